@@ -1,0 +1,67 @@
+"""The keyed draws of `draws` as compiled scalar functions for use in kernels; equal to the numpy form bit for bit."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms import draws
+
+_M0, _M1 = (np.uint64(m) for m in draws.MULTIPLIERS)
+_W0, _W1 = (np.uint64(w) for w in draws.WEYL)
+_LOW = np.uint64(draws.LOW32)
+_S32, _S11, _S52 = np.uint64(32), np.uint64(11), np.uint64(52)
+_MANTISSA, _ONE_BITS = np.uint64(0xFFFFFFFFFFFFF), np.uint64(0x3FF0000000000000)
+_TO_UNIT, _LN2, _SQRT2 = draws.TO_UNIT, draws.LN2, draws.SQRT2
+_ROUNDS = draws.ROUNDS
+_CENTRE, _TAIL, _FAR_TAIL = draws.CENTRE, draws.TAIL, draws.FAR_TAIL
+
+
+@njit(cache=True)
+def uniform(key, c0, c1, c2, c3):
+    """Uniform draw in [0, 1) of a uint64 key and four counters (the low 32 bits count)."""
+    key = np.uint64(key)
+    k0, k1 = key & _LOW, key >> _S32
+    x0, x1, x2, x3 = np.uint64(c0) & _LOW, np.uint64(c1) & _LOW, np.uint64(c2) & _LOW, np.uint64(c3) & _LOW
+    for _ in range(_ROUNDS):
+        p0, p1 = x0 * _M0, x2 * _M1
+        x0, x1, x2, x3 = (p1 >> _S32) ^ x1 ^ k0, p1 & _LOW, (p0 >> _S32) ^ x3 ^ k1, p0 & _LOW
+        k0, k1 = (k0 + _W0) & _LOW, (k1 + _W1) & _LOW
+    return np.float64(((x1 << _S32) | x0) >> _S11) * _TO_UNIT
+
+
+@njit(cache=True)
+def normal(key, c0, c1, c2, c3):
+    """Standard normal draw of a uint64 key and four counters."""
+    p = uniform(key, c0, c1, c2, c3) + 0.5 * _TO_UNIT
+    q = p - 0.5
+    if abs(q) <= 0.425:
+        return q * _ratio(_CENTRE, 0.180625 - q * q)
+    root = np.sqrt(-_log(max(p if q < 0.0 else 1.0 - p, 0.5 * _TO_UNIT)))
+    tail = _ratio(_TAIL, root - 1.6) if root <= 5.0 else _ratio(_FAR_TAIL, root - 5.0)
+    return -tail if q < 0.0 else tail
+
+
+@njit(cache=True)
+def _ratio(pieces, x):
+    above, below = pieces[0][7], pieces[1][7]
+    for i in range(6, -1, -1):
+        above = above * x + pieces[0][i]
+        below = below * x + pieces[1][i]
+    return above / below
+
+
+@njit(cache=True)
+def _log(x):
+    bits = np.float64(x).view(np.uint64)
+    exponent = np.int64(bits >> _S52) - 1023
+    mantissa = np.uint64((bits & _MANTISSA) | _ONE_BITS).view(np.float64)
+    if mantissa > _SQRT2:
+        mantissa = mantissa * 0.5
+        exponent += 1
+    s = (mantissa - 1.0) / (mantissa + 1.0)
+    z = s * s
+    series = 1.0 / 23.0
+    for odd in range(21, 0, -2):
+        series = series * z + 1.0 / odd
+    return exponent * _LN2 + 2.0 * s * series

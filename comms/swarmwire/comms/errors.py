@@ -1,0 +1,47 @@
+"""Errors divided by whose fault they are.
+
+SwarmwireError
+├── BadInput            a scenario, a body, an option: refused at the door (exit code 2)
+├── AgentFailed         the user's agent raised (exit code 1)
+├── RunnerLost          a runner's process or link is gone (exit code 1)
+└── BadFrame            a message on the wire breaks the protocol: counted and dropped, never fatal
+"""
+
+
+class SwarmwireError(Exception):
+    """Every error that swarmwire raises on purpose."""
+
+
+class BadInput(SwarmwireError):
+    """Input that is refused at the door: where it is, which key, what was expected.
+
+    `where` is a file or an option, `key` the path within it ("robots.flock.body"), `expected` one plain sentence.
+    """
+
+    def __init__(self, where: str, key: str, expected: str) -> None:
+        self.where, self.key, self.expected = where, key, expected
+        super().__init__(": ".join(part for part in (where, key, expected) if part))
+
+
+class AgentFailed(SwarmwireError):
+    """An agent raised while it decided: `robots` names whom for, `traceback` is the agent's own."""
+
+    def __init__(self, robots: str, traceback: str) -> None:
+        self.robots, self.traceback = robots, traceback
+        super().__init__(f"the agent of {robots} failed:\n{traceback}")
+
+
+class RunnerLost(SwarmwireError):
+    """A runner's token is gone or it did not answer in time; `robots` are those that it ran."""
+
+    def __init__(self, runner: str, robots: str, reason: str) -> None:
+        self.runner, self.robots, self.reason = runner, robots, reason
+        super().__init__(f"runner {runner} ({robots}) was lost: {reason}")
+
+
+class BadFrame(SwarmwireError):
+    """Bytes that are no frame of this protocol; `fault` is the name under which it is counted."""
+
+    def __init__(self, fault: str, detail: str) -> None:
+        self.fault = fault
+        super().__init__(f"{fault}: {detail}")

@@ -1,0 +1,18 @@
+"""What may become of a packet for one intended receiver."""
+
+from enum import IntEnum
+
+
+class Fate(IntEnum):
+    """One per (packet, intended receiver); the order is that of the tally's columns."""
+
+    HEARD = 0  # reached the receiver
+    OUT_OF_RANGE = 1  # the receiver was farther than the radio reaches when the packet went on air
+    BLOCKED = 2  # an obstacle stood in the line of sight
+    LOST = 3  # within reach, but lost by the medium's fixed loss
+    QUEUE_FULL = 4  # the sender's queue was full: never on air
+    TOO_LARGE = 5  # above the medium's largest payload: never on air
+    IN_FLIGHT = 6  # queued or on its way when the run ended
+
+
+FATE_NAMES = tuple(fate.name.lower() for fate in Fate)

@@ -1,0 +1,132 @@
+"""Packets as tables: what agents hand to the air, and what the air hands to agents."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
+
+BROADCAST = -1
+TAG_BYTES = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Payloads:
+    """Encoded messages, a row each: row p is data[offset[p]:offset[p + 1]]; its first two bytes are the message's tag."""
+
+    data: ByteArray  # (bytes,)
+    offset: IntArray  # (rows + 1,), starts at 0, never falls
+
+    def __len__(self) -> int:
+        return len(self.offset) - 1
+
+    @property
+    def sizes(self) -> IntArray:
+        """Bytes of each row, tag included, (rows,)."""
+        return np.diff(self.offset)
+
+    def tags(self) -> IntArray:
+        """The 2-byte tag of each row as a number, (rows,); -1 where a row is too short to have one."""
+        if not len(self.data):
+            return np.full(len(self), -1, np.int64)
+        start = np.minimum(self.offset[:-1], len(self.data) - 2)
+        tags = self.data[start].astype(np.int64) | self.data[start + 1].astype(np.int64) << 8
+        return np.where(self.sizes >= TAG_BYTES, tags, -1)
+
+    def rows(self, index: IntArray) -> "Payloads":
+        """The rows of `index`, in its order; a row may be taken more than once."""
+        sizes = self.sizes[index]
+        offset = offsets(sizes)
+        first = np.repeat(self.offset[index] - offset[:-1], sizes)
+        return Payloads(self.data[first + np.arange(offset[-1])], offset)
+
+    def row(self, index: int) -> bytes:
+        """One row as bytes."""
+        return self.data[self.offset[index] : self.offset[index + 1]].tobytes()
+
+    @classmethod
+    def of(cls, rows: list[bytes]) -> "Payloads":
+        """A table of the given encoded messages."""
+        data = np.frombuffer(b"".join(rows), np.uint8)
+        return cls(data, offsets(np.array([len(row) for row in rows], np.int64)))
+
+    @classmethod
+    def joined(cls, parts: "list[Payloads]") -> "Payloads":
+        """The rows of all parts, one after the other."""
+        if not parts:
+            return cls.of([])
+        data = np.concatenate([part.data for part in parts])
+        return cls(data, offsets(np.concatenate([part.sizes for part in parts])))
+
+
+def offsets(sizes: IntArray) -> IntArray:
+    """Where rows of the given sizes start, with the end as a last element, (rows + 1,)."""
+    out = np.zeros(len(sizes) + 1, np.int64)
+    np.cumsum(sizes, out=out[1:])
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """Packets that agents sent in one tick; those of one sender stand in the order in which it sent them."""
+
+    sender: IntArray  # (k,) robot row: arena x robots + index
+    to: IntArray  # (k,) index in the arena of the one receiver, or BROADCAST
+    payloads: Payloads  # (k,)
+
+    def __len__(self) -> int:
+        return len(self.sender)
+
+    @classmethod
+    def none(cls) -> "Sent":
+        """No packets."""
+        nothing = np.empty(0, np.int64)
+        return cls(nothing, nothing, Payloads.of([]))
+
+    @classmethod
+    def joined(cls, parts: "list[Sent]") -> "Sent":
+        """The packets of all parts."""
+        if len(parts) == 1:
+            return parts[0]
+        if not parts:
+            return cls.none()
+        return cls(
+            np.concatenate([part.sender for part in parts]),
+            np.concatenate([part.to for part in parts]),
+            Payloads.joined([part.payloads for part in parts]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """Packets that reached robots since the last tick, sorted by (receiver, heard_at_ns, sender, sequence)."""
+
+    receiver: IntArray  # (k,) robot row: arena x robots + index
+    sender: IntArray  # (k,) index of the sender in the arena
+    sequence: IntArray  # (k,) how many packets the sender had sent before this one
+    heard_at_ns: IntArray  # (k,)
+    given: dict[str, FloatArray]  # what the medium tells with a packet: "range_m" (k,), "bearing_rad" (k,), "rssi_dbm" (k,)
+    payload: IntArray  # (k,) row in `payloads`
+    payloads: Payloads  # one row per packet, shared by its receivers
+
+    def __len__(self) -> int:
+        return len(self.receiver)
+
+    @classmethod
+    def none(cls, gives: tuple[str, ...] = ()) -> "Heard":
+        """Nothing heard over a medium that gives the named columns."""
+        nothing = np.empty(0, np.int64)
+        given = {name: np.empty(0, np.float64) for name in gives}
+        return cls(nothing, nothing, nothing, nothing, given, nothing, Payloads.of([]))
+
+    def select(self, index: IntArray) -> "Heard":
+        """The rows of `index`; the payload table stays shared."""
+        return Heard(
+            self.receiver[index],
+            self.sender[index],
+            self.sequence[index],
+            self.heard_at_ns[index],
+            {name: column[index] for name, column in self.given.items()},
+            self.payload[index],
+            self.payloads,
+        )
