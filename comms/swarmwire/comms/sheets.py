@@ -21,9 +21,9 @@ class ResponseCurve:
     kind: str = parameter(help="form of the curve", choices=("rational", "quadratic"))
     a: float = parameter(help="coefficient a")
     b: float = parameter(help="coefficient b")
+    reach_m: float = parameter(help="beyond this the answer is 0", unit="m", above=0)
     c: float = parameter(0.0, help="coefficient c (quadratic)")
     full_m: float = parameter(0.0, help="below this the answer is 1 (rational)", unit="m", at_least=0)
-    reach_m: float = parameter(help="beyond this the answer is 0", unit="m", above=0)
 
     def value(self, distance_m: FloatArray) -> FloatArray:
         """The response, 0 to 1, to these distances (any shape)."""
