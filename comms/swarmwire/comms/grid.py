@@ -1,0 +1,63 @@
+"""A uniform grid over the robots of every arena, so that kernels look at near robots only. Compiled."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import IntArray
+
+MOST_CELLS_PER_SIDE = 512
+
+
+class Grid(NamedTuple):
+    """Robots by cell. Cell (i, j) of arena a is c = (a * ny + j) * nx + i; its robots are order[start[c]:start[c + 1]].
+
+    A robot outside the arena counts to the nearest border cell, so two robots nearer than `cell_m` are always in
+    the same or in neighbouring cells.
+    """
+
+    cell_m: float
+    nx: int
+    ny: int
+    left_m: float
+    bottom_m: float
+    start: IntArray  # (arenas * ny * nx + 1,)
+    order: IntArray  # (rows,) robot rows, rising within a cell
+
+
+def build(x, y, arenas: int, size_m: tuple[float, float], reach_m: float) -> Grid:
+    """The grid of robots at x, y (rows,), in which all within `reach_m` of a robot lie in the 3 x 3 cells around it."""
+    cell_m = max(reach_m, max(size_m) / MOST_CELLS_PER_SIDE)
+    nx, ny = max(int(np.ceil(size_m[0] / cell_m)), 1), max(int(np.ceil(size_m[1] / cell_m)), 1)
+    left_m, bottom_m = -0.5 * size_m[0], -0.5 * size_m[1]
+    start, order = _sort(x, y, arenas, cell_m, nx, ny, left_m, bottom_m)
+    return Grid(cell_m, nx, ny, left_m, bottom_m, start, order)
+
+
+@njit(cache=True)
+def cell_of(at_m, origin_m, cell_m, cells):
+    """The cell index along one axis of a coordinate in m."""
+    return min(max(int(np.floor((at_m - origin_m) / cell_m)), 0), cells - 1)
+
+
+@njit(cache=True)
+def _sort(x, y, arenas, cell_m, nx, ny, left_m, bottom_m):
+    rows = len(x)
+    robots = rows // arenas
+    cell = np.empty(rows, np.int64)
+    start = np.zeros(arenas * nx * ny + 1, np.int64)
+    for row in range(rows):
+        i, j = cell_of(x[row], left_m, cell_m, nx), cell_of(y[row], bottom_m, cell_m, ny)
+        cell[row] = ((row // robots) * ny + j) * nx + i
+        start[cell[row] + 1] += 1
+    for c in range(len(start) - 1):
+        start[c + 1] += start[c]
+    filled = start[:-1].copy()
+    order = np.empty(rows, np.int64)
+    for row in range(rows):
+        order[filled[cell[row]]] = row
+        filled[cell[row]] += 1
+    return start, order
