@@ -1,0 +1,34 @@
+# One command each; `make help` lists them. Every one brings uv and the locked packages by itself.
+
+UV := .ci/uv
+RUN := $(UV) run --no-sync
+export UV_PYTHON_DOWNLOADS := never
+export PYRIGHT_PYTHON_IGNORE_WARNINGS := 1 # does not ask the network for a newer version
+
+.PHONY: help
+help: ## list the commands
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS="$$(printf '\t')" read -r name text; do \
+		printf '  make %-6s %s\n' "$$name" "$$text"; done
+
+.PHONY: demo
+demo: sync ## fly a flock over a lossy radio, a process per robot, and record it under runs/
+	$(RUN) swarmwire run scenarios/flocking-lossy.toml --runners per-robot
+
+.PHONY: test
+test: check ## check, then the quick tests
+	$(RUN) pytest -m "not slow"
+
+.PHONY: check
+check: sync ## lint, format, types, and who may import whom
+	$(RUN) ruff check
+	$(RUN) ruff format --check
+	$(RUN) pyright
+	$(RUN) lint-imports
+
+.PHONY: bench
+bench: sync ## measure; ONLY=name for one of them
+	$(RUN) python -m benchmarks $(ONLY)
+
+.PHONY: sync
+sync: # the locked packages, exactly
+	@$(UV) sync --locked --quiet
