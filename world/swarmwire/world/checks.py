@@ -1,0 +1,64 @@
+"""Checks that need more than one key of a scenario: bodies, physics steps, obstacles, the radio's offset."""
+
+import math
+
+from swarmwire.comms.body import Body, load_body
+from swarmwire.comms.errors import BadInput
+from swarmwire.world.scenario import BoxTable, CylinderTable, Scenario
+
+MOST_OF_RADIUS = 0.25  # how far a robot at full speed may move in one physics step
+
+
+def check(scenario: Scenario, where: str) -> None:
+    """Raise BadInput for the first contradiction in a scenario."""
+    bodies = bodies_of(scenario, where)
+    _check_steps(scenario, bodies, where)
+    for i, obstacle in enumerate(scenario.arena.obstacles):
+        _check_obstacle(scenario, obstacle, f"arena.obstacles.{i}", where)
+    _check_send_offset(scenario, where)
+
+
+def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
+    """The body of each group, by the group's name."""
+    bodies: dict[str, Body] = {}
+    for group, table in scenario.robots.items():
+        try:
+            bodies[group] = load_body(table.body)
+        except BadInput as error:
+            raise BadInput(where, f"robots.{group}.body", error.expected) from None
+    return bodies
+
+
+def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> None:
+    for group, body in bodies.items():
+        tick_m = body.max_linear_mps / scenario.time.rate_hz
+        needed = math.ceil(tick_m / (MOST_OF_RADIUS * body.radius_m) - 1e-9)
+        if scenario.physics.steps < needed:
+            text = f"expected at least {needed}, so that a robot of {group} at full speed moves at most a quarter of its"
+            raise BadInput(where, "physics.steps", f"{text} radius in one step; got {scenario.physics.steps}")
+
+
+def _check_obstacle(scenario: Scenario, obstacle: CylinderTable | BoxTable, key: str, where: str) -> None:
+    """A fixed obstacle lies within the arena; a random one would fit into it at heading 0."""
+    half_x, half_y = 0.5 * scenario.arena.size_m[0], 0.5 * scenario.arena.size_m[1]
+    reach_x, reach_y = reach(obstacle)
+    x, y = obstacle.at or (0.0, 0.0)
+    if abs(x) + reach_x > half_x + 1e-9 or abs(y) + reach_y > half_y + 1e-9:
+        size = " x ".join(f"{extent:g}" for extent in scenario.arena.size_m)
+        raise BadInput(where, key, f"expected the {obstacle.shape} to lie within the arena of {size} m")
+
+
+def reach(obstacle: CylinderTable | BoxTable) -> tuple[float, float]:
+    """How far an obstacle reaches from its centre along the arena's x and y, in m."""
+    if isinstance(obstacle, CylinderTable):
+        return obstacle.radius_m, obstacle.radius_m
+    c, s = abs(math.cos(obstacle.heading_rad or 0.0)), abs(math.sin(obstacle.heading_rad or 0.0))
+    length, width = obstacle.size_m
+    return 0.5 * (c * length + s * width), 0.5 * (s * length + c * width)
+
+
+def _check_send_offset(scenario: Scenario, where: str) -> None:
+    offset = scenario.radio.send_offset if scenario.radio else 0.0
+    if offset not in ("uniform", "tick") if isinstance(offset, str) else not 0.0 <= offset < 1.0 / scenario.time.rate_hz:
+        expected = "expected uniform, tick, or an offset in s from 0 to below the period of a tick"
+        raise BadInput(where, "radio.send_offset", f"{expected}; got {offset!r}")

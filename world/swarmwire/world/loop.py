@@ -1,0 +1,71 @@
+"""The loop: one tick, written once. What differs between modes is only the crew."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from swarmwire.comms.air.air import Air
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.packets import Heard, Sent
+from swarmwire.comms.protocols import Crew, Observer
+from swarmwire.comms.truth import Truth
+from swarmwire.world.trajectory import TrajectoryHash
+from swarmwire.world.world import World
+
+
+class Loop:
+    """Drives world, air and crew through `ticks` ticks and shows each to the observers."""
+
+    def __init__(self, world: World, air: Air | None, crew: Crew, observers: Sequence[Observer]) -> None:
+        self.world, self.air, self.crew, self.observers = world, air, crew, observers
+        self.ticks_done = 0
+        self.packets_to_nobody = 0
+        self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
+
+    def run(self, ticks: int, stopped: Callable[[], bool] = lambda: False) -> None:
+        """Run up to tick `ticks`, or until `stopped()`; the crew must have been started."""
+        while self.ticks_done < ticks and not stopped():
+            self.step()
+
+    def step(self) -> None:
+        """One tick, in the order of the design: air, senses, crew, air, physics, observers."""
+        world, tick = self.world, self.ticks_done
+        start_ns = tick_start_ns(tick, world.static.rate_hz)
+        news = self.air.advance(start_ns) if self.air else None
+        heard = news.heard if news else Heard.none()
+        actions = self.crew.act(tick, world.sense(tick), heard)
+
+        pose, velocity, alive = world.pose.copy(), world.velocity.copy(), world.alive.copy()
+        if self.air:
+            self.air.hold(pose, alive)
+            self.air.send(start_ns, tick, self._addressable(actions.sent))
+        onsets = world.move(actions)
+        command = world.command.copy()
+        self._hash.add(pose, velocity, command, heard)
+        edges = self.air.edges(pose, alive) if self.air else None
+        tally, finished = (news.tally, news.finished) if news else (None, None)
+        truth = Truth(tick, start_ns, alive, pose, velocity, command, onsets, edges, tally, finished)
+        for observer in self.observers:
+            observer.see(truth)
+        self.ticks_done += 1
+
+    def hexdigests(self) -> list[str]:
+        """`trajectory_sha256` of each arena so far."""
+        return self._hash.hexdigests()
+
+    def counts(self) -> dict[str, int]:
+        """Faults on the way between agents and world so far, by name."""
+        to_nobody = {"packets_to_nobody": self.packets_to_nobody} if self.packets_to_nobody else {}
+        return {**self.crew.counts(), **self.world.counts(), **to_nobody}
+
+    def _addressable(self, sent: Sent) -> Sent:
+        """Without packets for a robot that is not there, or for the sender itself: counted, never on air."""
+        robots = self.world.static.robots
+        nobody = (sent.to >= robots) | (sent.to == sent.sender % robots)
+        if not nobody.any():
+            return sent
+        self.packets_to_nobody += int(nobody.sum())
+        keep = np.flatnonzero(~nobody)
+        return Sent(sent.sender[keep], sent.to[keep], sent.payloads.rows(keep))
+
+

@@ -1,0 +1,202 @@
+"""The scenario: everything that a run's file may say, as frozen tables. Unknown keys are refused."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field, PrivateAttr, StringConstraints, model_validator
+from pydantic_core import PydanticCustomError
+
+from swarmwire.comms.air.radio import Radio
+from swarmwire.world.schema import TABLE, AsTable
+
+
+def _metres(**bounds: Any) -> Any:
+    return Field(json_schema_extra={"unit": "m"}, **bounds)
+
+
+Coordinate = Annotated[float, _metres(ge=-10_000, le=10_000)]
+Length = Annotated[float, _metres(gt=0, le=10_000)]
+Point = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
+Extents = Annotated[tuple[Length, Length], Field(strict=False)]
+Heading = Annotated[float, Field(ge=-7, le=7, json_schema_extra={"unit": "rad"})]
+Pose = Annotated[tuple[Coordinate, Coordinate, Heading], Field(strict=False)]
+GroupName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=40)]
+
+
+class Table(BaseModel):
+    """A table of the file."""
+
+    model_config = TABLE
+
+
+class TimeTable(Table):
+    """[time]: the base period of the run."""
+
+    rate_hz: int = Field(10, ge=1, le=1000, json_schema_extra={"unit": "Hz"})
+    """Ticks per second."""
+
+
+class PhysicsTable(Table):
+    """[physics]: how bodies move and touch."""
+
+    engine: Literal["pymunk"] = "pymunk"
+    """The engine that moves the bodies."""
+    steps: int = Field(5, ge=1, le=1000)
+    """Physics steps per tick; refused if a robot at full speed would move over a quarter of its radius in one."""
+
+
+class _ObstacleTable(Table):
+    """Where an obstacle stands: either one at a point, or several at random."""
+
+    at: Point | None = None
+    """The centre of the one obstacle, in the arena's frame."""
+    place: Literal["random"] | None = None
+    """"random": anywhere in the arena, free of other things, by the seed."""
+    count: int = Field(1, ge=1, le=100_000)
+    """How many; only with place = "random"."""
+
+    @model_validator(mode="after")
+    def _one_place(self) -> "_ObstacleTable":
+        if (self.at is None) == (self.place is None):
+            raise PydanticCustomError("place", 'expected either at = [x, y] or place = "random"')
+        if self.at is not None and self.count != 1:
+            raise PydanticCustomError("place", 'expected place = "random" with a count; at = [x, y] sets one obstacle')
+        return self
+
+
+class CylinderTable(_ObstacleTable):
+    """A round obstacle."""
+
+    shape: Literal["cylinder"]
+    """Its shape."""
+    radius_m: Length
+    """Its radius."""
+
+
+class BoxTable(_ObstacleTable):
+    """A rectangular obstacle."""
+
+    shape: Literal["box"]
+    """Its shape."""
+    size_m: Extents
+    """Full extents along and across its heading."""
+    heading_rad: Heading | None = None
+    """Counter-clockwise turn; 0 if left out, or a random one with place = "random"."""
+
+
+class ArenaTable(Table):
+    """[arena]: a bounded plane and what stands in it; the origin is its centre."""
+
+    size_m: Extents
+    """Full extents along x and y."""
+    boundary: Literal["walls", "open"] = "walls"
+    """Walls that bodies hit and sensors see, or nothing at all."""
+    obstacles: tuple[Annotated[CylinderTable | BoxTable, Field(discriminator="shape")], ...] = Field((), strict=False)
+    """Fixed things that bodies hit, sensors see and radio signals are blocked by."""
+
+
+class InDisc(Table):
+    """Uniform in a disc."""
+
+    how: Literal["disc"]
+    """Uniform in a disc."""
+    radius_m: Length
+    """Radius of the disc in which the robots' centres lie."""
+    at: Point = (0.0, 0.0)
+    """Centre of the disc."""
+
+
+class InArena(Table):
+    """Uniform in the whole arena."""
+
+    how: Literal["arena"]
+    """Uniform in the whole arena."""
+
+
+class OnGrid(Table):
+    """In rows, as square as can be, around the origin."""
+
+    how: Literal["grid"]
+    """In rows, as square as can be, around the origin."""
+    spacing_m: Length
+    """Distance between neighbours in a row and between rows."""
+
+
+class AtPoses(Table):
+    """At poses that are given."""
+
+    how: Literal["poses"]
+    """At poses that are given."""
+    poses: tuple[Pose, ...] = Field(strict=False, min_length=1)
+    """x, y and heading of each robot."""
+
+
+class RobotsTable(Table):
+    """[robots.<group>]: robots of one kind that run the same agent."""
+
+    body: str = Field(min_length=1)
+    """Name of the body."""
+    count: int = Field(ge=1, le=1_000_000)
+    """How many robots."""
+    agent: str = Field(min_length=1)
+    """The agent's class, as module:Class or file.py:Class."""
+    params: dict[str, Any] = Field(default_factory=dict)
+    """The agent's parameters."""
+    place: Annotated[InDisc | InArena | OnGrid | AtPoses, Field(discriminator="how")] = InArena(how="arena")
+    """Where the robots stand at the start."""
+
+    @model_validator(mode="after")
+    def _a_pose_each(self) -> "RobotsTable":
+        if isinstance(self.place, AtPoses) and len(self.place.poses) != self.count:
+            text = "expected a pose for each of the {count} robots, got {poses} poses"
+            raise PydanticCustomError("poses", text, {"count": self.count, "poses": len(self.place.poses)})
+        return self
+
+
+class RunTable(Table):
+    """[run]: what the loop does about runners."""
+
+    on_runner_loss: Literal["stop"] = "stop"
+    """What to do when a runner is lost."""
+    runner_timeout_s: float = Field(30.0, gt=0, le=86_400, json_schema_extra={"unit": "s"})
+    """A runner is lost if it gives no answer for so long."""
+
+
+class Scenario(Table):
+    """One run: its arena, robots, radio and length."""
+
+    format: Literal[1]
+    """Version of this format."""
+    name: str = Field(min_length=1, max_length=200)
+    """What the run is about."""
+    seed: int = Field(1, ge=0, le=2**63 - 1)
+    """The seed of every draw of the run's arena."""
+    duration_s: float = Field(gt=0, le=1e9, json_schema_extra={"unit": "s"})
+    """Length of the run."""
+    time: TimeTable = TimeTable()
+    """The base period."""
+    physics: PhysicsTable = PhysicsTable()
+    """How bodies move."""
+    arena: ArenaTable
+    """The plane."""
+    robots: dict[GroupName, RobotsTable] = Field(min_length=1)
+    """The groups of robots, by name."""
+    radio: Annotated[Radio, AsTable()] | None = None
+    """The radio; without it robots hear nothing."""
+    run: RunTable = RunTable()
+    """Runners."""
+
+    _source: str = PrivateAttr("")
+
+    @property
+    def source(self) -> str:
+        """The file, or whatever else the scenario came from, for messages."""
+        return self._source
+
+    def with_source(self, source: str) -> "Scenario":
+        """This scenario, which says that it comes from `source`."""
+        self._source = source
+        return self
+
+    def robot_names(self) -> tuple[str, ...]:
+        """`group-i` for each robot index of an arena."""
+        return tuple(f"{group}-{i}" for group, table in self.robots.items() for i in range(table.count))

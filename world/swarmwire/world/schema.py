@@ -1,0 +1,67 @@
+"""Dataclasses of parameters as tables of a scenario: one declaration gives validation, JSON schema and the frozen object."""
+
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
+from functools import cache
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import pydantic
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from swarmwire.comms.parameters import limits_of
+
+TABLE = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True)
+
+
+@dataclass(frozen=True)
+class AsTable:
+    """Annotation of a field whose type is a parameter dataclass: read as a table with its limits, held as the dataclass."""
+
+    def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
+        """The schema of `source`'s table, followed by building `source`."""
+
+        def build(table: BaseModel) -> object:
+            return source(**{name: getattr(table, name) for name in type(table).model_fields})
+
+        return core_schema.no_info_after_validator_function(build, handler.generate_schema(table_of(source)))
+
+
+@cache
+def table_of(kind: type[Any]) -> type[BaseModel]:
+    """The pydantic model of a dataclass made with `parameter`: same names, bounds, choices, units and help."""
+    hints = get_type_hints(kind)
+    columns: dict[str, Any] = {of.name: (_hint(hints[of.name], of), _field(of)) for of in fields(kind)}
+    return pydantic.create_model(kind.__name__, __config__=TABLE, __doc__=kind.__doc__, **columns)
+
+
+def _hint(hint: Any, of: "Field[Any]") -> Any:
+    limits = limits_of(of)
+    if limits.choices:
+        return Literal[limits.choices]
+    if get_origin(hint) in (Union, UnionType):
+        return Union[tuple(_readable(item) for item in get_args(hint))]  # noqa: UP007 - made at run time
+    return _readable(hint)
+
+
+def _readable(hint: Any) -> Any:
+    if is_dataclass(hint):
+        return Annotated[hint, AsTable()]
+    if get_origin(hint) is tuple:
+        return Annotated[hint, pydantic.Field(strict=False)]  # TOML has lists only
+    return hint
+
+
+def _field(of: "Field[Any]") -> Any:
+    limits = limits_of(of)
+    given: dict[str, Any] = {"ge": limits.at_least, "le": limits.at_most, "gt": limits.above, "lt": limits.below}
+    given = {name: bound for name, bound in given.items() if bound is not None}
+    if limits.help:
+        given["description"] = limits.help
+    if limits.unit:
+        given["json_schema_extra"] = {"unit": limits.unit}
+    if of.default is not MISSING:
+        given["default"] = of.default
+    elif of.default_factory is not MISSING:
+        given["default_factory"] = of.default_factory
+    return pydantic.Field(**given)
