@@ -1,0 +1,30 @@
+"""The robots' side: write an `Agent` for one robot, or a `VectorAgent` for n at a time, and it runs anywhere."""
+
+from swarmwire.agent.agent import Agent
+from swarmwire.agent.packet import Packet
+from swarmwire.agent.robot import Robot
+from swarmwire.agent.robots import Robots
+from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, IntColumn, State, VectorAgent, column
+from swarmwire.comms.messages import Message, f4, f8, i1, i2, i4, u1, u2, u4
+
+__all__ = [
+    "Agent",
+    "BoolColumn",
+    "FloatColumn",
+    "IntColumn",
+    "Message",
+    "Packet",
+    "Robot",
+    "Robots",
+    "State",
+    "VectorAgent",
+    "column",
+    "f4",
+    "f8",
+    "i1",
+    "i2",
+    "i4",
+    "u1",
+    "u2",
+    "u4",
+]

@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
 from importlib.resources import files
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, cast, get_args, get_origin, get_type_hints
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import fault_of, limits_of, parameter
@@ -17,7 +17,7 @@ class DifferentialDrive:
 
     wheel_base_m: float = parameter(help="distance between the wheels", unit="m", above=0)
     max_wheel_mps: float = parameter(help="fastest speed of a wheel", unit="m/s", above=0)
-    max_force_n: float = parameter(help="largest force along the body, and across it against slipping", unit="N", above=0)
+    max_force_n: float = parameter(help="largest force along the body, or across it before it slips", unit="N", above=0)
     max_torque_nm: float = parameter(help="largest turning moment", unit="N m", above=0)
 
 
@@ -93,7 +93,7 @@ def body_from(sheet: Mapping[str, Any], where: str) -> Body:
 def _mapping(where: str, key: str, value: object) -> dict[str, Any]:
     if not isinstance(value, Mapping):
         raise BadInput(where, key, f"expected a table, got {value!r}")
-    return {str(name): item for name, item in value.items()}
+    return {str(name): item for name, item in cast("Mapping[object, Any]", value).items()}
 
 
 def _build(kind: type[Any], value: object, where: str, key: str) -> Any:
@@ -128,7 +128,8 @@ def _value(hint: Any, value: object, where: str, key: str) -> Any:
     if get_origin(hint) is tuple:
         if not isinstance(value, list | tuple) or not value:
             raise BadInput(where, key, f"expected a list, got {value!r}")
-        return tuple(_value(get_args(hint)[0], item, where, f"{key}[{i}]") for i, item in enumerate(value))
+        items = cast("list[object]", value)
+        return tuple(_value(get_args(hint)[0], item, where, f"{key}[{i}]") for i, item in enumerate(items))
     if hint is str and not isinstance(value, str):
         raise BadInput(where, key, f"expected a text, got {value!r}")
     return value

@@ -1,6 +1,7 @@
 """Time: integer nanoseconds, tick arithmetic, and the one place that reads the wall clock or sleeps."""
 
 import time
+from datetime import UTC, datetime
 from typing import Protocol
 
 NS_PER_S = 1_000_000_000
@@ -45,3 +46,7 @@ class WallClock:
         left_ns = at_ns - self.now_ns()
         if left_ns > 0:
             time.sleep(left_ns / NS_PER_S)
+
+    def utc_stamp(self) -> str:
+        """The date and time now as 20261121T030405Z: for names of folders, never for a run."""
+        return datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")

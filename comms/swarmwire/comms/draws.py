@@ -1,8 +1,9 @@
 """Keyed random draws: a value belongs to what it is for, not to the order in which it was asked.
 
 One counter-based generator, Philox 4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC 2011):
-a draw is a pure function of a 64-bit key (whose randomness) and four 32-bit counters (what for). This is the numpy form;
-`draws_compiled` is the numba form, equal bit for bit. Normals therefore use + - * / and sqrt only, also for the logarithm.
+a draw is a pure function of a 64-bit key (whose randomness) and four 32-bit counters (what for). This is the numpy
+form; `draws_compiled` is the numba form, equal bit for bit. Normals therefore use + - * / and sqrt only, also for the
+logarithm.
 """
 
 from hashlib import blake2b
@@ -103,7 +104,9 @@ def purpose(name: str) -> int:
     return int.from_bytes(blake2b(name.encode(), digest_size=4, person=b"purpose").digest(), "little")
 
 
-def philox(key: ArrayLike, c0: ArrayLike, c1: ArrayLike, c2: ArrayLike, c3: ArrayLike) -> tuple[Words, Words, Words, Words]:
+def philox(
+    key: ArrayLike, c0: ArrayLike, c1: ArrayLike, c2: ArrayLike, c3: ArrayLike
+) -> tuple[Words, Words, Words, Words]:
     """Philox 4x32-10: four random 32-bit words per broadcast element, held in uint64."""
     low = np.uint64(LOW32)
     shift = np.uint64(32)

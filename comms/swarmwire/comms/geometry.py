@@ -57,7 +57,7 @@ def ray_to_circle(px, py, dx, dy, cx, cy, radius):
 
 @njit(cache=True)
 def ray_to_box(px, py, dx, dy, box):
-    """Distance along the unit ray (dx, dy) from (px, py) to a box (a row of `Obstacles.box`); 0 from inside, inf if it misses."""
+    """As `ray_to_circle`, to a box (a row of `Obstacles.box`)."""
     c, s = box[4], box[5]
     ox, oy = px - box[0], py - box[1]
     x, y = c * ox + s * oy, c * oy - s * ox

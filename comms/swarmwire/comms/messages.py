@@ -8,8 +8,9 @@ checker a field is a `float`, in the constructor and when read: a decoded field 
 on air, so that both kinds of agent compute with the same numbers.
 """
 
+from collections.abc import Iterable
 from hashlib import blake2b
-from typing import Annotated, Any, ClassVar, Self, dataclass_transform, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Self, cast, dataclass_transform, get_args, get_origin, get_type_hints
 
 import msgpack
 import numpy as np
@@ -47,10 +48,10 @@ class Message:
         for name, hint in get_type_hints(cls, include_extras=True).items():
             if get_origin(hint) is ClassVar:
                 continue
-            dtype = next((arg for arg in get_args(hint) if isinstance(arg, np.dtype)), None)
-            if get_origin(hint) is not Annotated or dtype is None:
+            dtype: object = get_args(hint)[-1] if get_origin(hint) is Annotated else None
+            if not isinstance(dtype, np.dtype):
                 raise TypeError(f"{cls.__name__}.{name}: expected one of f4, f8, i1, i2, i4, u1, u2, u4")
-            fields.append((name, dtype))
+            fields.append((name, cast("np.dtype[Any]", dtype)))
         cls.layout = np.dtype(fields)
         cls.size_bytes = TAG_BYTES + cls.layout.itemsize
         cls.tag = _tag(cls.__name__, fields)
@@ -58,7 +59,7 @@ class Message:
     def __init__(self, **fields: float) -> None:
         names = self.layout.names or ()
         if set(fields) != set(names):
-            raise TypeError(f"{type(self).__name__} has the fields {', '.join(names) or '(none)'}; got {', '.join(fields)}")
+            raise _wrong_fields(type(self), fields)
         for name, value in fields.items():
             object.__setattr__(self, name, float(value))
 
@@ -92,7 +93,7 @@ def encode_rows(kind: type[Message], rows: int, fields: dict[str, Any]) -> Paylo
     """`rows` messages of one class at once; each field is a number or an array (rows,)."""
     names = kind.layout.names or ()
     if set(fields) != set(names):
-        raise TypeError(f"{kind.__name__} has the fields {', '.join(names) or '(none)'}; got {', '.join(fields)}")
+        raise _wrong_fields(kind, fields)
     table = np.zeros(rows, np.dtype([("tag", "<u2"), ("body", kind.layout)]))
     table["tag"] = kind.tag
     for name in names:
@@ -121,10 +122,15 @@ def encode_dict(message: dict[str, Any]) -> bytes:
 
 def decode_dict(payload: bytes) -> dict[str, Any]:
     """The dict of these bytes; ValueError if they hold none."""
-    message = msgpack.unpackb(payload[TAG_BYTES:])
+    message: object = msgpack.unpackb(payload[TAG_BYTES:])
     if not isinstance(message, dict):
         raise ValueError("the payload holds no dict")
-    return message
+    return cast("dict[str, Any]", message)
+
+
+def _wrong_fields(kind: type[Message], given: Iterable[str]) -> TypeError:
+    names = kind.layout.names or ("(none)",)
+    return TypeError(f"{kind.__name__} has the fields {', '.join(names)}; got {', '.join(given)}")
 
 
 def _whole(kind: type[Message], name: str, values: FloatArray, dtype: np.dtype[Any]) -> FloatArray:

@@ -12,7 +12,7 @@ TAG_BYTES = 2
 
 @dataclass(frozen=True, slots=True)
 class Payloads:
-    """Encoded messages, a row each: row p is data[offset[p]:offset[p + 1]]; its first two bytes are the message's tag."""
+    """Encoded messages, a row each: row p is data[offset[p]:offset[p + 1]] and starts with the message's tag."""
 
     data: ByteArray  # (bytes,)
     offset: IntArray  # (rows + 1,), starts at 0, never falls
@@ -39,6 +39,11 @@ class Payloads:
         offset = offsets(sizes)
         first = np.repeat(self.offset[index] - offset[:-1], sizes)
         return Payloads(self.data[first + np.arange(offset[-1])], offset)
+
+    def span(self, first: int, last: int) -> "Payloads":
+        """The rows first to last - 1, without a copy of their bytes."""
+        offset = self.offset[first : last + 1]
+        return Payloads(self.data[offset[0] : offset[-1]], offset - offset[0])
 
     def row(self, index: int) -> bytes:
         """One row as bytes."""
@@ -105,7 +110,7 @@ class Heard:
     sender: IntArray  # (k,) index of the sender in the arena
     sequence: IntArray  # (k,) how many packets the sender had sent before this one
     heard_at_ns: IntArray  # (k,)
-    given: dict[str, FloatArray]  # what the medium tells with a packet: "range_m" (k,), "bearing_rad" (k,), "rssi_dbm" (k,)
+    given: dict[str, FloatArray]  # what the medium tells: "range_m", "bearing_rad", "rssi_dbm", each (k,)
     payload: IntArray  # (k,) row in `payloads`
     payloads: Payloads  # one row per packet, shared by its receivers
 

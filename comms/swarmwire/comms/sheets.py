@@ -73,7 +73,7 @@ class Compass:
 class Odometry:
     """Encoders on the two wheels. Sense: left_m, right_m (n,), travelled since the start, with slip and quantised."""
 
-    slip: float = parameter(0.0, help="standard deviation of the relative error of a tick's travel", at_least=0, at_most=1)
+    slip: float = parameter(0.0, help="standard deviation of a tick's relative error", at_least=0, at_most=1)
     step_m: float = parameter(0.0, help="travel per encoder step; 0: not quantised", unit="m", at_least=0)
 
 

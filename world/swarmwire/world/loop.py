@@ -67,5 +67,3 @@ class Loop:
         self.packets_to_nobody += int(nobody.sum())
         keep = np.flatnonzero(~nobody)
         return Sent(sent.sender[keep], sent.to[keep], sent.payloads.rows(keep))
-
-

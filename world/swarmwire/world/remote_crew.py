@@ -48,7 +48,9 @@ class RemoteCrew:
             session = self._session = open_world(self._endpoint)
         except zenoh.ZError as error:
             reason = str(error).split(" at ")[0]
-            raise BadInput("", self._endpoint, f"expected an endpoint that is free and can be listened on: {reason}") from error
+            raise BadInput(
+                "", self._endpoint, f"expected an endpoint that is free and can be listened on: {reason}"
+            ) from error
         session.liveliness().declare_token(self._keys.world)
         session.declare_queryable(self._keys.join, (self._inbox.put, self._inbox))
         session.declare_subscriber(self._keys.any_answer, (self._inbox.put, self._inbox))
@@ -92,14 +94,11 @@ class RemoteCrew:
             item = self._next()
             if item is not None:
                 self._handle(item)
-                continue
-            trouble = self._trouble()
-            if trouble is not None:
-                runner, robots = self._lockstep.missing
-                raise RunnerLost(runner, robots, trouble)
-            if self._clock.now_ns() > deadline_ns:
-                runner, robots = self._lockstep.missing
-                raise RunnerLost(runner, robots, f"no answer for {self._timeout_s:g} s")
+            trouble = self._trouble() if item is None else None
+            if trouble is None and self._clock.now_ns() > deadline_ns:
+                trouble = f"no answer for {self._timeout_s:g} s"
+            if trouble is not None and not self._lockstep.complete:
+                raise RunnerLost(*self._lockstep.missing, trouble)
 
     def _next(self) -> zenoh.Sample | zenoh.Query | None:
         try:

@@ -1,0 +1,21 @@
+"""Agent: the code that decides for one robot."""
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+from swarmwire.agent.robot import Robot
+
+
+class Agent(ABC):
+    """Decides for one robot, from what that robot alone senses and hears. One instance per robot.
+
+    Annotated class attributes (float, int, bool, str) are its parameters, set before `__init__` runs; what it should
+    remember it keeps in attributes of its own, made in `__init__`. `needs` names the senses of the body that it reads
+    ("proximity", "compass", "odometry") and what it reads of a packet ("radio.range", "radio.bearing").
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ()
+
+    @abstractmethod
+    def step(self, robot: Robot) -> None:
+        """Called once a tick in which the robot acts: read `robot`, then drive and send."""

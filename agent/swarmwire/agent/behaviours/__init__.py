@@ -1,0 +1,6 @@
+"""Behaviours that come with swarmwire, each a VectorAgent."""
+
+from swarmwire.agent.behaviours.diffusion import Diffusion
+from swarmwire.agent.behaviours.flocking import Flocking
+
+__all__ = ["Diffusion", "Flocking"]

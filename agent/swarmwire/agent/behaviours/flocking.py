@@ -1,0 +1,55 @@
+"""Flocking over the radio: robots tell one another their headings, and keep together, apart and aligned."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from swarmwire.agent.robots import Robots
+from swarmwire.agent.vector_agent import State, VectorAgent
+from swarmwire.comms.messages import Message, f4
+
+
+class Heading(Message):
+    """What a flocking robot broadcasts in every step."""
+
+    heading_rad: f4  # of its compass
+
+
+class Flocking(VectorAgent):
+    """Attraction, repulsion and alignment (Reynolds 1987) from neighbours' beacons, avoidance by proximity.
+
+    Each neighbour heard since the last step pulls along its bearing if it is farther than `separation_m` and pushes if
+    it is nearer, in proportion to the relative difference, at most 1 either way; its heading relative to the own compass
+    adds a unit vector. Both are averaged over the neighbours heard. The rays push away from what is near. The robot
+    turns towards the sum, and drives the slower the more it has to turn.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("proximity", "compass", "radio.range", "radio.bearing")
+    speed_mps: float = 0.1  # straight ahead
+    separation_m: float = 0.4  # distance between neighbours at which nothing pulls or pushes
+    cohesion: float = 0.6  # weight of attraction and repulsion
+    alignment: float = 1.0  # weight of the neighbours' mean heading
+    avoidance: float = 3.0  # weight of the rays
+    forward: float = 0.3  # weight of the way ahead, against dithering
+    turn_gain_per_s: float = 2.0  # turn rate per angle to the wanted direction
+
+    def step(self, robots: Robots, state: State) -> None:
+        """Steer to the sum of all pulls, and broadcast the heading."""
+        heading = robots.compass.heading_rad
+        heard = robots.radio.heard(Heading)
+        pull = np.clip((heard.range_m - self.separation_m) / self.separation_m, -1.0, 1.0)
+        turn = heard.message.heading_rad - heading[heard.row]
+        along = self.cohesion * pull * np.cos(heard.bearing_rad) + self.alignment * np.cos(turn)
+        across = self.cohesion * pull * np.sin(heard.bearing_rad) + self.alignment * np.sin(turn)
+        neighbours = np.maximum(heard.count(), 1)
+
+        proximity = robots.proximity
+        near_x = (proximity.value * np.cos(proximity.angle_rad)).sum(1)
+        near_y = (proximity.value * np.sin(proximity.angle_rad)).sum(1)
+        x = self.forward + heard.sum(along) / neighbours - self.avoidance * near_x
+        y = heard.sum(across) / neighbours - self.avoidance * near_y
+
+        angle = np.arctan2(y, x)
+        linear = self.speed_mps * np.maximum(np.cos(angle), 0.0)
+        robots.drive(linear_mps=linear, angular_radps=self.turn_gain_per_s * angle)
+        robots.radio.send(Heading, heading_rad=heading)

@@ -1,0 +1,123 @@
+"""The host runs the agents of some robots, tick by tick: the same code in a local crew and in every runner."""
+
+import traceback
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+
+from swarmwire.agent.agent import Agent
+from swarmwire.agent.declared import make
+from swarmwire.agent.loading import AgentClass, load_agent
+from swarmwire.agent.robot import Robot
+from swarmwire.agent.robots import Robots
+from swarmwire.agent.turn import Turn
+from swarmwire.agent.vector_agent import State, VectorAgent, state_of
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.senses import Actions, GroupSenses, Senses
+
+
+class Host:
+    """The agents of all robots of an assignment."""
+
+    def __init__(self, assignment: Assignment) -> None:
+        self._rate_hz = assignment.rate_hz
+        self._gives = assignment.gives or ()
+        self._groups = {group.name: _hosted(group) for group in assignment.groups}
+
+    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+        """What the robots do in this tick; AgentFailed with the robot's name and the agent's traceback if one raises."""
+        time_ns = tick_start_ns(tick, self._rate_hz)
+        time = (tick, time_ns, tick_start_ns(tick + 1, self._rate_hz) - time_ns)
+        return Actions.joined([self._groups[name].act(time, group, heard) for name, group in senses.items()])
+
+
+class _Hosted(ABC):
+    """The agents of one group: what both kinds share."""
+
+    def __init__(self, group: GroupAssignment, needs: tuple[str, ...]) -> None:
+        self.group, self.needs = group, needs
+        self.rows: IntArray = group.rows  # that acted last: state is kept for these
+        self._sent_before = np.zeros(len(group.rows), np.int64)
+
+    def act(self, time: tuple[int, int, int], senses: GroupSenses, heard: Heard) -> Actions:
+        place = np.searchsorted(self.group.rows, senses.rows)
+        sent_before = self._sent_before[place]
+        turn = Turn(self.group, self.needs, time, senses, _own(heard, senses.rows), self.group.keys[place], sent_before)
+        if len(senses.rows) != len(self.rows) or not np.array_equal(senses.rows, self.rows):
+            self.keep(senses.rows)
+            self.rows = senses.rows
+        self.step(turn)
+        self._sent_before[place] = sent_before
+        return turn.actions()
+
+    @abstractmethod
+    def step(self, turn: Turn) -> None:
+        """Let the agents act."""
+
+    @abstractmethod
+    def keep(self, rows: IntArray) -> None:
+        """Keep the memory of robots that act again, drop that of others, give new ones a fresh one."""
+
+
+class _Vector(_Hosted):
+    """One VectorAgent for all robots of the group, and the State that it works on."""
+
+    def __init__(self, group: GroupAssignment, kind: type[VectorAgent[Any]]) -> None:
+        super().__init__(group, kind.needs)
+        self._agent = make(kind, group.params)
+        self._state: State = state_of(kind).fresh(len(group.rows))
+
+    def step(self, turn: Turn) -> None:
+        try:
+            self._agent.step(Robots(turn), self._state)
+        except Exception as error:
+            place = np.searchsorted(self.group.rows, turn.senses.rows)
+            names = robots_text([self.group.robot_names[at] for at in place])
+            raise AgentFailed(names, traceback.format_exc()) from error
+
+    def keep(self, rows: IntArray) -> None:
+        self._state = self._state.moved(self.rows, rows)
+
+
+class _Single(_Hosted):
+    """An Agent for each robot of the group."""
+
+    def __init__(self, group: GroupAssignment, kind: type[Agent]) -> None:
+        super().__init__(group, kind.needs)
+        self._kind = kind
+        self._agents = {int(row): make(kind, group.params) for row in group.rows}
+
+    def step(self, turn: Turn) -> None:
+        for at, row in enumerate(turn.senses.rows):
+            try:
+                self._agents[int(row)].step(Robot(turn, at))
+            except Exception as error:
+                name = self.group.robot_names[int(np.searchsorted(self.group.rows, row))]
+                raise AgentFailed(name, traceback.format_exc()) from error
+
+    def keep(self, rows: IntArray) -> None:
+        self._agents = {int(row): self._agents.get(int(row)) or make(self._kind, self.group.params) for row in rows}
+
+
+def _hosted(group: GroupAssignment) -> _Hosted:
+    kind: AgentClass = load_agent(group.agent)
+    try:
+        return _Vector(group, kind) if issubclass(kind, VectorAgent) else _Single(group, kind)
+    except Exception as error:
+        raise AgentFailed(robots_text(list(group.robot_names)), traceback.format_exc()) from error
+
+
+def _own(heard: Heard, rows: IntArray) -> Heard:
+    """What the robots `rows` heard, with the receiver as a place in `rows`."""
+    if not len(heard):
+        return heard
+    place = np.searchsorted(rows, heard.receiver)
+    place = np.minimum(place, len(rows) - 1)
+    mine = rows[place] == heard.receiver
+    own = heard if mine.all() else heard.select(np.flatnonzero(mine))
+    return Heard(place[mine], own.sender, own.sequence, own.heard_at_ns, own.given, own.payload, own.payloads)

@@ -1,0 +1,66 @@
+"""From the text that names an agent to its class."""
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+from swarmwire.agent.agent import Agent
+from swarmwire.agent.declared import parameters_of
+from swarmwire.agent.vector_agent import VectorAgent
+
+AgentClass = type[Agent] | type[VectorAgent[Any]]
+
+
+class NoAgent(ValueError):
+    """The text does not lead to an agent class; the message says at which point."""
+
+
+def resolve(spec: str, beside: Path) -> str:
+    """The spec with the path of a file made absolute: "my_agent.py:Mine" lies beside the scenario."""
+    place, _, name = spec.rpartition(":")
+    return f"{(beside / place).resolve()}:{name}" if place.endswith(".py") else spec
+
+
+def load_agent(spec: str) -> AgentClass:
+    """The class of "package.module:Class" or "/path/file.py:Class"; NoAgent if it is none."""
+    place, _, name = spec.rpartition(":")
+    if not place or not name.isidentifier():
+        raise NoAgent(f'expected "package.module:Class" or "file.py:Class", got {spec!r}')
+    try:
+        module = _load_file(Path(place)) if place.endswith(".py") else importlib.import_module(place)
+    except FileNotFoundError as error:
+        raise NoAgent(f"there is no file {place}") from error
+    except Exception as error:
+        raise NoAgent(f"{place} does not import: {type(error).__name__}: {error}") from error
+    found = getattr(module, name, None)
+    if not isinstance(found, type) or not issubclass(found, Agent | VectorAgent):
+        what = "no such name" if found is None else "no Agent or VectorAgent"
+        raise NoAgent(f"{place} holds {what}: {name!r}")
+    if getattr(found, "__abstractmethods__", None):
+        raise NoAgent(f"{name} has no step method")
+    try:
+        parameters_of(found)
+    except (TypeError, NameError) as error:
+        raise NoAgent(str(error)) from error
+    return found
+
+
+def _load_file(path: Path) -> Any:
+    # A name of its own, so that two files called agent.py do not meet in sys.modules.
+    name = f"swarmwire_user_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise FileNotFoundError(path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module

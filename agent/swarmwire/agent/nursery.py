@@ -1,0 +1,71 @@
+"""A nursery: one process that imports what runners need, then forks a runner for each name it is given.
+
+Forking after the import makes a thousand runners cheap: they start in milliseconds and share the memory of the code. The
+nursery itself never opens a zenoh session (one opened in a child of a process that has had one hangs). It is a program of
+its own rather than multiprocessing's fork server, which would run the user's script again in every runner.
+
+Standard input is the life line: when it ends, the world is gone, and so are all runners. A runner that ends badly is
+reported as one line on standard output: its name and its exit code.
+"""
+
+import gc
+import os
+import select
+import signal
+import sys
+import traceback
+from contextlib import suppress
+
+from swarmwire.agent import host, runner
+from swarmwire.agent.loading import NoAgent, load_agent
+
+__all__ = ["host", "main"]  # the host is imported here so that its code is shared
+
+POLL_MS = 50
+
+
+def main(arguments: list[str]) -> int:
+    """`endpoint run_id agent,agent,… runner runner …`: fork the runners and wait for them all."""
+    endpoint, run_id, agents, *names = arguments
+    for agent in agents.split(","):
+        with suppress(NoAgent):  # the runner finds it again and reports it
+            load_agent(agent)
+    gc.freeze()  # the collector would write to, and so copy, every shared page
+    children: dict[int, str] = {}
+    for name in names:
+        child = os.fork()
+        if child == 0:
+            os._exit(_runner(endpoint, run_id, name))
+        children[child] = name
+    _watch(children)
+    return 0
+
+
+def _runner(endpoint: str, run_id: str, name: str) -> int:
+    os.close(0)
+    try:
+        runner.run(endpoint, run_id, name)
+    except BaseException:  # noqa: BLE001 - the last frame of this process: whatever it is, show it and end
+        traceback.print_exc()
+        return 1
+    return 0
+
+
+def _watch(children: dict[int, str]) -> None:
+    lifeline = select.poll()
+    lifeline.register(0, select.POLLIN | select.POLLHUP)
+    while children:
+        if lifeline.poll(POLL_MS):
+            for child in children:
+                os.kill(child, signal.SIGKILL)
+            return
+        child, status = os.waitpid(-1, os.WNOHANG)
+        while child:
+            name, code = children.pop(child), os.waitstatus_to_exitcode(status)
+            if code != 0:
+                print(name, code, flush=True)
+            child, status = os.waitpid(-1, os.WNOHANG) if children else (0, 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

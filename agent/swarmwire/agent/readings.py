@@ -1,0 +1,55 @@
+"""What a robot's senses read in this tick. Arrays of Proximity have a leading axis n for a VectorAgent."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.sheets import Proximity
+
+
+@dataclass(frozen=True)
+class ProximityReading:
+    """Rays around the body, in the data sheet's order (use the angles, never the indices)."""
+
+    value: FloatArray  # (…, rays) the sensor's response: 0 nothing, 1 touching
+    sheet: Proximity
+
+    @cached_property
+    def distance_m(self) -> FloatArray:
+        """Distance from the rim at which an ideal sensor answers `value`; the reach if nothing is seen, (…, rays)."""
+        return self.sheet.response.distance_m(self.value)
+
+    @property
+    def angle_rad(self) -> FloatArray:
+        """Directions of the rays in the body's frame, (rays,)."""
+        return self.sheet.angle_rad
+
+
+@dataclass(frozen=True)
+class CompassReading:
+    """One robot's compass."""
+
+    heading_rad: float  # 0 along the arena's +x, counter-clockwise, in (-pi, pi]
+
+
+@dataclass(frozen=True)
+class CompassReadings:
+    """The compasses of n robots."""
+
+    heading_rad: FloatArray  # (n,)
+
+
+@dataclass(frozen=True)
+class OdometryReading:
+    """One robot's wheel encoders."""
+
+    left_m: float  # travelled by the left wheel since the start
+    right_m: float
+
+
+@dataclass(frozen=True)
+class OdometryReadings:
+    """The wheel encoders of n robots."""
+
+    left_m: FloatArray  # (n,)
+    right_m: FloatArray  # (n,)

@@ -1,0 +1,100 @@
+"""Robot: the handle through which an Agent's step sees and moves its one robot."""
+
+from collections.abc import Iterator
+from typing import Any, TypeVar, overload
+
+import numpy as np
+
+from swarmwire.agent.draw import Draw
+from swarmwire.agent.packet import Packet, Packets
+from swarmwire.agent.readings import CompassReading, OdometryReading, ProximityReading
+from swarmwire.agent.robots import proximity_sheet
+from swarmwire.agent.turn import Turn
+from swarmwire.comms.body import Body
+from swarmwire.comms.clock import to_s
+from swarmwire.comms.messages import DICT_TAG, Message, decode_dict, encode_dict
+from swarmwire.comms.packets import Payloads
+
+M = TypeVar("M", bound=Message)
+
+
+class Robot:
+    """One robot in one tick. Senses raise NotDeclared unless the agent's `needs` name them."""
+
+    def __init__(self, turn: Turn, row: int) -> None:
+        self._turn, self._row = turn, row
+        self.radio = RadioPort(turn, row)
+        self.draw = Draw(turn.keys[row : row + 1], turn.tick)
+
+    @property
+    def time_s(self) -> float:
+        """Time since the start of the run, at this tick."""
+        return to_s(self._turn.time_ns)
+
+    @property
+    def period_s(self) -> float:
+        """Time between two steps of this robot."""
+        return to_s(self._turn.period_ns)
+
+    @property
+    def body(self) -> Body:
+        """Geometry and limits of this robot."""
+        return self._turn.group.body
+
+    @property
+    def proximity(self) -> ProximityReading:
+        """Rays around the body: value, distance_m and angle_rad, (rays,)."""
+        return ProximityReading(self._turn.field("proximity", "value")[self._row], proximity_sheet(self.body))
+
+    @property
+    def compass(self) -> CompassReading:
+        """Heading in the arena's frame."""
+        return CompassReading(float(self._turn.field("compass", "heading_rad")[self._row]))
+
+    @property
+    def odometry(self) -> OdometryReading:
+        """Wheel encoders."""
+        left, right = self._turn.field("odometry", "left_m"), self._turn.field("odometry", "right_m")
+        return OdometryReading(float(left[self._row]), float(right[self._row]))
+
+    def drive(self, linear_mps: float, angular_radps: float) -> None:
+        """Wanted forward speed and turn rate (positive to the left); it holds until the next call."""
+        self._turn.drive[self._row] = True
+        self._turn.linear_mps[self._row] = linear_mps
+        self._turn.angular_radps[self._row] = angular_radps
+
+
+class RadioPort:
+    """The robot's radio: an unreliable medium."""
+
+    def __init__(self, turn: Turn, row: int) -> None:
+        self._turn, self._row = turn, row
+
+    @overload
+    def heard(self, kind: type[M]) -> "list[Packet[M]]": ...
+    @overload
+    def heard(self, kind: type[dict[str, Any]]) -> "list[Packet[dict[str, Any]]]": ...
+    def heard(self, kind: type[Any]) -> "list[Packet[Any]]":
+        """The packets of a message class (or `dict`) heard since the robot's last step, by time; messages decode when asked for."""
+        if issubclass(kind, Message):
+            packets = self._turn.packets(kind)
+            names = kind.layout.names or ()
+            columns = [getattr(packets.message, name) for name in names]
+            return [
+                Packet(
+                    packets, at, kind(**{name: float(column[at]) for name, column in zip(names, columns, strict=True)})
+                )
+                for at in self._mine(packets)
+            ]
+        table = self._turn.tagged(DICT_TAG)
+        dicts = Packets[dict[str, Any]](self._turn.n, table, {}, self._turn.needs)
+        return [Packet(dicts, at, decode_dict(table.payloads.row(int(table.payload[at])))) for at in self._mine(dicts)]
+
+    def send(self, message: Message | dict[str, Any], to: int | None = None) -> int:
+        """Send to all who hear it, or to the robot with index `to` in the arena; returns the packet's id."""
+        payload = encode_dict(message) if isinstance(message, dict) else message.encode()
+        return int(self._turn.send(np.array([self._row]), to, Payloads.of([payload]))[0])
+
+    def _mine(self, packets: Packets[Any]) -> Iterator[int]:
+        first, last = np.searchsorted(packets.row, [self._row, self._row + 1])
+        return iter(range(int(first), int(last)))

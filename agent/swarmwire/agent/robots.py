@@ -1,0 +1,109 @@
+"""Robots: the handle through which a VectorAgent's step sees and moves n robots."""
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swarmwire.agent.draw import Draws
+from swarmwire.agent.packet import Packets
+from swarmwire.agent.readings import CompassReadings, OdometryReadings, ProximityReading
+from swarmwire.agent.turn import Turn
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.body import Body
+from swarmwire.comms.clock import to_s
+from swarmwire.comms.messages import Message, encode_rows
+from swarmwire.comms.sheets import Proximity
+
+M = TypeVar("M", bound=Message)
+
+
+class Robots:
+    """n robots of one group in one tick; every array has a leading axis n. Senses raise NotDeclared unless needed."""
+
+    def __init__(self, turn: Turn) -> None:
+        self._turn = turn
+        self.radio = RadioRows(turn)
+        self.draw = Draws(turn.keys, turn.tick)
+
+    @property
+    def n(self) -> int:
+        """How many robots act in this tick in this process: says nothing about the swarm."""
+        return self._turn.n
+
+    @property
+    def time_s(self) -> float:
+        """Time since the start of the run, at this tick."""
+        return to_s(self._turn.time_ns)
+
+    @property
+    def period_s(self) -> float:
+        """Time between two steps of these robots."""
+        return to_s(self._turn.period_ns)
+
+    @property
+    def body(self) -> Body:
+        """Geometry and limits of these robots."""
+        return self._turn.group.body
+
+    @property
+    def proximity(self) -> ProximityReading:
+        """Rays around the bodies: value and distance_m (n, rays), angle_rad (rays,)."""
+        value = self._turn.field("proximity", "value")
+        return ProximityReading(value, proximity_sheet(self.body))
+
+    @property
+    def compass(self) -> CompassReadings:
+        """Headings in the arena's frame: heading_rad (n,)."""
+        return CompassReadings(self._turn.field("compass", "heading_rad"))
+
+    @property
+    def odometry(self) -> OdometryReadings:
+        """Wheel encoders: left_m and right_m (n,)."""
+        return OdometryReadings(self._turn.field("odometry", "left_m"), self._turn.field("odometry", "right_m"))
+
+    def drive(self, linear_mps: ArrayLike, angular_radps: ArrayLike, rows: BoolArray | None = None) -> None:
+        """Wanted forward speed and turn rate (positive to the left), (n,) or one number; those not in the mask `rows` keep theirs."""
+        turn = self._turn
+        mask = np.ones(turn.n, np.bool_) if rows is None else rows
+        turn.drive |= mask
+        turn.linear_mps[mask] = np.broadcast_to(np.asarray(linear_mps, np.float64), (turn.n,))[mask]
+        turn.angular_radps[mask] = np.broadcast_to(np.asarray(angular_radps, np.float64), (turn.n,))[mask]
+
+
+class RadioRows:
+    """The radios of n robots: an unreliable medium."""
+
+    def __init__(self, turn: Turn) -> None:
+        self._turn = turn
+
+    def heard(self, kind: type[M]) -> Packets[M]:
+        """All packets of a message class heard since the robots' last step."""
+        return self._turn.packets(kind)
+
+    def send(
+        self,
+        kind: type[Message],
+        rows: BoolArray | None = None,
+        to: IntArray | int | None = None,
+        **fields: FloatArray | float,
+    ) -> IntArray:
+        """Send a message from each robot (or those of the mask `rows`), fields (n,) or one number; to all, or to the index `to` (n,).
+
+        Returns the ids of the packets, in the order of the robots that sent.
+        """
+        n = self._turn.n
+        row = np.arange(n) if rows is None else np.flatnonzero(rows)
+        columns: dict[str, Any] = {
+            name: np.broadcast_to(np.asarray(value), (n,))[row] for name, value in fields.items()
+        }
+        receiver = to if to is None or isinstance(to, int) else np.asarray(to)[row]
+        return self._turn.send(row, receiver, encode_rows(kind, len(row), columns))
+
+
+def proximity_sheet(body: Body) -> Proximity:
+    """The data sheet of the body's proximity sensor, which it has (needs are checked before a run)."""
+    sheet = body.proximity
+    if sheet is None:
+        raise AttributeError(f"the body {body.name} has no proximity sensor")
+    return sheet

@@ -1,0 +1,77 @@
+"""One tick of one group: what its robots sense and hear, and what they do, as arrays behind both kinds of handle."""
+
+from typing import Any, TypeVar
+
+import numpy as np
+
+from swarmwire.agent.packet import NotDeclared, Packets
+from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
+from swarmwire.comms.assignment import GroupAssignment
+from swarmwire.comms.messages import Message, decode_rows
+from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.senses import Actions, GroupSenses
+
+M = TypeVar("M", bound=Message)
+
+
+class Turn:
+    """The robots `senses.rows` of a group in one tick; `heard.receiver` counts these rows from 0."""
+
+    def __init__(
+        self,
+        group: GroupAssignment,
+        needs: tuple[str, ...],
+        time: tuple[int, int, int],
+        senses: GroupSenses,
+        heard: Heard,
+        keys: KeyArray,
+        sent_before: IntArray,
+    ) -> None:
+        self.group, self.needs = group, needs
+        self.tick, self.time_ns, self.period_ns = time
+        self.senses, self.heard = senses, heard
+        self.keys = keys  # (n,) of the robots' draws
+        self.n = len(senses.rows)
+        self.drive = np.zeros(self.n, np.bool_)
+        self.linear_mps = np.zeros(self.n)
+        self.angular_radps = np.zeros(self.n)
+        self._sent_before = sent_before  # (n,) packets that each robot has sent up to now; written to
+        self._outbox: list[Sent] = []
+        self._packets: dict[int, Packets[Any]] = {}
+
+    def field(self, sense: str, name: str) -> FloatArray:
+        """A field of a sense, (n, …); NotDeclared if the agent's needs do not name the sense."""
+        if sense not in self.needs:
+            raise NotDeclared(f"reads {sense!r}, which its needs do not name: {', '.join(self.needs) or 'none'}")
+        return self.senses.fields[f"{sense}.{name}"]
+
+    def packets(self, kind: type[M]) -> Packets[M]:
+        """All packets of a message class that these robots heard."""
+        known = self._packets.get(kind.tag)
+        if known is None:
+            table = self.tagged(kind.tag, kind.size_bytes)
+            fields = decode_rows(kind, table.payloads, table.payload)
+            known = self._packets[kind.tag] = Packets[M](self.n, table, fields, self.needs)
+        return known
+
+    def tagged(self, tag: int, size_bytes: int | None = None) -> Heard:
+        """What was heard with a tag and, if given, of this size."""
+        wanted = self.heard.payloads.tags() == tag
+        if size_bytes is not None:
+            wanted &= self.heard.payloads.sizes == size_bytes
+        mask = wanted[self.heard.payload]
+        return self.heard if mask.all() else self.heard.select(np.flatnonzero(mask))
+
+    def send(self, row: IntArray, to: IntArray | int | None, payloads: Payloads) -> IntArray:
+        """Queue a packet for each of the robots `row` (rising, each once); returns their ids."""
+        receiver = np.broadcast_to(np.asarray(BROADCAST if to is None else to, np.int64), row.shape)
+        if np.any(receiver < BROADCAST):
+            raise ValueError("send(to=…): expected the index of a robot in the arena, 0 or more")
+        self._outbox.append(Sent(self.senses.rows[row], receiver, payloads))
+        ids = self._sent_before[row]
+        self._sent_before[row] += 1
+        return ids
+
+    def actions(self) -> Actions:
+        """What the robots did."""
+        return Actions(self.senses.rows, self.drive, self.linear_mps, self.angular_radps, Sent.joined(self._outbox))

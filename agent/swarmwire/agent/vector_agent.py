@@ -1,0 +1,104 @@
+"""VectorAgent: the code that decides for n robots at a time, and the State that the framework keeps for it."""
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_args, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarmwire.agent.robots import Robots
+from swarmwire.comms.arrays import IntArray
+
+FloatColumn = NDArray[np.float64]
+IntColumn = NDArray[np.int64]
+BoolColumn = NDArray[np.bool_]
+
+
+class _Default:
+    """What a state's column starts with."""
+
+    def __init__(self, value: float | int | bool) -> None:
+        self.value = value
+
+
+def column(default: float | int | bool) -> Any:
+    """A column of a State: `count: IntColumn = column(0)`; a new robot's row starts with `default`."""
+    return _Default(default)
+
+
+class State:
+    """What a VectorAgent remembers: a table with a row per robot, (n,) arrays that `step` reads and writes in place.
+
+    The framework owns it: rows are added, removed and moved to another runner with their robots.
+    """
+
+    columns: ClassVar[dict[str, tuple[np.dtype[Any], float | int | bool]]] = {}
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        cls.columns = dict(cls.columns)
+        for name, hint in get_type_hints(cls).items():
+            default = getattr(cls, name, None)
+            if isinstance(default, _Default):
+                dtype = np.dtype(get_args(get_args(hint)[1])[0])
+                cls.columns[name] = (dtype, default.value)
+            elif name != "columns":
+                raise TypeError(
+                    f"{cls.__name__}.{name}: expected FloatColumn, IntColumn or BoolColumn = column(default)"
+                )
+
+    @classmethod
+    def fresh(cls, n: int) -> Self:
+        """A state of n new robots."""
+        state = cls()
+        for name, (dtype, default) in cls.columns.items():
+            object.__setattr__(state, name, np.full(n, default, dtype))
+        return state
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Assigning a column copies into it, so that its length and dtype stay."""
+        if name not in self.columns:
+            raise AttributeError(
+                f"{type(self).__name__} has no column {name!r}; it has {', '.join(self.columns) or 'none'}"
+            )
+        getattr(self, name)[...] = value
+
+    def moved(self, old_rows: IntArray, new_rows: IntArray) -> Self:
+        """The state of robots `new_rows`: rows of those in `old_rows` (both rising) are kept, others start afresh."""
+        state = type(self).fresh(len(new_rows))
+        _, old, new = np.intersect1d(old_rows, new_rows, assume_unique=True, return_indices=True)
+        for name in self.columns:
+            getattr(state, name)[new] = getattr(self, name)[old]
+        return state
+
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar as DefaultTypeVar
+
+    S = DefaultTypeVar("S", bound=State, default=State)
+else:
+    S = TypeVar("S", bound=State)
+
+
+class VectorAgent(ABC, Generic[S]):
+    """Decides for the robots of a group, n at a time, each row from its own senses and packets alone.
+
+    One instance serves all robots of a group in a process, over all arenas; so nothing may be kept on `self` but
+    parameters (annotated class attributes, as for Agent). `class Search(VectorAgent[Memory])` names its State.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ()
+
+    @abstractmethod
+    def step(self, robots: Robots, state: S) -> None:
+        """Called once a tick with the robots that act in it: read `robots`, then drive and send."""
+
+
+def state_of(kind: type[VectorAgent[Any]]) -> type[State]:
+    """The State that a VectorAgent class names, or the empty one."""
+    for base in kind.__mro__:
+        for generic in getattr(base, "__orig_bases__", ()):
+            for arg in get_args(generic):
+                if isinstance(arg, type) and issubclass(arg, State):
+                    return arg
+    return State

@@ -1,0 +1,79 @@
+"""Which robots a crew or a runner plays, and all that its agents may know before the first tick."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import IntArray, KeyArray
+from swarmwire.comms.body import Body, body_from
+
+
+@dataclass(frozen=True)
+class GroupAssignment:
+    """Robots of one group, over all arenas, with the agent that decides for them."""
+
+    name: str
+    agent: str  # "package.module:Class" or "/path/file.py:Class"
+    params: dict[str, Any]
+    body: Body
+    rows: IntArray  # (n,) robot row: arena x robots + index, rising
+    robot_names: tuple[str, ...]  # (n,) for messages to people
+    keys: KeyArray  # (n,) for the agents' draws; derived one way, they tell nothing of the arena's seed
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """All robots of one runner (or of the whole run, for a crew in this process)."""
+
+    groups: tuple[GroupAssignment, ...]
+    rate_hz: int
+    gives: tuple[str, ...] | None  # columns that the radio tells with a packet; None: there is no radio
+
+    @property
+    def robots_text(self) -> str:
+        """The robots in a few words: "flock-3", or "flock-0 … flock-9 (10 robots)"."""
+        return robots_text([name for group in self.groups for name in group.robot_names])
+
+    def as_mapping(self) -> dict[str, Any]:
+        """The assignment as plain values that msgpack takes."""
+        return {
+            "rate_hz": self.rate_hz,
+            "gives": None if self.gives is None else list(self.gives),
+            "groups": [
+                {
+                    "name": group.name,
+                    "agent": group.agent,
+                    "params": group.params,
+                    "body": group.body.as_mapping(),
+                    "rows": group.rows.tolist(),
+                    "robot_names": list(group.robot_names),
+                    "keys": group.keys.tolist(),
+                }
+                for group in self.groups
+            ],
+        }
+
+    @classmethod
+    def from_mapping(cls, given: dict[str, Any]) -> "Assignment":
+        """The assignment that `as_mapping` described."""
+        groups = tuple(
+            GroupAssignment(
+                name=group["name"],
+                agent=group["agent"],
+                params=group["params"],
+                body=body_from(group["body"], where="assignment"),
+                rows=np.array(group["rows"], np.int64),
+                robot_names=tuple(group["robot_names"]),
+                keys=np.array(group["keys"], np.uint64),
+            )
+            for group in given["groups"]
+        )
+        return cls(groups, given["rate_hz"], None if given["gives"] is None else tuple(given["gives"]))
+
+
+def robots_text(names: list[str]) -> str:
+    """Robot names in a few words."""
+    if len(names) <= 3:
+        return ", ".join(names)
+    return f"{names[0]} … {names[-1]} ({len(names)} robots)"

@@ -1,0 +1,54 @@
+"""zenoh sessions: the world routes on one endpoint, each runner is a client of it. Nothing scouts, nothing gossips.
+
+Two peers on one hub are not routed by zenoh, or link past it; so the world is a router and runners are clients. The
+start-up delay of scouting is set to 0 even where it is off (it costs half a second otherwise). Frames in lockstep block
+rather than drop; a put that blocks closes its link after `BLOCK_S`, which lies below a runner's time-out.
+"""
+
+import json
+import os
+
+import zenoh
+
+BLOCK_S = 5.0
+LEASE_MS = 10_000  # a frozen peer is noticed after this; a dead one at once, by its closed socket
+# A runner has one session and little traffic: three threads instead of ten, and half the memory.
+SMALL_RUNTIME = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app),app:(worker_threads:1))"
+
+
+def open_world(endpoint: str) -> zenoh.Session:
+    """A router that listens on `endpoint`; zenoh.ZError if it is taken."""
+    return zenoh.open(_config("router", {"listen": {"endpoints": [endpoint]}}))
+
+
+def open_runner(endpoint: str, connect_s: float = 10.0) -> zenoh.Session:
+    """A client of the world at `endpoint`, tried for `connect_s`; zenoh.ZError if nobody answers."""
+    os.environ.setdefault("ZENOH_RUNTIME", SMALL_RUNTIME)
+    connect = {
+        "endpoints": [endpoint],
+        "timeout_ms": round(connect_s * 1000),
+        "retry": {"period_init_ms": 50, "period_max_ms": 1000, "period_increase_factor": 1.5},
+    }
+    return zenoh.open(_config("client", {"connect": connect}))
+
+
+def unix_endpoint(path: str) -> str:
+    """The endpoint of a unix socket; a path may have 108 characters at most."""
+    return f"unixsock-stream/{path}"
+
+
+def _config(mode: str, more: dict[str, object]) -> zenoh.Config:
+    block = {"wait_before_close": round(BLOCK_S * 1e6)}
+    return zenoh.Config.from_json5(
+        json.dumps(
+            {
+                "mode": mode,
+                "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
+                "transport": {
+                    "shared_memory": {"enabled": False},
+                    "link": {"tx": {"lease": LEASE_MS, "queue": {"congestion_control": {"block": block}}}},
+                },
+                **more,
+            }
+        )
+    )

@@ -1,0 +1,109 @@
+"""What a tick carries across the wire: senses and heard packets to a runner, actions back; checked on arrival."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray, IntArray
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.senses import Actions, GroupSenses, Senses
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.frames import Frame
+
+GIVEN = "heard/given/"
+
+
+def encode_tick(tick: int, senses: Senses, heard: Heard) -> bytes:
+    """A `tick` frame: what a runner's robots sense and heard."""
+    arrays: dict[str, AnyArray] = {}
+    for name, group in senses.items():
+        arrays[f"sense/{name}/rows"] = group.rows
+        for sense, column in group.fields.items():
+            arrays[f"sense/{name}/{sense}"] = column
+    if len(heard):
+        arrays["heard/receiver"] = heard.receiver
+        arrays["heard/sender"] = heard.sender
+        arrays["heard/sequence"] = heard.sequence
+        arrays["heard/at_ns"] = heard.heard_at_ns
+        arrays["heard/payload"] = heard.payload
+        arrays["heard/data"] = heard.payloads.data
+        arrays["heard/offset"] = heard.payloads.offset
+        for name, column in heard.given.items():
+            arrays[GIVEN + name] = column
+    return frames.encode("tick", tick, arrays)
+
+
+def decode_tick(frame: Frame, gives: tuple[str, ...]) -> tuple[Senses, Heard]:
+    """Senses and heard packets of a `tick` frame; a runner trusts its world."""
+    groups: dict[str, dict[str, AnyArray]] = {}
+    for key, array in frame.arrays.items():
+        if key.startswith("sense/"):
+            _, name, sense = key.split("/", 2)
+            groups.setdefault(name, {})[sense] = array
+    senses = {name: GroupSenses(fields.pop("rows"), fields) for name, fields in groups.items()}
+    arrays = frame.arrays
+    if "heard/receiver" not in arrays:
+        return senses, Heard.none(gives)
+    heard = Heard(
+        arrays["heard/receiver"],
+        arrays["heard/sender"],
+        arrays["heard/sequence"],
+        arrays["heard/at_ns"],
+        {name: arrays[GIVEN + name] for name in gives},
+        arrays["heard/payload"],
+        Payloads(arrays["heard/data"], arrays["heard/offset"]),
+    )
+    return senses, heard
+
+
+def encode_actions(tick: int, actions: Actions) -> bytes:
+    """An `actions` frame: what a runner's robots do and send."""
+    arrays: dict[str, AnyArray] = {
+        "rows": actions.rows,
+        "drive": actions.drive,
+        "linear_mps": actions.linear_mps,
+        "angular_radps": actions.angular_radps,
+    }
+    if len(actions.sent):
+        arrays["sent/sender"] = actions.sent.sender
+        arrays["sent/to"] = actions.sent.to
+        arrays["sent/data"] = actions.sent.payloads.data
+        arrays["sent/offset"] = actions.sent.payloads.offset
+    return frames.encode("actions", tick, arrays)
+
+
+def decode_actions(frame: Frame, rows: IntArray) -> Actions:
+    """The actions of the robots `rows`; BadFrame if the frame's arrays are not for exactly these or contradict themselves."""
+    n = len(rows)
+    got = _column(frame, "rows", "<i8", lambda length: length == n)
+    if not np.array_equal(got, rows):
+        raise BadFrame("malformed", "rows: expected the runner's own robots")
+    drive = _column(frame, "drive", "|b1", lambda length: length == n)
+    linear = _column(frame, "linear_mps", "<f8", lambda length: length == n)
+    angular = _column(frame, "angular_radps", "<f8", lambda length: length == n)
+    return Actions(rows, drive, linear, angular, _sent(frame, rows) if "sent/sender" in frame.arrays else Sent.none())
+
+
+def _sent(frame: Frame, rows: IntArray) -> Sent:
+    sender = _column(frame, "sent/sender", "<i8", lambda _: True)
+    to = _column(frame, "sent/to", "<i8", lambda length: length == len(sender))
+    offset = _column(frame, "sent/offset", "<i8", lambda length: length == len(sender) + 1)
+    data = _column(frame, "sent/data", "|u1", lambda _: True)
+    if (
+        offset[0] != 0
+        or offset[-1] != len(data)
+        or np.any((offset < 0) | (offset > len(data)))
+        or np.any(np.diff(offset) < 0)
+    ):
+        raise BadFrame("malformed", "sent/offset: expected rising offsets into sent/data")
+    if not np.all(np.isin(sender, rows)) or np.any(to < BROADCAST):
+        raise BadFrame("malformed", "sent: expected packets of the runner's own robots")
+    return Sent(sender, to, Payloads(data, offset))
+
+
+def _column(frame: Frame, name: str, code: str, fits: Callable[[int], bool]) -> AnyArray:
+    array = frame.arrays.get(name)
+    if array is None or array.ndim != 1 or array.dtype.str != code or not fits(len(array)):
+        raise BadFrame("malformed", f"{name}: expected a column of {code} of the right length")
+    return array

@@ -1,0 +1,44 @@
+"""Agents at the door: a scenario's agents must import, take their parameters, and find what they need on body and radio."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from swarmwire.agent.declared import BadParameter, checked
+from swarmwire.agent.loading import AgentClass, NoAgent, load_agent, resolve
+from swarmwire.comms.body import load_body
+from swarmwire.comms.errors import BadInput
+from swarmwire.world.scenario import Scenario
+
+
+def agent_specs(scenario: Scenario) -> dict[str, str]:
+    """By group: the agent's spec, with the path of a file beside the scenario made absolute."""
+    beside = Path(scenario.source).parent
+    return {name: resolve(group.agent, beside) for name, group in scenario.robots.items()}
+
+
+def check_agents(scenario: Scenario, specs: Mapping[str, str]) -> dict[str, AgentClass]:
+    """By group: the agent's class, fit for its robots; BadInput names the first that is not."""
+    return {name: _checked(scenario, name, spec) for name, spec in specs.items()}
+
+
+def _checked(scenario: Scenario, name: str, spec: str) -> AgentClass:
+    group, where = scenario.robots[name], scenario.source
+    try:
+        kind = load_agent(spec)
+        checked(kind, group.params)
+    except NoAgent as error:
+        raise BadInput(where, f"robots.{name}.agent", str(error)) from error
+    except BadParameter as error:
+        raise BadInput(where, f"robots.{name}.params.{error.key}", error.expected) from error
+    body = load_body(group.body)
+    of_radio = scenario.radio.gives.needs if scenario.radio else ()
+    for need in kind.needs:
+        if need.startswith("radio."):
+            if need not in of_radio:
+                told = ", ".join(of_radio) or "nothing"
+                text = f"{kind.__name__} needs {need!r}, which the radio does not tell: [radio] gives {told}"
+                raise BadInput(where, f"robots.{name}.agent", text)
+        elif need not in body.senses:
+            text = f"{kind.__name__} needs {need!r}, which the body {body.name} lacks: it has {', '.join(body.senses)}"
+            raise BadInput(where, f"robots.{name}.agent", text)
+    return kind

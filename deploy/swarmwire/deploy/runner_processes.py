@@ -1,0 +1,57 @@
+"""Runners as processes of this machine: a nursery that forks them, watched and ended with the run."""
+
+import os
+import selectors
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+
+LEAVE_S = 3.0
+
+
+class RunnerProcesses:
+    """The processes of all runners of one run; none of them outlives `stop` or this process."""
+
+    def __init__(self, endpoint: str, run_id: str, agents: Sequence[str], names: Sequence[str]) -> None:
+        command = [sys.executable, "-m", "swarmwire.agent.nursery", endpoint, run_id, ",".join(agents), *names]
+        # A session of its own: Ctrl-C is for the world alone, and the whole group can be ended at once. One BLAS thread:
+        # a runner's arrays are small, and idle threads would double its memory.
+        self._nursery = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        )
+        self._reports = selectors.DefaultSelector()
+        if self._nursery.stdout is not None:
+            self._reports.register(self._nursery.stdout, selectors.EVENT_READ)
+
+    @property
+    def nursery_pid(self) -> int:
+        """Process id of the nursery; runners are its children."""
+        return self._nursery.pid
+
+    def trouble(self) -> str | None:
+        """What happened to a runner that ended badly, in words; None while all is well."""
+        if self._nursery.poll() is not None:
+            return f"the runners' processes ended early (exit code {self._nursery.returncode})"
+        stdout = self._nursery.stdout
+        if stdout is not None and self._reports.select(timeout=0):
+            name, _, code = stdout.readline().decode().strip().partition(" ")
+            return f"the process of runner {name} ended with exit code {code}"
+        return None
+
+    def stop(self) -> None:
+        """Wait a moment for the runners to leave, then end those that are left."""
+        self._reports.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._nursery.wait(LEAVE_S)
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._nursery.pid, signal.SIGKILL)
+        self._nursery.wait()
+        for stream in (self._nursery.stdin, self._nursery.stdout):
+            if stream is not None:
+                stream.close()

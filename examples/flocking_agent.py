@@ -1,0 +1,52 @@
+"""The flocking rule as a user would write it: an Agent that decides for one robot.
+
+Run it with a process per robot:
+
+    swarmwire run scenarios/flocking-lossy.toml --set robots.flock.agent=../examples/flocking_agent.py:MyFlocking --runners per-robot
+
+The arithmetic is that of `swarmwire.agent.behaviours:Flocking`, in numpy functions, so the swarm moves the same bit for bit.
+"""
+
+import numpy as np
+
+from swarmwire.agent import Agent, Message, Robot, f4
+
+
+class Heading(Message):
+    """What each robot broadcasts in every step."""
+
+    heading_rad: f4
+
+
+class MyFlocking(Agent):
+    """Keep together, apart and aligned with the neighbours that were heard; keep away from what is near."""
+
+    needs = ("proximity", "compass", "radio.range", "radio.bearing")
+    speed_mps: float = 0.1
+    separation_m: float = 0.4
+    cohesion: float = 0.6
+    alignment: float = 1.0
+    avoidance: float = 3.0
+    forward: float = 0.3
+    turn_gain_per_s: float = 2.0
+
+    def step(self, robot: Robot) -> None:
+        """Steer to the sum of all pulls, and broadcast the heading."""
+        heading = robot.compass.heading_rad
+        packets = robot.radio.heard(Heading)
+        x = y = 0.0
+        for packet in packets:
+            pull = np.clip((packet.range_m - self.separation_m) / self.separation_m, -1.0, 1.0)
+            turn = packet.message.heading_rad - heading
+            x += self.cohesion * pull * np.cos(packet.bearing_rad) + self.alignment * np.cos(turn)
+            y += self.cohesion * pull * np.sin(packet.bearing_rad) + self.alignment * np.sin(turn)
+        neighbours = max(len(packets), 1)
+
+        near_x = (robot.proximity.value * np.cos(robot.proximity.angle_rad)).sum()
+        near_y = (robot.proximity.value * np.sin(robot.proximity.angle_rad)).sum()
+        x = self.forward + x / neighbours - self.avoidance * near_x
+        y = y / neighbours - self.avoidance * near_y
+
+        angle = np.arctan2(y, x)
+        robot.drive(self.speed_mps * max(np.cos(angle), 0.0), self.turn_gain_per_s * angle)
+        robot.radio.send(Heading(heading_rad=heading))
