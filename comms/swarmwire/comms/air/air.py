@@ -1,0 +1,129 @@
+"""The air as a state machine: packets and poses go in, time passes, and what was heard comes out. No I/O, no clock."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.air import news
+from swarmwire.comms.air.accounts import Accounts
+from swarmwire.comms.air.channel import Channel
+from swarmwire.comms.air.links import Links
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.senders import Senders
+from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.air.transmissions import Transmissions
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.geometry import Obstacles
+from swarmwire.comms.packets import BROADCAST, Heard, Sent
+from swarmwire.comms.truth import Finished, Tally
+
+NEVER_NS = 2**63 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """What became final while time passed."""
+
+    heard: Heard
+    finished: Finished
+    tally: Tally
+
+
+class Air:
+    """The emulated medium of every arena of a world; robot row r is robot r % robots of arena r // robots.
+
+    A packet waits in its sender's queue, goes on air, and ends at each intended receiver in one fate. Tick k starts
+    with `advance(its start)`; then come `hold` with the poses of tick k and `send`. So a packet sent in a tick is heard
+    in the next at the earliest, and geometry is that of the tick in which the packet goes on air.
+
+    A fate is final when the reception ends: HEARD at `on_air_at + airtime + latency + jitter`, every other fate of a
+    packet on air at `on_air_at + airtime`, a fate at the sender's radio at `sent_at`.
+    """
+
+    def __init__(
+        self, radio: Radio, keys: KeyArray, robots: int, size_m: tuple[float, float], obstacles: Obstacles, rate_hz: int
+    ) -> None:
+        rows = len(keys) * robots
+        self._radio, self._robots = radio, robots
+        self._channel = Channel(Medium(radio, keys, robots, obstacles), size_m)
+        self._senders = Senders(radio, keys, robots, rate_hz)
+        self._accounts = Accounts(len(keys), robots)
+        self._pose, self._alive = np.zeros((rows, 3)), np.zeros(rows, np.bool_)
+        self._others_alive = np.zeros(rows, np.int64)
+        self._now_ns = 0
+        self._on_air = Transmissions.none()  # packets of `_links`
+        self._links = Links.none(len(radio.gives.columns))
+
+    def hold(self, pose: FloatArray, alive: BoolArray) -> None:
+        """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive."""
+        self._pose, self._alive = pose.copy(), alive.copy()
+        in_arena = alive.reshape(-1, self._robots).sum(axis=1)
+        self._others_alive = np.repeat(in_arena, self._robots) - alive
+
+    def send(self, at_ns: int, tick: int, sent: Sent) -> None:
+        """Queue the packets that agents sent in the tick that started at `at_ns`; `hold` has told the tick's poses.
+
+        A broadcast intends every other robot of the arena that is alive now; an addressed packet its one receiver.
+        Senders may stand in any order. ValueError, and nothing changed, for a receiver outside the arena or the sender
+        itself, or for a time that has passed.
+        """
+        self._refuse(at_ns, sent)
+        if not len(sent):
+            return
+        packets = self._senders.accept(at_ns, tick, sent, self._others_alive)
+        self._accounts.take_up(packets)
+
+    def advance(self, until_ns: int) -> News:
+        """Let time pass to `until_ns`, with the poses held: what goes on air before it, what is final by it.
+
+        What happens at a sender's radio at `until_ns` itself belongs to the poses held next, and so to the next call.
+        """
+        if until_ns < self._now_ns:
+            raise ValueError(f"until_ns: expected at least {self._now_ns}, got {until_ns}")
+        self._now_ns = until_ns
+        self._put_on_air(until_ns)
+        final = self._links.final_at_ns <= until_ns
+        ended = self._links.select(np.flatnonzero(final))
+        self._accounts.settle(ended)
+        told = News(
+            news.heard(ended, self._on_air, self._radio.gives.columns, self._robots, len(self._pose)),
+            news.finished(ended, self._on_air, self._robots),
+            self._accounts.close(),
+        )
+        self._keep(np.flatnonzero(~final))
+        return told
+
+    def end(self) -> Tally:
+        """The run is over: what is queued or on its way ends as IN_FLIGHT."""
+        self._accounts.strand(self._links, self._senders.leave(NEVER_NS))
+        self._keep(np.empty(0, np.int64))
+        return self._accounts.close()
+
+    def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
+        """The radio graph over robots that stand at `pose`: pairs of robot rows a < b, sorted, (e, 2).
+
+        Two robots alive are joined where a lone packet gets through with at least `min_delivery`.
+        """
+        return self._channel.edges(pose, alive)
+
+    def _refuse(self, at_ns: int, sent: Sent) -> None:
+        if at_ns < self._now_ns:
+            raise ValueError(f"at_ns: expected at least {self._now_ns}, got {at_ns}")
+        addressed = sent.to != BROADCAST
+        wrong = addressed & ((sent.to < 0) | (sent.to >= self._robots) | (sent.to == sent.sender % self._robots))
+        if wrong.any():
+            raise ValueError(f"to: expected another robot of the arena's {self._robots}, got {sent.to[wrong][0]}")
+
+    def _put_on_air(self, until_ns: int) -> None:
+        packets = self._senders.leave(until_ns)
+        if not packets:
+            return
+        links = self._channel.decide(packets, self._pose, self._alive)
+        self._links = self._links.followed_by(links._replace(packet=links.packet + len(self._on_air.sender)))
+        self._on_air = self._on_air.followed_by(packets)
+
+    def _keep(self, index: IntArray) -> None:
+        """Keep these links and their packets only."""
+        kept, packet = news.compacted(self._links.packet[index], len(self._on_air.sender))
+        self._links = self._links.select(index)._replace(packet=packet)
+        self._on_air = self._on_air.select(kept)

@@ -1,0 +1,71 @@
+"""The way from senders' radios to receivers: links in range, then the chain of stages. Keeps no state of its own."""
+
+import numpy as np
+
+from swarmwire.comms.air.links import HEARD, THE_REST, Links
+from swarmwire.comms.air.reach import links_in_range
+from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.air.stages import chain
+from swarmwire.comms.air.transmissions import Transmissions
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import BROADCAST
+
+# 1 - 0.9 is a hair below 0.1.
+ROUNDING = 1e-9
+
+
+class Channel:
+    """Decides what becomes of packets at robots that stand at given poses."""
+
+    def __init__(self, medium: Medium, size_m: tuple[float, float]) -> None:
+        self._radio, self._arenas, self._size_m = medium.radio, len(medium.keys), size_m
+        self._columns = len(medium.radio.gives.columns)
+        self._stages = chain(medium)
+
+    def decide(self, packets: Transmissions, pose: FloatArray, alive: BoolArray) -> Links:
+        """What becomes of packets that go on air, or are refused, while robots stand at `pose`."""
+        # No geometry for what is too large; for a full queue it tells how many it would have reached.
+        tried = np.flatnonzero(packets.fate != Fate.TOO_LARGE)
+        found, receiver = self._reach(pose, alive, packets.sender[tried], packets.to[tried])
+        packet = tried[found]
+        sender, sequence, end_ns = packets.sender[packet], packets.sequence[packet], packets.off_air_at_ns[packet]
+        links = Links.under_way(packet, sender, receiver, sequence, end_ns, self._columns)
+        for stage in self._stages:
+            stage.decide(links, pose)
+        return _with_the_rest(links, packets, self._columns)
+
+    def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
+        """Pairs of robot rows a < b joined in the radio graph, sorted, (e, 2)."""
+        senders = np.flatnonzero(alive)
+        found, b = self._reach(pose, alive, senders, np.full(len(senders), BROADCAST))
+        rising = senders[found] < b
+        a, b = senders[found][rising], b[rising]
+        zero = np.zeros(len(a), np.int64)
+        links = Links.under_way(zero, a, b, zero, zero, 0)
+        probability = np.ones(len(a))
+        for stage in self._stages:
+            probability *= stage.delivery(links, pose)
+        pair = (a * len(pose) + b)[probability >= self._radio.min_delivery - ROUNDING]
+        return np.stack(np.divmod(np.sort(pair), len(pose)), axis=1)
+
+    def _reach(self, pose: FloatArray, alive: BoolArray, sender: IntArray, to: IntArray) -> tuple[IntArray, IntArray]:
+        return links_in_range(pose, alive, self._arenas, self._size_m, self._radio.range_m, sender, to)
+
+
+def _with_the_rest(links: Links, packets: Transmissions, columns: int) -> Links:
+    """The links of packets that went on air, then a row per packet for all its other intended receivers."""
+    k = len(packets.sender)
+    refused = packets.fate != HEARD
+    in_range = np.zeros(k, np.int64)
+    if refused.any():
+        never = refused[links.packet]
+        np.add.at(in_range, links.packet[never], links.in_range[never])
+        links = links.select(np.flatnonzero(~never))
+    others = packets.intended - np.bincount(links.packet, minlength=k)
+    fate = np.where(refused, packets.fate, Fate.OUT_OF_RANGE)
+    receiver, given = np.full(k, THE_REST), np.zeros((k, columns))
+    final_at_ns = packets.off_air_at_ns
+    return links.followed_by(
+        Links(np.arange(k), packets.sender, receiver, packets.sequence, others, in_range, fate, final_at_ns, given)
+    )

@@ -1,0 +1,54 @@
+"""What the air tells after time has passed: packets heard, and links whose fate became final."""
+
+import numpy as np
+
+from swarmwire.comms.air.links import HEARD, THE_REST, Links
+from swarmwire.comms.air.order import by_receiver
+from swarmwire.comms.air.transmissions import Transmissions
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.truth import Finished
+
+
+def heard(ended: Links, packets: Transmissions, gives: tuple[str, ...], robots: int, rows: int) -> Heard:
+    """The links that were heard, sorted by (receiver, heard_at, sender, sequence)."""
+    index = np.flatnonzero(ended.fate == HEARD)
+    if not len(index):
+        return Heard.none(gives)
+    index = index[by_receiver(ended.receiver[index], ended.final_at_ns[index], ended.sender[index], rows)]
+    kept, payload = compacted(ended.packet[index], len(packets.sender))
+    given = ended.given[index]
+    return Heard(
+        receiver=ended.receiver[index],
+        sender=ended.sender[index] % robots,
+        sequence=ended.sequence[index],
+        heard_at_ns=ended.final_at_ns[index],
+        given={name: np.ascontiguousarray(given[:, column]) for column, name in enumerate(gives)},
+        payload=payload,
+        payloads=packets.payloads.rows(kept),
+    )
+
+
+def finished(ended: Links, packets: Transmissions, robots: int) -> Finished:
+    """The links whose fate is final, without those that are only counted."""
+    index = np.flatnonzero(ended.receiver != THE_REST)
+    packet, sender = ended.packet[index], ended.sender[index]
+    return Finished(
+        arena=sender // robots,
+        sender=sender % robots,
+        receiver=ended.receiver[index] % robots,
+        sequence=ended.sequence[index],
+        sent_at_ns=packets.sent_at_ns[packet],
+        on_air_at_ns=packets.on_air_at_ns[packet],
+        final_at_ns=ended.final_at_ns[index],
+        fate=ended.fate[index],
+        size_bytes=packets.payloads.sizes[packet],
+        tag=packets.tag[packet],
+    )
+
+
+def compacted(index: IntArray, rows: int) -> tuple[IntArray, IntArray]:
+    """Which of `rows` rows are referred to, rising, and `index` renumbered to refer to these only."""
+    used = np.zeros(rows, np.bool_)
+    used[index] = True
+    return np.flatnonzero(used), (np.cumsum(used) - 1)[index]

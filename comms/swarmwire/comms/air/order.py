@@ -1,0 +1,38 @@
+"""The order in which robots get what they heard."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import IntArray
+
+
+@njit(cache=True)
+def by_receiver(receiver: IntArray, heard_at_ns: IntArray, sender: IntArray, rows: int) -> IntArray:
+    """The order by (receiver, heard_at, sender) that keeps ties as they stand, (k,); robots are rows."""
+    # Counting sorts by robot leave only the few packets of one receiver to compare.
+    order, _ = _counting_sort(np.arange(len(sender)), sender, rows)
+    order, start = _counting_sort(order, receiver, rows)
+    for row in range(rows):
+        own = order[start[row] : start[row + 1]]
+        for k in range(1, len(own)):
+            if heard_at_ns[own[k - 1]] > heard_at_ns[own[k]]:
+                own[:] = own[np.argsort(heard_at_ns[own], kind="mergesort")]
+                break
+    return order
+
+
+@njit(cache=True)
+def _counting_sort(order, row_of, rows):
+    start = np.zeros(rows + 1, np.int64)
+    for i in order:
+        start[row_of[i] + 1] += 1
+    for row in range(rows):
+        start[row + 1] += start[row]
+    filled = start[:-1].copy()
+    out = np.empty_like(order)
+    for i in order:
+        out[filled[row_of[i]]] = i
+        filled[row_of[i]] += 1
+    return out, start

@@ -1,0 +1,75 @@
+"""The senders' side of all radios: packets are numbered, queued, and leave when they go on air or are refused."""
+
+import numpy as np
+
+from swarmwire.comms.air import access
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.send_times import SendTimes
+from swarmwire.comms.air.transmissions import Transmissions
+from swarmwire.comms.arrays import IntArray, KeyArray
+from swarmwire.comms.packets import BROADCAST, Sent
+
+
+class Senders:
+    """Each robot's radio: a queue, first in, first out, and a count of the packets that it was handed."""
+
+    def __init__(self, radio: Radio, keys: KeyArray, robots: int, rate_hz: int) -> None:
+        self._radio = radio
+        self._send_times = SendTimes(radio.send_offset, keys, robots, rate_hz)
+        self._rows = len(keys) * robots
+        self._sent_before = np.zeros(self._rows, np.int64)
+        self._free_at_ns = np.zeros(self._rows, np.int64)
+        self.queued = Transmissions.none()
+
+    def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray) -> Transmissions:
+        """The packets as the radios take them up, sorted by sender; also kept in `queued`.
+
+        `others_alive` (rows,) are the receivers that a robot's broadcast intends.
+        """
+        # By sender, so that nothing depends on how the crew was divided.
+        order = np.argsort(sent.sender, kind="stable")
+        sender, to, payloads = sent.sender[order], sent.to[order], sent.payloads.rows(order)
+        sent_at_ns = self._send_times.at(at_ns, tick)
+        on_air_at_ns, off_air_at_ns, fate = self._access(sent_at_ns, sender, payloads.sizes)
+        packets = Transmissions(
+            sender=sender,
+            to=to,
+            sequence=self._numbers(sender),
+            intended=np.where(to == BROADCAST, others_alive[sender], 1),
+            tag=payloads.tags(),
+            sent_at_ns=sent_at_ns[sender],
+            on_air_at_ns=on_air_at_ns,
+            off_air_at_ns=off_air_at_ns,
+            fate=fate,
+            payloads=payloads,
+        )
+        self.queued = self.queued.followed_by(packets)
+        return packets
+
+    def leave(self, until_ns: int) -> Transmissions:
+        """Take out of the queues what goes on air, or is refused, before `until_ns`."""
+        due = self.queued.on_air_at_ns < until_ns
+        packets = self.queued.select(np.flatnonzero(due))
+        self.queued = self.queued.select(np.flatnonzero(~due))
+        return packets
+
+    def _access(self, sent_at_ns: IntArray, sender: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+        radio = self._radio
+        airtime_ns = access.airtime_ns(sizes, radio.overhead_bytes, radio.bit_rate_bps)
+        on_air_at_ns, fate, self._free_at_ns = access.enter(
+            sent_at_ns,
+            self._free_at_ns,
+            self.queued.sender,
+            self.queued.on_air_at_ns,
+            sender,
+            airtime_ns,
+            sizes > radio.max_payload_bytes,
+            radio.queue_limit,
+        )
+        return on_air_at_ns, on_air_at_ns + np.where(fate == access.ACCEPTED, airtime_ns, 0), fate
+
+    def _numbers(self, sender: IntArray) -> IntArray:
+        """The sequence numbers of packets sorted by sender."""
+        sequence = self._sent_before[sender] + np.arange(len(sender)) - np.searchsorted(sender, sender)
+        self._sent_before += np.bincount(sender, minlength=self._rows)
+        return sequence

@@ -1,0 +1,35 @@
+"""What a stage of the channel is, and what it may know."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+from swarmwire.comms.air.links import Links
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.arrays import FloatArray, KeyArray
+from swarmwire.comms.geometry import Obstacles
+
+
+@dataclass(frozen=True, slots=True)
+class Medium:
+    """What stages are made from."""
+
+    radio: Radio
+    keys: KeyArray  # (arenas,) for draws
+    robots: int  # in each arena
+    obstacles: Obstacles
+
+
+class Stage(ABC):
+    """One step in the life of a packet between the sender's radio and one receiver."""
+
+    @abstractmethod
+    def decide(self, links: Links, pose: FloatArray) -> None:
+        """Give a fate to links that end here, or change what becomes of the others; in place.
+
+        Only links with fate HEARD are still under way. `pose` (rows, 3) is that at `on_air_at`: x, y in m, heading.
+        A stage before reception that ends a link also sets its `in_range` to 0.
+        """
+
+    def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
+        """With which probability lone packets pass, fast fading apart, (k,) or one for all: for the radio graph."""
+        return 1.0

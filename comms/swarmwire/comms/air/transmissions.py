@@ -1,0 +1,47 @@
+"""Packets at or beyond their sender's radio, as a table."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.packets import Payloads
+
+
+class Transmissions(NamedTuple):
+    """A row per packet, those of one sender in the order in which it sent them.
+
+    A packet that its sender's radio refused never goes on air: its three times are then all `sent_at_ns`.
+    """
+
+    sender: IntArray  # (k,) robot row
+    to: IntArray  # (k,) index in the arena of the one receiver, or BROADCAST
+    sequence: IntArray  # (k,) packets that the sender had sent before this one, refused ones too
+    intended: IntArray  # (k,) receivers that it is meant for
+    tag: IntArray  # (k,) topic
+    sent_at_ns: IntArray  # (k,) handed to the sender's radio
+    on_air_at_ns: IntArray  # (k,) the first bit
+    off_air_at_ns: IntArray  # (k,) the end of the last bit
+    fate: IntArray  # (k,) HEARD: accepted, to be decided for each receiver; else the fate for all of them
+    payloads: Payloads  # (k,)
+
+    @classmethod
+    def none(cls) -> "Transmissions":
+        """No packets."""
+        return cls._make([*[np.empty(0, np.int64)] * 9, Payloads.of([])])
+
+    def __bool__(self) -> bool:
+        return len(self.sender) > 0
+
+    def select(self, index: IntArray) -> "Transmissions":
+        """The packets of `index`, in its order."""
+        if len(index) == len(self.sender) and np.array_equal(index, np.arange(len(index))):
+            return self
+        return Transmissions._make([*(column[index] for column in self[:-1]), self.payloads.rows(index)])
+
+    def followed_by(self, later: "Transmissions") -> "Transmissions":
+        """These packets and then the later ones."""
+        if not (self and later):
+            return self or later
+        columns = [np.concatenate(pair) for pair in zip(self[:-1], later[:-1], strict=True)]
+        return Transmissions._make([*columns, Payloads.joined([self.payloads, later.payloads])])
