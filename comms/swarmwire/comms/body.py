@@ -4,6 +4,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
 from importlib.resources import files
+from math import isfinite
 from typing import Any, cast, get_args, get_origin, get_type_hints
 
 from swarmwire.comms.errors import BadInput
@@ -124,6 +125,8 @@ def _value(hint: Any, value: object, where: str, key: str) -> Any:
     if hint is float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise BadInput(where, key, f"expected a number, got {value!r}")
+        if not isfinite(value):
+            raise BadInput(where, key, f"expected a finite number, got {value!r}")
         return float(value)
     if get_origin(hint) is tuple:
         if not isinstance(value, list | tuple) or not value:

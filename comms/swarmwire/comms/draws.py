@@ -95,7 +95,10 @@ SQRT2 = 1.4142135623730951
 
 def derive_key(*parts: int | str) -> int:
     """A 64-bit key for whatever `parts` name; one-way, so that a holder learns nothing of the parts (BLAKE2b)."""
-    digest = blake2b(repr(parts).encode(), digest_size=8, person=b"swarmwire").digest()
+    plain = tuple(
+        str(part) if isinstance(part, str) else int(part) for part in parts
+    )  # numpy's scalars print otherwise
+    digest = blake2b(repr(plain).encode(), digest_size=8, person=b"swarmwire").digest()
     return int.from_bytes(digest, "little")
 
 

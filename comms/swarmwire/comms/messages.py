@@ -35,7 +35,7 @@ class Message:
     """Base of all messages; subclasses declare their fields with `f4`, `f8`, `i1` … `u4`.
 
     Raises TypeError where a class declares a field of another type or an instance is made with a missing or unknown
-    field, and OverflowError where a number does not fit its field.
+    field; `encode` raises OverflowError where a number does not fit its field.
     """
 
     layout: ClassVar[np.dtype[Any]] = np.dtype([])
@@ -48,6 +48,8 @@ class Message:
         for name, hint in get_type_hints(cls, include_extras=True).items():
             if get_origin(hint) is ClassVar:
                 continue
+            if hasattr(Message, name):
+                raise TypeError(f"{cls.__name__}.{name}: the name is taken by Message")
             dtype: object = get_args(hint)[-1] if get_origin(hint) is Annotated else None
             if not isinstance(dtype, np.dtype):
                 raise TypeError(f"{cls.__name__}.{name}: expected one of f4, f8, i1, i2, i4, u1, u2, u4")
@@ -101,6 +103,8 @@ def encode_rows(kind: type[Message], rows: int, fields: dict[str, Any]) -> Paylo
         values = np.broadcast_to(np.asarray(fields[name], np.float64), (rows,))
         if column.dtype.kind in "iu":
             values = _whole(kind, name, values, column.dtype)
+        elif np.any(np.isfinite(values) & (np.abs(values) > np.finfo(column.dtype).max)):
+            raise OverflowError(f"{kind.__name__}.{name}: expected numbers up to {np.finfo(column.dtype).max:g}")
         column[:] = values
     return Payloads(table.view(np.uint8).reshape(-1), offsets(np.full(rows, kind.size_bytes, np.int64)))
 

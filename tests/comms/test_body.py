@@ -1,0 +1,156 @@
+"""Bodies: the data sheets that come along are ARGoS's robots, and a bad sheet is refused with its place in it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.body import Body, body_from, body_names, load_body
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.sheets import Proximity
+
+
+def proximity_of(name: str) -> Proximity:
+    sheet = load_body(name).proximity
+    assert sheet is not None
+    return sheet
+
+
+@pytest.mark.parametrize("name", body_names())
+def test_every_body_that_comes_along_loads_under_its_name(name: str) -> None:
+    assert load_body(name).name == name
+
+
+@pytest.mark.parametrize("name", body_names())
+def test_a_body_written_down_reads_back_the_same(name: str) -> None:
+    body = load_body(name)
+    assert body_from(body.as_mapping(), "copy.toml") == body
+
+
+def test_an_unknown_body_is_refused_with_those_that_there_are() -> None:
+    with pytest.raises(BadInput, match=r"body: expected one of epuck, .*; got 'roomba'"):
+        load_body("roomba")
+
+
+@pytest.mark.parametrize(
+    ("name", "distance_m", "value"),
+    [
+        ("epuck", 0.005, 0.905),
+        ("epuck", 0.01, 0.743),
+        ("epuck", 0.02, 0.464),
+        ("epuck", 0.03, 0.244),
+        ("epuck", 0.04, 0.084),
+        ("footbot", 0.02, 0.4986),
+        ("footbot", 0.05, 0.2004),
+        ("footbot", 0.10, 0.1004),
+    ],
+)
+def test_proximity_answers_as_in_argos(name: str, distance_m: float, value: float) -> None:
+    digits = 3 if name == "epuck" else 4
+    assert round(float(proximity_of(name).response.value(np.float64(distance_m))), digits) == value
+
+
+def test_the_epuck_sees_nothing_from_48_mm_on() -> None:
+    assert not proximity_of("epuck").response.value(np.linspace(0.048, 0.2, 100)).any()
+
+
+def test_the_footbot_answers_fully_at_the_rim_and_not_beyond_10_cm() -> None:
+    response = proximity_of("footbot").response
+    assert response.value(np.array([0.0, 0.009])).tolist() == [1.0, 1.0]
+    assert response.value(np.array([0.1001, 1.0])).tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("name", body_names())
+@given(st.floats(0.0, 0.2))
+def test_a_response_names_the_distance_it_came_from(name: str, distance_m: float) -> None:
+    response = proximity_of(name).response
+    value = response.value(np.array([distance_m]))
+    if 1e-9 < value[0] < 1.0:
+        assert response.distance_m(value)[0] == pytest.approx(distance_m, abs=1e-9)
+    elif value[0] == 0.0:
+        assert response.distance_m(value)[0] == response.reach_m
+
+
+@pytest.mark.parametrize("name", body_names())
+def test_a_stronger_response_never_means_farther_away(name: str) -> None:
+    response = proximity_of(name).response
+    distance_m = response.distance_m(np.linspace(0.0, 1.0, 1001))
+    assert np.all(np.diff(distance_m) <= 0.0)
+    assert 0.0 <= distance_m.min() <= distance_m.max() == response.reach_m
+
+
+@pytest.mark.parametrize("name", body_names())
+def test_rays_are_mirrored_left_and_right_and_lie_within_half_a_turn(name: str) -> None:
+    angle = proximity_of(name).angle_rad
+    assert np.all((angle > -np.pi) & (angle <= np.pi))
+    assert np.allclose(np.sort(angle), np.sort(-angle))
+
+
+def test_the_turning_limit_follows_from_wheels_and_axle() -> None:
+    body = load_body("epuck")
+    assert body.max_angular_radps == pytest.approx(2.0 * body.drive.max_wheel_mps / body.drive.wheel_base_m)
+    assert body.max_linear_mps == body.drive.max_wheel_mps
+
+
+def test_a_body_without_a_sense_has_no_sheet_for_it() -> None:
+    body = body_from({**sheet_of("epuck"), "senses": {}}, "blind.toml")
+    assert (body.proximity, body.compass, body.odometry) == (None, None, None)
+
+
+def sheet_of(name: str) -> dict[str, Any]:
+    return load_body(name).as_mapping()
+
+
+def changed(path: str, value: object) -> dict[str, Any]:
+    """The e-puck's sheet with one value put in place, or taken away where it is None."""
+    sheet = sheet_of("epuck")
+    *tables, key = path.split(".")
+    table = sheet
+    for name in tables:
+        table = table[name]
+    table[key] = value
+    if value is None:
+        del table[key]
+    return sheet
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "expected"),
+    [
+        ("radius_m", None, "radius_m: is missing"),
+        ("drive", None, "drive: is missing"),
+        ("drive.wheel_base_m", None, "drive.wheel_base_m: is missing"),
+        ("colour", "red", "colour: unknown key; expected one of name, source, radius_m"),
+        ("drive.gears", 3, "drive.gears: unknown key; expected one of wheel_base_m"),
+        ("senses.lidar", {}, "senses.lidar: unknown sense; expected one of proximity, compass, odometry"),
+        ("senses", 3, "senses: expected a table, got 3"),
+        ("senses.compass", True, "senses.compass: expected a table, got True"),
+        ("drive", [], "drive: expected a table, got []"),
+        ("name", 3, "name: expected a text, got 3"),
+        ("radius_m", "big", "radius_m: expected a number, got 'big'"),
+        ("radius_m", True, "radius_m: expected a number, got True"),
+        ("radius_m", 0.0, "radius_m: expected more than 0 m, got 0.0"),
+        ("radius_m", float("nan"), "radius_m: expected a finite number, got nan"),
+        ("radius_m", float("inf"), "radius_m: expected a finite number, got inf"),
+        ("senses.compass.noise_rad", -1, "senses.compass.noise_rad: expected at least 0 rad, got -1.0"),
+        ("senses.odometry.slip", 2, "senses.odometry.slip: expected at most 1, got 2.0"),
+        ("senses.proximity.response.kind", "cubic", "response.kind: expected one of rational, quadratic; got 'cubic'"),
+        ("senses.proximity.angles_deg", 17, "senses.proximity.angles_deg: expected a list, got 17"),
+        ("senses.proximity.angles_deg", [], "senses.proximity.angles_deg: expected a list, got []"),
+        ("senses.proximity.angles_deg", [1, "x"], "senses.proximity.angles_deg[1]: expected a number, got 'x'"),
+    ],
+)
+def test_a_bad_sheet_is_refused_with_file_key_and_what_was_expected(path: str, value: object, expected: str) -> None:
+    with pytest.raises(BadInput) as refused:
+        body_from(changed(path, value), "mine.toml")
+    assert str(refused.value).startswith("mine.toml: ")
+    assert expected in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_whole_numbers_serve_as_numbers() -> None:
+    body = body_from(changed("mass_kg", 2), "mine.toml")
+    assert isinstance(body, Body)
+    assert (body.mass_kg, type(body.mass_kg)) == (2.0, float)

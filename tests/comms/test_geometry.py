@@ -1,0 +1,130 @@
+"""Rays and lines of sight: where a ray ends lies on the obstacle, and nothing of the obstacle comes before."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.geometry import is_blocked, obstacle_arrays, ray_to_box, ray_to_circle
+from swarmwire.comms.truth import Obstacle
+
+FAR_M = 20.0
+Depth = Callable[[FloatArray, FloatArray], FloatArray]
+
+
+def circle_depth(cx: float, cy: float, radius: float) -> Depth:
+    """How far outside the circle points are, in m; negative inside."""
+    return lambda x, y: np.hypot(x - cx, y - cy) - radius
+
+
+def box_depth(box: FloatArray) -> Depth:
+    """How far outside the box points are along its worse axis, in m; negative inside."""
+    c, s = box[4], box[5]
+
+    def depth(x: FloatArray, y: FloatArray) -> FloatArray:
+        ox, oy = x - box[0], y - box[1]
+        return np.maximum(np.abs(c * ox + s * oy) - box[2], np.abs(c * oy - s * ox) - box[3])
+
+    return depth
+
+
+def check_ray(distance: float, depth: Depth, px: float, py: float, angle: float) -> None:
+    """`distance` is that of the first point of the ray in the obstacle, by a fine search along the ray."""
+    if distance == 0.0:
+        assert depth(np.array(px), np.array(py)) <= 1e-12
+        return
+    dx, dy = math.cos(angle), math.sin(angle)
+    along = np.linspace(0.0, min(distance, FAR_M), 4001)[:-1]
+    assert np.all(depth(px + along * dx, py + along * dy) > -1e-9)
+    if math.isfinite(distance):
+        assert abs(depth(np.array(px + distance * dx), np.array(py + distance * dy))) < 1e-9
+
+
+def test_rays_end_where_they_first_meet_a_circle() -> None:
+    random = np.random.default_rng(1)
+    outcomes = set[str]()
+    for px, py, angle, cx, cy, radius in random.uniform([-3, -3, -4, -3, -3, 0.1], [3, 3, 4, 3, 3, 2], (300, 6)):
+        distance = ray_to_circle(px, py, math.cos(angle), math.sin(angle), cx, cy, radius)
+        check_ray(distance, circle_depth(cx, cy, radius), px, py, angle)
+        outcomes.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
+    assert outcomes == {"inside", "miss", "hit"}
+
+
+def test_rays_end_where_they_first_meet_a_box() -> None:
+    random = np.random.default_rng(2)
+    outcomes = set[str]()
+    for px, py, angle, *rest in random.uniform([-3, -3, -4, -3, -3, 0.1, 0.1, -4], [3, 3, 4, 3, 3, 2, 2, 4], (300, 8)):
+        cx, cy, half_length, half_width, heading = rest
+        box = np.array([cx, cy, half_length, half_width, math.cos(heading), math.sin(heading)])
+        distance = ray_to_box(px, py, math.cos(angle), math.sin(angle), box)
+        check_ray(distance, box_depth(box), px, py, angle)
+        outcomes.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
+    assert outcomes == {"inside", "miss", "hit"}
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "dx", "dy", "expected"),
+    [
+        (-3.0, 0.0, 1.0, 0.0, 2.0),
+        (-3.0, 0.4, 1.0, 0.0, 2.0),
+        (-3.0, 0.6, 1.0, 0.0, math.inf),  # beside it, parallel to a side
+        (-3.0, 0.0, -1.0, 0.0, math.inf),  # behind
+        (0.0, 3.0, 0.0, -1.0, 2.5),
+        (0.9, 0.4, 1.0, 0.0, 0.0),  # from inside
+    ],
+)
+def test_rays_along_the_sides_of_a_box(x: float, y: float, dx: float, dy: float, expected: float) -> None:
+    assert ray_to_box(x, y, dx, dy, np.array([0.0, 0.0, 1.0, 0.5, 1.0, 0.0])) == expected
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "expected"), [(-3.0, 0.0, 2.0), (3.0, 0.0, math.inf), (0.5, 0.0, 0.0), (-3.0, 1.1, math.inf)]
+)
+def test_rays_ahead_at_a_circle(x: float, y: float, expected: float) -> None:
+    assert ray_to_circle(x, y, 1.0, 0.0, 0.0, 0.0, 1.0) == expected
+
+
+ARENAS = (
+    (Obstacle("cylinder", 0.0, 0.0, radius_m=0.5), Obstacle("box", 2.0, 0.0, math.pi / 4, size_m=(1.0, 1.0))),
+    (),
+    (Obstacle("box", 0.0, 1.0, size_m=(4.0, 0.2)),),
+)
+
+
+@pytest.mark.parametrize(
+    ("arena", "line", "blocked"),
+    [
+        (0, (-1.0, 0.0, 1.0, 0.0), True),
+        (0, (-1.0, 0.0, -0.6, 0.0), False),  # ends before the cylinder
+        (0, (-1.0, 0.6, 1.0, 0.6), False),
+        (0, (2.65, -1.0, 2.65, 1.0), True),  # the corner of the turned box
+        (0, (2.75, -1.0, 2.75, 1.0), False),
+        (1, (-1.0, 0.0, 1.0, 0.0), False),
+        (2, (-1.0, 0.0, 1.0, 0.0), False),
+        (2, (0.0, 0.0, 0.0, 2.0), True),
+        (2, (1.0, 0.5, 1.0, 0.5), False),  # no line at all
+    ],
+)
+def test_an_obstacle_blocks_lines_of_its_own_arena_only(
+    arena: int, line: tuple[float, float, float, float], blocked: bool
+) -> None:
+    x0, y0, x1, y1 = line
+    obstacles = obstacle_arrays(ARENAS)
+    assert is_blocked(obstacles, arena, x0, y0, x1, y1) is blocked
+    assert is_blocked(obstacles, arena, x1, y1, x0, y0) is blocked
+
+
+def test_a_line_is_blocked_from_both_ends_alike() -> None:
+    obstacles = obstacle_arrays(ARENAS)
+    for x0, y0, x1, y1 in np.random.default_rng(3).uniform(-3.0, 3.0, (500, 4)):
+        assert is_blocked(obstacles, 0, x0, y0, x1, y1) == is_blocked(obstacles, 0, x1, y1, x0, y0)
+
+
+def test_obstacles_of_each_arena_stand_together() -> None:
+    obstacles = obstacle_arrays(ARENAS)
+    assert obstacles.circle_start.tolist() == [0, 1, 1, 1]
+    assert obstacles.box_start.tolist() == [0, 1, 1, 2]
+    assert obstacles.circle.shape == (1, 3)
+    assert obstacle_arrays(((), ())).box.shape == (0, 6)

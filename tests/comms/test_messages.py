@@ -1,0 +1,215 @@
+"""Messages: exact bytes on air, and nothing quietly cut to fit."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.messages import (
+    DICT_TAG,
+    Message,
+    decode_dict,
+    decode_rows,
+    encode_dict,
+    encode_rows,
+    f4,
+    f8,
+    i1,
+    i2,
+    i4,
+    u1,
+    u2,
+    u4,
+)
+from swarmwire.comms.packets import TAG_BYTES, Payloads
+
+
+class Everything(Message):
+    single: f4
+    double: f8
+    a: i1
+    b: i2
+    c: i4
+    d: u1
+    e: u2
+    f: u4
+
+
+class Beacon(Message):
+    heading_rad: f4
+
+
+class Here(Message):
+    pass
+
+
+class Numbered(Beacon):
+    number: u2
+
+
+def whole(bits: int, signed: bool) -> st.SearchStrategy[float]:
+    low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
+    return st.integers(low, high).map(float)
+
+
+everything = st.builds(
+    Everything,
+    single=st.floats(width=32, allow_nan=False),
+    double=st.floats(allow_nan=False),
+    a=whole(8, True),
+    b=whole(16, True),
+    c=whole(32, True),
+    d=whole(8, False),
+    e=whole(16, False),
+    f=whole(32, False),
+)
+
+
+@given(everything)
+def test_what_is_decoded_is_what_was_encoded(message: Everything) -> None:
+    assert Everything.decode(message.encode()) == message
+
+
+@given(everything)
+def test_decoded_fields_are_plain_floats(message: Everything) -> None:
+    decoded = Everything.decode(message.encode())
+    assert all(type(value) is float for value in vars(decoded).values())
+
+
+@given(st.floats(-1e30, 1e30))
+def test_a_narrow_field_carries_the_nearest_number_it_can(value: float) -> None:
+    assert Beacon.decode(Beacon(heading_rad=value).encode()).heading_rad == float(np.float32(value))
+
+
+def test_the_size_on_air_is_the_tag_and_the_fields_without_padding() -> None:
+    assert Everything.size_bytes == TAG_BYTES + 4 + 8 + 1 + 2 + 4 + 1 + 2 + 4
+    assert Here.size_bytes == TAG_BYTES
+    for message in (Here(), Beacon(heading_rad=1.0), Numbered(heading_rad=1.0, number=2)):
+        assert len(message.encode()) == type(message).size_bytes
+
+
+def test_bytes_on_air_are_little_endian_after_the_tag() -> None:
+    assert Numbered(heading_rad=1.0, number=0x0102).encode()[TAG_BYTES:] == bytes.fromhex("0000803f 0201")
+
+
+def test_a_message_starts_with_its_tag() -> None:
+    assert int.from_bytes(Beacon(heading_rad=0.0).encode()[:TAG_BYTES], "little") == Beacon.tag
+
+
+def test_the_tag_differs_with_the_name_and_with_the_fields() -> None:
+    def made(name: str, **fields: Any) -> int:
+        return type(name, (Message,), {"__annotations__": fields}).tag
+
+    kinds = [made("A", x=f4), made("B", x=f4), made("A", y=f4), made("A", x=f8), made("A", x=f4, y=f4), made("A")]
+    assert len(set(kinds)) == len(kinds)
+    assert made("A", x=f4) == made("A", x=f4)
+    assert all(DICT_TAG < tag < 2**16 for tag in kinds)
+
+
+def test_a_message_is_frozen() -> None:
+    beacon = Beacon(heading_rad=1.0)
+    with pytest.raises(AttributeError, match=r"frozen: Beacon\.heading_rad"):
+        beacon.heading_rad = 2.0
+    assert beacon.heading_rad == 1.0
+
+
+def test_equal_messages_are_equal_and_hash_alike() -> None:
+    assert Beacon(heading_rad=1.0) == Beacon(heading_rad=1)
+    assert hash(Beacon(heading_rad=1.0)) == hash(Beacon(heading_rad=1))
+    assert Beacon(heading_rad=1.0) != Beacon(heading_rad=2.0)
+    assert Beacon(heading_rad=1.0) != Here()
+
+
+@pytest.mark.parametrize("fields", [{}, {"heading_rad": 1.0, "speed_mps": 2.0}, {"heading": 1.0}])
+def test_a_missing_or_unknown_field_is_refused(fields: dict[str, float]) -> None:
+    with pytest.raises(TypeError, match="Beacon has the fields heading_rad"):
+        Beacon(**fields)
+    with pytest.raises(TypeError, match="Beacon has the fields heading_rad"):
+        encode_rows(Beacon, 1, fields)
+
+
+@pytest.mark.parametrize("hint", [float, int, str, "list[float]"])
+def test_a_field_of_another_type_is_refused_where_the_class_is_made(hint: object) -> None:
+    with pytest.raises(TypeError, match=r"Odd\.x: expected one of f4"):
+        type("Odd", (Message,), {"__annotations__": {"x": hint}})
+
+
+@pytest.mark.parametrize("name", ["encode", "layout", "size_bytes", "tag"])
+def test_a_field_cannot_take_a_name_that_messages_use(name: str) -> None:
+    with pytest.raises(TypeError, match=rf"Odd\.{name}: .*taken"):
+        type("Odd", (Message,), {"__annotations__": {name: f4}})
+
+
+@pytest.mark.parametrize(("name", "value"), [("a", 128), ("a", -129), ("d", -1), ("d", 256), ("e", 65536), ("f", -1)])
+def test_a_number_beyond_a_whole_field_is_refused(name: str, value: float) -> None:
+    fields = dict.fromkeys(Everything.layout.names or (), 0.0) | {name: value}
+    with pytest.raises(OverflowError, match=rf"Everything\.{name}: expected whole numbers from"):
+        Everything(**fields).encode()
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_what_is_no_number_does_not_fit_a_whole_field(value: float) -> None:
+    with pytest.raises(OverflowError, match=r"Numbered\.number"):
+        Numbered(heading_rad=0.0, number=value).encode()
+
+
+@pytest.mark.parametrize("value", [1e39, -1e39])
+def test_a_number_beyond_a_narrow_float_is_refused(value: float) -> None:
+    with pytest.raises(OverflowError, match=r"Beacon\.heading_rad"):
+        Beacon(heading_rad=value).encode()
+
+
+@pytest.mark.parametrize("payload", [b"", b"\0", Here().encode(), Beacon(heading_rad=0.0).encode() + b"\0"])
+def test_bytes_of_another_kind_are_refused(payload: bytes) -> None:
+    with pytest.raises(ValueError, match="no Beacon"):
+        Beacon.decode(payload)
+
+
+@given(st.lists(everything, max_size=6))
+def test_rows_encode_and_decode_as_single_messages_do(messages: list[Everything]) -> None:
+    columns = {name: np.array([getattr(m, name) for m in messages]) for name in Everything.layout.names or ()}
+    payloads = encode_rows(Everything, len(messages), columns)
+    assert [payloads.row(i) for i in range(len(payloads))] == [message.encode() for message in messages]
+    decoded = decode_rows(Everything, payloads, np.arange(len(messages)))
+    for name, column in decoded.items():
+        assert column.dtype == np.float64
+        assert np.array_equal(column, columns[name])
+
+
+def test_rows_decode_from_among_payloads_of_other_kinds() -> None:
+    numbered = [Numbered(heading_rad=i, number=i) for i in range(3)]
+    payloads = Payloads.of([b"", numbered[0].encode(), Here().encode(), numbered[1].encode(), numbered[2].encode()])
+    index = np.flatnonzero(payloads.tags() == Numbered.tag)
+    assert decode_rows(Numbered, payloads, index[::-1])["number"].tolist() == [2.0, 1.0, 0.0]
+
+
+def test_a_single_number_fills_all_rows() -> None:
+    payloads = encode_rows(Numbered, 3, {"heading_rad": 0.5, "number": np.array([1, 2, 3])})
+    assert [Numbered.decode(payloads.row(i)).heading_rad for i in range(3)] == [0.5] * 3
+
+
+def test_messages_without_fields_encode_as_their_tag() -> None:
+    payloads = encode_rows(Here, 2, {})
+    assert payloads.tags().tolist() == [Here.tag] * 2
+    assert Here.decode(payloads.row(1)) == Here()
+    assert decode_rows(Here, payloads, np.arange(2)) == {}
+
+
+plain = st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.floats(allow_nan=False) | st.text(max_size=5)
+
+
+@given(st.dictionaries(st.text(max_size=5), plain | st.lists(plain, max_size=3), max_size=4))
+def test_a_dict_comes_back_as_it_was_sent(message: dict[str, Any]) -> None:
+    payload = encode_dict(message)
+    assert Payloads.of([payload]).tags().tolist() == [DICT_TAG]
+    assert decode_dict(payload) == message
+
+
+@pytest.mark.parametrize(
+    "payload", [b"\0\0", b"\0\0\x01", b"\0\0\x81", b"\0\0\x80\x80", b"\0\0\xc1", b"\0\0\x81\xa1\xff\0"]
+)
+def test_bytes_that_hold_no_dict_are_refused(payload: bytes) -> None:
+    with pytest.raises(ValueError):
+        decode_dict(payload)

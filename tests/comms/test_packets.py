@@ -1,0 +1,89 @@
+"""Payload tables: rows of any length, taken, joined and sorted without loss."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Heard, Payloads, Sent
+from swarmwire.comms.senses import Actions
+
+ragged = st.lists(st.binary(max_size=5), max_size=6)
+
+
+def listed(payloads: Payloads) -> list[bytes]:
+    return [payloads.row(i) for i in range(len(payloads))]
+
+
+@given(ragged)
+def test_a_table_holds_the_rows_it_was_made_of(rows: list[bytes]) -> None:
+    payloads = Payloads.of(rows)
+    assert len(payloads) == len(rows)
+    assert listed(payloads) == rows
+    assert payloads.sizes.tolist() == [len(row) for row in rows]
+
+
+@given(ragged, st.data())
+def test_rows_are_taken_in_the_order_of_the_index(rows: list[bytes], data: st.DataObject) -> None:
+    index = data.draw(st.lists(st.integers(0, len(rows) - 1), max_size=8)) if rows else []
+    assert listed(Payloads.of(rows).rows(np.array(index, np.int64))) == [rows[i] for i in index]
+
+
+@given(st.lists(ragged, max_size=4))
+def test_joined_tables_follow_one_another(parts: list[list[bytes]]) -> None:
+    joined = Payloads.joined([Payloads.of(rows) for rows in parts])
+    assert listed(joined) == [row for rows in parts for row in rows]
+
+
+@given(ragged)
+def test_the_tag_of_a_row_is_its_first_two_bytes(rows: list[bytes]) -> None:
+    expected = [int.from_bytes(row[:TAG_BYTES], "little") if len(row) >= TAG_BYTES else -1 for row in rows]
+    assert Payloads.of(rows).tags().tolist() == expected
+
+
+def test_offsets_are_int64_whatever_the_table() -> None:
+    tables = [Payloads.of([]), Payloads.joined([]), Payloads.of([b"abc"]), Payloads.of([b""]).rows(np.array([0, 0]))]
+    assert all(table.offset.dtype == np.int64 and table.data.dtype == np.uint8 for table in tables)
+
+
+def test_sent_packets_keep_their_order_when_joined() -> None:
+    first = Sent(np.array([3]), np.array([BROADCAST]), Payloads.of([b"aa"]))
+    second = Sent(np.array([1, 1]), np.array([0, 2]), Payloads.of([b"b", b"ccc"]))
+    joined = Sent.joined([first, Sent.none(), second])
+    assert joined.sender.tolist() == [3, 1, 1]
+    assert joined.to.tolist() == [BROADCAST, 0, 2]
+    assert listed(joined.payloads) == [b"aa", b"b", b"ccc"]
+    assert len(Sent.joined([])) == 0
+
+
+def test_actions_joined_carry_the_packets_of_all() -> None:
+    parts = [
+        Actions(np.array([row]), np.array([True]), np.array([0.1]), np.array([0.2]), sent)
+        for row, sent in ((2, Sent.none()), (0, Sent(np.array([0]), np.array([BROADCAST]), Payloads.of([b"xy"]))))
+    ]
+    joined = Actions.joined(parts)
+    assert joined.rows.tolist() == [2, 0]
+    assert listed(joined.sent.payloads) == [b"xy"]
+    none = Actions.joined([])
+    assert (len(none.rows), none.drive.dtype, none.linear_mps.dtype) == (0, np.bool_, np.float64)
+
+
+def test_heard_packets_selected_keep_their_columns_together() -> None:
+    heard = Heard(
+        receiver=np.array([0, 1, 1]),
+        sender=np.array([5, 6, 7]),
+        sequence=np.array([0, 1, 2]),
+        heard_at_ns=np.array([10, 20, 30]),
+        given={"range_m": np.array([0.1, 0.2, 0.3])},
+        payload=np.array([1, 0, 1]),
+        payloads=Payloads.of([b"aa", b"bb"]),
+    )
+    chosen = heard.select(np.array([2, 0]))
+    assert len(chosen) == 2
+    assert chosen.sender.tolist() == [7, 5]
+    assert chosen.given["range_m"].tolist() == [0.3, 0.1]
+    assert [chosen.payloads.row(int(i)) for i in chosen.payload] == [b"bb", b"bb"]
+
+
+def test_a_medium_that_gives_range_gives_it_also_when_nothing_is_heard() -> None:
+    assert set(Heard.none(("range_m",)).given) == {"range_m"}
+    assert len(Heard.none()) == 0
