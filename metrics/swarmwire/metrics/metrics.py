@@ -1,0 +1,71 @@
+"""Metrics, computed online: one number per metric and arena in each tick, their statistics over ticks at the end."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.plain import plain
+from swarmwire.metrics.registry import chosen
+
+
+class Metrics:
+    """Observer that measures each tick. Summary part: `metrics`, per arena {name: {final, mean, min, max}}.
+
+    mean, min and max are over ticks: of a level its value at each, of a count what each added, so a count's mean is
+    per tick (times the tick rate: per second). final is the level at the start of the last tick, the count's total over
+    the run. Ticks without a value (no robot alive) are left out; what never had one, as the radio graph's without a
+    radio, is null. Memory does not grow with the run.
+    """
+
+    def __init__(self, metrics: Sequence[str | Metric] | None = None) -> None:
+        """Measure these, by name or as they are, or all that are registered; BadInput for an unknown name."""
+        self.metrics = chosen(metrics)
+
+    def begin(self, static: Static) -> None:
+        """Start afresh."""
+        shape = (len(self.metrics), static.arenas)
+        self._static = static
+        self._measures: list[Measure] = [metric.begin(static) for metric in self.metrics]
+        self._counts: BoolArray = np.array([metric.kind == "count" for metric in self.metrics], np.bool_)
+        self._seen: IntArray = np.zeros(shape, np.int64)
+        self._sum: FloatArray = np.zeros(shape)
+        self._min: FloatArray = np.full(shape, np.nan)
+        self._max: FloatArray = np.full(shape, np.nan)
+        self._latest: FloatArray = np.full(shape, np.nan)
+
+    def see(self, truth: Truth) -> None:
+        """Measure a tick."""
+        moment = Moment(self._static, truth)
+        value = np.empty_like(self._sum)
+        for row, measure in enumerate(self._measures):
+            value[row] = measure(moment)
+        known = ~np.isnan(value)
+        self._seen += known
+        self._sum += np.where(known, value, 0.0)
+        self._min = np.fmin(self._min, value)
+        self._max = np.fmax(self._max, value)
+        self._latest = np.where(self._counts[:, None], self._sum, value)
+
+    @property
+    def latest(self) -> dict[str, FloatArray]:
+        """By name, per arena: each level in the tick last seen, each count's total so far; NaN where undefined."""
+        return {metric.name: self._latest[row] for row, metric in enumerate(self.metrics)}
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """The statistics over the ticks seen."""
+        mean = self._sum / np.where(self._seen > 0, self._seen, np.nan)
+        columns = {"final": self._latest, "mean": mean, "min": self._min, "max": self._max}
+        return {
+            "metrics": [
+                {
+                    metric.name: {name: plain(column[row, arena]) for name, column in columns.items()}
+                    for row, metric in enumerate(self.metrics)
+                }
+                for arena in range(self._static.arenas)
+            ]
+        }

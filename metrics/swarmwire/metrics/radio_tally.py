@@ -1,0 +1,77 @@
+"""The radio's account of a run: what became of every packet, the delivery ratio, and how late packets were."""
+
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.truth import Finished, Static, Tally, Truth
+from swarmwire.metrics.log_histogram import LogHistogram
+from swarmwire.metrics.plain import plain
+
+PERCENTS = (50.0, 90.0, 99.0)
+
+
+class RadioTally:
+    """Observer that adds up the radio's tallies. Summary part: `radio`, per arena; nothing without a radio.
+
+    sent (packets), intended and in_range (receivers), fates {name: receivers}, pdr = heard / in_range (null if none was
+    in range), and of the packets heard the p50, p90 and p99 of two latencies in s, within 0.5 % (null if none was
+    heard): latency_air_s from sending to hearing, latency_agent_s from sending to the tick that handed it over.
+    """
+
+    def begin(self, static: Static) -> None:
+        """Start afresh."""
+        arenas = static.arenas
+        self._has_radio = False
+        self._sent = np.zeros(arenas, np.int64)
+        self._intended = np.zeros(arenas, np.int64)
+        self._in_range = np.zeros(arenas, np.int64)
+        self._fates = np.zeros((arenas, len(FATE_NAMES)), np.int64)
+        self._air = LogHistogram(arenas)
+        self._agent = LogHistogram(arenas)
+
+    def see(self, truth: Truth) -> None:
+        """Add what a tick brought."""
+        if truth.tally is not None:
+            self._add(truth.tally)
+        if truth.finished is not None:
+            self._time(truth.finished, truth.time_ns)
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """The account; with `last`, in which what is still in flight has its fate, the fates add up to intended."""
+        if last is not None:
+            self._add(last)
+        return {"radio": [self._arena(arena) for arena in range(len(self._sent))]} if self._has_radio else {}
+
+    def _add(self, tally: Tally) -> None:
+        self._has_radio = True
+        self._sent += tally.sent
+        self._intended += tally.intended
+        self._in_range += tally.in_range
+        self._fates += tally.fates
+
+    def _time(self, finished: Finished, handed_over_ns: int) -> None:
+        heard = finished.fate == Fate.HEARD
+        arena, sent_at_ns = finished.arena[heard], finished.sent_at_ns[heard]
+        self._air.add(arena, finished.final_at_ns[heard] - sent_at_ns)
+        self._agent.add(arena, handed_over_ns - sent_at_ns)
+
+    def _arena(self, arena: int) -> dict[str, Any]:
+        fates = [int(count) for count in self._fates[arena]]
+        in_range = int(self._in_range[arena])
+        return {
+            "sent": int(self._sent[arena]),
+            "intended": int(self._intended[arena]),
+            "in_range": in_range,
+            "fates": dict(zip(FATE_NAMES, fates, strict=True)),
+            "pdr": fates[Fate.HEARD] / in_range if in_range else None,
+            "latency_air_s": _percentiles_s(self._air, arena),
+            "latency_agent_s": _percentiles_s(self._agent, arena),
+        }
+
+
+def _percentiles_s(histogram: LogHistogram, arena: int) -> dict[str, float | None]:
+    found_ns = histogram.percentiles_ns(arena, PERCENTS)
+    return {f"p{percent:g}": plain(ns / NS_PER_S) for percent, ns in zip(PERCENTS, found_ns, strict=True)}

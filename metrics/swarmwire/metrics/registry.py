@@ -1,0 +1,45 @@
+"""Metrics by name. A new one is a file like `order.py` and its line here; a user's own is passed to `register`."""
+
+from collections.abc import Sequence
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.components import ComponentCount
+from swarmwire.metrics.contacts import Collisions, WallContacts
+from swarmwire.metrics.largest_component import LargestComponent
+from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.order import Order
+
+METRICS: dict[str, type[Metric]] = {
+    kind.name: kind
+    for kind in (
+        Order,
+        ComponentCount,
+        LargestComponent,
+        Collisions,
+        WallContacts,
+    )
+}
+
+
+def register(kind: type[Metric]) -> type[Metric]:
+    """Make a metric known by its name (also as a decorator); BadInput if the name is taken."""
+    if METRICS.get(kind.name, kind) is not kind:
+        raise BadInput("", f"metrics.{kind.name}", "there is a metric of this name already")
+    METRICS[kind.name] = kind
+    return kind
+
+
+def chosen(metrics: Sequence[str | Metric] | None) -> list[Metric]:
+    """The metrics asked for, by name (with its default parameters) or as they are; None: all that are registered.
+
+    BadInput if a name is unknown or comes twice.
+    """
+    found: dict[str, Metric] = {}
+    for item in METRICS if metrics is None else metrics:
+        if isinstance(item, str) and item not in METRICS:
+            raise BadInput("", "metrics", f"expected some of {', '.join(METRICS)}; got {item!r}")
+        metric = METRICS[item]() if isinstance(item, str) else item
+        if metric.name in found:
+            raise BadInput("", "metrics", f"{metric.name!r} is named twice")
+        found[metric.name] = metric
+    return list(found.values())

@@ -1,0 +1,78 @@
+"""Truth made by hand: what a test does not name is a robot at rest, alive, without a radio."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.body import load_body
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.truth import Finished, Group, Obstacle, Static, Tally, Truth
+from swarmwire.metrics.metrics import Metrics
+
+
+def static(robots: int = 4, arenas: int = 1, radio: bool = True, obstacles: Sequence[Obstacle] = ()) -> Static:
+    return Static(
+        name="test",
+        seeds=tuple(range(1, arenas + 1)),
+        rate_hz=10,
+        arena_size_m=(8.0, 6.0),
+        walled=True,
+        obstacles=(tuple(obstacles),) * arenas,
+        groups=(Group("flock", load_body("epuck"), 0, robots),),
+        robot_names=tuple(f"flock-{i}" for i in range(robots)),
+        range_m=2.0 if radio else None,
+    )
+
+
+def truth(of: Static, tick: int = 0, **given: Any) -> Truth:
+    rows = of.arenas * of.robots
+    fields: dict[str, Any] = {
+        "tick": tick,
+        "time_ns": tick * 100_000_000,
+        "alive": np.ones(rows, np.bool_),
+        "pose": np.zeros((rows, 3)),
+        "velocity": np.zeros((rows, 3)),
+        "command": np.zeros((rows, 2)),
+        "contact_onsets": np.zeros((of.arenas, 2), np.int64),
+        "edges": None,
+        "tally": None,
+        "finished": None,
+    }
+    return Truth(**{**fields, **given})
+
+
+def poses(heading_rad: Sequence[float]) -> np.ndarray[Any, Any]:
+    pose = np.zeros((len(heading_rad), 3))
+    pose[:, 2] = heading_rad
+    return pose
+
+
+def edges(*pairs: tuple[int, int]) -> np.ndarray[Any, Any]:
+    return np.array(pairs, np.int64).reshape(-1, 2)
+
+
+def tally(*fates: Mapping[Fate, int], sent: int = 1) -> Tally:
+    """A row per mapping; every fate but out_of_range counts as in range."""
+    table = np.zeros((len(fates), len(Fate)), np.int64)
+    for arena, counts in enumerate(fates):
+        for fate, count in counts.items():
+            table[arena, fate] = count
+    intended = table.sum(axis=1)
+    return Tally(np.full(len(fates), sent, np.int64), intended, intended - table[:, Fate.OUT_OF_RANGE], table)
+
+
+def finished(
+    sent_at_ns: Sequence[int], final_at_ns: Sequence[int], fate: Fate = Fate.HEARD, arena: int = 0
+) -> Finished:
+    sent, final = np.array(sent_at_ns, np.int64), np.array(final_at_ns, np.int64)
+    zero = np.zeros(len(sent), np.int64)
+    return Finished(zero + arena, zero, zero + 1, zero, sent, sent, final, zero + fate, zero, zero)
+
+
+def measured(name: str, of: Static, seen: Truth) -> list[float]:
+    """The metric's value in this one tick, per arena."""
+    metrics = Metrics([name])
+    metrics.begin(of)
+    metrics.see(seen)
+    return metrics.latest[name].tolist()
