@@ -27,7 +27,7 @@ class Host:
     def __init__(self, assignment: Assignment) -> None:
         self._rate_hz = assignment.rate_hz
         self._gives = assignment.gives or ()
-        self._groups = {group.name: _hosted(group) for group in assignment.groups}
+        self._groups = {group.name: hosted(group, load_agent(group.agent)) for group in assignment.groups}
 
     def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
         """What the robots do in this tick; AgentFailed with the robot's name and the agent's traceback if one raises."""
@@ -36,7 +36,7 @@ class Host:
         return Actions.joined([self._groups[name].act(time, group, heard) for name, group in senses.items()])
 
 
-class _Hosted(ABC):
+class Hosted(ABC):
     """The agents of one group: what both kinds share."""
 
     def __init__(self, group: GroupAssignment, needs: tuple[str, ...]) -> None:
@@ -45,6 +45,7 @@ class _Hosted(ABC):
         self._sent_before = np.zeros(len(group.rows), np.int64)
 
     def act(self, time: tuple[int, int, int], senses: GroupSenses, heard: Heard) -> Actions:
+        """What the robots `senses.rows` do; `time` is the tick, its start and its length in ns."""
         place = np.searchsorted(self.group.rows, senses.rows)
         sent_before = self._sent_before[place]
         turn = Turn(self.group, self.needs, time, senses, _own(heard, senses.rows), self.group.keys[place], sent_before)
@@ -64,7 +65,7 @@ class _Hosted(ABC):
         """Keep the memory of robots that act again, drop that of others, give new ones a fresh one."""
 
 
-class _Vector(_Hosted):
+class _Vector(Hosted):
     """One VectorAgent for all robots of the group, and the State that it works on."""
 
     def __init__(self, group: GroupAssignment, kind: type[VectorAgent[Any]]) -> None:
@@ -84,7 +85,7 @@ class _Vector(_Hosted):
         self._state = self._state.moved(self.rows, rows)
 
 
-class _Single(_Hosted):
+class _Single(Hosted):
     """An Agent for each robot of the group."""
 
     def __init__(self, group: GroupAssignment, kind: type[Agent]) -> None:
@@ -104,8 +105,8 @@ class _Single(_Hosted):
         self._agents = {int(row): self._agents.get(int(row)) or make(self._kind, self.group.params) for row in rows}
 
 
-def _hosted(group: GroupAssignment) -> _Hosted:
-    kind: AgentClass = load_agent(group.agent)
+def hosted(group: GroupAssignment, kind: AgentClass) -> Hosted:
+    """The agents of a group, of this class; AgentFailed if one cannot be made."""
     try:
         return _Vector(group, kind) if issubclass(kind, VectorAgent) else _Single(group, kind)
     except Exception as error:
@@ -114,8 +115,8 @@ def _hosted(group: GroupAssignment) -> _Hosted:
 
 def _own(heard: Heard, rows: IntArray) -> Heard:
     """What the robots `rows` heard, with the receiver as a place in `rows`."""
-    if not len(heard):
-        return heard
+    if not len(heard) or not len(rows):
+        return heard.select(np.empty(0, np.int64))
     place = np.searchsorted(rows, heard.receiver)
     place = np.minimum(place, len(rows) - 1)
     mine = rows[place] == heard.receiver

@@ -1,0 +1,137 @@
+"""Checks for agents, ours and users': two agents that are the same rule, and rows that do not see one another.
+
+Both feed made-up senses and packets, keyed by a seed, through the same host that runs agents anywhere: ragged packets
+(what robots sent a tick ago, heard by some), robots that drop out and come back, any body and parameters.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swarmwire.agent.agent import Agent
+from swarmwire.agent.host import Hosted, hosted
+from swarmwire.agent.loading import AgentClass
+from swarmwire.agent.vector_agent import VectorAgent
+from swarmwire.comms import draws
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.assignment import GroupAssignment
+from swarmwire.comms.body import Body, load_body
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.packets import Heard, Payloads, Sent
+from swarmwire.comms.senses import Actions, GroupSenses
+
+RATE_HZ = 10
+GIVEN = ("range_m", "bearing_rad", "rssi_dbm")
+DROP_OUT = 0.1  # share of the robots missing in a tick
+HEARING = 0.4  # share of the senders that a robot hears
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What to try an agent with."""
+
+    robots: int = 7
+    ticks: int = 12
+    seed: int = 1
+    body: str = "epuck"
+    params: dict[str, Any] | None = None
+
+
+def assert_equivalent(single: type[Agent], vector: type[VectorAgent[Any]], trial: Trial | None = None) -> None:
+    """AssertionError unless both do exactly the same, bit for bit, for robots that sense and hear the same."""
+    trial = trial or Trial()
+    one, other = (_host(kind, trial, np.arange(trial.robots)) for kind in (single, vector))
+    for time, senses, heard, show in _inputs(trial):
+        first, second = one.act(time, senses, heard), other.act(time, senses, heard)
+        names = f"{single.__name__} and {vector.__name__}"
+        _assert_same(first, second, f"{names} differ in tick {time[0]}")
+        show(first.sent)
+
+
+def assert_rows_independent(vector: type[VectorAgent[Any]], trial: Trial | None = None) -> None:
+    """AssertionError unless n rows at once do exactly what each row does alone, bit for bit: so no row peeks."""
+    trial = trial or Trial()
+    together = _host(vector, trial, np.arange(trial.robots))
+    alone = [_host(vector, trial, np.array([row])) for row in range(trial.robots)]
+    for time, senses, heard, show in _inputs(trial):
+        at_once = together.act(time, senses, heard)
+        each = [host.act(time, *_only(row, senses, heard)) for row, host in enumerate(alone)]
+        _assert_same(at_once, Actions.joined(each), f"rows of {vector.__name__} are not independent in tick {time[0]}")
+        show(at_once.sent)
+
+
+def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> Hosted:
+    keys = np.array([draws.derive_key("trial", trial.seed, int(row)) for row in rows], np.uint64)
+    names = tuple(f"robot-{row}" for row in rows)
+    group = GroupAssignment("trial", "", trial.params or {}, load_body(trial.body), rows, names, keys)
+    return hosted(group, kind)
+
+
+class _Ether:
+    """What was sent a tick ago, heard at random."""
+
+    def __init__(self, key: int) -> None:
+        self._key, self._sent = key, Sent.none()
+
+    def show(self, sent: Sent) -> None:
+        order = np.argsort(sent.sender, kind="stable")
+        self._sent = Sent(sent.sender[order], sent.to[order], sent.payloads.rows(order))
+
+    def heard(self, tick: int, rows: IntArray) -> Heard:
+        chance = _uniform(self._key, tick, "hearing", (len(rows), len(self._sent)))
+        receiver, payload = np.nonzero((chance < HEARING) & (self._sent.sender != rows[:, None]))
+        given = {name: _uniform(self._key, tick, name, (len(receiver),)) * 3.0 - 1.0 for name in GIVEN}
+        at_ns = np.full(len(receiver), tick_start_ns(tick, RATE_HZ) - 1, np.int64)
+        sender = self._sent.sender[payload]
+        payloads: Payloads = self._sent.payloads
+        return Heard(rows[receiver], sender, np.full(len(receiver), tick), at_ns, given, payload, payloads)
+
+
+def _inputs(trial: Trial) -> Iterator[tuple[tuple[int, int, int], GroupSenses, Heard, Any]]:
+    key = draws.derive_key("inputs", trial.seed)
+    body, ether = load_body(trial.body), _Ether(key)
+    for tick in range(trial.ticks):
+        rows = np.flatnonzero(_uniform(key, tick, "drop-out", (trial.robots,)) >= DROP_OUT)
+        time_ns = tick_start_ns(tick, RATE_HZ)
+        time = (tick, time_ns, tick_start_ns(tick + 1, RATE_HZ) - time_ns)
+        yield time, GroupSenses(rows, _senses(body, key, tick, rows)), ether.heard(tick, rows), ether.show
+
+
+def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatArray]:
+    n, fields = len(rows), dict[str, FloatArray]()
+    if body.proximity is not None:
+        value = _uniform(key, tick, "proximity", (n, len(body.proximity.angles_deg)))
+        fields["proximity.value"] = np.maximum(value * 2.0 - 1.0, 0.0)
+    if body.compass is not None:
+        fields["compass.heading_rad"] = (_uniform(key, tick, "compass", (n,)) * 2.0 - 1.0) * np.pi
+    if body.odometry is not None:
+        for side in ("left_m", "right_m"):
+            fields[f"odometry.{side}"] = tick * 0.01 + _uniform(key, tick, side, (n,)) * 0.01
+    return fields
+
+
+def _uniform(key: int, tick: int, purpose: str, shape: tuple[int, ...]) -> FloatArray:
+    count = np.arange(int(np.prod(shape))).reshape(shape)
+    return draws.uniform(key, tick, count, 0, draws.purpose(purpose))
+
+
+def _only(row: int, senses: GroupSenses, heard: Heard) -> tuple[GroupSenses, Heard]:
+    at = np.flatnonzero(senses.rows == row)
+    own = GroupSenses(senses.rows[at], {name: column[at] for name, column in senses.fields.items()})
+    return own, heard.select(np.flatnonzero(heard.receiver == row))
+
+
+def _assert_same(first: Actions, second: Actions, text: str) -> None:
+    for name in ("rows", "drive", "linear_mps", "angular_radps"):
+        one, other = getattr(first, name), getattr(second, name)
+        if not np.array_equal(one, other, equal_nan=name not in ("rows", "drive")):
+            raise AssertionError(f"{text}: {name}\n{one}\n{other}")
+    if _packets(first.sent) != _packets(second.sent):
+        raise AssertionError(f"{text}: packets\n{_packets(first.sent)}\n{_packets(second.sent)}")
+
+
+def _packets(sent: Sent) -> list[tuple[int, int, bytes]]:
+    order = np.argsort(sent.sender, kind="stable")
+    return [(int(sent.sender[i]), int(sent.to[i]), sent.payloads.row(int(i))) for i in order]

@@ -1,0 +1,121 @@
+"""Run benchmarks and print one JSON object a line: name, value, unit, and the whole configuration.
+
+`python -m benchmarks [NAME …]`. Every run is what a user's run is: the full loop with trajectory hash and all metrics,
+without a run folder. The value is the median of a few runs; the machine's noise shows in their spread, printed with it.
+"""
+
+import json
+import statistics
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import psutil
+
+from benchmarks import scenes
+from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.deploy import Result, run
+from swarmwire.deploy.machine import cpu
+from swarmwire.world.scenario_file import scenario_from
+
+REPEATS = 3
+
+
+class OwnMemory:
+    """Observer that reads, once, the memory that belongs to each runner alone (USS)."""
+
+    def __init__(self, at_tick: int) -> None:
+        self.at_tick, self.uss_mb = at_tick, list[float]()
+
+    def begin(self, static: Static) -> None:
+        """Nothing to do."""
+
+    def see(self, truth: Truth) -> None:
+        """Read at one tick."""
+        if truth.tick == self.at_tick:
+            nursery = [child for child in psutil.Process().children() if "swarmwire.agent.nursery" in child.cmdline()]
+            runners = [runner for process in nursery for runner in process.children()]
+            self.uss_mb = [runner.memory_full_info().uss / 1e6 for runner in runners]
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """No part of the summary."""
+        return {}
+
+
+def in_process(name: str, *, robots: int, steps: int, ticks: int, radio: bool, runners: int | None = None) -> None:
+    """Robot-steps per second of diffusing foot-bots."""
+    scenario = scenario_from(scenes.diffusion(robots, steps, ticks / 10, radio=radio), name)
+    warm_up = scenario.model_copy(update={"duration_s": 2.0})
+    run(warm_up, runners=runners)
+    results = [run(scenario, runners=runners) for _ in range(REPEATS)]
+    speeds = [robots * result.ticks / result.wall_time_s for result in results]
+    config = {
+        "physics_steps": steps,
+        "density_per_m2": scenes.DENSITY_PER_M2,
+        "speed_mps": scenes.SPEED_MPS,
+        "body": "footbot",
+        "rays": 24,
+    }
+    report(name, statistics.median(speeds), "robot-steps/s", results[0], {**config, **spread(speeds)})
+
+
+def processes(name: str, *, robots: int, ticks: int) -> None:
+    """Real-time factor of a flock with a process per robot; its start, and what each process costs."""
+    scenario = scenario_from(scenes.flocking(robots, ticks / 10), name)
+    run(scenario.model_copy(update={"duration_s": 1.0}))
+    memory = OwnMemory(ticks // 2)
+    results = [run(scenario, runners="per-robot", observers=[memory]) for _ in range(REPEATS)]
+    factors = [result.realtime_factor for result in results]
+    config = {"body": "epuck", "physics_steps": 5, "density_per_m2": 20 / 64, "speed_mps": 0.1}
+    report(name, statistics.median(factors), "x real time", results[0], {**config, **spread(factors)})
+    starts = [result.start_time_s for result in results]
+    report(f"{name}-start", statistics.median(starts), "s", results[0], {**config, **spread(starts)})
+    report(f"{name}-uss", statistics.median(memory.uss_mb), "MB", results[0], {**config, **spread(memory.uss_mb)})
+
+
+def report(name: str, value: float, unit: str, result: Result, config: dict[str, Any]) -> None:
+    """Print one line."""
+    radio = result.radio
+    line = {
+        "name": name,
+        "value": round(value, 3),
+        "unit": unit,
+        "robots": result.robots,
+        "runners": result.runners,
+        "ticks": result.ticks,
+        "rate_hz": 10,
+        **config,
+        "packets_heard_per_robot_tick": round(radio.fates["heard"] / result.robots / result.ticks, 2) if radio else 0,
+        "collisions": result.metrics["collisions"].final,
+        "cpu": cpu(),
+    }
+    print(json.dumps(line), flush=True)
+
+
+def spread(values: list[float]) -> dict[str, float]:
+    """Lowest and highest of the repeats."""
+    return {"lowest": round(min(values), 3), "highest": round(max(values), 3)}
+
+
+BENCHMARKS: dict[str, Callable[[str], None]] = {
+    "inprocess-1000-d1": lambda name: in_process(name, robots=1000, steps=5, ticks=200, radio=False),
+    "inprocess-1000-d1-10steps": lambda name: in_process(name, robots=1000, steps=10, ticks=200, radio=False),
+    "inprocess-1000-d1-radio": lambda name: in_process(name, robots=1000, steps=5, ticks=200, radio=True),
+    "wire-1000x2": lambda name: in_process(name, robots=1000, steps=5, ticks=200, radio=True, runners=2),
+    "processes-100": lambda name: processes(name, robots=100, ticks=300),
+}
+
+
+def main(names: list[str]) -> int:
+    """Run the named benchmarks, or all."""
+    unknown = [name for name in names if name not in BENCHMARKS]
+    if unknown:
+        print(f"no benchmark {unknown[0]!r}; there are {', '.join(BENCHMARKS)}", file=sys.stderr)
+        return 2
+    for name in names or BENCHMARKS:
+        BENCHMARKS[name](name)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,53 @@
+"""The summary as people read it in a terminal."""
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from swarmwire.deploy.result import ArenaResult, Percentiles, Result
+
+
+def print_result(result: Result, console: Console) -> None:
+    """What came of a run: one table for the run, and its first arena's radio and metrics."""
+    arena = result.arenas[0]
+    table = Table(title=Text(result.scenario), show_header=False, title_justify="left", title_style="bold")
+    table.add_column(style="cyan")
+    table.add_column()
+    who = f"{result.runners} processes, lockstep" if result.runners else "all agents in this process"
+    table.add_row("robots", f"{result.robots}, {who}" + (f", {len(result.arenas)} arenas" if len(result.arenas) > 1 else ""))
+    speed = f"{result.sim_time_s:g} s in {result.wall_time_s:.2f} s: {result.realtime_factor:.1f} x real time"
+    table.add_row("simulated", f"{speed} (start took {result.start_time_s:.2f} s)")
+    if result.ended != "duration":
+        table.add_row("ended", result.ended)
+    if len(result.arenas) > 1:
+        table.add_row("shown below", f"the arena of seed {arena.seed}")
+    _add_radio(table, arena)
+    for name, value in arena.metrics.items():
+        if value.mean is not None:
+            table.add_row(name, f"final {_number(value.final)}, mean {_number(value.mean)}, min {_number(value.min)}")
+    for body, senses in result.global_senses.items():
+        table.add_row("global senses", f"{body}: {', '.join(senses)}")
+    if result.counts:
+        table.add_row("counts", ", ".join(f"{name} {count}" for name, count in result.counts.items()))
+    table.add_row("trajectory", f"{arena.trajectory_sha256[:16]}… (seed {arena.seed})")
+    console.print(table)
+
+
+def _add_radio(table: Table, arena: ArenaResult) -> None:
+    radio = arena.radio
+    if radio is None:
+        return
+    share = "none in range" if radio.pdr is None else f"{radio.pdr:.1%} of those in range heard it"
+    table.add_row("radio", f"{radio.sent} packets, {radio.intended} intended receivers, {radio.in_range} in range; {share}")
+    table.add_row("fates", ", ".join(f"{name} {count}" for name, count in radio.fates.items() if count))
+    table.add_row("latency", f"on air {_percentiles(radio.latency_air_s)}; to the agent {_percentiles(radio.latency_agent_s)}")
+
+
+def _percentiles(value: Percentiles) -> str:
+    if value.p50 is None or value.p99 is None:
+        return "-"
+    return f"{value.p50 * 1000:.0f} ms (99 %: {value.p99 * 1000:.0f} ms)"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"

@@ -1,0 +1,143 @@
+"""What a run comes to: the summary as a typed result."""
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+SUMMARY_FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """A metric over the ticks of a run; None where it had no value."""
+
+    final: float | None
+    mean: float | None
+    min: float | None
+    max: float | None
+
+
+@dataclass(frozen=True)
+class Percentiles:
+    """Percentiles in s; None if nothing was heard."""
+
+    p50: float | None
+    p90: float | None
+    p99: float | None
+
+
+@dataclass(frozen=True)
+class RadioResult:
+    """What became of every packet of one arena."""
+
+    sent: int  # packets
+    intended: int  # receivers that they were meant for
+    in_range: int  # of these, receivers in range
+    fates: dict[str, int]  # receivers; they add up to `intended`
+    pdr: float | None  # heard / in_range
+    latency_air_s: Percentiles  # from sending to hearing
+    latency_agent_s: Percentiles  # from sending to the tick that handed it over
+
+
+@dataclass(frozen=True)
+class ArenaResult:
+    """What came of one arena."""
+
+    seed: int
+    trajectory_sha256: str
+    radio: RadioResult | None
+    metrics: dict[str, Statistics]
+
+
+@dataclass(frozen=True)
+class Result:
+    """One execution: the same as `summary.json`."""
+
+    scenario: str
+    robots: int  # in each arena
+    runners: int  # 0: all agents in the world's process
+    mode: str  # "local" | "lockstep"
+    ended: str  # "duration" | "interrupted"
+    ticks: int
+    sim_time_s: float
+    wall_time_s: float  # of the loop
+    start_time_s: float  # from the call to the first tick
+    arenas: tuple[ArenaResult, ...]
+    global_senses: dict[str, list[str]]  # bodies that know more than their surroundings, and by which sense
+    counts: dict[str, int]  # late, missing, malformed, clipped: whatever was not as it should be, by name
+    cpu: str
+    versions: dict[str, str]
+    out: Path | None = field(default=None, compare=False)  # the run folder
+
+    @property
+    def realtime_factor(self) -> float:
+        """Simulated time over the wall time of the loop."""
+        return self.sim_time_s / self.wall_time_s if self.wall_time_s > 0 else 0.0
+
+    @property
+    def trajectory_sha256(self) -> list[str]:
+        """The trajectory hash of each arena."""
+        return [arena.trajectory_sha256 for arena in self.arenas]
+
+    @property
+    def radio(self) -> RadioResult | None:
+        """The radio of the first arena."""
+        return self.arenas[0].radio
+
+    @property
+    def metrics(self) -> dict[str, Statistics]:
+        """The metrics of the first arena."""
+        return self.arenas[0].metrics
+
+    def summary(self) -> dict[str, Any]:
+        """The content of `summary.json`: with several arenas, `seed`, `radio` and `metrics` are lists."""
+        radios = [asdict(arena.radio) if arena.radio else None for arena in self.arenas]
+        metrics = [{name: asdict(value) for name, value in arena.metrics.items()} for arena in self.arenas]
+        one = len(self.arenas) == 1
+        return {
+            "format": SUMMARY_FORMAT,
+            "scenario": self.scenario,
+            "seed": self.arenas[0].seed if one else [arena.seed for arena in self.arenas],
+            "arenas": len(self.arenas),
+            "robots": self.robots,
+            "runners": self.runners,
+            "mode": self.mode,
+            "ended": self.ended,
+            "ticks": self.ticks,
+            "sim_time_s": self.sim_time_s,
+            "wall_time_s": self.wall_time_s,
+            "start_time_s": self.start_time_s,
+            "realtime_factor": self.realtime_factor,
+            "trajectory_sha256": self.trajectory_sha256,
+            "radio": radios[0] if one else radios,
+            "metrics": metrics[0] if one else metrics,
+            "global_senses": self.global_senses,
+            "counts": self.counts,
+            "cpu": self.cpu,
+            "versions": self.versions,
+        }
+
+    def write(self, path: Path) -> None:
+        """Write `summary.json`: aside first, then renamed, so that no half of it is ever seen."""
+        aside = path.with_suffix(".part")
+        aside.write_text(json.dumps(self.summary(), indent=2) + "\n", encoding="utf-8")
+        aside.replace(path)
+
+
+def arena_result(seed: int, sha256: str, radio: dict[str, Any] | None, metrics: dict[str, Any]) -> ArenaResult:
+    """The parts of the observers' summaries that belong to one arena, typed."""
+    return ArenaResult(
+        seed,
+        sha256,
+        None
+        if radio is None
+        else RadioResult(
+            **{
+                **radio,
+                "latency_air_s": Percentiles(**radio["latency_air_s"]),
+                "latency_agent_s": Percentiles(**radio["latency_agent_s"]),
+            }
+        ),
+        {name: Statistics(**value) for name, value in metrics.items()},
+    )

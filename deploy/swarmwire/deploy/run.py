@@ -1,0 +1,183 @@
+"""One execution of a scenario: wires the parts together, runs the loop, and gives back what came of it."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.comms.air.air import Air
+from swarmwire.comms.clock import WallClock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.protocols import Crew, Observer
+from swarmwire.deploy import machine
+from swarmwire.deploy.agents import agent_specs, check_agents
+from swarmwire.deploy.endpoint import local_endpoint, new_run_id
+from swarmwire.deploy.folder import make_folder
+from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.result import Result, arena_result
+from swarmwire.deploy.runner_processes import RunnerProcesses
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.radio_tally import RadioTally
+from swarmwire.metrics.rerun_recording import RerunRecording
+from swarmwire.world import assignments
+from swarmwire.world.loop import Loop
+from swarmwire.world.remote_crew import RemoteCrew
+from swarmwire.world.scenario import Scenario
+from swarmwire.world.scenario_file import load_scenario
+from swarmwire.world.world import World
+
+GLOBAL_SENSES = ("compass", "positioning")
+Runners = int | str | None  # how many, "per-robot", or None for a local crew
+
+
+def run(
+    scenario: Scenario | Path | str,
+    *,
+    seed: int | None = None,
+    seeds: Sequence[int] | None = None,
+    runners: Runners = None,
+    overrides: Sequence[str] = (),
+    out: Path | str | None = None,
+    observers: Sequence[Observer] = (),
+    socket: Path | None = None,
+) -> Result:
+    """Run a scenario and return its result; with `seeds`, one arena per seed, side by side in one world.
+
+    `runners` is None (all agents in this process), a number of runner processes, or "per-robot". `overrides` are
+    "path=value" as for `--set`. With `out`, a new or empty folder, `summary.json` and `run.rrd` are written there.
+
+    Raises BadInput for anything wrong with the scenario or these arguments, AgentFailed with the agent's traceback, and
+    RunnerLost if a runner's process or link is gone.
+    """
+    checked = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
+    if isinstance(scenario, Scenario) and overrides:
+        raise BadInput("overrides", "", "expected a path of a scenario; a Scenario is complete as it is")
+    chosen = choose_seeds(checked, seed, seeds)
+    folder = None if out is None else make_folder(Path(out), checked.name, chosen)
+    return Execution(checked, chosen, runners, folder, socket).run(observers)
+
+
+class Execution:
+    """A checked scenario on its way to a result."""
+
+    def __init__(
+        self, scenario: Scenario, seeds: tuple[int, ...], runners: Runners, folder: Path | None, socket: Path | None = None
+    ) -> None:
+        self.scenario, self.seeds, self.folder = scenario, seeds, folder
+        self.ticks = _ticks(scenario)
+        self._socket, self._clock = socket, WallClock()
+        self._called_ns = self._clock.now_ns()
+        self._specs = agent_specs(scenario)
+        needs = {name: kind.needs for name, kind in check_agents(scenario, self._specs).items()}
+        self.world = World(scenario, seeds, needs)
+        self.runners = _runner_count(runners, self.world.static.arenas * self.world.static.robots)
+
+    def run(self, observers: Sequence[Observer] = ()) -> Result:
+        """Run to the end of the scenario, or until an interrupt."""
+        metrics, radio_tally = Metrics(), RadioTally()
+        recorders = [RerunRecording(self.folder / "run.rrd", metrics)] if self.folder else []
+        watching: list[Observer] = [metrics, radio_tally, *recorders, *observers]
+        with self._crew() as crew, Interrupt() as interrupt:
+            air = self._air()
+            crew.start()
+            loop = Loop(self.world, air, crew, watching)
+            started_ns = self._clock.now_ns()
+            for observer in watching:
+                observer.begin(self.world.static)
+            loop.run(self.ticks, stopped=lambda: interrupt.asked)
+            ended_ns = self._clock.now_ns()
+            last = air.end() if air else None
+            parts: dict[str, Any] = {}
+            for observer in watching:
+                parts.update(observer.end(last))
+        result = self._result(loop, parts, started_ns, ended_ns)
+        if self.folder:
+            result.write(self.folder / "summary.json")
+        return result
+
+    def _air(self) -> Air | None:
+        static, radio = self.world.static, self.scenario.radio
+        if radio is None:
+            return None
+        obstacles = obstacle_arrays(static.obstacles)
+        return Air(radio, self.world.keys, static.robots, static.arena_size_m, obstacles, static.rate_hz)
+
+    @contextmanager
+    def _crew(self) -> Iterator[Crew]:
+        whole = assignments.whole(self.scenario, self.world.static, self._specs)
+        if not self.runners:
+            local = LocalCrew(whole)
+            yield local
+            local.close()
+            return
+        parts, run_id = assignments.split(whole, self.runners), new_run_id()
+        names = [f"r{i}" for i in range(len(parts))]
+        processes: list[RunnerProcesses] = []
+
+        def trouble() -> str | None:
+            return processes[0].trouble() if processes else None
+
+        with local_endpoint(self._socket) as endpoint:
+            timeout_s = self.scenario.run.runner_timeout_s
+            crew = RemoteCrew(endpoint, run_id, parts, timeout_s, self._clock, trouble)
+            try:
+                crew.open()
+                processes.append(RunnerProcesses(endpoint, run_id, sorted(set(self._specs.values())), names))
+                yield crew
+            finally:
+                crew.close()
+                for process in processes:
+                    process.stop()
+
+    def _result(self, loop: Loop, parts: dict[str, Any], started_ns: int, ended_ns: int) -> Result:
+        static = self.world.static
+        radios: list[Any] = parts.get("radio", [None] * static.arenas)
+        arenas = zip(static.seeds, loop.hexdigests(), radios, parts["metrics"], strict=True)
+        senses = {group.body.name: [s for s in GLOBAL_SENSES if s in group.body.senses] for group in static.groups}
+        return Result(
+            scenario=static.name,
+            robots=static.robots,
+            runners=self.runners,
+            mode="lockstep" if self.runners else "local",
+            ended="duration" if loop.ticks_done == self.ticks else "interrupted",
+            ticks=loop.ticks_done,
+            sim_time_s=to_s(tick_start_ns(loop.ticks_done, static.rate_hz)),
+            wall_time_s=to_s(ended_ns - started_ns),
+            start_time_s=to_s(started_ns - self._called_ns),
+            arenas=tuple(arena_result(*arena) for arena in arenas),
+            global_senses={body: found for body, found in senses.items() if found},
+            counts=loop.counts(),
+            cpu=machine.cpu(),
+            versions=machine.versions(),
+            out=self.folder,
+        )
+
+
+def _ticks(scenario: Scenario) -> int:
+    """Ticks that start before the scenario's duration is over."""
+    return -(-to_ns(scenario.duration_s) * scenario.time.rate_hz // 10**9)
+
+
+def choose_seeds(scenario: Scenario, seed: int | None, seeds: Sequence[int] | None) -> tuple[int, ...]:
+    if seed is not None and seeds is not None:
+        raise BadInput("", "seeds", "expected either one seed or several seeds")
+    chosen = tuple(seeds) if seeds is not None else (scenario.seed if seed is None else seed,)
+    if not chosen or len(set(chosen)) != len(chosen) or min(chosen) < 0:
+        raise BadInput("", "seeds", f"expected different whole numbers of at least 0, got {list(chosen)}")
+    return chosen
+
+
+def _runner_count(runners: Runners, robots: int) -> int:
+    if runners is None or runners == "none":
+        return 0
+    if runners == "per-robot":
+        return robots
+    if isinstance(runners, str) and runners.isdecimal():
+        runners = int(runners)
+    if isinstance(runners, str) or isinstance(runners, bool) or not 1 <= runners <= robots:
+        raise BadInput("--runners", "", f'expected "none", "per-robot" or 1 to {robots} (the robots), got {runners!r}')
+    return runners
+
+
