@@ -1,0 +1,62 @@
+"""A recording of a run for rerun's viewer: the arena as it moves, and its metrics over time, in one file."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.rerun_arena import RerunArena
+from swarmwire.metrics.rerun_layout import layout
+from swarmwire.metrics.rerun_plots import RerunPlots
+from swarmwire.metrics.view_extra import need_view_extra
+
+
+class RerunRecording:
+    """Observer that writes one arena of a run to a file for `rerun`, with timelines `tick` and `sim_time`.
+
+    Every tick is written in full, but in swarms of more than 200 robots the radio links only every tenth tick. Of
+    several arenas it records one, the first if none is named. It plots what `metrics` measured, so that must see each
+    tick before it. Two runs that are equal give equal contents (there is no wall-clock time in it), but not equal
+    bytes: rerun numbers its chunks at random and cuts them as they come.
+    """
+
+    def __init__(self, path: Path, metrics: Metrics, arena: int = 0) -> None:
+        """Record to this file, which is replaced; BadInput without the extra [view]."""
+        need_view_extra(f"recording {path.name}")
+        self._path, self._metrics, self._arena = path, metrics, arena
+
+    def begin(self, static: Static) -> None:
+        """Open the file and log what does not change; BadInput if there is no such arena."""
+        import rerun as rr
+
+        if not 0 <= self._arena < static.arenas:
+            raise BadInput(f"recording {self._path.name}", "arena", f"expected 0 to {static.arenas - 1}")
+        seed = static.seeds[self._arena]
+        self._arena_view = RerunArena(static, self._arena)
+        self._plots = RerunPlots(static, self._metrics.metrics, self._arena)
+        self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
+        self._rec.set_log_time_enabled(False)
+        self._rec.set_log_tick_enabled(False)
+        self._rec.save(self._path, default_blueprint=layout(static))
+        self._rec.send_recording_name(f"{static.name}, seed {seed}")
+        links_every = self._arena_view.links_every_ticks
+        run = rr.AnyValues(scenario=static.name, seed=seed, robots=static.robots, links_every_ticks=links_every)
+        self._rec.send_property("run", run)
+        self._arena_view.begin(self._rec)
+        self._plots.begin(self._rec)
+
+    def see(self, truth: Truth) -> None:
+        """Record one tick."""
+        self._rec.set_time("tick", sequence=truth.tick)
+        self._rec.set_time("sim_time", duration=np.timedelta64(truth.time_ns, "ns"))
+        self._arena_view.log(self._rec, truth)
+        self._plots.log(self._rec, self._metrics.latest, truth.tally)
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """Close the file; a recording adds nothing to the summary."""
+        self._rec.flush()
+        self._rec.disconnect()
+        return {}
