@@ -1,0 +1,76 @@
+"""Differential drive by bounded force: what the motors and the grip of the wheels can do in one physics step. Compiled.
+
+Velocities are never written: a motor pushes until its robot has the speed asked for or its force is spent, so contacts
+keep the last word. Along and across the body the wheels share one grip (a friction circle of `max_force_n`, as ARGoS
+bounds the length of its pivot's impulse), and turning has a bound of its own, `max_torque_nm`.
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import FloatArray
+
+
+class Motors(NamedTuple):
+    """What drives each robot index of an arena, (robots,) each."""
+
+    wheel_base_m: FloatArray
+    max_wheel_mps: FloatArray
+    max_force_n: FloatArray
+    max_torque_nm: FloatArray
+    mass_kg: FloatArray
+    inertia_kgm2: FloatArray
+
+
+@njit(cache=True)
+def push(motors, command, state, dt_s, force, travel_m):
+    """Set the force on every robot for the physics step to come, and add what its wheels roll in that step.
+
+    Pymunk moves a body by the velocity that it has before the step and then applies the force, so a force set now shows
+    in the motion of the step after. There the body turns while it moves straight: the velocity to reach lies along the
+    heading in the middle of that step, which makes the path a chord of the arc.
+
+    Args:
+        motors: of each robot index.
+        command: (arenas, robots, 2) forward m/s, left turn rad/s, within the wheels' limits.
+        state: (arenas, robots, 6) x, y in m, heading in rad, velocity in m/s, m/s, rad/s, arena frame.
+        dt_s: length of a physics step.
+        force: (arenas, robots + 1, 3) set: N, N, N m, arena frame; the last row is the static body's.
+        travel_m: (arenas, robots, 2) left and right wheel, added to.
+    """
+    arenas, robots = state.shape[:2]
+    for arena in range(arenas):
+        for i in range(robots):
+            heading, vx, vy, turn = state[arena, i, 2], state[arena, i, 3], state[arena, i, 4], state[arena, i, 5]
+            middle = heading + 0.5 * dt_s * turn
+            rolled = dt_s * (vx * np.cos(middle) + vy * np.sin(middle))
+            apart = 0.5 * dt_s * turn * motors.wheel_base_m[i]
+            travel_m[arena, i, 0] += rolled - apart
+            travel_m[arena, i, 1] += rolled + apart
+
+            bound = motors.max_torque_nm[i]
+            inertia = motors.inertia_kgm2[i]
+            torque = min(max((command[arena, i, 1] - turn) * inertia / dt_s, -bound), bound)
+            ahead = heading + dt_s * (turn + 0.5 * (turn + torque * dt_s / inertia))
+            speed, per_step = command[arena, i, 0], motors.mass_kg[i] / dt_s
+            fx, fy = (speed * np.cos(ahead) - vx) * per_step, (speed * np.sin(ahead) - vy) * per_step
+            size = np.sqrt(fx * fx + fy * fy)
+            share = motors.max_force_n[i] / size if size > motors.max_force_n[i] else 1.0
+            force[arena, i, 0], force[arena, i, 1], force[arena, i, 2] = fx * share, fy * share, torque
+
+
+def within_wheels(motors: Motors, index, linear_mps, angular_radps):
+    """Commands (n,) of robots with these indices as their wheels can follow them, and which of them were too fast.
+
+    Both speeds shrink by one factor, so that the curve stays the same.
+    """
+    half_base = 0.5 * motors.wheel_base_m[index]
+    most = motors.max_wheel_mps[index]
+    fastest = np.abs(linear_mps) + np.abs(angular_radps) * half_base
+    clipped = fastest > most * (1.0 + 1e-9)  # not a command that asks for exactly the limit and was rounded
+    share = np.where(clipped, most / np.maximum(fastest, most), 1.0)
+    return np.stack([linear_mps * share, angular_radps * share], axis=1), clipped

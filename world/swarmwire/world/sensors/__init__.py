@@ -1,0 +1,18 @@
+"""What robots sense: a file per sensor. A new one is a sheet in `swarmwire.comms.sheets`, a file here, and a line below."""
+
+from collections.abc import Callable
+from typing import Any
+
+from swarmwire.comms.truth import Group
+from swarmwire.world.sensors.compass import CompassSensor
+from swarmwire.world.sensors.odometry import OdometrySensor
+from swarmwire.world.sensors.proximity import ProximitySensor
+from swarmwire.world.sensors.scene import Scene, Sensor
+
+SENSORS: dict[str, Callable[[Scene, Group, Any], Sensor]] = {
+    "proximity": ProximitySensor,
+    "compass": CompassSensor,
+    "odometry": OdometrySensor,
+}
+
+__all__ = ["SENSORS", "Scene", "Sensor"]

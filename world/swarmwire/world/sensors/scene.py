@@ -1,0 +1,31 @@
+"""What sensors look at, and what every sensor is."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from swarmwire.comms.arrays import FloatArray, KeyArray
+from swarmwire.comms.geometry import Obstacles
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """The arenas and the bodies in them; the arrays are the physics' own and always show the present."""
+
+    keys: KeyArray  # (arenas,)
+    size_m: tuple[float, float]  # full extents of an arena
+    walled: bool
+    obstacles: Obstacles
+    radius_m: FloatArray  # (robots,) of each robot index
+    state: FloatArray  # (arenas, robots, 6) x, y in m, heading in rad (not wrapped), velocities; arena frame
+    travel_m: FloatArray  # (arenas, robots, 2) rolled by the left and right wheel since the start
+
+
+class Sensor(Protocol):
+    """One kind of sense of one group, in all arenas."""
+
+    def read(self, tick: int) -> dict[str, FloatArray]:
+        """Fields "sense.field" -> (n,) or (n, width), a row per robot of the group, arena by arena.
+
+        Called once per tick. A value depends on the robot's own arena, its index and the tick, not on other arenas.
+        """
+        ...

@@ -1,0 +1,140 @@
+"""The world: every arena's bodies and senses, tick by tick. It does no I/O and knows neither agents nor the radio."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.body import Body
+from swarmwire.comms.draws import derive_key
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.senses import Actions, GroupSenses, Senses
+from swarmwire.comms.truth import Group, Static
+from swarmwire.world.angles import wrapped
+from swarmwire.world.checks import bodies_of
+from swarmwire.world.drive import within_wheels
+from swarmwire.world.physics import Physics
+from swarmwire.world.placement import place
+from swarmwire.world.scenario import Scenario
+from swarmwire.world.sensors import SENSORS, Scene, Sensor
+
+
+class World:
+    """Arenas side by side, one per seed; robot row r is robot r % robots of arena r // robots.
+
+    Each tick: `sense`, then `move`. The arrays below are replaced in each tick, never written to after.
+
+    Attributes:
+        static: what does not change.
+        keys: (arenas,) the key of each arena's draws, which depends on its seed alone.
+        pose: (rows, 3) x, y in m, heading in rad in (-pi, pi], arena frame.
+        velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
+        command: (rows, 2) applied, within the wheels' limits: forward m/s, left turn rad/s.
+        alive: (rows,).
+    """
+
+    def __init__(self, scenario: Scenario, seeds: Sequence[int], needs: Mapping[str, Sequence[str]]) -> None:
+        """An arena per seed; `needs` names, by group, the senses to compute (`radio.…` is not the world's affair).
+
+        Raises BadInput if a body lacks a sense, or if something finds no room.
+        """
+        if not seeds:
+            raise BadInput(scenario.source, "seed", "expected at least one seed")
+        groups = _groups(scenario, bodies_of(scenario, scenario.source))
+        self.keys: KeyArray = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
+        placed = [place(scenario, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
+        obstacles, pose = tuple(p.obstacles for p in placed), np.stack([p.pose for p in placed])
+        self.static = Static(
+            name=scenario.name,
+            seeds=tuple(seeds),
+            rate_hz=scenario.time.rate_hz,
+            arena_size_m=scenario.arena.size_m,
+            walled=scenario.arena.boundary == "walls",
+            obstacles=obstacles,
+            groups=groups,
+            robot_names=scenario.robot_names(),
+            range_m=scenario.radio.range_m if scenario.radio else None,
+        )
+        tick_s, steps = 1.0 / scenario.time.rate_hz, scenario.physics.steps
+        self._physics = Physics(scenario.arena.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
+        self._sensors = _sensors(scenario, self._scene(), groups, needs)
+        rows = self.static.arenas * self.static.robots
+        self.alive: BoolArray = np.ones(rows, np.bool_)
+        self.command: FloatArray = np.zeros((rows, 2))
+        self._clipped = self._not_finite = 0
+        self._show()
+
+    def sense(self, tick: int) -> Senses:
+        """What every robot senses in a tick, by group: rows rising, and the fields of the senses that are needed."""
+        senses: Senses = {}
+        for group in self.static.groups:
+            index = np.arange(group.start, group.stop)
+            rows = (np.arange(self.static.arenas)[:, None] * self.static.robots + index).ravel()
+            fields: dict[str, FloatArray] = {}
+            for sensor in self._sensors[group.name]:
+                fields.update(sensor.read(tick))
+            senses[group.name] = GroupSenses(rows, fields)
+        return senses
+
+    def move(self, actions: Actions) -> IntArray:
+        """Move by one tick. Robots without a new command keep the last one; one that is not finite is none.
+
+        Returns:
+            (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle.
+        """
+        finite = np.isfinite(actions.linear_mps) & np.isfinite(actions.angular_radps)
+        self._not_finite += int(np.count_nonzero(actions.drive & ~finite))
+        given = actions.drive & finite
+        rows = actions.rows[given]
+        linear_mps, angular_radps = actions.linear_mps[given], actions.angular_radps[given]
+        index = rows % self.static.robots
+        within, clipped = within_wheels(self._physics.motors, index, linear_mps, angular_radps)
+        self._clipped += int(np.count_nonzero(clipped))
+        self.command = self.command.copy()
+        self.command[rows] = within
+        onsets = self._physics.tick(self.command.reshape(self.static.arenas, self.static.robots, 2))
+        self._show()
+        return onsets
+
+    def counts(self) -> dict[str, int]:
+        """Commands since the start that the wheels could not follow, and that were not finite and so dropped."""
+        return {"clipped_commands": self._clipped, "nan_commands": self._not_finite}
+
+    def _show(self) -> None:
+        state = self._physics.state.reshape(-1, 6)
+        self.pose: FloatArray = state[:, :3].copy()
+        self.pose[:, 2] = wrapped(self.pose[:, 2])
+        self.velocity: FloatArray = state[:, 3:].copy()
+
+    def _scene(self) -> Scene:
+        radius_m = np.concatenate([np.full(g.stop - g.start, g.body.radius_m) for g in self.static.groups])
+        obstacles = obstacle_arrays(self.static.obstacles)
+        size_m, physics = self.static.arena_size_m, self._physics
+        return Scene(self.keys, size_m, self.static.walled, obstacles, radius_m, physics.state, physics.travel_m)
+
+
+def _groups(scenario: Scenario, bodies: Mapping[str, Body]) -> tuple[Group, ...]:
+    groups: list[Group] = []
+    start = 0
+    for name, table in scenario.robots.items():
+        groups.append(Group(name, bodies[name], start, start + table.count))
+        start += table.count
+    return tuple(groups)
+
+
+def _sensors(
+    scenario: Scenario, scene: Scene, groups: Sequence[Group], needs: Mapping[str, Sequence[str]]
+) -> dict[str, list[Sensor]]:
+    """The sensors of each group that its agents need."""
+    made: dict[str, list[Sensor]] = {group.name: [] for group in groups}
+    for group in groups:
+        for need in dict.fromkeys(needs.get(group.name, ())):
+            if need.startswith("radio."):
+                continue
+            if need not in group.body.senses:
+                has = ", ".join(group.body.senses) or "none"
+                expected = f"the agent needs the sense {need!r}; the body {group.body.name} has {has}"
+                raise BadInput(scenario.source, f"robots.{group.name}.agent", expected)
+            made[group.name].append(SENSORS[need](scene, group, group.body.senses[need]))
+    return made
