@@ -31,4 +31,4 @@ bench: sync ## measure; ONLY=name for one of them
 
 .PHONY: sync
 sync: # the locked packages, exactly
-	@$(UV) sync --locked --quiet
+	@.ci/sync

@@ -139,6 +139,6 @@ def test_tests_and_benchmarks_use_a_seeded_generator_but_never_sleep(folder: str
     assert "TID251" in lint("import time\n\ntime.sleep(1)\n", f"{folder}/newcomer.py")
 
 
-@pytest.mark.parametrize("name", ["uv", "run"])
+@pytest.mark.parametrize("name", ["run", "sync", "uv"])
 def test_the_scripts_of_continuous_integration_are_executable(name: str) -> None:
     assert (ROOT / ".ci" / name).stat().st_mode & 0o111
