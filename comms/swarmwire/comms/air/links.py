@@ -51,7 +51,7 @@ class Links(NamedTuple):
 
     def select(self, index: IntArray) -> "Links":
         """The rows of `index`, in its order."""
-        return Links._make(column[index] for column in self)
+        return Links._make(column.take(index, axis=0) for column in self)
 
     def followed_by(self, later: "Links") -> "Links":
         """These rows and then the later ones."""

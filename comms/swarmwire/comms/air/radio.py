@@ -69,7 +69,7 @@ class Radio:
     queue_limit: int = parameter(20, help="packets that may wait at a sender for its radio to become free", at_least=0)
     send_offset: str | float = parameter(
         "uniform",
-        help='when in its tick a robot sends: "uniform" (keyed phase, jitter), "tick" (at its start), or an offset in s',
+        help='when in its tick a robot sends: "uniform" (keyed phase, jitter), "tick" (its start), or an offset in s',
     )
     min_delivery: float = parameter(
         0.1,

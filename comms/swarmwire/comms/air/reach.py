@@ -45,17 +45,16 @@ def _within(x, y, alive, robots, cells, range_m, sender, to):
         s = sender[p]
         if to[p] != BROADCAST:
             r = s - s % robots + to[p]
-            if _joined(x, y, alive, range_m, s, r):
-                packet[found], receiver[found] = p, r
-                found += 1
+            packet[found], receiver[found] = p, r
+            found += _joined(x, y, alive, range_m, s, r)
             continue
         for j in range(-1, 2):
             first, stop = _strip(x[s], y[s], s // robots, cells, j)
             for k in range(first, stop):
                 r = cells.order[k]
-                if _joined(x, y, alive, range_m, s, r):
-                    packet[found], receiver[found] = p, r
-                    found += 1
+                # Written first and kept if it counts: a branch would be guessed wrong a third of the time.
+                packet[found], receiver[found] = p, r
+                found += _joined(x, y, alive, range_m, s, r)
     return packet[:found].copy(), receiver[:found].copy()
 
 
@@ -73,4 +72,4 @@ def _strip(x, y, arena, cells, row):
 @njit(cache=True)
 def _joined(x, y, alive, range_m, s, r):
     dx, dy = x[r] - x[s], y[r] - y[s]
-    return r != s and alive[r] and dx * dx + dy * dy <= range_m * range_m
+    return (r != s) & alive[r] & (dx * dx + dy * dy <= range_m * range_m)

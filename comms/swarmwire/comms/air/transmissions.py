@@ -37,7 +37,7 @@ class Transmissions(NamedTuple):
         """The packets of `index`, in its order."""
         if len(index) == len(self.sender) and np.array_equal(index, np.arange(len(index))):
             return self
-        return Transmissions._make([*(column[index] for column in self[:-1]), self.payloads.rows(index)])
+        return Transmissions._make([*(column.take(index) for column in self[:-1]), self.payloads.rows(index)])
 
     def followed_by(self, later: "Transmissions") -> "Transmissions":
         """These packets and then the later ones."""

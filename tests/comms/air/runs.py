@@ -1,0 +1,100 @@
+"""Small runs of the air: fixed poses, packets by tick, everything that became final."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+
+from swarmwire.comms.air.air import Air, News
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.draws import derive_key
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.truth import Obstacle, Tally
+
+RATE_HZ = 10
+TICK_NS = tick_start_ns(1, RATE_HZ)
+SIZE_M = (6.0, 5.0)
+
+
+@dataclass
+class Run:
+    """What an air told over a run, tick by tick."""
+
+    air: Air
+    news: list[News] = field(default_factory=list)
+    last: Tally | None = None
+
+    @property
+    def tally(self) -> Tally:
+        """All tallies added up."""
+        tallies = [one.tally for one in self.news] + ([self.last] if self.last else [])
+        return Tally(*(np.sum([getattr(t, f.name) for t in tallies], axis=0) for f in fields(Tally)))
+
+    def fates(self) -> dict[str, int]:
+        """Receivers by fate, those with none left out."""
+        return {fate.name: int(n) for fate, n in zip(Fate, self.tally.fates.sum(axis=0), strict=True) if n}
+
+    def heard(self, name: str) -> IntArray:
+        """A column of everything heard, in order."""
+        return np.concatenate([getattr(one.heard, name) for one in self.news])
+
+    def given(self, name: str) -> FloatArray:
+        """What receivers learned, in order."""
+        return np.concatenate([one.heard.given[name] for one in self.news])
+
+    def finished(self, name: str) -> IntArray:
+        """A column of all links that became final, in order."""
+        return np.concatenate([getattr(one.finished, name) for one in self.news])
+
+
+def make_air(
+    radio: Radio, robots: int, seeds: Sequence[int] = (1,), obstacles: Sequence[Sequence[Obstacle]] | None = None
+) -> Air:
+    """An air over arenas of SIZE_M at RATE_HZ, an arena per seed."""
+    keys = np.array([derive_key(seed, "air") for seed in seeds], np.uint64)
+    placed = obstacle_arrays(tuple(map(tuple, obstacles or [()] * len(seeds))))
+    return Air(radio, keys, robots, SIZE_M, placed, RATE_HZ)
+
+
+def run(air: Air, pose: FloatArray, sent_in: Callable[[int], Sent], ticks: int, quiet_ticks: int = 0) -> Run:
+    """Ticks in the loop's order with robots at rest, then quiet ones, then the end."""
+    out = Run(air)
+    alive = np.ones(len(pose), np.bool_)
+    for tick in range(ticks + quiet_ticks + 1):
+        at_ns = tick_start_ns(tick, RATE_HZ)
+        out.news.append(air.advance(at_ns))
+        if tick < ticks:
+            air.hold(pose, alive)
+            air.send(at_ns, tick, sent_in(tick))
+    out.last = air.end()
+    return out
+
+
+def packets(sender: Sequence[int], to: Sequence[int] | int = BROADCAST, size: Sequence[int] | int = 10) -> Sent:
+    """Packets whose bytes tell their place in the list."""
+    k = len(sender)
+    sizes = np.broadcast_to(np.asarray(size, np.int64), (k,))
+    payloads = Payloads.of([bytes([i % 256]) * int(n) for i, n in enumerate(sizes)])
+    return Sent(np.asarray(sender, np.int64), np.broadcast_to(np.asarray(to, np.int64), (k,)).copy(), payloads)
+
+
+def everybody(rows: int) -> Callable[[int], Sent]:
+    """A broadcast of ten bytes from every robot in every tick."""
+    sent = packets(range(rows))
+    return lambda _: sent
+
+
+def scattered(rows: int, seed: int = 5) -> FloatArray:
+    """Random poses over an arena of SIZE_M."""
+    rng = np.random.default_rng(seed)
+    half = np.array(SIZE_M) / 2
+    return np.column_stack([rng.uniform(-half, half, (rows, 2)), rng.uniform(-np.pi, np.pi, rows)])
+
+
+def at(*positions: tuple[float, ...]) -> FloatArray:
+    """Poses from (x, y) or (x, y, heading)."""
+    return np.array([(*p, 0.0)[:3] for p in positions], np.float64)
