@@ -34,8 +34,8 @@ def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> Non
         tick_m = body.max_linear_mps / scenario.time.rate_hz
         needed = math.ceil(tick_m / (MOST_OF_RADIUS * body.radius_m) - 1e-9)
         if scenario.physics.steps < needed:
-            text = f"expected at least {needed}, so that a robot of {group} at full speed moves at most a quarter of its"
-            raise BadInput(where, "physics.steps", f"{text} radius in one step; got {scenario.physics.steps}")
+            text = f"so that a robot of {group} at full speed moves at most a quarter of its radius in one step"
+            raise BadInput(where, "physics.steps", f"expected at least {needed}, {text}; got {scenario.physics.steps}")
 
 
 def _check_obstacle(scenario: Scenario, obstacle: CylinderTable | BoxTable, key: str, where: str) -> None:
@@ -58,7 +58,8 @@ def reach(obstacle: CylinderTable | BoxTable) -> tuple[float, float]:
 
 
 def _check_send_offset(scenario: Scenario, where: str) -> None:
-    offset = scenario.radio.send_offset if scenario.radio else 0.0
-    if offset not in ("uniform", "tick") if isinstance(offset, str) else not 0.0 <= offset < 1.0 / scenario.time.rate_hz:
+    offset, tick_s = scenario.radio.send_offset if scenario.radio else "uniform", 1.0 / scenario.time.rate_hz
+    known = offset in ("uniform", "tick") if isinstance(offset, str) else 0.0 <= offset < tick_s
+    if not known:
         expected = "expected uniform, tick, or an offset in s from 0 to below the period of a tick"
         raise BadInput(where, "radio.send_offset", f"{expected}; got {offset!r}")

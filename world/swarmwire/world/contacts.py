@@ -5,9 +5,11 @@
 import numpy as np
 from numba import njit
 
+from swarmwire.comms.arrays import AnyArray, IntArray
+
 
 @njit(cache=True)
-def pairs_of(contacts, ids, index):
+def pairs_of(contacts: AnyArray, ids: AnyArray, index: IntArray) -> IntArray:
     """One rising int64 code for each pair of bodies in contact: lower index x bodies + higher index.
 
     Args:
@@ -29,7 +31,7 @@ def pairs_of(contacts, ids, index):
 
 
 @njit(cache=True)
-def count_began(now, before, bodies, onsets):
+def count_began(now: IntArray, before: IntArray, bodies: int, onsets: IntArray) -> None:
     """Add the pairs of `now` that are not in `before` to onsets (2,): of two robots, of a robot and something fixed."""
     at = 0
     for code in now:

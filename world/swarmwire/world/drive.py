@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
 
 class Motors(NamedTuple):
@@ -27,7 +27,9 @@ class Motors(NamedTuple):
 
 
 @njit(cache=True)
-def push(motors, command, state, dt_s, force, travel_m):
+def push(
+    motors: Motors, command: FloatArray, state: FloatArray, dt_s: float, force: FloatArray, travel_m: FloatArray
+) -> None:
     """Set the force on every robot for the physics step to come, and add what its wheels roll in that step.
 
     Pymunk moves a body by the velocity that it has before the step and then applies the force, so a force set now shows
@@ -63,7 +65,9 @@ def push(motors, command, state, dt_s, force, travel_m):
             force[arena, i, 0], force[arena, i, 1], force[arena, i, 2] = fx * share, fy * share, torque
 
 
-def within_wheels(motors: Motors, index, linear_mps, angular_radps):
+def within_wheels(
+    motors: Motors, index: IntArray, linear_mps: FloatArray, angular_radps: FloatArray
+) -> tuple[FloatArray, BoolArray]:
     """Commands (n,) of robots with these indices as their wheels can follow them, and which of them were too fast.
 
     Both speeds shrink by one factor, so that the curve stays the same.

@@ -1,7 +1,7 @@
 """Validation errors as one plain line: which key, what was expected. The words come from the JSON schema."""
 
 from decimal import Decimal
-from typing import Any
+from typing import Any, cast
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -43,9 +43,9 @@ def _explained(error: ErrorDetails, schema: Node) -> tuple[str, str]:
     if kind.startswith("union_tag"):
         tag = node["discriminator"]["propertyName"]
         choices = f"expected one of {', '.join(node['discriminator']['mapping'])}"
-        given: Any = error["input"]
-        if not isinstance(given, dict):
+        if not isinstance(error["input"], dict):
             return key, f"expected a table, got {got}"
+        given = cast("Node", error["input"])
         return f"{key}.{tag}", f"{choices}; got {_shown(given[tag])}" if tag in given else f"is missing; {choices}"
     if error["loc"][-1] == "[key]":
         return key, f"expected a name of at most 40 letters, digits and _ that starts with a letter, got {got}"
@@ -64,12 +64,17 @@ def _followed(loc: tuple[int | str, ...], schema: Node) -> tuple[list[str], Node
             node = {"$ref": node["discriminator"]["mapping"][part]}
         elif node.get("type") == "object":
             holder, names = node, [*names, str(part)]
-            node = node.get("properties", {}).get(part) or next(iter(node.get("patternProperties", {}).values()), {})
+            named, patterned = _table(node, "properties"), _table(node, "patternProperties")
+            node = _table(named, str(part)) or next(iter(patterned.values()), Node())
         elif node.get("type") == "array":
             holder, names = node, [*names, str(part)]
             places = node.get("prefixItems", [])
-            node = places[part] if isinstance(part, int) and part < len(places) else node.get("items", {})
+            node = places[part] if isinstance(part, int) and part < len(places) else _table(node, "items")
     return [name for name in names if name != "[key]"], _plain(node, schema), holder
+
+
+def _table(node: Node, name: str) -> Node:
+    return node.get(name) or Node()
 
 
 def _plain(node: Node, schema: Node) -> Node:

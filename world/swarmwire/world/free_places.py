@@ -66,7 +66,7 @@ def _disc_clear_of_obstacles(taken, x, y, radius):
         dx, dy, apart = x - taken.circle[i, 0], y - taken.circle[i, 1], reach + taken.circle[i, 2]
         if dx * dx + dy * dy < apart * apart:
             return False
-    for i in range(len(taken.box)):
+    for i in range(len(taken.box)):  # noqa: SIM110 - compiled: no generators
         if _distance_to_box(x, y, taken.box[i]) < reach:
             return False
     return True
@@ -115,7 +115,9 @@ def _box_clear_of_obstacles(taken, box):
 
 
 @njit(cache=True)
-def free_circle(taken, region, key, entity, purpose, radius):
+def free_circle(
+    taken: Taken, region: Region, key: np.uint64, entity: int, purpose: int, radius: float
+) -> tuple[float, float]:
     """x, y of the first candidate where a round obstacle is clear of all obstacles; nan if there is none."""
     for attempt in range(MOST_CANDIDATES):
         x, y, inside = candidate(region, key, entity, attempt, purpose)
@@ -125,7 +127,16 @@ def free_circle(taken, region, key, entity, purpose, radius):
 
 
 @njit(cache=True)
-def free_box(taken, region, key, entity, purpose, half_length, half_width, heading):
+def free_box(
+    taken: Taken,
+    region: Region,
+    key: np.uint64,
+    entity: int,
+    purpose: int,
+    half_length: float,
+    half_width: float,
+    heading: float,
+) -> tuple[float, float, float]:
     """x, y, heading of the first candidate where a box is clear of all obstacles; nan if there is none.
 
     A heading that is not finite is drawn with each candidate.
@@ -144,7 +155,16 @@ def free_box(taken, region, key, entity, purpose, half_length, half_width, headi
 
 
 @njit(cache=True)
-def put_robots(taken, region, fixed, key, purpose, start, stop, radius):
+def put_robots(
+    taken: Taken,
+    region: Region,
+    fixed: FloatArray,
+    key: np.uint64,
+    purpose: int,
+    start: int,
+    stop: int,
+    radius: float,
+) -> int:
     """Put robots start to stop - 1, each at its first free candidate; the first that found no place, else -1.
 
     `fixed` (robots put, 2) gives each its only candidate; with no rows candidates are drawn from the region.

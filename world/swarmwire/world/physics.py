@@ -12,12 +12,13 @@ A space has its own coordinates, so an arena moves bit for bit alike alone and b
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
 
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.contacts import count_began, pairs_of
 from swarmwire.world.drive import Motors, push
@@ -155,13 +156,13 @@ class _ArenaSpace:
     def _check_order(self, ids: list[int]) -> None:
         """Rows are the robots in the order in which they were added, and the static body last."""
         get_space_bodies(self._space, BodyFields.BODY_ID, self._bodies)
-        assert np.frombuffer(self._bodies.int_buf(), np.uintp).tolist() == ids, "pymunk lists bodies in another order"
+        assert _ids_in(self._bodies).tolist() == ids, "pymunk lists bodies in another order"
 
     def read(self, state: FloatArray) -> None:
         """Copy what READ names of all robots into (robots, 6)."""
         self._bodies.clear()
         get_space_bodies(self._space, READ, self._bodies)
-        state[:] = np.frombuffer(self._bodies.float_buf()).reshape(-1, 6)[:-1]
+        state[:] = _numbers_in(self._bodies).reshape(-1, 6)[:-1]
 
     def step(self, step_s: float) -> None:
         """Hand over the forces and move by one physics step."""
@@ -172,6 +173,16 @@ class _ArenaSpace:
         """Add the contacts that began in the tick that ends to (2,): robot with robot, robot with something fixed."""
         self._contacts.clear()
         get_space_arbiters(self._space, CONTACT, self._contacts)
-        contacts = np.frombuffer(self._contacts.int_buf(), np.uintp).reshape(-1, 2)
+        contacts = _ids_in(self._contacts).reshape(-1, 2)
         before, self._touching = self._touching, pairs_of(contacts, self._ids, self._index)
         count_began(self._touching, before, len(self._ids), onsets)
+
+
+def _numbers_in(buffer: Any) -> FloatArray:
+    """The numbers that pymunk put into a buffer, until it is used again."""
+    return np.frombuffer(buffer.float_buf())
+
+
+def _ids_in(buffer: Any) -> AnyArray:
+    """The ids that pymunk put into a buffer, until it is used again."""
+    return np.frombuffer(buffer.int_buf(), np.uintp)

@@ -43,8 +43,9 @@ def place(scenario: Scenario, groups: Sequence[Group], seed: int, key: np.uint64
         region, radius_m = _region(scenario, table), group.body.radius_m
         lost = put_robots(taken, region, fixed, key, ROBOT, group.start, group.stop, radius_m)
         if lost >= 0:
-            i = lost - group.start
-            why = f"at ({fixed[i, 0]:g}, {fixed[i, 1]:g}) it would stand outside or touch something" if len(fixed) else TRIED
+            i, why = lost - group.start, TRIED
+            if len(fixed):
+                why = f"at ({fixed[i, 0]:g}, {fixed[i, 1]:g}) it would stand outside or touch something"
             raise _no_room(scenario, f"robots.{group.name}.place", f"{group.name}-{i}", why, seed)
         pose[group.start : group.stop, 2] = _headings(table, group, key)
     pose[:, :2] = taken.robot[:, :2]
@@ -135,7 +136,7 @@ def _fixed(table: RobotsTable) -> FloatArray:
         return np.empty((0, 2))
     columns = int(np.ceil(np.sqrt(table.count)))
     rows = -(-table.count // columns)
-    i = np.arange(table.count)
+    i = np.arange(table.count, dtype=np.float64)
     x, y = i % columns - 0.5 * (columns - 1), i // columns - 0.5 * (rows - 1)
     return np.stack([x, y], axis=1) * table.place.spacing_m
 
@@ -145,4 +146,3 @@ def _headings(table: RobotsTable, group: Group, key: np.uint64) -> FloatArray:
         return wrapped(np.array(table.place.poses, np.float64)[:, 2])
     keys: KeyArray = np.array(key, np.uint64)
     return np.pi - 2.0 * np.pi * uniform(keys, np.arange(group.start, group.stop), 0, 0, HEADING)
-

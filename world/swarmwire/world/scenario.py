@@ -31,7 +31,7 @@ class Table(BaseModel):
 class TimeTable(Table):
     """[time]: the base period of the run."""
 
-    rate_hz: int = Field(10, ge=1, le=1000, json_schema_extra={"unit": "Hz"})
+    rate_hz: int = Field(default=10, ge=1, le=1000, json_schema_extra={"unit": "Hz"})
     """Ticks per second."""
 
 
@@ -40,7 +40,7 @@ class PhysicsTable(Table):
 
     engine: Literal["pymunk"] = "pymunk"
     """The engine that moves the bodies."""
-    steps: int = Field(5, ge=1, le=1000)
+    steps: int = Field(default=5, ge=1, le=1000)
     """Physics steps per tick; refused if a robot at full speed would move over a quarter of its radius in one."""
 
 
@@ -51,7 +51,7 @@ class _ObstacleTable(Table):
     """The centre of the one obstacle, in the arena's frame."""
     place: Literal["random"] | None = None
     """"random": anywhere in the arena, free of other things, by the seed."""
-    count: int = Field(1, ge=1, le=100_000)
+    count: int = Field(default=1, ge=1, le=100_000)
     """How many; only with place = "random"."""
 
     @model_validator(mode="after")
@@ -90,7 +90,9 @@ class ArenaTable(Table):
     """Full extents along x and y."""
     boundary: Literal["walls", "open"] = "walls"
     """Walls that bodies hit and sensors see, or nothing at all."""
-    obstacles: tuple[Annotated[CylinderTable | BoxTable, Field(discriminator="shape")], ...] = Field((), strict=False)
+    obstacles: tuple[Annotated[CylinderTable | BoxTable, Field(discriminator="shape")], ...] = Field(
+        default=(), strict=False
+    )
     """Fixed things that bodies hit, sensors see and radio signals are blocked by."""
 
 
@@ -157,7 +159,7 @@ class RunTable(Table):
 
     on_runner_loss: Literal["stop"] = "stop"
     """What to do when a runner is lost."""
-    runner_timeout_s: float = Field(30.0, gt=0, le=86_400, json_schema_extra={"unit": "s"})
+    runner_timeout_s: float = Field(default=30.0, gt=0, le=86_400, json_schema_extra={"unit": "s"})
     """A runner is lost if it gives no answer for so long."""
 
 
@@ -168,7 +170,7 @@ class Scenario(Table):
     """Version of this format."""
     name: str = Field(min_length=1, max_length=200)
     """What the run is about."""
-    seed: int = Field(1, ge=0, le=2**63 - 1)
+    seed: int = Field(default=1, ge=0, le=2**63 - 1)
     """The seed of every draw of the run's arena."""
     duration_s: float = Field(gt=0, le=1e9, json_schema_extra={"unit": "s"})
     """Length of the run."""

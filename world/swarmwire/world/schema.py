@@ -1,4 +1,4 @@
-"""Dataclasses of parameters as tables of a scenario: one declaration gives validation, JSON schema and the frozen object."""
+"""Parameter dataclasses as tables of a scenario: one declaration gives validation, JSON schema and frozen object."""
 
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from functools import cache
@@ -16,7 +16,7 @@ TABLE = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False
 
 @dataclass(frozen=True)
 class AsTable:
-    """Annotation of a field whose type is a parameter dataclass: read as a table with its limits, held as the dataclass."""
+    """Annotation of a field whose type is a parameter dataclass: read as a table, held as the dataclass."""
 
     def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
         """The schema of `source`'s table, followed by building `source`."""

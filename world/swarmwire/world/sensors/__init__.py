@@ -1,4 +1,4 @@
-"""What robots sense: a file per sensor. A new one is a sheet in `swarmwire.comms.sheets`, a file here, and a line below."""
+"""What robots sense, a file per sensor. A new one: a sheet in `swarmwire.comms.sheets`, a file here, a line below."""
 
 from collections.abc import Callable
 from typing import Any

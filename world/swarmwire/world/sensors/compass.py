@@ -2,7 +2,6 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray

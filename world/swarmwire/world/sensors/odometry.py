@@ -29,7 +29,8 @@ class OdometrySensor:
     def read(self, tick: int) -> dict[str, FloatArray]:
         """The travel that the encoders of every robot show; slip is drawn for the travel since the last reading."""
         rolled_m = self._true()
-        _add_travel(self._told_m, rolled_m - self._rolled_m, self._scene.keys, self._group.start, tick, self._sheet.slip)
+        new_m, keys = rolled_m - self._rolled_m, self._scene.keys
+        _add_travel(self._told_m, new_m, keys, self._group.start, tick, self._sheet.slip)
         self._rolled_m = rolled_m
         step_m = self._sheet.step_m
         shown = np.floor(self._told_m / step_m) * step_m if step_m > 0.0 else self._told_m
