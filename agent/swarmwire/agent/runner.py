@@ -30,14 +30,18 @@ def run(endpoint: str, run_id: str, runner: str) -> None:
     keys = Keys(run_id)
     with open_runner(endpoint) as session:
         inbox: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
-        session.liveliness().declare_subscriber(keys.world, Callback(inbox.put, indirect=False), history=True)
-        session.declare_subscriber(keys.frame(runner), Callback(inbox.put, indirect=False))
-        session.liveliness().declare_token(keys.alive(runner))
+        arrived = Callback(inbox.put, indirect=False)
+        declared = (  # zenoh takes back what nobody holds on to
+            session.liveliness().declare_subscriber(keys.world, arrived, history=True),
+            session.declare_subscriber(keys.frame(runner), arrived),
+            session.liveliness().declare_token(keys.alive(runner)),
+        )
         assignment = _join(session, keys, runner)
         answer = session.declare_publisher(
             keys.answer(runner), congestion_control=zenoh.CongestionControl.BLOCK, express=True
         )
         _serve(assignment, inbox, lambda data: cast(None, answer.put(data)))
+        del declared
 
 
 def _join(session: zenoh.Session, keys: Keys, runner: str) -> Assignment:

@@ -2,7 +2,6 @@
 
 import json
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -10,12 +9,12 @@ import typer
 from rich.console import Console
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import AgentFailed, BadInput, SwarmwireError
-from swarmwire.deploy.folder import make_folder
+from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.deploy.folder import default_folder, make_folder
 from swarmwire.deploy.report import print_result
 from swarmwire.deploy.result import Result
 
-OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 
 app = typer.Typer(
     help="A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own.",
@@ -59,7 +58,7 @@ def run_command(
     checked = load_scenario(scenario, overrides or [])
     chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
     execution = Execution(checked, chosen, runners, socket=socket)
-    folder = execution.folder = make_folder(out, scenario.stem, chosen)
+    folder = execution.folder = make_folder(out or default_folder(scenario.stem, chosen))
     result = execution.run([ProgressLine(execution.ticks, WallClock(), console)])
     print_result(result, console)
     _say_where(result, folder, console)
@@ -74,7 +73,7 @@ def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     from swarmwire.world.scenario_file import load_scenario
 
     checked = load_scenario(scenario, overrides or [])
-    static = Execution(checked, choose_seeds(checked, None, None), None).world.static
+    static = Execution(checked, choose_seeds(checked, None, None)).world.static
     groups = ", ".join(f"{group.stop - group.start} {group.body.name} ({group.name})" for group in static.groups)
     typer.echo(f"{scenario}: good: {groups}, {checked.duration_s:g} s at {static.rate_hz} Hz")
 
@@ -88,31 +87,17 @@ def schema_command() -> None:
 
 
 def main() -> None:
-    """Entry point of `swarmwire`."""
-    sys.exit(exit_code(lambda: app(standalone_mode=False)))
-
-
-def exit_code(call: Callable[[], object]) -> int:
-    """The exit code of a command; every error of ours becomes one line (an agent's keeps its own traceback)."""
+    """Entry point of `swarmwire`: every error of ours is one line (an agent's failure keeps the agent's own traceback)."""
     try:
-        returned = call()
+        app()
     except BadInput as error:
-        return _fail(f"error: {error}", BAD_INPUT)
-    except AgentFailed as error:
-        return _fail(f"error: {error}", FAILED)
+        sys.exit(_fail(error, BAD_INPUT))
     except SwarmwireError as error:
-        return _fail(f"error: {error}", FAILED)
-    except typer.Exit as leave:
-        return leave.exit_code
-    except typer.Abort:
-        return INTERRUPTED
-    except KeyboardInterrupt:
-        return INTERRUPTED
-    return returned if isinstance(returned, int) else OK
+        sys.exit(_fail(error, FAILED))
 
 
-def _fail(text: str, code: int) -> int:
-    typer.echo(text.rstrip(), err=True)
+def _fail(error: SwarmwireError, code: int) -> int:
+    typer.echo(f"error: {error}".rstrip(), err=True)
     return code
 
 

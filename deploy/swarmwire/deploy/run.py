@@ -54,18 +54,20 @@ def run(
     checked = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
     if isinstance(scenario, Scenario) and overrides:
         raise BadInput("overrides", "", "expected a path of a scenario; a Scenario is complete as it is")
-    chosen = choose_seeds(checked, seed, seeds)
-    folder = None if out is None else make_folder(Path(out), checked.name, chosen)
-    return Execution(checked, chosen, runners, folder, socket).run(observers)
+    execution = Execution(checked, choose_seeds(checked, seed, seeds), runners, socket)
+    if out is not None:
+        execution.folder = make_folder(Path(out))
+    return execution.run(observers)
 
 
 class Execution:
     """A checked scenario on its way to a result."""
 
     def __init__(
-        self, scenario: Scenario, seeds: tuple[int, ...], runners: Runners, folder: Path | None, socket: Path | None = None
+        self, scenario: Scenario, seeds: tuple[int, ...], runners: Runners = None, socket: Path | None = None
     ) -> None:
-        self.scenario, self.seeds, self.folder = scenario, seeds, folder
+        self.scenario, self.seeds = scenario, seeds
+        self.folder: Path | None = None  # where summary and recording go, if anywhere
         self.ticks = _ticks(scenario)
         self._socket, self._clock = socket, WallClock()
         self._called_ns = self._clock.now_ns()
@@ -161,6 +163,7 @@ def _ticks(scenario: Scenario) -> int:
 
 
 def choose_seeds(scenario: Scenario, seed: int | None, seeds: Sequence[int] | None) -> tuple[int, ...]:
+    """The seed of each arena: those asked for, or the scenario's own; BadInput if they are no good."""
     if seed is not None and seeds is not None:
         raise BadInput("", "seeds", "expected either one seed or several seeds")
     chosen = tuple(seeds) if seeds is not None else (scenario.seed if seed is None else seed,)

@@ -39,6 +39,7 @@ class RemoteCrew:
         self._timeout_s, self._clock, self._trouble = timeout_s, clock, trouble
         self._inbox: queue.SimpleQueue[zenoh.Sample | zenoh.Query] = queue.SimpleQueue()
         self._session: zenoh.Session | None = None
+        self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to
         self._frames: dict[str, zenoh.Publisher] = {}
         self._present: set[str] = set()
 
@@ -51,10 +52,13 @@ class RemoteCrew:
             raise BadInput(
                 "", self._endpoint, f"expected an endpoint that is free and can be listened on: {reason}"
             ) from error
-        session.liveliness().declare_token(self._keys.world)
-        session.declare_queryable(self._keys.join, (self._inbox.put, self._inbox))
-        session.declare_subscriber(self._keys.any_answer, (self._inbox.put, self._inbox))
-        session.liveliness().declare_subscriber(self._keys.any_alive, (self._inbox.put, self._inbox))
+        arrived = (self._inbox.put, self._inbox)
+        self._declared = (
+            session.liveliness().declare_token(self._keys.world),
+            session.declare_queryable(self._keys.join, arrived),
+            session.declare_subscriber(self._keys.any_answer, arrived),
+            session.liveliness().declare_subscriber(self._keys.any_alive, arrived),
+        )
 
     def start(self) -> None:
         """Wait until runners have taken all robots and built their agents."""
