@@ -44,7 +44,7 @@ class PhysicsTable(Table):
     """Physics steps per tick; refused if a robot at full speed would move over a quarter of its radius in one."""
 
 
-class _ObstacleTable(Table):
+class _StandingTable(Table):
     """Where an obstacle stands: either one at a point, or several at random."""
 
     at: Point | None = None
@@ -55,7 +55,7 @@ class _ObstacleTable(Table):
     """How many; only with place = "random"."""
 
     @model_validator(mode="after")
-    def _one_place(self) -> "_ObstacleTable":
+    def _one_place(self) -> "_StandingTable":
         if (self.at is None) == (self.place is None):
             raise PydanticCustomError("place", 'expected either at = [x, y] or place = "random"')
         if self.at is not None and self.count != 1:
@@ -63,7 +63,7 @@ class _ObstacleTable(Table):
         return self
 
 
-class CylinderTable(_ObstacleTable):
+class CylinderTable(_StandingTable):
     """A round obstacle."""
 
     shape: Literal["cylinder"]
@@ -72,7 +72,7 @@ class CylinderTable(_ObstacleTable):
     """Its radius."""
 
 
-class BoxTable(_ObstacleTable):
+class BoxTable(_StandingTable):
     """A rectangular obstacle."""
 
     shape: Literal["box"]
@@ -83,6 +83,9 @@ class BoxTable(_ObstacleTable):
     """Counter-clockwise turn; 0 if left out, or a random one with place = "random"."""
 
 
+ObstacleTable = Annotated[CylinderTable | BoxTable, Field(discriminator="shape")]
+
+
 class ArenaTable(Table):
     """[arena]: a bounded plane and what stands in it; the origin is its centre."""
 
@@ -90,9 +93,7 @@ class ArenaTable(Table):
     """Full extents along x and y."""
     boundary: Literal["walls", "open"] = "walls"
     """Walls that bodies hit and sensors see, or nothing at all."""
-    obstacles: tuple[Annotated[CylinderTable | BoxTable, Field(discriminator="shape")], ...] = Field(
-        default=(), strict=False
-    )
+    obstacles: tuple[ObstacleTable, ...] = Field(default=(), strict=False)
     """Fixed things that bodies hit, sensors see and radio signals are blocked by."""
 
 

@@ -1,0 +1,73 @@
+"""Scenarios and commands that the world's tests share."""
+
+import copy
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.senses import Actions
+from swarmwire.world.scenario import Scenario
+from swarmwire.world.scenario_file import scenario_from
+from swarmwire.world.world import World
+
+SAMPLE: dict[str, Any] = {
+    "format": 1,
+    "name": "sample",
+    "seed": 3,
+    "duration_s": 10.0,
+    "arena": {
+        "size_m": [6.0, 4.0],
+        "obstacles": [
+            {"shape": "cylinder", "radius_m": 0.1, "count": 4, "place": "random"},
+            {"shape": "box", "size_m": [0.5, 0.1], "at": [1.0, 1.0]},
+        ],
+    },
+    "robots": {
+        "flock": {"body": "epuck", "count": 12, "agent": "a:B", "place": {"how": "disc", "radius_m": 1.5}},
+        "big": {"body": "footbot", "count": 3, "agent": "a:C"},
+    },
+    "radio": {"range_m": 2.0, "loss": 0.3, "gives": {"range": {"noise_m": 0.02}, "bearing": {}}},
+}
+ALL_SENSES = {"flock": ("proximity", "compass", "odometry"), "big": ("proximity", "compass", "odometry")}
+
+
+def changed(path: str, value: Any) -> dict[str, Any]:
+    """The sample with one value set; a number in the path is a place in a list."""
+    mapping = copy.deepcopy(SAMPLE)
+    at: Any = mapping
+    *parents, last = path.split(".")
+    for name in parents:
+        at = at[int(name)] if isinstance(at, list) else at.setdefault(name, {})
+    at[int(last) if isinstance(at, list) else last] = value
+    return mapping
+
+
+def without(path: str) -> dict[str, Any]:
+    """The sample with one key left out."""
+    mapping = copy.deepcopy(SAMPLE)
+    at: Any = mapping
+    *parents, last = path.split(".")
+    for name in parents:
+        at = at[name]
+    del at[last]
+    return mapping
+
+
+def posed(poses: list[list[float]], body: str = "epuck", **tables: Any) -> Scenario:
+    """Robots of one group `a` at these poses, alone in a 4 m square unless `tables` say otherwise."""
+    group = {"body": body, "count": len(poses), "agent": "x", "place": {"how": "poses", "poses": poses}}
+    mapping = {"format": 1, "name": "posed", "duration_s": 1.0, "arena": {"size_m": [4.0, 4.0]}, "robots": {"a": group}}
+    return scenario_from({**mapping, **tables}, "posed")
+
+
+def commanded(world: World, linear_mps: Any, angular_radps: Any) -> Actions:
+    """A command for every robot; numbers or arrays with a value per row."""
+    rows = np.arange(world.static.arenas * world.static.robots)
+    linear, angular = (np.broadcast_to(np.asarray(v, np.float64), rows.shape).copy() for v in (linear_mps, angular_radps))
+    return Actions(rows, np.ones(len(rows), np.bool_), linear, angular)
+
+
+def wandering(world: World, tick: int) -> Actions:
+    """Commands that differ by robot index and tick, alike in every arena."""
+    index = np.arange(world.static.arenas * world.static.robots) % world.static.robots
+    return commanded(world, 0.06 + 0.06 * np.sin(index + 0.1 * tick), np.cos(3.0 * index + 0.2 * tick))
