@@ -95,6 +95,15 @@ def test_heard_is_sorted_by_receiver_time_sender_and_sequence():
         assert len(told.heard("receiver")) > 1000
 
 
+def test_the_order_of_ties_is_that_of_senders_also_over_ticks():
+    """Robot 2 takes 150 ms from tick 0, robot 1 takes 50 ms from tick 1: both are heard at 150 ms."""
+    air = make_air(Radio(99.0, bit_rate_bps=800, send_offset="tick"), 3)
+    told = run(air, scattered(3), lambda tick: [packets([2], size=15), packets([1], size=5)][tick], 2, 2)
+    heard_by_0 = told.heard("receiver") == 0
+    assert told.heard("heard_at_ns")[heard_by_0].tolist() == [150_000_000] * 2
+    assert told.heard("sender")[heard_by_0].tolist() == [1, 2]
+
+
 def test_payloads_hold_only_packets_that_somebody_heard():
     told = run(make_air(RADIO, ROBOTS), scattered(ROBOTS), lambda _: two_each(1), 5, 2)
     for one in told.news:

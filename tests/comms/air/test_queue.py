@@ -43,6 +43,14 @@ def test_the_queue_empties_as_time_passes():
     assert (np.diff(told.finished("sequence")) > 0).all()
 
 
+def test_what_earlier_ticks_left_waiting_counts_against_the_limit():
+    """Packets of 60 ms and room for three: 120 and 180 ms still wait at 100 ms, 240 ms at 200 ms."""
+    radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=3)
+    told = run(make_air(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0] * 5, size=30), 3, 6)
+    assert told.finished("sequence").tolist() == [0, 1, 2, 3, 5, 10, 11]
+    assert told.finished("on_air_at_ns")[-3:].tolist() == [240_000_000, 300_000_000, 360_000_000]
+
+
 def test_refused_packets_are_numbered_too():
     """And a packet too large takes no time on air: the next goes out at once."""
     told = run(make_air(SLOW, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=[101, 100]), 1, 3)
@@ -60,12 +68,12 @@ def test_a_payload_above_the_maximum_is_too_large_for_every_intended_receiver():
 
 def test_a_refusal_is_final_when_it_was_sent():
     """Offset 150 ms: in the second tick, whose poses tell who would have been in range."""
-    radio = Radio(2.0, bit_rate_bps=4000, send_offset=0.15, queue_limit=0)
+    radio = Radio(2.0, bit_rate_bps=1000, send_offset=0.15, queue_limit=0)  # on air for 80 ms
     air = make_air(radio, 2)
     air.hold(at((0, 0), (3, 0)), np.ones(2, bool))
     air.send(0, 0, packets([0, 0]))
     assert air.advance(TICK_NS).tally.fates.sum() == 0
     air.hold(at((0, 0), (1, 0)), np.ones(2, bool))
     tally = air.advance(2 * TICK_NS).tally
-    assert tally.fates[0].tolist() == [1, 0, 0, 0, 1, 0, 0]
-    assert tally.in_range.tolist() == [2]
+    assert tally.fates[0].tolist() == [0, 0, 0, 0, 1, 0, 0]
+    assert tally.in_range.tolist() == [1]

@@ -86,10 +86,10 @@ def test_no_other_offset_is_taken(send_offset: str | float):
 
 
 def test_geometry_is_that_of_the_tick_in_which_a_packet_goes_on_air():
-    """Sent in tick 0 while near, on air in tick 1 while far; and the other way round."""
+    """Sent in tick 0, on air in tick 1 (its very start included), near in only one of them."""
     near, far = at((0, 0), (1, 0)), at((0, 0), (3, 0))
-    for before, after, heard in ((near, far, 0), (far, near, 1)):
-        air = make_air(Radio(2.0, send_offset=0.15), 2)
+    for before, after, send_offset, heard in ((near, far, 0.15, 0), (far, near, 0.15, 1), (far, near, 0.1, 1)):
+        air = make_air(Radio(2.0, send_offset=send_offset), 2)
         air.hold(before, np.ones(2, bool))
         air.send(0, 0, packets([0]))
         assert len(air.advance(TICK_NS).finished.fate) == 0
