@@ -90,14 +90,10 @@ def _sent(frame: Frame, rows: IntArray) -> Sent:
     to = _column(frame, "sent/to", "<i8", lambda length: length == len(sender))
     offset = _column(frame, "sent/offset", "<i8", lambda length: length == len(sender) + 1)
     data = _column(frame, "sent/data", "|u1", lambda _: True)
-    if (
-        offset[0] != 0
-        or offset[-1] != len(data)
-        or np.any((offset < 0) | (offset > len(data)))
-        or np.any(np.diff(offset) < 0)
-    ):
+    if offset[0] != 0 or offset[-1] != len(data) or (offset[1:] < offset[:-1]).any():
         raise BadFrame("malformed", "sent/offset: expected rising offsets into sent/data")
-    if not np.all(np.isin(sender, rows)) or np.any(to < BROADCAST):
+    known = np.sort(rows)
+    if (known[np.searchsorted(known[:-1], sender)] != sender).any() or (to < BROADCAST).any():
         raise BadFrame("malformed", "sent: expected packets of the runner's own robots")
     return Sent(sender, to, Payloads(data, offset))
 
