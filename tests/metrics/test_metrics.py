@@ -3,7 +3,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from tests.metrics.truths import edges, poses, static, truth
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import parameter
@@ -12,6 +11,7 @@ from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.order import Order
 from swarmwire.metrics.registry import METRICS, register
+from tests.metrics.truths import edges, poses, static, truth
 
 
 @dataclass(frozen=True)

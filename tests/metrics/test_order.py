@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from tests.metrics.truths import measured, poses, static, truth
 
 headings = st.lists(st.floats(-np.pi, np.pi), min_size=1, max_size=20)

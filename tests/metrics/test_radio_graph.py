@@ -1,6 +1,7 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+
 from tests.metrics.truths import edges, measured, static, truth
 
 

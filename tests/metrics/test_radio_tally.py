@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.metrics.truths import finished, static, tally, truth
 
 from swarmwire.comms.fates import FATE_NAMES, Fate
 from swarmwire.metrics.radio_tally import RadioTally
+from tests.metrics.truths import finished, static, tally, truth
 
 
 def radio(of, *ticks, last=None):

@@ -14,8 +14,9 @@ _GROUP_COLORS = ((86, 180, 233), (240, 160, 50), (0, 200, 140), (230, 110, 180),
 _DEAD_COLOR = (95, 95, 100)
 _WALL_COLOR = (150, 155, 170)
 _LINK_COLOR = (120, 135, 170, 70)
+_TRAIL_ALPHA = 170
 _HEADING_RADII = 2.5  # length of a heading's arrow in body radii, from the centre
-_LEAST_HEADING = 0.012  # and at least this share of the arena's larger side, so that it can be seen
+_LEAST_HEADING = 0.025  # and at least this share of the arena's larger side, so that it can be seen
 
 
 class RerunArena:
@@ -42,20 +43,21 @@ class RerunArena:
         rec.log("world", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
         half_x, half_y = (size / 2 for size in static.arena_size_m)
         boundary = _closed(np.array([[-half_x, -half_y], [half_x, -half_y], [half_x, half_y], [-half_x, half_y]]))
-        width = rr.Radius.ui_points(2.0 if static.walled else 0.7)
+        width = rr.Radius.ui_points(1.2 if static.walled else 0.5)
         rec.log("world/boundary", rr.LineStrips2D([boundary], radii=width, colors=_WALL_COLOR), static=True)
         outlines = [_outline(obstacle) for obstacle in static.obstacles[self._arena]]
         if outlines:
-            thin = rr.Radius.ui_points(1.5)
+            thin = rr.Radius.ui_points(1.2)
             rec.log("world/obstacles", rr.LineStrips2D(outlines, radii=thin, colors=_WALL_COLOR), static=True)
-        names, hidden = list(static.robot_names), False
-        rec.log(
-            "world/robots", rr.Points2D.from_fields(radii=self._radius_m, labels=names, show_labels=hidden), static=True
-        )
-        rec.log("world/trails", rr.Points2D.from_fields(radii=rr.Radius.ui_points(0.8)), static=True)
+        names = list(static.robot_names)
+        robots = rr.Points2D.from_fields(radii=self._radius_m, labels=names, show_labels=False)
+        rec.log("world/robots", robots, static=True)
+        faint = np.column_stack([self._color, np.full(static.robots, _TRAIL_ALPHA, np.uint8)])
+        trails = rr.Points2D.from_fields(radii=rr.Radius.ui_points(0.7), colors=faint)
+        rec.log("world/trails", trails, static=True)
         links = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(0.5), colors=_LINK_COLOR)
         rec.log("world/links", links, static=True)
-        rec.log("world/headings", rr.Arrows2D.from_fields(radii=rr.Radius.ui_points(1.0)), static=True)
+        rec.log("world/headings", rr.Arrows2D.from_fields(radii=rr.Radius.ui_points(1.2)), static=True)
 
     def log(self, rec: Any, truth: Truth) -> None:
         """Log one tick."""
@@ -84,10 +86,8 @@ class RerunArena:
         import rerun as rr
 
         color = np.where(alive[:, None], self._color, np.array(_DEAD_COLOR, np.uint8))
-        faint = np.column_stack([color, np.full(len(color), 110, np.uint8)])
         rec.log("world/robots", rr.Points2D.from_fields(colors=color))
         rec.log("world/headings", rr.Arrows2D.from_fields(colors=color))
-        rec.log("world/trails", rr.Points2D.from_fields(colors=faint))
         self._was_alive = alive
 
 

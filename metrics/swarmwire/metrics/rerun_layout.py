@@ -14,7 +14,7 @@ def layout(static: Static) -> Any:
     """The blueprint for recordings of this run; without a radio it has no plot of packets."""
     import rerun.blueprint as rrb
 
-    plots = [_plot("shares", "Order and connectivity, as shares", (0.0, 1.02)), _plot("numbers", "Counts")]
+    plots = [_plot("shares", "Order and connectivity, as shares", (-0.03, 1.03)), _plot("numbers", "Counts")]
     if static.range_m is not None:
         plots.insert(1, _plot("packets", "Packets per second, over the last second"))
     return rrb.Blueprint(
@@ -62,5 +62,5 @@ def _plot(entity: str, name: str, bounds: tuple[float, float] | None = None) -> 
         origin=f"/plots/{entity}",
         name=name,
         axis_y=rrb.ScalarAxis(range=bounds) if bounds else None,
-        plot_legend=rrb.Corner2D.LeftBottom if bounds else rrb.Corner2D.LeftTop,
+        plot_legend=rrb.Corner2D.RightBottom if bounds else rrb.Corner2D.LeftTop,
     )
