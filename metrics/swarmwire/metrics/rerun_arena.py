@@ -1,5 +1,6 @@
 """The arena of a recording: boundary and obstacles once; robots, headings, trails and links per tick."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ _WALL_COLOR = (150, 155, 170)
 _LINK_COLOR = (120, 135, 170, 70)
 _TRAIL_ALPHA = 170
 _HEADING_RADII = 2.5  # length of a heading's arrow in body radii, from the centre
-_LEAST_HEADING = 0.025  # and at least this share of the arena's larger side, so that it can be seen
+_LEAST_HEADING = 0.025  # and at least this share of the arena's larger side, so that it can be seen,
+_CROWDED = 0.25  # or this share / sqrt(robots) if that is less, so that a thousand do not cover one another
 
 
 class RerunArena:
@@ -31,7 +33,8 @@ class RerunArena:
         self._rows = slice(arena * static.robots, (arena + 1) * static.robots)
         self._color, radius_m = _by_group(static)
         self._radius_m = radius_m
-        self._heading_m = np.maximum(_HEADING_RADII * radius_m, _LEAST_HEADING * max(static.arena_size_m))
+        least = min(_LEAST_HEADING, _CROWDED / math.sqrt(static.robots))
+        self._heading_m = np.maximum(_HEADING_RADII * radius_m, least * max(static.arena_size_m))
         self._was_alive: BoolArray | None = None
         self.links_every_ticks = 1 if static.robots <= LINKS_EVERY_TICK_UP_TO else THINNED_LINKS_EVERY_TICKS
 
