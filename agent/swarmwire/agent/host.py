@@ -52,7 +52,8 @@ class Hosted(ABC):
         if len(senses.rows) != len(self.rows) or not np.array_equal(senses.rows, self.rows):
             self.keep(senses.rows)
             self.rows = senses.rows
-        self.step(turn)
+        if turn.n:  # no step for nobody: an agent must not tell whether others share its process
+            self.step(turn)
         self._sent_before[place] = sent_before
         return turn.actions()
 
@@ -102,7 +103,8 @@ class _Single(Hosted):
                 raise AgentFailed(name, traceback.format_exc()) from error
 
     def keep(self, rows: IntArray) -> None:
-        self._agents = {int(row): self._agents.get(int(row)) or make(self._kind, self.group.params) for row in rows}
+        known = self._agents
+        self._agents = {row: known[row] if row in known else make(self._kind, self.group.params) for row in rows.tolist()}
 
 
 def hosted(group: GroupAssignment, kind: AgentClass) -> Hosted:

@@ -29,10 +29,11 @@ def load_agent(spec: str) -> AgentClass:
     place, _, name = spec.rpartition(":")
     if not place or not name.isidentifier():
         raise NoAgent(f'expected "package.module:Class" or "file.py:Class", got {spec!r}')
+    of_file = place.endswith(".py")
+    if of_file and not Path(place).is_file():
+        raise NoAgent(f"there is no file {place}")
     try:
-        module = _load_file(Path(place)) if place.endswith(".py") else importlib.import_module(place)
-    except FileNotFoundError as error:
-        raise NoAgent(f"there is no file {place}") from error
+        module = _load_file(Path(place)) if of_file else importlib.import_module(place)
     except Exception as error:
         raise NoAgent(f"{place} does not import: {type(error).__name__}: {error}") from error
     found = getattr(module, name, None)

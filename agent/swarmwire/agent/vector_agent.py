@@ -39,7 +39,7 @@ class State:
         cls.columns = dict(cls.columns)
         for name, hint in get_type_hints(cls).items():
             default = getattr(cls, name, None)
-            if isinstance(default, _Default):
+            if isinstance(default, _Default) and hint in (FloatColumn, IntColumn, BoolColumn):
                 dtype = np.dtype(get_args(get_args(hint)[1])[0])
                 cls.columns[name] = (dtype, default.value)
             elif name != "columns":

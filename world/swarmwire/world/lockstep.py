@@ -10,6 +10,7 @@
 Whatever does not fit is counted by name and dropped; it never changes the state.
 """
 
+import re
 from collections import Counter
 from dataclasses import dataclass
 from typing import cast
@@ -26,6 +27,9 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
 
 
+NAME = re.compile(r"[\w.-]{1,64}", re.ASCII)  # of a runner: it is part of a key, so no wildcard, slash or hash
+
+
 class Refused(Exception):
     """A request to join that is not granted; the text goes back to the runner."""
 
@@ -35,7 +39,7 @@ class _Slot:
     """Some robots, and the runner that plays them."""
 
     assignment: Assignment
-    rows: IntArray  # (n,) in the order of the answer: group after group
+    rows: IntArray  # (n,) that act in the tick that is open, in the order of the answer: group after group
     runner: str | None = None
     state: str = "free"
     actions: Actions | None = None
@@ -76,7 +80,7 @@ class Lockstep:
         except (ValueError, frames.UnpackException):
             asked = None
         match asked:
-            case {"v": frames.VERSION, "runner": str(runner)} if runner and "/" not in runner:
+            case {"v": frames.VERSION, "runner": str(runner)} if NAME.fullmatch(runner):
                 pass
             case _:
                 self._counts["bad_join"] += 1
@@ -103,6 +107,7 @@ class Lockstep:
         out: list[tuple[str, bytes]] = []
         for slot, part, own in zip(self._slots, parts, packets, strict=True):
             slot.state, slot.actions = "waiting", None
+            slot.rows = np.concatenate([np.empty(0, np.int64), *(group.rows for group in part.values())])
             out.append((slot.runner or "", encode_tick(tick, part, own)))
         return out
 
@@ -146,8 +151,10 @@ class Lockstep:
             bounds = np.searchsorted(owner[order], np.arange(len(self._slots) + 1))
             rows = group.rows[order]
             fields = {field: column[order] for field, column in group.fields.items()}
-            for part, first, last in zip(parts, bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
-                if last > first:
+            spans = zip(self._slots, parts, bounds[:-1].tolist(), bounds[1:].tolist(), strict=True)
+            for slot, part, first, last in spans:
+                # Also a group none of whose robots acts now: their agents must forget, as they do beside others.
+                if any(group.name == name for group in slot.assignment.groups):
                     own = {field: column[first:last] for field, column in fields.items()}
                     part[name] = GroupSenses(rows[first:last], own)
         return parts

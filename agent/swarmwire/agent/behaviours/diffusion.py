@@ -11,8 +11,8 @@ from swarmwire.agent.vector_agent import State, VectorAgent
 class Diffusion(VectorAgent):
     """ARGoS's diffusion rule (argos3-examples, footbot_diffusion.cpp), by proximity alone.
 
-    The mean of the rays' vectors (value towards angle) says where things are. If it is short or points to the side of
-    the go-straight sector … the robot drives straight; otherwise one wheel stops, so that it turns away.
+    The mean of the rays' vectors (value towards angle) says where things are. While it is short and points into the
+    go-straight sector the robot drives straight; otherwise one wheel stops, so that it turns away.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
