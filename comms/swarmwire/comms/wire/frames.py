@@ -15,6 +15,7 @@ from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.errors import BadFrame
 
 VERSION = 1
+KEYS = ("v", "kind", "tick", "arrays", "values")
 MOST_BYTES = 64 * 1024 * 1024
 DTYPES = {code: np.dtype(code) for code in ("<f8", "<i8", "<u8", "|b1", "|u1")}
 
@@ -44,12 +45,12 @@ def decode(data: bytes, most_bytes: int = MOST_BYTES) -> Frame:
     except (ValueError, UnpackException) as error:
         raise BadFrame("malformed", f"no msgpack: {error}") from error
     match body:
-        case {"v": version, "kind": str(kind), "tick": int(tick), "arrays": dict(), "values": dict(), **rest}:
-            if type(version) is not int or version != VERSION:
-                raise BadFrame("malformed", f"version {version!r}, expected {VERSION}")
+        case {"v": int(version), "kind": str(kind), "tick": int(tick), "arrays": dict(), "values": dict()}:
             whole = cast("dict[str, dict[object, Any]]", body)
-            if rest or type(tick) is not int:
-                raise BadFrame("malformed", f"tick {tick!r} and keys {list(rest)}, expected a number and none")
+            if bool in (type(version), type(tick)) or len(whole) > len(KEYS):
+                raise BadFrame("malformed", f"expected v and tick to be numbers, and no more keys than {KEYS}")
+            if version != VERSION:
+                raise BadFrame("malformed", f"version {version}, expected {VERSION}")
             arrays = {_name(name): _array(name, item) for name, item in whole["arrays"].items()}
             return Frame(kind, tick, arrays, {_name(name): value for name, value in whole["values"].items()})
         case _:
@@ -62,7 +63,7 @@ def _name(name: object) -> str:
     raise BadFrame("malformed", f"expected names of arrays and values to be texts, got {name!r}")
 
 
-def _array(name: str, item: object) -> AnyArray:
+def _array(name: object, item: object) -> AnyArray:
     # Written out by hand, not with `match`: a world decodes ten arrays from each of a hundred runners in every tick.
     if type(item) is list and len(cast("list[object]", item)) == 3:
         code, shape, buffer = cast("tuple[object, object, object]", item)
@@ -76,11 +77,16 @@ def _array(name: str, item: object) -> AnyArray:
 
 def _shaped(dtype: np.dtype[Any], shape: list[object], buffer: bytes) -> AnyArray | None:
     rows = shape[0] if shape else None
-    if type(rows) is not int or rows < 0:
+    # Each length is bounded, too: 0 x 2^63 holds nothing, and yet numpy has no such array.
+    if type(rows) is not int or not 0 <= rows <= MOST_BYTES:
         return None
+    if dtype.kind == "b" and buffer.translate(None, b"\x00\x01"):
+        return None  # numpy masks and counts wrongly with any other byte
     if len(shape) == 1:
         return np.frombuffer(buffer, dtype) if rows * dtype.itemsize == len(buffer) else None
     columns = shape[1]
-    if len(shape) > 2 or type(columns) is not int or columns < 0 or rows * columns * dtype.itemsize != len(buffer):
+    if len(shape) > 2 or type(columns) is not int or not 0 <= columns <= MOST_BYTES:
+        return None
+    if rows * columns * dtype.itemsize != len(buffer):
         return None
     return np.frombuffer(buffer, dtype).reshape(rows, columns)

@@ -1,0 +1,72 @@
+"""What hosts, crews and lockstep are fed with in tests: assignments, senses and heard packets, all made up."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms import draws
+from swarmwire.comms.assignment import Assignment, GroupAssignment
+from swarmwire.comms.body import load_body
+from swarmwire.comms.packets import Heard, Sent
+from swarmwire.comms.senses import Actions, GroupSenses, Senses
+
+PLAYERS = Path(__file__).with_name("players.py")
+GIVES = ("range_m", "bearing_rad")
+
+
+def spec(name: str) -> str:
+    """The spec of an agent in `players`, as a file."""
+    return f"{PLAYERS}:{name}"
+
+
+def group(
+    agent: str, rows: list[int], name: str = "flock", body: str = "epuck", params: dict[str, Any] | None = None
+) -> GroupAssignment:
+    keys = np.array([draws.derive_key("robot", 5, row) for row in rows], np.uint64)
+    names = tuple(f"{name}-{row}" for row in rows)
+    return GroupAssignment(name, agent, params or {}, load_body(body), np.array(rows, np.int64), names, keys)
+
+
+def assignment(*groups: GroupAssignment) -> Assignment:
+    return Assignment(groups, 10, GIVES)
+
+
+def senses(tick: int, rows: list[int], rays: int = 8) -> GroupSenses:
+    """What robots sense: different for each robot and tick, the same whoever else is there."""
+    row = np.array(rows, np.int64)
+    fields = {
+        "proximity.value": np.stack([np.sin(tick + row + ray) ** 2 for ray in range(rays)], 1).reshape(len(rows), rays),
+        "compass.heading_rad": np.sin(1.0 + tick + row),
+        "odometry.left_m": 0.1 * tick + row,
+        "odometry.right_m": 0.2 * tick - row,
+    }
+    return GroupSenses(row, fields)
+
+
+def heard_from(sent: Sent, receivers: list[int]) -> Heard:
+    """What was sent, heard by all of these robots but its sender, in the order that the air keeps."""
+    sent = by_sender(sent)
+    pairs = [(to, p) for to in receivers for p in range(len(sent)) if sent.sender[p] != to]
+    receiver, payload = (np.array([pair[i] for pair in pairs], np.int64) for i in (0, 1))
+    sender = sent.sender[payload]
+    given = {"range_m": 0.1 + 0.3 * np.abs(receiver - sender), "bearing_rad": np.sin(1.0 * receiver - sender)}
+    return Heard(receiver, sender, payload, 10 + payload, given, payload, sent.payloads)
+
+
+def by_sender(sent: Sent) -> Sent:
+    order = np.argsort(sent.sender, kind="stable")
+    return Sent(sent.sender[order], sent.to[order], sent.payloads.rows(order))
+
+
+def plain(actions: Actions) -> list[Any]:
+    """Actions as plain values, by robot, to be compared bit for bit."""
+    order = np.argsort(actions.rows, kind="stable")
+    columns = (actions.rows, actions.drive, actions.linear_mps, actions.angular_radps)
+    sent = by_sender(actions.sent)
+    payloads = [sent.payloads.row(i) for i in range(len(sent))]
+    return [*(column[order].tolist() for column in columns), sent.sender.tolist(), sent.to.tolist(), payloads]
+
+
+def one_group(tick: int, rows: list[int]) -> Senses:
+    return {"flock": senses(tick, rows)}

@@ -1,0 +1,172 @@
+"""Agents that tests play with: each shows one thing that a host does for its agents."""
+
+import os
+from typing import ClassVar
+
+import numpy as np
+
+from swarmwire.agent import Agent, FloatColumn, IntColumn, Message, Robot, Robots, State, VectorAgent, column, f4, i2
+
+
+class Word(Message):
+    number: f4
+
+
+class Other(Message):
+    number: i2
+
+
+class Chatter(Agent):
+    """Uses all that there is: senses, draws, packets of each kind, addresses, a command in some ticks only."""
+
+    needs = ("proximity", "compass", "radio.range", "radio.bearing")
+    gain: float = 0.5
+
+    def __init__(self) -> None:
+        self.total = 0.0
+
+    def step(self, robot: Robot) -> None:
+        for packet in robot.radio.heard(Word):
+            self.total += packet.message.number * packet.range_m + packet.bearing_rad + packet.sender
+        for packet in robot.radio.heard(dict):
+            self.total += float(packet.message["x"])
+        if robot.draw.uniform("whether") < 0.7:
+            robot.drive(self.gain * self.total, robot.compass.heading_rad + robot.proximity.value.sum())
+        robot.radio.send(Word(number=robot.draw.normal("word")))
+        robot.radio.send({"x": robot.time_s}, to=0)
+        robot.radio.send(Other(number=7), to=1)
+
+
+class Counter(Agent):
+    """Drives as many m/s as it has made steps."""
+
+    def __init__(self) -> None:
+        self.steps = 0
+
+    def __len__(self) -> int:
+        return 0  # an agent may be an empty container, and still be there
+
+    def step(self, robot: Robot) -> None:
+        self.steps += 1
+        robot.drive(float(self.steps), 0.0)
+
+
+class Steps(State):
+    steps: IntColumn = column(0)
+
+
+class VectorCounter(VectorAgent[Steps]):
+    def step(self, robots: Robots, state: Steps) -> None:
+        state.steps += 1
+        robots.drive(state.steps, 0.0)
+
+
+class Failing(Agent):
+    """Reads a sense that it did not declare, in tick 2 as the robot whose compass shows more than 0."""
+
+    needs = ("compass",)
+
+    def step(self, robot: Robot) -> None:
+        if robot.time_s > 0.15 and robot.compass.heading_rad > 0.0:
+            print(robot.proximity)
+
+
+class Vanishing(Agent):
+    """Takes its whole process away at once, in tick 2 as the robot whose compass shows more than 0."""
+
+    needs = ("compass",)
+
+    def step(self, robot: Robot) -> None:
+        if robot.time_s > 0.15 and robot.compass.heading_rad > 0.0:
+            os._exit(3)
+
+
+class Unmade(Agent):
+    """Cannot be made."""
+
+    def __init__(self) -> None:
+        raise RuntimeError("no memory left")
+
+    def step(self, robot: Robot) -> None: ...
+
+
+class Stateless(Agent):
+    def step(self, robot: Robot) -> None: ...
+
+
+class Parametrised(Agent):
+    """Has a parameter of each type, and sees them when it is made."""
+
+    speed_mps: float
+    count: int = 3
+    eager: bool = False
+    word: str = "hop"
+    needs: ClassVar[tuple[str, ...]] = ()
+
+    def __init__(self) -> None:
+        self.seen = (self.speed_mps, self.count, self.eager, self.word)
+
+    def step(self, robot: Robot) -> None: ...
+
+
+class Means(VectorAgent):
+    """Cheats: every robot knows the mean heading of all."""
+
+    needs: ClassVar[tuple[str, ...]] = ("compass",)
+
+    def step(self, robots: Robots, state: State) -> None:
+        heading = robots.compass.heading_rad
+        robots.drive(0.1, heading.mean() if len(heading) else 0.0)
+
+
+class Neighbour(VectorAgent):
+    """Cheats: every robot knows the heading of the next row."""
+
+    needs: ClassVar[tuple[str, ...]] = ("compass",)
+
+    def step(self, robots: Robots, state: State) -> None:
+        robots.drive(0.1, np.roll(robots.compass.heading_rad, 1))
+
+
+class Crowd(VectorAgent):
+    """Cheats: every robot knows how many there are."""
+
+    def step(self, robots: Robots, state: State) -> None:
+        robots.drive(0.01 * robots.n, 0.0)
+
+
+class Remembering(VectorAgent):
+    """Cheats: keeps on itself what belongs into its State."""
+
+    needs: ClassVar[tuple[str, ...]] = ("compass",)
+    last = np.zeros(0)
+
+    def step(self, robots: Robots, state: State) -> None:
+        if len(self.last) != robots.n:
+            self.last = np.zeros(robots.n)
+        robots.drive(0.1, self.last)
+        self.last = robots.compass.heading_rad
+
+
+class Ageing(VectorAgent):
+    """Cheats: counts on itself, for all robots, how often it was called."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def step(self, robots: Robots, state: State) -> None:
+        self.calls += 1
+        robots.drive(float(self.calls), 0.0)
+
+
+class Reply(VectorAgent):
+    """Cheats: sends what its neighbours' rows heard."""
+
+    def step(self, robots: Robots, state: State) -> None:
+        heard = robots.radio.heard(Word)
+        robots.radio.send(Word, number=float(len(heard)))
+
+
+class Table(State):
+    x: FloatColumn = column(0.5)
+    n: IntColumn = column(-1)

@@ -1,0 +1,215 @@
+"""Frames: what is packed comes back, and whatever else arrives is refused as a BadFrame, never as anything else."""
+
+from typing import Any
+
+import msgpack
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+
+from swarmwire.comms.arrays import AnyArray
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.frames import DTYPES
+
+shapes = npst.array_shapes(min_dims=1, max_dims=2, min_side=0, max_side=4)
+arrays = st.sampled_from(sorted(DTYPES)).flatmap(lambda code: npst.arrays(DTYPES[code], shapes))
+plain = st.recursive(
+    st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.floats(allow_nan=False) | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
+    max_leaves=6,
+)
+ticks = st.integers(-1, 2**62)
+names = st.text(max_size=8)
+
+
+def whole(**changes: Any) -> bytes:
+    """A frame of one array of two numbers, with parts of its map replaced."""
+    item = ("<f8", [2], bytes(16))
+    return msgpack.packb({"v": 1, "kind": "tick", "tick": 3, "arrays": {"a": item}, "values": {}, **changes})
+
+
+def fault(data: bytes, **limits: int) -> str:
+    with pytest.raises(BadFrame) as caught:
+        frames.decode(data, **limits)
+    return caught.value.fault
+
+
+@given(
+    st.text(max_size=8), ticks, st.dictionaries(names, arrays, max_size=4), st.dictionaries(names, plain, max_size=3)
+)
+def test_what_is_packed_comes_back(kind: str, tick: int, given_arrays: dict[str, AnyArray], values: Any) -> None:
+    frame = frames.decode(frames.encode(kind, tick, given_arrays, values))
+    assert (frame.kind, frame.tick, frame.values) == (kind, tick, values)
+    assert list(frame.arrays) == list(given_arrays)
+    for name, array in given_arrays.items():
+        got = frame.arrays[name]
+        assert (got.dtype, got.shape, got.tobytes()) == (array.dtype, array.shape, array.tobytes())
+
+
+def test_an_array_that_does_not_lie_in_one_piece_is_packed_as_it_reads() -> None:
+    array = np.arange(12.0).reshape(3, 4).T[::2]
+    assert np.array_equal(frames.decode(frames.encode("k", 0, {"a": array})).arrays["a"], array)
+
+
+@pytest.mark.parametrize("code", sorted(DTYPES))
+def test_arrays_of_a_frame_cannot_be_written_to(code: str) -> None:
+    array = frames.decode(frames.encode("k", 0, {"a": np.zeros(3, code)})).arrays["a"]
+    assert not array.flags.writeable
+
+
+def test_the_frame_that_the_others_spoil_is_sound() -> None:
+    assert frames.decode(whole()).arrays["a"].tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"v": 2},
+        {"v": True},
+        {"v": 1.0},
+        {"v": "1"},
+        {"kind": b"tick"},
+        {"kind": 3},
+        {"tick": "3"},
+        {"tick": 3.0},
+        {"tick": True},
+        {"tick": None},
+        {"arrays": []},
+        {"arrays": None},
+        {"arrays": {b"a": ("<f8", [2], bytes(16))}},
+        {"values": []},
+        {"values": {b"a": 1}},
+        {"more": 1},
+    ],
+    ids=repr,
+)
+def test_a_map_of_other_keys_or_types_is_malformed(changes: dict[str, Any]) -> None:
+    assert fault(whole(**changes)) == "malformed"
+
+
+@pytest.mark.parametrize("key", ["v", "kind", "tick", "arrays", "values"])
+def test_a_map_without_one_of_its_keys_is_malformed(key: str) -> None:
+    body = msgpack.unpackb(whole())
+    del body[key]
+    assert fault(msgpack.packb(body)) == "malformed"
+
+
+@pytest.mark.parametrize(
+    "item",
+    [
+        ("<f4", [4], bytes(16)),
+        (">f8", [2], bytes(16)),
+        ("|O", [2], bytes(16)),
+        ("<f8,<f8", [1], bytes(16)),
+        (["<f8"], [2], bytes(16)),
+        (b"<f8", [2], bytes(16)),
+        ("<f8", 2, bytes(16)),
+        ("<f8", [3], bytes(16)),
+        ("<f8", [1], bytes(16)),
+        ("<f8", [2], bytes(15)),
+        ("<f8", [], bytes(16)),
+        ("<f8", [-1], bytes(16)),
+        ("<f8", [2.0], bytes(16)),
+        ("<f8", ["2"], bytes(16)),
+        ("<f8", [None], b""),
+        ("|u1", [True], bytes(1)),
+        ("|b1", [False], b""),
+        ("|b1", [2], b"\x01\x02"),
+        ("|b1", [1], b"\xff"),
+        ("<f8", [1, 1, 2], bytes(16)),
+        ("<f8", [2, True], bytes(16)),
+        ("<f8", [-1, -2], bytes(16)),
+        ("<f8", [-2, 0], b""),
+        ("<f8", [2**61], b""),
+        ("<f8", [2**63], bytes(16)),
+        ("<f8", [2**61 + 2], bytes(16)),  # 8 x this is 16, modulo 2^64
+        ("<f8", [2**32, 2**32], b""),
+        ("<f8", [0, 2**63], b""),
+        ("<f8", [2**63, 0], b""),
+        ("|b1", [1, 2], b"\x01\x02"),
+        ("<f8", [2], "0123456789abcdef"),
+        ("<f8", [2], None),
+        ("<f8", [2]),
+        ("<f8", [2], bytes(16), 1),
+        {"dtype": "<f8"},
+        7,
+        None,
+    ],
+    ids=repr,
+)
+def test_an_array_that_does_not_fit_its_bytes_is_malformed(item: Any) -> None:
+    assert fault(whole(arrays={"a": item})) == "malformed"
+
+
+@pytest.mark.parametrize("shape", [[0], [0, 5], [5, 0], [2**26, 0]])
+def test_an_array_of_nothing_keeps_its_shape(shape: list[int]) -> None:
+    assert frames.decode(whole(arrays={"a": ("<f8", shape, b"")})).arrays["a"].shape == tuple(shape)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"\xc1",
+        b"\xc0",
+        b"\x80",
+        b"\x90",
+        b"\xa1\xff",  # no UTF-8
+        b"\xdf\xff\xff\xff\xff",  # a map of 2^32 - 1
+        b"\xdd\xff\xff\xff\xff",  # an array of as many
+        b"\xc6\xff\xff\xff\xff",  # bytes of as many
+        b"\x81\x91\x01\x01",  # a list as a key
+        b"\x81\x01\x01",  # a number as a key
+        b"\x81\xd6\xff\xff\xff\xff\xff\x01",  # a time as a key
+        b"\xc7\x0c\xff" + b"\xff" * 12,  # a time out of bounds
+        b"\xc7\x03\xffabc",  # a time of three bytes
+        b"\x91" * 100_000,  # lists in lists
+        b"\x81\xa1a" * 100_000,
+        whole() + b"\x00",
+    ],
+    ids=lambda data: data[:8].hex(),
+)
+def test_bytes_that_are_no_message_are_malformed(data: bytes) -> None:
+    assert fault(data) == "malformed"
+
+
+def test_more_bytes_than_the_limit_are_oversized_and_not_read() -> None:
+    data = whole()
+    assert fault(data, most_bytes=len(data) - 1) == "oversized"
+    assert fault(b"\xc1" * 10, most_bytes=9) == "oversized"
+    assert frames.decode(data, most_bytes=len(data)).tick == 3
+
+
+def test_every_cut_of_a_frame_is_malformed() -> None:
+    data = frames.encode("tick", 7, {"a": np.arange(5), "b": np.ones((2, 3))}, {"x": [1, "two"]})
+    assert {fault(data[:end]) for end in range(len(data))} == {"malformed"}
+
+
+def test_a_frame_with_flipped_bits_is_a_frame_or_a_bad_frame_but_nothing_else() -> None:
+    data = frames.encode("tick", 7, {"a": np.arange(5), "m": np.ones(3, np.bool_)}, {"x": [1, {"y": None}]})
+    generator = np.random.default_rng(1)
+    refused = 0
+    for _ in range(3000):
+        spoiled = bytearray(data)
+        for at in generator.integers(0, len(data), generator.integers(1, 4)):
+            spoiled[at] ^= 1 << int(generator.integers(8))
+        try:
+            frames.decode(bytes(spoiled))
+        except BadFrame:
+            refused += 1
+    assert refused > 500
+
+
+def test_random_bytes_are_malformed() -> None:
+    generator = np.random.default_rng(2)
+    for _ in range(3000):
+        assert fault(generator.bytes(int(generator.integers(0, 60)))) == "malformed"
+
+
+@given(plain)
+def test_any_other_message_is_malformed(junk: Any) -> None:
+    assert fault(msgpack.packb(junk)) == "malformed"
+    assert fault(whole(arrays={"a": junk})) == "malformed"

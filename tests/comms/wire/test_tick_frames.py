@@ -1,0 +1,171 @@
+"""What a tick carries across the wire comes over whole, and a runner speaks for its own robots only."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.senses import Actions, GroupSenses, Senses
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_actions, encode_tick
+
+I64 = np.iinfo(np.int64)
+ROWS = np.array([4, 6, 9])
+payload_lists = st.lists(st.binary(max_size=6), min_size=1, max_size=5)
+
+
+def ints(n: int) -> st.SearchStrategy[IntArray]:
+    return npst.arrays(np.int64, n)
+
+
+def floats(*shape: int) -> st.SearchStrategy[Any]:
+    return npst.arrays(np.float64, shape)
+
+
+@st.composite
+def senses_(draw: st.DrawFn) -> Senses:
+    out: Senses = {}
+    for name in draw(st.lists(st.sampled_from(["flock", "a-b", "x_1"]), unique=True, max_size=3)):
+        n = draw(st.integers(0, 4))
+        fields = {"compass.heading_rad": draw(floats(n)), "proximity.value": draw(floats(n, 8))}
+        out[name] = GroupSenses(np.sort(draw(ints(n))), fields)
+    return out
+
+
+@st.composite
+def heard_(draw: st.DrawFn, gives: tuple[str, ...]) -> Heard:
+    payloads = draw(payload_lists)
+    k = draw(st.integers(0, 5))
+    which = draw(st.lists(st.integers(0, len(payloads) - 1), min_size=k, max_size=k))
+    given_columns = {name: draw(floats(k)) for name in gives}
+    columns = [draw(ints(k)) for _ in range(4)]
+    return Heard(*columns, given_columns, np.array(which, np.int64), Payloads.of(payloads))
+
+
+def same(one: Any, other: Any) -> bool:
+    return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
+
+
+@given(senses_(), st.sampled_from([(), ("range_m",), ("range_m", "bearing_rad")]), st.data())
+def test_senses_and_heard_packets_come_over_whole(senses: Senses, gives: tuple[str, ...], data: st.DataObject) -> None:
+    heard = data.draw(heard_(gives))
+    got_senses, got = decode_tick(frames.decode(encode_tick(5, senses, heard)), gives)
+    assert list(got_senses) == list(senses)
+    for name, group in senses.items():
+        assert same(got_senses[name].rows, group.rows)
+        assert list(got_senses[name].fields) == list(group.fields)
+        assert all(same(got_senses[name].fields[field], column) for field, column in group.fields.items())
+    assert len(got) == len(heard)
+    assert set(got.given) == set(gives)
+    for column in ("receiver", "sender", "sequence", "heard_at_ns", "payload"):
+        assert same(getattr(got, column), getattr(heard, column))
+    assert all(same(got.given[name], heard.given[name]) for name in gives)
+    of, got_of = heard.payloads, got.payloads
+    assert [got_of.row(int(p)) for p in got.payload] == [of.row(int(p)) for p in heard.payload]
+
+
+@given(payload_lists, st.data())
+def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> None:
+    k = len(payloads)
+    sender = np.array(data.draw(st.lists(st.sampled_from(ROWS.tolist()), min_size=k, max_size=k)), np.int64)
+    to = np.array(data.draw(st.lists(st.integers(BROADCAST, I64.max), min_size=k, max_size=k)), np.int64)
+    drive = data.draw(npst.arrays(np.bool_, 3))
+    actions = Actions(ROWS, drive, data.draw(floats(3)), data.draw(floats(3)), Sent(sender, to, Payloads.of(payloads)))
+    frame = frames.decode(encode_actions(8, actions))
+    assert (frame.kind, frame.tick) == ("actions", 8)
+    got = decode_actions(frame, ROWS)
+    for column in ("rows", "drive", "linear_mps", "angular_radps"):
+        assert same(getattr(got, column), getattr(actions, column))
+    assert same(got.sent.sender, sender)
+    assert same(got.sent.to, to)
+    assert [got.sent.payloads.row(i) for i in range(k)] == payloads
+
+
+def sound() -> Actions:
+    sent = Sent(np.array([4, 9, 9]), np.array([BROADCAST, 0, 2]), Payloads.of([b"ab", b"", b"cde"]))
+    return Actions(ROWS, np.array([True, False, True]), np.ones(3), np.zeros(3), sent)
+
+
+def refused(**changes: Any) -> None:
+    frame = frames.decode(encode_actions(0, sound()))
+    with pytest.raises(BadFrame) as caught:
+        decode_actions(replace(frame, arrays={**frame.arrays, **changes}), ROWS)
+    assert caught.value.fault == "malformed"
+
+
+def test_actions_of_a_silent_runner_carry_no_packets() -> None:
+    silent = frames.decode(encode_actions(0, replace(sound(), sent=Sent.none())))
+    assert len(decode_actions(silent, ROWS).sent) == 0
+    assert not [name for name in silent.arrays if name.startswith("sent")]
+
+
+@pytest.mark.parametrize("rows", [[4, 6, 8], [6, 4, 9], [4, 6], [4, 6, 9, 9], [], [0, 0, 0]], ids=repr)
+def test_actions_for_other_robots_are_refused(rows: list[int]) -> None:
+    refused(rows=np.array(rows, np.int64))
+
+
+@pytest.mark.parametrize(
+    "name", ["rows", "drive", "linear_mps", "angular_radps", "sent/sender", "sent/to", "sent/offset"]
+)
+def test_a_column_of_another_length_or_dtype_or_rank_is_refused(name: str) -> None:
+    column = frames.decode(encode_actions(0, sound())).arrays[name]
+    for wrong in (column[:-1], np.append(column, column[-1:]), column[:, None], column[:0], np.zeros((), column.dtype)):
+        refused(**{name: wrong})
+    for code in {"<f8", "<i8", "<u8", "|b1", "|u1"} - {column.dtype.str}:
+        refused(**{name: column.astype(code)})
+
+
+@pytest.mark.parametrize(
+    "name", ["rows", "drive", "linear_mps", "angular_radps", "sent/to", "sent/offset", "sent/data"]
+)
+def test_a_column_that_is_missing_is_refused(name: str) -> None:
+    frame = frames.decode(encode_actions(0, sound()))
+    rest = {key: array for key, array in frame.arrays.items() if key != name}
+    with pytest.raises(BadFrame):
+        decode_actions(replace(frame, arrays=rest), ROWS)
+
+
+@pytest.mark.parametrize(
+    "offset",
+    [
+        [0, 3, 2, 5],  # falls
+        [0, 2, 2, 4],  # leaves bytes over
+        [0, 2, 2, 6],  # leaves the data
+        [1, 2, 2, 5],
+        [0, -1, 2, 5],
+        [-1, 2, 2, 5],
+        [0, 6, 6, 5],
+        [0, I64.max, I64.min, 5],  # the differences wrap around to positive numbers
+        [0, I64.min, I64.max, 5],
+        [0, I64.max, I64.max, 5],
+        [0, 2, 2, I64.max],
+    ],
+    ids=repr,
+)
+def test_offsets_that_fall_or_leave_the_data_are_refused(offset: list[int]) -> None:
+    refused(**{"sent/offset": np.array(offset)})
+
+
+@pytest.mark.parametrize("sender", [[4, 9, 5], [4, 9, -1], [I64.max, 9, 9], [0, 1, 2]], ids=repr)
+def test_packets_of_robots_that_are_not_the_runners_are_refused(sender: list[int]) -> None:
+    refused(**{"sent/sender": np.array(sender)})
+
+
+@pytest.mark.parametrize("to", [-2, I64.min])
+def test_packets_to_a_negative_index_are_refused(to: int) -> None:
+    refused(**{"sent/to": np.array([0, to, 0])})
+
+
+def test_packets_without_any_sender_are_none() -> None:
+    frame = frames.decode(encode_actions(0, sound()))
+    nothing = np.empty(0, np.int64)
+    empty = {"sent/sender": nothing, "sent/to": nothing, "sent/offset": np.zeros(1, np.int64)}
+    arrays = {**frame.arrays, **empty, "sent/data": np.empty(0, np.uint8)}
+    assert len(decode_actions(replace(frame, arrays=arrays), ROWS).sent) == 0
