@@ -63,7 +63,9 @@ def posed(poses: list[list[float]], body: str = "epuck", **tables: Any) -> Scena
 def commanded(world: World, linear_mps: Any, angular_radps: Any) -> Actions:
     """A command for every robot; numbers or arrays with a value per row."""
     rows = np.arange(world.static.arenas * world.static.robots)
-    linear, angular = (np.broadcast_to(np.asarray(v, np.float64), rows.shape).copy() for v in (linear_mps, angular_radps))
+    linear, angular = (
+        np.broadcast_to(np.asarray(v, np.float64), rows.shape).copy() for v in (linear_mps, angular_radps)
+    )
     return Actions(rows, np.ones(len(rows), np.bool_), linear, angular)
 
 

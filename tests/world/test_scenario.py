@@ -4,12 +4,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.world.samples import SAMPLE, changed, without
 
 from swarmwire.comms.air.radio import BearingGiven, Gives, Radio, RangeGiven
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario, scenario_from, scenario_schema
+from tests.world.samples import SAMPLE, changed, without
 
 COUNT = "expected a whole number of at least 1 and at most 1000000"
 OFFSET = "expected uniform, tick, or an offset in s from 0 to below the period of a tick"

@@ -28,13 +28,23 @@ class Motors(NamedTuple):
 
 @njit(cache=True)
 def push(
-    motors: Motors, command: FloatArray, state: FloatArray, dt_s: float, force: FloatArray, travel_m: FloatArray
+    motors: Motors,
+    command: FloatArray,
+    state: FloatArray,
+    dt_s: float,
+    force: FloatArray,
+    travel_m: FloatArray,
+    unhindered: FloatArray,
 ) -> None:
     """Set the force on every robot for the physics step to come, and add what its wheels roll in that step.
 
     Pymunk moves a body by the velocity that it has before the step and then applies the force, so a force set now shows
     in the motion of the step after. There the body turns while it moves straight: the velocity to reach lies along the
     heading in the middle of that step, which makes the path a chord of the arc.
+
+    What contacts took from the turn rate in the last step is made up for in this one: a robot that is pushed off its
+    centre keeps its heading as long as its torque lasts, where the motors alone would answer each push a step too late.
+    Nothing of the kind is done for the force: at the end of a contact it would throw the robot forward for a step.
 
     Args:
         motors: of each robot index.
@@ -43,6 +53,7 @@ def push(
         dt_s: length of a physics step.
         force: (arenas, robots + 1, 3) set: N, N, N m, arena frame; the last row is the static body's.
         travel_m: (arenas, robots, 2) left and right wheel, added to.
+        unhindered: (arenas, robots) turn rate that the last torque would have given without contacts, set.
     """
     arenas, robots = state.shape[:2]
     for arena in range(arenas):
@@ -56,8 +67,10 @@ def push(
 
             bound = motors.max_torque_nm[i]
             inertia = motors.inertia_kgm2[i]
-            torque = min(max((command[arena, i, 1] - turn) * inertia / dt_s, -bound), bound)
-            ahead = heading + dt_s * (turn + 0.5 * (turn + torque * dt_s / inertia))
+            taken = unhindered[arena, i] - turn
+            torque = min(max((command[arena, i, 1] - turn + taken) * inertia / dt_s, -bound), bound)
+            unhindered[arena, i] = turn + torque * dt_s / inertia
+            ahead = heading + dt_s * (turn + 0.5 * unhindered[arena, i])
             speed, per_step = command[arena, i, 0], motors.mass_kg[i] / dt_s
             fx, fy = (speed * np.cos(ahead) - vx) * per_step, (speed * np.sin(ahead) - vy) * per_step
             size = np.sqrt(fx * fx + fy * fy)

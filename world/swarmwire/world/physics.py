@@ -55,6 +55,7 @@ class Physics:
         self._steps, self._step_s = steps, tick_s / steps
         self.state = np.zeros((arenas, robots, 6))
         self.travel_m = np.zeros((arenas, robots, 2))
+        self._unhindered = np.zeros((arenas, robots))
         self._force = np.zeros((arenas, robots + 1, 3))
         walls = _walls(size_m, groups) if walled else ()
         self._spaces = [
@@ -71,7 +72,7 @@ class Physics:
             touches in this tick and did not in the one before; all that is fixed counts as one thing.
         """
         for _ in range(self._steps):
-            push(self.motors, command, self.state, self._step_s, self._force, self.travel_m)
+            push(self.motors, command, self.state, self._step_s, self._force, self.travel_m, self._unhindered)
             for space in self._spaces:
                 space.step(self._step_s)
             self._read()

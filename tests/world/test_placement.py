@@ -1,0 +1,181 @@
+"""Things stand apart, where they were asked to, and where the seed alone puts them."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.truth import Obstacle, Static
+from swarmwire.world.scenario_file import scenario_from
+from swarmwire.world.world import World
+from tests.world.samples import SAMPLE, changed
+
+
+def built(mapping: dict[str, Any], *seeds: int) -> World:
+    return World(scenario_from(mapping, "file.toml"), seeds, {})
+
+
+def outline(obstacle: Obstacle) -> FloatArray:
+    """Points on the rim of an obstacle, (k, 2)."""
+    if obstacle.shape == "cylinder":
+        angle = np.linspace(0.0, 2.0 * np.pi, 200)
+        return np.stack(
+            [obstacle.x_m + obstacle.radius_m * np.cos(angle), obstacle.y_m + obstacle.radius_m * np.sin(angle)], 1
+        )
+    along, across = 0.5 * obstacle.size_m[0], 0.5 * obstacle.size_m[1]
+    t = np.linspace(-1.0, 1.0, 100)
+    sides = [
+        (t * along, across + 0 * t),
+        (t * along, -across + 0 * t),
+        (along + 0 * t, t * across),
+        (-along + 0 * t, t * across),
+    ]
+    x, y = np.concatenate(sides, axis=1)
+    c, s = np.cos(obstacle.heading_rad), np.sin(obstacle.heading_rad)
+    return np.stack([obstacle.x_m + c * x - s * y, obstacle.y_m + s * x + c * y], axis=1)
+
+
+def depth(obstacle: Obstacle, points: FloatArray) -> FloatArray:
+    """How far outside an obstacle points (k, 2) are, in m; negative within."""
+    x, y = points[:, 0] - obstacle.x_m, points[:, 1] - obstacle.y_m
+    if obstacle.shape == "cylinder":
+        return np.hypot(x, y) - obstacle.radius_m
+    c, s = np.cos(obstacle.heading_rad), np.sin(obstacle.heading_rad)
+    along, across = np.abs(c * x + s * y) - 0.5 * obstacle.size_m[0], np.abs(c * y - s * x) - 0.5 * obstacle.size_m[1]
+    return np.where(
+        (along < 0) & (across < 0), np.maximum(along, across), np.hypot(np.maximum(along, 0), np.maximum(across, 0))
+    )
+
+
+def radii(static: Static) -> FloatArray:
+    return np.concatenate([np.full(g.stop - g.start, g.body.radius_m) for g in static.groups])
+
+
+def check_apart(world: World) -> None:
+    static = world.static
+    radius, half = radii(static), 0.5 * np.array(static.arena_size_m)
+    for arena, obstacles in enumerate(static.obstacles):
+        xy = world.pose[arena * static.robots :][: static.robots, :2]
+        assert np.all(np.abs(xy) + radius[:, None] <= half)
+        distance = np.hypot(*(xy[:, None] - xy).transpose(2, 0, 1)) + 10.0 * np.eye(len(xy))
+        assert np.all(distance >= radius[:, None] + radius)
+        for i, obstacle in enumerate(obstacles):
+            assert np.all(np.abs(outline(obstacle)) <= half + 1e-9)
+            assert np.all(depth(obstacle, xy) >= radius)
+            for other in obstacles[:i]:
+                assert np.all(depth(other, outline(obstacle)) > 0.0)
+                assert np.all(depth(obstacle, outline(other)) > 0.0)
+
+
+PLACES = st.sampled_from(
+    [{"how": "disc", "radius_m": 1.2}, {"how": "arena"}, {"how": "disc", "radius_m": 0.8, "at": [0.5, -0.5]}]
+)
+OBSTACLES = st.lists(
+    st.sampled_from(
+        [
+            {"shape": "cylinder", "radius_m": 0.15, "count": 5, "place": "random"},
+            {"shape": "box", "size_m": [0.4, 0.1], "count": 4, "place": "random"},
+            {"shape": "box", "size_m": [0.3, 0.3], "heading_rad": 0.5, "count": 2, "place": "random"},
+            {"shape": "box", "size_m": [0.1, 2.0], "at": [1.4, 0.0]},
+        ]
+    ),
+    max_size=3,
+    unique_by=str,
+)
+
+
+@settings(max_examples=40)
+@given(seed=st.integers(0, 2**63 - 1), place=PLACES, obstacles=OBSTACLES)
+def test_nothing_overlaps_at_the_start(seed: int, place: dict[str, Any], obstacles: list[dict[str, Any]]) -> None:
+    mapping = changed("robots.flock.place", place)
+    mapping["arena"]["obstacles"] = obstacles
+    world = built(mapping, seed)
+    check_apart(world)
+    if place["how"] == "disc":
+        assert np.all(np.hypot(*(world.pose[:12, :2] - place.get("at", (0.0, 0.0))).T) <= place["radius_m"])
+
+
+def test_an_arena_s_seed_alone_decides_where_things_stand() -> None:
+    many = built(SAMPLE, 5, 6, 7)
+    alone = built(SAMPLE, 6)
+    assert many.static.obstacles[1] == alone.static.obstacles[0]
+    assert np.array_equal(many.pose[15:30], alone.pose)
+    assert not np.array_equal(many.pose[:15], many.pose[15:30])
+
+
+def test_robots_stand_where_they_stood_whatever_groups_follow() -> None:
+    before, after = built(SAMPLE, 1), built(changed("robots.big.count", 6), 1)
+    assert np.array_equal(before.pose[:12], after.pose[:12])
+    assert np.array_equal(before.pose[12:15], after.pose[12:15])
+
+
+def test_robots_fill_the_disc_and_all_headings_evenly() -> None:
+    mapping = changed(
+        "robots.flock", {"body": "epuck", "count": 2000, "agent": "x", "place": {"how": "disc", "radius_m": 20}}
+    )
+    mapping["arena"] = {"size_m": [60, 60]}
+    pose = built(mapping, 1).pose[:2000]
+    # Shares of a half have a standard deviation of 0.011: 4 of them give a false alarm in 16,000.
+    assert abs(np.mean(np.hypot(pose[:, 0], pose[:, 1]) < 20 / np.sqrt(2)) - 0.5) < 0.045
+    assert abs(np.mean(pose[:, 1] > 0) - 0.5) < 0.045
+    assert abs(np.mean(pose[:, 2] > 0) - 0.5) < 0.045
+    assert abs(np.mean(np.abs(pose[:, 2]) < np.pi / 2) - 0.5) < 0.045
+
+
+def test_a_grid_is_centred_and_evenly_spaced() -> None:
+    mapping = changed(
+        "robots.flock", {"body": "epuck", "count": 6, "agent": "x", "place": {"how": "grid", "spacing_m": 0.3}}
+    )
+    mapping["arena"]["obstacles"] = []
+    xy = built(mapping, 1).pose[:6, :2]
+    assert np.allclose(xy, [[-0.3, -0.15], [0, -0.15], [0.3, -0.15], [-0.3, 0.15], [0, 0.15], [0.3, 0.15]])
+
+
+def test_poses_are_taken_as_given_with_headings_wrapped() -> None:
+    poses = [[0.0, 0.0, 0.5], [0.3, 0.0, 4.0]]
+    mapping = changed(
+        "robots.flock", {"body": "epuck", "count": 2, "agent": "x", "place": {"how": "poses", "poses": poses}}
+    )
+    mapping["arena"]["obstacles"] = []
+    assert np.allclose(built(mapping, 1).pose[:2], [[0, 0, 0.5], [0.3, 0, 4.0 - 2 * np.pi]])
+
+
+NO_ROOM = [
+    (
+        "robots.flock.place.radius_m",
+        0.08,
+        r"robots.flock.place: no room for flock-\d+ with seed 1: none of 1000 places",
+    ),
+    (
+        "arena.obstacles.0.radius_m",
+        1.5,
+        "arena.obstacles.0: no room for cylinder 2 of 4 with seed 1: none of 1000 places",
+    ),
+    ("robots.flock.place", {"how": "grid", "spacing_m": 2.0}, "no room for flock-0 with seed 1: at "),
+    (
+        "robots.flock.place",
+        {"how": "poses", "poses": [[0, 0, 0]] * 12},
+        r"no room for flock-1 with seed 1: at \(0, 0\)",
+    ),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "text"), NO_ROOM)
+def test_what_finds_no_room_is_named(path: str, value: Any, text: str) -> None:
+    mapping = changed(path, value)
+    if "robots" in path:
+        mapping["arena"]["obstacles"] = []
+    with pytest.raises(BadInput, match=f"^file.toml: .*{text}"):
+        built(mapping, 1)
+
+
+def test_ten_thousand_robots_find_room() -> None:
+    mapping = changed("robots.flock", {"body": "footbot", "count": 10_000, "agent": "x", "place": {"how": "arena"}})
+    mapping["arena"] = {"size_m": [50, 50]}
+    xy = built(mapping, 1).pose[:, :2]
+    assert cKDTree(xy[:10_000]).query(xy[:10_000], k=2)[0][:, 1].min() >= 2 * 0.085036758
