@@ -3,6 +3,7 @@
 import os
 import socket
 import subprocess
+from collections import deque
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,7 @@ from swarmwire.metrics.view_extra import need_view_extra
 
 PATIENCE_NS = 60 * NS_PER_S  # for each of: the viewer is up, the picture stands still
 _PAUSE_NS = NS_PER_S // 20
+_SAME_IN_A_ROW = 4
 _NO_GRAPHICS = ("No graphics adapter", "Failed to get render context")  # how the viewer says that it has no Vulkan
 _Found = TypeVar("_Found")
 
@@ -59,13 +61,14 @@ def _opened(client: Any) -> Any | None:
 
 
 def _still(take: Callable[[], bytes]) -> Callable[[], bytes | None]:
-    """A function that gives the picture once two in a row are the same: plots slide into place after a jump in time."""
-    last = b""
+    """A function that gives the picture once some in a row are the same: after a jump in time the viewer fetches what
+    it has not loaded yet, and plots slide into place.
+    """
+    row: deque[bytes] = deque(maxlen=_SAME_IN_A_ROW)
 
     def taken() -> bytes | None:
-        nonlocal last
-        before, last = last, take()
-        return last if last == before else None
+        row.append(take())
+        return row[0] if row.count(row[0]) == _SAME_IN_A_ROW else None
 
     return taken
 

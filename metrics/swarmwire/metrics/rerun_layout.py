@@ -58,9 +58,11 @@ def _last(duration_s: float, rate_hz: int) -> Any:
 def _plot(entity: str, name: str, bounds: tuple[float, float] | None = None) -> Any:
     import rerun.blueprint as rrb
 
+    always = rrb.TimeRangeBoundary.infinite()  # else the viewer shows no more than a minute around the cursor
     return rrb.TimeSeriesView(
         origin=f"/plots/{entity}",
         name=name,
+        axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(start=always, end=always)),
         axis_y=rrb.ScalarAxis(range=bounds) if bounds else None,
-        plot_legend=rrb.Corner2D.RightBottom if bounds else rrb.Corner2D.LeftTop,
+        plot_legend=rrb.Corner2D.LeftTop if entity == "numbers" else rrb.Corner2D.RightBottom,
     )

@@ -19,6 +19,7 @@ _COLORS = (
     (204, 121, 167),
     (180, 180, 190),
 )
+_WIDEST = 3.0  # of a series' line; each is drawn over those before it, and is thinner, so that equal ones are all seen
 
 
 class RerunPlots:
@@ -45,7 +46,8 @@ class RerunPlots:
             names["packets"] = ["heard", "in range, not heard"]
         for plot, series in names.items():
             colors = [_COLORS[i % len(_COLORS)] for i in range(len(series))]
-            rec.log(f"plots/{plot}", rr.SeriesLines(names=series, colors=colors, widths=2.0), static=True)
+            widths = [_WIDEST / (1 + i) ** 0.5 for i in range(len(series))]
+            rec.log(f"plots/{plot}", rr.SeriesLines(names=series, colors=colors, widths=widths), static=True)
 
     def log(self, rec: Any, latest: Mapping[str, FloatArray], tally: Tally | None) -> None:
         """Log the numbers of a tick."""
