@@ -61,8 +61,9 @@ def _opened(client: Any) -> Any | None:
 
 
 def _still(take: Callable[[], bytes]) -> Callable[[], bytes | None]:
-    """A function that gives the picture once some in a row are the same: after a jump in time the viewer fetches what
-    it has not loaded yet, and plots slide into place.
+    """A function that gives the picture once some in a row are the same.
+
+    After a jump in time the viewer fetches what it has not loaded yet, and its plots slide into place.
     """
     row: deque[bytes] = deque(maxlen=_SAME_IN_A_ROW)
 

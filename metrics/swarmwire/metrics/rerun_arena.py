@@ -16,6 +16,7 @@ _DEAD_COLOR = (95, 95, 100)
 _WALL_COLOR = (150, 155, 170)
 _LINK_COLOR = (130, 145, 180, 50)
 _TRAIL_ALPHA = 170
+_LINKS, _TRAILS, _HEADINGS, _ROBOTS = 1.0, 2.0, 3.0, 4.0  # drawn in this order
 _HEADING_RADII = 2.5  # length of a heading's arrow in body radii, from the centre
 _LEAST_HEADING = 0.025  # and at least this share of the arena's larger side, so that it can be seen,
 _CROWDED = 0.25  # or this share / sqrt(robots) if that is less, so that a thousand do not cover one another
@@ -53,14 +54,15 @@ class RerunArena:
             thin = rr.Radius.ui_points(1.2)
             rec.log("world/obstacles", rr.LineStrips2D(outlines, radii=thin, colors=_WALL_COLOR), static=True)
         names = list(static.robot_names)
-        robots = rr.Points2D.from_fields(radii=self._radius_m, labels=names, show_labels=False)
+        robots = rr.Points2D.from_fields(radii=self._radius_m, labels=names, show_labels=False, draw_order=_ROBOTS)
         rec.log("world/robots", robots, static=True)
         faint = np.column_stack([self._color, np.full(static.robots, _TRAIL_ALPHA, np.uint8)])
-        trails = rr.Points2D.from_fields(radii=rr.Radius.ui_points(0.7), colors=faint)
+        trails = rr.Points2D.from_fields(radii=rr.Radius.ui_points(0.7), colors=faint, draw_order=_TRAILS)
         rec.log("world/trails", trails, static=True)
-        links = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(0.5), colors=_LINK_COLOR)
+        links = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(0.5), colors=_LINK_COLOR, draw_order=_LINKS)
         rec.log("world/links", links, static=True)
-        rec.log("world/headings", rr.Arrows2D.from_fields(radii=rr.Radius.ui_points(1.2)), static=True)
+        headings = rr.Arrows2D.from_fields(radii=rr.Radius.ui_points(1.2), draw_order=_HEADINGS)
+        rec.log("world/headings", headings, static=True)
 
     def log(self, rec: Any, truth: Truth) -> None:
         """Log one tick."""
