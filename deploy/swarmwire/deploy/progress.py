@@ -35,6 +35,9 @@ class ProgressLine:
         if self._console.is_terminal:
             self._progress.start()
             self._task = self._progress.add_task(static.name, total=self._ticks, speed="")
+        else:
+            size = f"{static.robots} robots" + (f" in each of {static.arenas} arenas" if static.arenas > 1 else "")
+            self._console.print(f"{static.name}: {size}, {self._ticks} ticks at {static.rate_hz} Hz")
 
     def see(self, truth: Truth) -> None:
         """Move it, a few times a second at most."""

@@ -69,6 +69,7 @@ class Execution:
         self.scenario, self.seeds = scenario, seeds
         self.folder: Path | None = None  # where summary and recording go, if anywhere
         self.ticks = _ticks(scenario)
+        self.run_id = new_run_id()
         self._socket, self._clock = socket, WallClock()
         self._called_ns = self._clock.now_ns()
         self._specs = agent_specs(scenario)
@@ -82,7 +83,7 @@ class Execution:
         recorders = [RerunRecording(self.folder / "run.rrd", metrics)] if self.folder else []
         watching: list[Observer] = [metrics, radio_tally, *recorders, *observers]
         with self._crew() as crew, Interrupt() as interrupt:
-            air = self._air()
+            air = self.air()
             crew.start()
             loop = Loop(self.world, air, crew, watching)
             started_ns = self._clock.now_ns()
@@ -99,7 +100,8 @@ class Execution:
             result.write(self.folder / "summary.json")
         return result
 
-    def _air(self) -> Air | None:
+    def air(self) -> Air | None:
+        """The air of the scenario's radio, if it has one."""
         static, radio = self.world.static, self.scenario.radio
         if radio is None:
             return None
@@ -114,7 +116,7 @@ class Execution:
             yield local
             local.close()
             return
-        parts, run_id = assignments.split(whole, self.runners), new_run_id()
+        parts = assignments.split(whole, self.runners)
         names = [f"r{i}" for i in range(len(parts))]
         processes: list[RunnerProcesses] = []
 
@@ -123,10 +125,10 @@ class Execution:
 
         with local_endpoint(self._socket) as endpoint:
             timeout_s = self.scenario.run.runner_timeout_s
-            crew = RemoteCrew(endpoint, run_id, parts, timeout_s, self._clock, trouble)
+            crew = RemoteCrew(endpoint, self.run_id, parts, timeout_s, self._clock, trouble)
             try:
                 crew.open()
-                processes.append(RunnerProcesses(endpoint, run_id, sorted(set(self._specs.values())), names))
+                processes.append(RunnerProcesses(endpoint, self.run_id, sorted(set(self._specs.values())), names))
                 yield crew
             finally:
                 crew.close()

@@ -116,8 +116,9 @@ class RemoteCrew:
             return
         key = str(item.key_expr)
         runner = runner_of(key)
-        if key == self._keys.answer(runner):
-            self._lockstep.answer(runner, item.payload.to_bytes())
+        if key != self._keys.alive(runner):
+            # A put may name its key with wildcards; only the exact one speaks for a runner.
+            self._lockstep.answer(runner if key == self._keys.answer(runner) else key, item.payload.to_bytes())
         elif item.kind == zenoh.SampleKind.DELETE:
             self._present.discard(runner)
             self._lockstep.gone(runner, "its process or its link is gone")

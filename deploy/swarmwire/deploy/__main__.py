@@ -1,0 +1,5 @@
+"""`python -m swarmwire.deploy` is the command `swarmwire`."""
+
+from swarmwire.deploy.cli import main
+
+main()

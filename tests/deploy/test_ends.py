@@ -1,0 +1,93 @@
+"""However a run ends, it says so, and nothing of it is left behind."""
+
+import json
+import os
+import signal
+
+import psutil
+import pytest
+from tests.deploy.commands import LOSSY, family, runners_of, started, swarmwire
+
+LONG = ["--set", "duration_s=3600", "--runners", "4", "--set", "robots.flock.count=8"]
+GONE_S = 5.0
+
+
+@pytest.fixture
+def long_run(tmp_path):
+    process = started(LOSSY, *LONG, "--out", tmp_path / "run")
+    children = family(process)
+    assert len(children) == 5  # a nursery and four runners
+    yield process, children
+    for left in [*children, psutil.Process(process.pid)] if process.poll() is None else children:
+        if left.is_running():
+            left.kill()
+    process.communicate()
+
+
+def test_killing_the_world_leaves_no_process(long_run):
+    process, children = long_run
+    process.kill()
+    _, alive = psutil.wait_procs(children, timeout=GONE_S)
+    assert not alive
+
+
+def test_killing_a_runner_ends_the_run_and_names_its_robots(long_run):
+    process, children = long_run
+    runners_of(process)[2].kill()
+    _, errors = process.communicate(timeout=GONE_S + 5)
+    assert process.returncode == 1
+    assert "flock-" in errors
+    assert "was lost" in errors
+    assert "Traceback" not in errors
+    _, alive = psutil.wait_procs(children, timeout=GONE_S)
+    assert not alive
+
+
+def test_killing_the_nursery_and_all_runners_ends_the_run(long_run):
+    process, children = long_run
+    os.killpg(children[0].pid, signal.SIGKILL)
+    _, errors = process.communicate(timeout=GONE_S + 5)
+    assert process.returncode == 1
+    assert "was lost" in errors
+
+
+def test_an_interrupt_ends_the_run_with_a_summary(long_run, tmp_path):
+    process, children = long_run
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=GONE_S + 5)
+    assert (process.returncode, errors) == (130, "")
+    assert "interrupted" in output
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["ended"] == "interrupted"
+    assert summary["ticks"] < 36_000
+    assert sum(summary["radio"]["fates"].values()) == summary["radio"]["intended"]
+    _, alive = psutil.wait_procs(children, timeout=GONE_S)
+    assert not alive
+
+
+FAULTY = """
+from swarmwire.agent import Agent, Robot
+
+class Faulty(Agent):
+    needs = ("compass",)
+
+    def __init__(self):
+        self.steps = 0
+
+    def step(self, robot: Robot) -> None:
+        self.steps += 1
+        if self.steps == 3:
+            raise ZeroDivisionError("the third step is too much")
+"""
+
+
+@pytest.mark.parametrize("runners", ["none", "3", "per-robot"])
+def test_an_agent_that_raises_ends_the_run_with_its_robots_name_and_its_own_traceback(tmp_path, runners):
+    agent = tmp_path / "faulty.py"
+    agent.write_text(FAULTY)
+    setting = ["--set", f"robots.flock.agent={agent}:Faulty", "--set", "robots.flock.params={}"]
+    ended = swarmwire("run", LOSSY, *setting, "--runners", runners, "--out", tmp_path / "run", "--quiet")
+    assert ended.returncode == 1
+    assert "the agent of flock-" in ended.stderr
+    assert 'raise ZeroDivisionError("the third step is too much")' in ended.stderr
+    assert "faulty.py" in ended.stderr

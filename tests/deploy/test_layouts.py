@@ -1,0 +1,79 @@
+"""Law 2: the same scenario and seed give the same run bit for bit, in every layout, over real processes."""
+
+import pytest
+from tests.deploy.commands import LOSSY, ROOT
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.deploy import Result, run
+from swarmwire.deploy.agents import agent_specs
+from swarmwire.deploy.endpoint import local_endpoint, new_run_id
+from swarmwire.deploy.run import Execution
+from swarmwire.deploy.runner_processes import RunnerProcesses
+from swarmwire.world import assignments
+from swarmwire.world.loop import Loop
+from swarmwire.world.remote_crew import RemoteCrew
+from swarmwire.world.scenario_file import load_scenario
+
+SHORT = ["duration_s=3"]
+SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
+
+
+@pytest.fixture(scope="module")
+def local() -> Result:
+    return run(LOSSY, overrides=SHORT)
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("runners", [1, 3, "per-robot"])
+def test_every_shipped_scenario_runs_alike_in_one_process_and_in_many(scenario, runners):
+    assert (
+        run(scenario, overrides=SHORT, runners=runners).trajectory_sha256
+        == run(scenario, overrides=SHORT).trajectory_sha256
+    )
+
+
+def test_two_executions_in_one_process_are_alike(local):
+    again = run(LOSSY, overrides=SHORT)
+    assert again.trajectory_sha256 == local.trajectory_sha256
+    assert (again.radio, again.metrics) == (local.radio, local.metrics)
+
+
+@pytest.mark.parametrize("runners", [None, "per-robot"])
+def test_a_users_agent_of_the_same_rule_gives_the_same_run(local, runners):
+    mine = f"robots.flock.agent={ROOT / 'examples' / 'flocking_agent.py'}:MyFlocking"
+    assert run(LOSSY, overrides=[*SHORT, mine], runners=runners).trajectory_sha256 == local.trajectory_sha256
+
+
+@pytest.mark.parametrize("runners", [None, 3])
+def test_an_arena_is_the_same_alone_and_as_one_of_eight(local, runners):
+    eight = run(LOSSY, overrides=SHORT, seeds=range(1, 9), runners=runners)
+    assert eight.trajectory_sha256[0] == local.trajectory_sha256[0]
+    assert eight.trajectory_sha256[4] == run(LOSSY, overrides=SHORT, seed=5).trajectory_sha256[0]
+    assert eight.arenas[0].radio == local.radio
+    assert eight.arenas[0].metrics == local.metrics
+    assert len(set(eight.trajectory_sha256)) == 8
+
+
+def test_which_runner_plays_which_robots_does_not_matter(local):
+    """Runners get robots in the order in which they come: handing them out backwards is the other order of starting."""
+    execution = Execution(load_scenario(LOSSY, SHORT), (1,))
+    specs = agent_specs(execution.scenario)
+    parts = assignments.split(assignments.whole(execution.scenario, execution.world.static, specs), 3)
+    run_id = new_run_id()
+    with local_endpoint(None) as endpoint:
+        crew = RemoteCrew(endpoint, run_id, parts[::-1], 30.0, WallClock())
+        crew.open()
+        processes = RunnerProcesses(endpoint, run_id, sorted(specs.values()), ["c", "b", "a"])
+        try:
+            crew.start()
+            loop = Loop(execution.world, execution.air(), crew, [])
+            loop.run(execution.ticks)
+        finally:
+            crew.close()
+            processes.stop()
+    assert loop.hexdigests() == local.trajectory_sha256
+
+
+def test_another_seed_or_another_loss_is_another_run(local):
+    assert run(LOSSY, overrides=SHORT, seed=2).trajectory_sha256 != local.trajectory_sha256
+    assert run(LOSSY, overrides=[*SHORT, "radio.loss=0.31"]).trajectory_sha256 != local.trajectory_sha256
