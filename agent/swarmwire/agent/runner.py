@@ -36,7 +36,7 @@ def run(endpoint: str, run_id: str, runner: str) -> None:
             session.declare_subscriber(keys.frame(runner), arrived),
             session.liveliness().declare_token(keys.alive(runner)),
         )
-        assignment = _join(session, keys, runner)
+        assignment = _join(session, keys, runner, inbox)
         answer = session.declare_publisher(
             keys.answer(runner), congestion_control=zenoh.CongestionControl.BLOCK, express=True
         )
@@ -44,7 +44,13 @@ def run(endpoint: str, run_id: str, runner: str) -> None:
         del declared
 
 
-def _join(session: zenoh.Session, keys: Keys, runner: str) -> Assignment:
+def _join(session: zenoh.Session, keys: Keys, runner: str, inbox: "queue.SimpleQueue[zenoh.Sample]") -> Assignment:
+    try:
+        inbox.get(
+            timeout=JOIN_S
+        )  # the world's token, declared last: one that has only just begun to listen cannot answer
+    except queue.Empty:
+        raise RunnerLost(runner, "none yet", "there is no world") from None
     request = msgpack.packb({"v": frames.VERSION, "runner": runner})
     for reply in session.get(keys.join, payload=request, timeout=JOIN_S):
         if reply.ok is None:

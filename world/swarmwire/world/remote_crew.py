@@ -54,10 +54,10 @@ class RemoteCrew:
             ) from error
         arrived = (self._inbox.put, self._inbox)
         self._declared = (
-            session.liveliness().declare_token(self._keys.world),
             session.declare_queryable(self._keys.join, arrived),
             session.declare_subscriber(self._keys.any_answer, arrived),
-            session.liveliness().declare_subscriber(self._keys.any_alive, arrived),
+            session.liveliness().declare_subscriber(self._keys.any_alive, arrived, history=True),
+            session.liveliness().declare_token(self._keys.world),  # last: it says that runners may join
         )
 
     def start(self) -> None:
