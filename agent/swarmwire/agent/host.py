@@ -104,7 +104,9 @@ class _Single(Hosted):
 
     def keep(self, rows: IntArray) -> None:
         known = self._agents
-        self._agents = {row: known[row] if row in known else make(self._kind, self.group.params) for row in rows.tolist()}
+        self._agents = {
+            row: known[row] if row in known else make(self._kind, self.group.params) for row in rows.tolist()
+        }
 
 
 def hosted(group: GroupAssignment, kind: AgentClass) -> Hosted:

@@ -1,0 +1,90 @@
+"""From a text to an agent class, and every way in which it can lead nowhere."""
+
+from pathlib import Path
+
+import pytest
+
+from swarmwire.agent.behaviours import Flocking
+from swarmwire.agent.loading import NoAgent, load_agent, resolve
+from tests.agent.hosts import PLAYERS, spec
+
+HEAD = "from swarmwire.agent import Agent, Robot, VectorAgent\n"
+
+
+def refused(text: str) -> str:
+    with pytest.raises(NoAgent) as caught:
+        load_agent(text)
+    return str(caught.value)
+
+
+def written(directory: Path, code: str) -> str:
+    path = directory / "mine.py"
+    path.write_text(HEAD + code, encoding="utf-8")
+    return f"{path}:Mine"
+
+
+def test_a_class_of_a_module_is_found() -> None:
+    assert load_agent("swarmwire.agent.behaviours:Flocking") is Flocking
+
+
+def test_a_class_of_a_file_is_found_and_loaded_once() -> None:
+    found = load_agent(spec("Counter"))
+    assert found.__name__ == "Counter"
+    assert load_agent(spec("Counter")) is found
+
+
+def test_files_of_one_name_do_not_meet(tmp_path: Path) -> None:
+    specs: list[str] = []
+    for number in (1, 2):
+        (tmp_path / str(number)).mkdir()
+        code = f"class Mine(Agent):\n    number = {number}\n    def step(self, robot): ...\n"
+        specs.append(written(tmp_path / str(number), code))
+    assert [vars(load_agent(text))["number"] for text in specs] == [1, 2]
+
+
+def test_a_file_lies_beside_the_scenario_and_a_module_lies_nowhere(tmp_path: Path) -> None:
+    assert resolve("../agents/mine.py:Mine", tmp_path / "scenarios") == f"{tmp_path.resolve()}/agents/mine.py:Mine"
+    assert resolve("a.b:Mine", tmp_path) == "a.b:Mine"
+    assert resolve(spec("Counter"), tmp_path) == f"{PLAYERS.resolve()}:Counter"
+
+
+@pytest.mark.parametrize("text", ["", "Mine", ":Mine", "a.b:", "mine.py", "a.b:Mine.Inner", "a.b:1", "mine.py:x y"])
+def test_a_text_without_a_place_or_a_name_says_what_was_expected(text: str) -> None:
+    assert refused(text) == f'expected "package.module:Class" or "file.py:Class", got {text!r}'
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    assert refused(f"{tmp_path}/mine.py:Mine") == f"there is no file {tmp_path}/mine.py"
+
+
+@pytest.mark.parametrize("text", ["no.such.module:Mine", "..up:Mine", "swarmwire.agent.nothing:Mine"])
+def test_a_module_that_is_not_there(text: str) -> None:
+    assert "does not import" in refused(text)
+
+
+@pytest.mark.parametrize(
+    ("code", "reason"),
+    [
+        ("import no_such_module\n", "does not import: ModuleNotFoundError: No module named 'no_such_module'"),
+        ("def broken(:\n", "does not import: SyntaxError"),
+        ("1 / 0\n", "does not import: ZeroDivisionError: division by zero"),
+        ("open('weights.json')\n", "does not import: FileNotFoundError"),  # the agent's own file, not the agent
+        ("class Yours(Agent): ...\n", "holds no such name: 'Mine'"),
+        ("Mine = 3\n", "holds no Agent or VectorAgent: 'Mine'"),
+        ("class Mine: ...\n", "holds no Agent or VectorAgent: 'Mine'"),
+        ("class Mine(Agent): ...\n", "Mine has no step method"),
+        ("class Mine(VectorAgent): ...\n", "Mine has no step method"),
+        (
+            "class Mine(Agent):\n    speeds: list[float]\n    def step(self, robot): ...\n",
+            "Mine.speeds: a parameter is a float, int, bool or str",
+        ),
+        ("class Mine(Agent):\n    x: 'Nowhere'\n    def step(self, robot): ...\n", "name 'Nowhere' is not defined"),
+    ],
+)
+def test_a_file_that_holds_no_agent_says_at_which_point(tmp_path: Path, code: str, reason: str) -> None:
+    assert reason in refused(written(tmp_path, code))
+
+
+def test_a_file_that_did_not_import_may_be_mended(tmp_path: Path) -> None:
+    refused(written(tmp_path, "1 / 0\n"))
+    assert load_agent(written(tmp_path, "class Mine(Agent):\n    def step(self, robot): ...\n")).__name__ == "Mine"

@@ -1,0 +1,77 @@
+"""The checks for agents let honest ones pass and catch those that cheat."""
+
+from pathlib import Path
+
+import pytest
+
+from swarmwire.agent import VectorAgent
+from swarmwire.agent.behaviours import Diffusion, Flocking
+from swarmwire.agent.loading import load_agent
+from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
+from swarmwire.comms.errors import AgentFailed
+from tests.agent.players import (
+    Ageing,
+    Counter,
+    Crowd,
+    Means,
+    Neighbour,
+    Remembering,
+    Reply,
+    Steps,
+    VectorCounter,
+)
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "flocking_agent.py"
+TRIALS = [Trial(), Trial(robots=1), Trial(robots=40, ticks=8, seed=7, body="footbot")]
+
+
+@pytest.mark.parametrize("trial", TRIALS, ids=repr)
+@pytest.mark.parametrize("kind", [Diffusion, Flocking, VectorCounter])
+def test_honest_rows_are_independent(kind: type[VectorAgent], trial: Trial) -> None:
+    assert_rows_independent(kind, trial)
+
+
+@pytest.mark.parametrize("kind", [Means, Neighbour, Crowd, Remembering, Ageing, Reply])
+def test_rows_that_peek_or_remember_on_their_own_are_caught(kind: type[VectorAgent]) -> None:
+    with pytest.raises(AssertionError, match=f"rows of {kind.__name__} are not independent in tick"):
+        assert_rows_independent(kind)
+
+
+@pytest.mark.parametrize("trial", TRIALS, ids=repr)
+def test_the_example_is_the_same_rule_as_the_behaviour(trial: Trial) -> None:
+    assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), Flocking, trial)
+
+
+def test_two_kinds_of_one_rule_with_memory_are_equivalent() -> None:
+    assert_equivalent(Counter, VectorCounter)
+
+
+@pytest.mark.parametrize("name", ["cohesion", "alignment", "avoidance", "forward", "speed_mps", "turn_gain_per_s"])
+def test_a_weight_that_differs_is_caught(name: str) -> None:
+    changed = type("Changed", (Flocking,), {name: getattr(Flocking, name) * (1.0 + 1e-12)})
+    with pytest.raises(AssertionError, match="MyFlocking and Changed differ in tick"):
+        assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), changed)
+
+
+def test_packets_that_differ_are_caught() -> None:
+    class Silent(Flocking):
+        def step(self, robots, state) -> None:
+            robots.radio.send = lambda *_, **__: None
+            super().step(robots, state)
+
+    with pytest.raises(AssertionError, match="packets"):
+        assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), Silent)
+
+
+def test_parameters_of_a_trial_reach_both_agents() -> None:
+    params = {"separation_m": 0.9, "alignment": 0.0}
+    assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), Flocking, Trial(params=params))
+
+
+def test_an_agent_that_raises_is_named() -> None:
+    class Raises(VectorAgent[Steps]):
+        def step(self, robots, state) -> None:
+            raise KeyError("nothing")
+
+    with pytest.raises(AgentFailed, match="KeyError"):
+        assert_rows_independent(Raises)
