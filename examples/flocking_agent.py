@@ -36,14 +36,13 @@ class MyFlocking(Agent):
         packets = robot.radio.heard(Heading)
         x = y = 0.0
         for packet in packets:
-            pull = np.clip((packet.range_m - self.separation_m) / self.separation_m, -1.0, 1.0)
+            pull = min((packet.range_m - self.separation_m) / self.separation_m, 1.0)
             turn = packet.message.heading_rad - heading
             x += self.cohesion * pull * np.cos(packet.bearing_rad) + self.alignment * np.cos(turn)
             y += self.cohesion * pull * np.sin(packet.bearing_rad) + self.alignment * np.sin(turn)
         neighbours = max(len(packets), 1)
 
-        near_x = (robot.proximity.value * np.cos(robot.proximity.angle_rad)).sum()
-        near_y = (robot.proximity.value * np.sin(robot.proximity.angle_rad)).sum()
+        near_x, near_y = robot.proximity.vector_sum()
         x = self.forward + x / neighbours - self.avoidance * near_x
         y = y / neighbours - self.avoidance * near_y
 

@@ -136,7 +136,7 @@ def test_a_field_of_another_type_is_refused_where_the_class_is_made(hint: object
         type("Odd", (Message,), {"__annotations__": {"x": hint}})
 
 
-@pytest.mark.parametrize("name", ["encode", "layout", "size_bytes", "tag"])
+@pytest.mark.parametrize("name", ["encode", "on_air", "size_bytes", "tag"])
 def test_a_field_cannot_take_a_name_that_messages_use(name: str) -> None:
     with pytest.raises(TypeError, match=rf"Odd\.{name}: .*taken"):
         type("Odd", (Message,), {"__annotations__": {name: f4}})
@@ -144,7 +144,7 @@ def test_a_field_cannot_take_a_name_that_messages_use(name: str) -> None:
 
 @pytest.mark.parametrize(("name", "value"), [("a", 128), ("a", -129), ("d", -1), ("d", 256), ("e", 65536), ("f", -1)])
 def test_a_number_beyond_a_whole_field_is_refused(name: str, value: float) -> None:
-    fields = dict.fromkeys(Everything.layout.names or (), 0.0) | {name: value}
+    fields = dict.fromkeys(Everything.ranges or (), 0.0) | {name: value}
     with pytest.raises(OverflowError, match=rf"Everything\.{name}: expected whole numbers from"):
         Everything(**fields).encode()
 
@@ -169,7 +169,7 @@ def test_bytes_of_another_kind_are_refused(payload: bytes) -> None:
 
 @given(st.lists(everything, max_size=6))
 def test_rows_encode_and_decode_as_single_messages_do(messages: list[Everything]) -> None:
-    columns = {name: np.array([getattr(m, name) for m in messages]) for name in Everything.layout.names or ()}
+    columns = {name: np.array([getattr(m, name) for m in messages]) for name in Everything.ranges or ()}
     payloads = encode_rows(Everything, len(messages), columns)
     assert [payloads.row(i) for i in range(len(payloads))] == [message.encode() for message in messages]
     decoded = decode_rows(Everything, payloads, np.arange(len(messages)))

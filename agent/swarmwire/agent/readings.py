@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.sheets import Proximity
 
@@ -18,6 +20,11 @@ class ProximityReading:
     def distance_m(self) -> FloatArray:
         """Distance from the rim at which an ideal sensor answers `value`; the reach if nothing is seen, (…, rays)."""
         return self.sheet.response.distance_m(self.value)
+
+    def vector_sum(self) -> tuple[FloatArray, FloatArray]:
+        """x and y, (…), of the sum of the rays as vectors: `value` long, towards `angle_rad`; where things are near."""
+        cosine, sine = self.sheet.direction
+        return np.add.reduce(self.value * cosine, -1), np.add.reduce(self.value * sine, -1)
 
     @property
     def angle_rad(self) -> FloatArray:

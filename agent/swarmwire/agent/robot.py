@@ -78,12 +78,9 @@ class RadioPort:
         """The packets of a message class (or `dict`) heard since the robot's last step, by time; messages decode when asked for."""
         if issubclass(kind, Message):
             packets = self._turn.packets(kind)
-            names = kind.layout.names or ()
-            columns = [getattr(packets.message, name) for name in names]
+            columns = {name: getattr(packets.message, name) for name in kind.ranges}
             return [
-                Packet(
-                    packets, at, kind(**{name: float(column[at]) for name, column in zip(names, columns, strict=True)})
-                )
+                Packet(packets, at, kind(**{name: float(column[at]) for name, column in columns.items()}))
                 for at in self._mine(packets)
             ]
         table = self._turn.tagged(DICT_TAG)

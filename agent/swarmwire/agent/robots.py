@@ -65,10 +65,10 @@ class Robots:
     def drive(self, linear_mps: ArrayLike, angular_radps: ArrayLike, rows: BoolArray | None = None) -> None:
         """Wanted forward speed and turn rate (positive to the left), (n,) or one number; those not in the mask `rows` keep theirs."""
         turn = self._turn
-        mask = np.ones(turn.n, np.bool_) if rows is None else rows
-        turn.drive |= mask
-        turn.linear_mps[mask] = np.broadcast_to(np.asarray(linear_mps, np.float64), (turn.n,))[mask]
-        turn.angular_radps[mask] = np.broadcast_to(np.asarray(angular_radps, np.float64), (turn.n,))[mask]
+        moved = True if rows is None else rows
+        np.copyto(turn.drive, True, where=moved)
+        np.copyto(turn.linear_mps, linear_mps, where=moved)
+        np.copyto(turn.angular_radps, angular_radps, where=moved)
 
 
 class RadioRows:
@@ -93,12 +93,16 @@ class RadioRows:
         Returns the ids of the packets, in the order of the robots that sent.
         """
         n = self._turn.n
-        row = np.arange(n) if rows is None else np.flatnonzero(rows)
-        columns: dict[str, Any] = {
-            name: np.broadcast_to(np.asarray(value), (n,))[row] for name, value in fields.items()
-        }
-        receiver = to if to is None or isinstance(to, int) else np.asarray(to)[row]
-        return self._turn.send(row, receiver, encode_rows(kind, len(row), columns))
+        if rows is None:
+            return self._turn.send(np.arange(n), to, encode_rows(kind, n, fields))
+        row = np.flatnonzero(rows)
+        columns = {name: _of(rows, value) for name, value in fields.items()}
+        return self._turn.send(row, None if to is None else _of(rows, to), encode_rows(kind, len(row), columns))
+
+
+def _of(rows: BoolArray, value: Any) -> Any:
+    """The values of the rows of a mask; one number serves them all."""
+    return value if np.ndim(value) == 0 else np.asarray(value)[rows]
 
 
 def proximity_sheet(body: Body) -> Proximity:

@@ -64,8 +64,9 @@ class Turn:
 
     def send(self, row: IntArray, to: IntArray | int | None, payloads: Payloads) -> IntArray:
         """Queue a packet for each of the robots `row` (rising, each once); returns their ids."""
-        receiver = np.broadcast_to(np.asarray(BROADCAST if to is None else to, np.int64), row.shape)
-        if np.any(receiver < BROADCAST):
+        receiver = np.empty(len(row), np.int64)
+        receiver[:] = BROADCAST if to is None else to
+        if to is not None and (receiver < 0).any():
             raise ValueError("send(to=…): expected the index of a robot in the arena, 0 or more")
         self._outbox.append(Sent(self.senses.rows[row], receiver, payloads))
         ids = self._sent_before[row]

@@ -16,7 +16,7 @@ import msgpack
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.packets import TAG_BYTES, Payloads, offsets
+from swarmwire.comms.packets import TAG_BYTES, Payloads
 
 f4 = Annotated[float, np.dtype("<f4")]
 f8 = Annotated[float, np.dtype("<f8")]
@@ -38,9 +38,11 @@ class Message:
     field; `encode` raises OverflowError where a number does not fit its field.
     """
 
-    layout: ClassVar[np.dtype[Any]] = np.dtype([])
     tag: ClassVar[int] = -1
     size_bytes: ClassVar[int] = TAG_BYTES
+    on_air: ClassVar[np.dtype[Any]] = np.dtype([("tag", "<u2")])  # tag and fields, packed
+    ranges: ClassVar[dict[str, tuple[float, float, bool]]] = {}  # of each field: lowest, highest, whole numbers only
+    places: ClassVar[IntArray] = np.arange(TAG_BYTES)  # of the bytes
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -54,13 +56,14 @@ class Message:
             if not isinstance(dtype, np.dtype):
                 raise TypeError(f"{cls.__name__}.{name}: expected one of f4, f8, i1, i2, i4, u1, u2, u4")
             fields.append((name, cast("np.dtype[Any]", dtype)))
-        cls.layout = np.dtype(fields)
-        cls.size_bytes = TAG_BYTES + cls.layout.itemsize
         cls.tag = _tag(cls.__name__, fields)
+        cls.on_air = np.dtype([("tag", "<u2"), *fields])
+        cls.size_bytes = cls.on_air.itemsize
+        cls.places = np.arange(cls.size_bytes)
+        cls.ranges = {name: _range(dtype) for name, dtype in fields}
 
     def __init__(self, **fields: float) -> None:
-        names = self.layout.names or ()
-        if set(fields) != set(names):
+        if fields.keys() != self.ranges.keys():
             raise _wrong_fields(type(self), fields)
         for name, value in fields.items():
             object.__setattr__(self, name, float(value))
@@ -79,44 +82,40 @@ class Message:
 
     def encode(self) -> bytes:
         """The bytes on air: tag and fields."""
-        columns = {name: np.array([getattr(self, name)]) for name in self.layout.names or ()}
-        return encode_rows(type(self), 1, columns).row(0)
+        return encode_rows(type(self), 1, dict(self.__dict__)).row(0)
 
     @classmethod
     def decode(cls, payload: bytes) -> Self:
         """The message of these bytes; ValueError if they are not of this class."""
         if len(payload) != cls.size_bytes or int.from_bytes(payload[:TAG_BYTES], "little") != cls.tag:
             raise ValueError(f"{len(payload)} bytes that are no {cls.__name__}")
-        fields = np.frombuffer(payload, cls.layout, 1, TAG_BYTES)[0] if cls.layout.names else None
-        return cls(**{name: float(fields[name]) for name in cls.layout.names or ()} if fields is not None else {})
+        fields = np.frombuffer(payload, cls.on_air)[0]
+        return cls(**{name: float(fields[name]) for name in cls.ranges})
 
 
 def encode_rows(kind: type[Message], rows: int, fields: dict[str, Any]) -> Payloads:
     """`rows` messages of one class at once; each field is a number or an array (rows,)."""
-    names = kind.layout.names or ()
-    if set(fields) != set(names):
+    if fields.keys() != kind.ranges.keys():
         raise _wrong_fields(kind, fields)
-    table = np.zeros(rows, np.dtype([("tag", "<u2"), ("body", kind.layout)]))
+    table = np.empty(rows, kind.on_air)
     table["tag"] = kind.tag
-    for name in names:
-        column = table["body"][name]
-        values = np.broadcast_to(np.asarray(fields[name], np.float64), (rows,))
-        if column.dtype.kind in "iu":
-            values = _whole(kind, name, values, column.dtype)
-        elif np.any(np.isfinite(values) & (np.abs(values) > np.finfo(column.dtype).max)):
-            raise OverflowError(f"{kind.__name__}.{name}: expected numbers up to {np.finfo(column.dtype).max:g}")
-        column[:] = values
-    return Payloads(table.view(np.uint8).reshape(-1), offsets(np.full(rows, kind.size_bytes, np.int64)))
+    for name, (lowest, highest, whole) in kind.ranges.items():
+        values = np.rint(fields[name]) if whole else np.asarray(fields[name], np.float64)
+        beyond = (values < lowest) | (values > highest) | (values != values if whole else False)
+        if beyond.any() and (whole or (beyond & np.isfinite(values)).any()):
+            what = "whole numbers" if whole else "numbers"
+            raise OverflowError(f"{kind.__name__}.{name}: expected {what} from {lowest:g} to {highest:g}")
+        table[name] = values
+    return Payloads(table.view(np.uint8), np.arange(rows + 1) * kind.size_bytes)
 
 
 def decode_rows(kind: type[Message], payloads: Payloads, index: IntArray) -> dict[str, FloatArray]:
     """The fields of payload rows `index`, which must all be of this class, each as float64 (len(index),)."""
-    if not kind.layout.names:
+    if not kind.ranges:
         return {}
-    start = payloads.offset[index] + TAG_BYTES
-    raw = payloads.data[start[:, None] + np.arange(kind.layout.itemsize)]
-    table = np.ascontiguousarray(raw).view(kind.layout).reshape(-1)
-    return {name: table[name].astype(np.float64) for name in kind.layout.names}
+    raw = payloads.data[payloads.offset[index, None] + kind.places]
+    table = raw.view(kind.on_air)[:, 0]
+    return {name: table[name].astype(np.float64) for name in kind.ranges}
 
 
 def encode_dict(message: dict[str, Any]) -> bytes:
@@ -133,16 +132,14 @@ def decode_dict(payload: bytes) -> dict[str, Any]:
 
 
 def _wrong_fields(kind: type[Message], given: Iterable[str]) -> TypeError:
-    names = kind.layout.names or ("(none)",)
+    names = kind.ranges or ("(none)",)
     return TypeError(f"{kind.__name__} has the fields {', '.join(names)}; got {', '.join(given)}")
 
 
-def _whole(kind: type[Message], name: str, values: FloatArray, dtype: np.dtype[Any]) -> FloatArray:
-    span = np.iinfo(dtype)
-    whole = np.rint(values)
-    if not np.all((whole >= span.min) & (whole <= span.max)):
-        raise OverflowError(f"{kind.__name__}.{name}: expected whole numbers from {span.min} to {span.max}")
-    return whole
+def _range(dtype: np.dtype[Any]) -> tuple[float, float, bool]:
+    whole = dtype.kind in "iu"
+    span = np.iinfo(dtype) if whole else np.finfo(dtype)
+    return float(span.min), float(span.max), whole
 
 
 def _tag(name: str, fields: list[tuple[str, np.dtype[Any]]]) -> int:

@@ -23,15 +23,19 @@ class Payloads:
     @property
     def sizes(self) -> IntArray:
         """Bytes of each row, tag included, (rows,)."""
-        return np.diff(self.offset)
+        return self.offset[1:] - self.offset[:-1]
 
     def tags(self) -> IntArray:
         """The 2-byte tag of each row as a number, (rows,); -1 where a row is too short to have one."""
-        if not len(self.data):
-            return np.full(len(self), -1, np.int64)
-        start = np.minimum(self.offset[:-1], len(self.data) - 2)
-        tags = self.data[start].astype(np.int64) | self.data[start + 1].astype(np.int64) << 8
-        return np.where(self.sizes >= TAG_BYTES, tags, -1)
+        whole = self.sizes >= TAG_BYTES
+        if whole.all():
+            return self._tags_at(self.offset[:-1])
+        tags = np.full(len(self), -1, np.int64)
+        tags[whole] = self._tags_at(self.offset[:-1][whole])
+        return tags
+
+    def _tags_at(self, start: IntArray) -> IntArray:
+        return self.data[start].astype(np.int64) | self.data[start + 1].astype(np.int64) << 8
 
     def rows(self, index: IntArray) -> "Payloads":
         """The rows of `index`, in its order; a row may be taken more than once."""

@@ -62,6 +62,12 @@ class Proximity:
         return wrapped
 
 
+    @cached_property
+    def direction(self) -> tuple[FloatArray, FloatArray]:
+        """Cosine and sine of `angle_rad`, (rays,) each."""
+        return np.cos(self.angle_rad), np.sin(self.angle_rad)
+
+
 @dataclass(frozen=True)
 class Compass:
     """The heading in the arena's frame. Sense: heading_rad (n,), in (-pi, pi], 0 along the arena's +x."""

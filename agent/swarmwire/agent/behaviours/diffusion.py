@@ -24,10 +24,9 @@ class Diffusion(VectorAgent):
         """Straight, or one wheel."""
         proximity = robots.proximity
         rays = len(proximity.angle_rad)
-        x = (proximity.value * np.cos(proximity.angle_rad)).sum(1) / rays
-        y = (proximity.value * np.sin(proximity.angle_rad)).sum(1) / rays
+        x, y = proximity.vector_sum()
         angle = np.arctan2(y, x)
-        straight = (np.abs(angle) <= self.go_straight_rad) & (np.hypot(x, y) < self.nearness)
+        straight = (np.abs(angle) <= self.go_straight_rad) & (np.hypot(x, y) < self.nearness * rays)
         turn = self.speed_mps / robots.body.drive.wheel_base_m
         linear = np.where(straight, self.speed_mps, 0.5 * self.speed_mps)
         angular = np.where(straight, 0.0, np.where(angle > 0.0, -turn, turn))

@@ -37,15 +37,13 @@ class Flocking(VectorAgent):
         """Steer to the sum of all pulls, and broadcast the heading."""
         heading = robots.compass.heading_rad
         heard = robots.radio.heard(Heading)
-        pull = np.clip((heard.range_m - self.separation_m) / self.separation_m, -1.0, 1.0)
+        pull = np.minimum((heard.range_m - self.separation_m) / self.separation_m, 1.0)
         turn = heard.message.heading_rad - heading[heard.row]
         along = self.cohesion * pull * np.cos(heard.bearing_rad) + self.alignment * np.cos(turn)
         across = self.cohesion * pull * np.sin(heard.bearing_rad) + self.alignment * np.sin(turn)
         neighbours = np.maximum(heard.count(), 1)
 
-        proximity = robots.proximity
-        near_x = (proximity.value * np.cos(proximity.angle_rad)).sum(1)
-        near_y = (proximity.value * np.sin(proximity.angle_rad)).sum(1)
+        near_x, near_y = robots.proximity.vector_sum()
         x = self.forward + heard.sum(along) / neighbours - self.avoidance * near_x
         y = heard.sum(across) / neighbours - self.avoidance * near_y
 

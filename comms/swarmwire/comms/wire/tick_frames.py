@@ -1,7 +1,5 @@
 """What a tick carries across the wire: senses and heard packets to a runner, actions back; checked on arrival."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, IntArray
@@ -11,9 +9,6 @@ from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame
 
-GIVEN = "heard/given/"
-
-
 def encode_tick(tick: int, senses: Senses, heard: Heard) -> bytes:
     """A `tick` frame: what a runner's robots sense and heard."""
     arrays: dict[str, AnyArray] = {}
@@ -22,15 +17,12 @@ def encode_tick(tick: int, senses: Senses, heard: Heard) -> bytes:
         for sense, column in group.fields.items():
             arrays[f"sense/{name}/{sense}"] = column
     if len(heard):
-        arrays["heard/receiver"] = heard.receiver
-        arrays["heard/sender"] = heard.sender
-        arrays["heard/sequence"] = heard.sequence
-        arrays["heard/at_ns"] = heard.heard_at_ns
-        arrays["heard/payload"] = heard.payload
+        # A row per column, so that each is contiguous again on the other side.
+        numbers = (heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, heard.payload)
+        arrays["heard/numbers"] = np.array(numbers)
+        arrays["heard/given"] = np.array(list(heard.given.values())).reshape(len(heard.given), len(heard))
         arrays["heard/data"] = heard.payloads.data
         arrays["heard/offset"] = heard.payloads.offset
-        for name, column in heard.given.items():
-            arrays[GIVEN + name] = column
     return frames.encode("tick", tick, arrays)
 
 
@@ -43,18 +35,12 @@ def decode_tick(frame: Frame, gives: tuple[str, ...]) -> tuple[Senses, Heard]:
             groups.setdefault(name, {})[sense] = array
     senses = {name: GroupSenses(fields.pop("rows"), fields) for name, fields in groups.items()}
     arrays = frame.arrays
-    if "heard/receiver" not in arrays:
+    if "heard/numbers" not in arrays:
         return senses, Heard.none(gives)
-    heard = Heard(
-        arrays["heard/receiver"],
-        arrays["heard/sender"],
-        arrays["heard/sequence"],
-        arrays["heard/at_ns"],
-        {name: arrays[GIVEN + name] for name in gives},
-        arrays["heard/payload"],
-        Payloads(arrays["heard/data"], arrays["heard/offset"]),
-    )
-    return senses, heard
+    receiver, sender, sequence, heard_at_ns, payload = arrays["heard/numbers"]
+    given = dict(zip(gives, arrays["heard/given"], strict=True))
+    payloads = Payloads(arrays["heard/data"], arrays["heard/offset"])
+    return senses, Heard(receiver, sender, sequence, heard_at_ns, given, payload, payloads)
 
 
 def encode_actions(tick: int, actions: Actions) -> bytes:
@@ -76,20 +62,19 @@ def encode_actions(tick: int, actions: Actions) -> bytes:
 def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     """The actions of the robots `rows`; BadFrame if the frame's arrays are not for exactly these or contradict themselves."""
     n = len(rows)
-    got = _column(frame, "rows", "<i8", lambda length: length == n)
-    if not np.array_equal(got, rows):
+    if (_column(frame, "rows", "<i8", n) != rows).any():
         raise BadFrame("malformed", "rows: expected the runner's own robots")
-    drive = _column(frame, "drive", "|b1", lambda length: length == n)
-    linear = _column(frame, "linear_mps", "<f8", lambda length: length == n)
-    angular = _column(frame, "angular_radps", "<f8", lambda length: length == n)
+    drive = _column(frame, "drive", "|b1", n)
+    linear = _column(frame, "linear_mps", "<f8", n)
+    angular = _column(frame, "angular_radps", "<f8", n)
     return Actions(rows, drive, linear, angular, _sent(frame, rows) if "sent/sender" in frame.arrays else Sent.none())
 
 
 def _sent(frame: Frame, rows: IntArray) -> Sent:
-    sender = _column(frame, "sent/sender", "<i8", lambda _: True)
-    to = _column(frame, "sent/to", "<i8", lambda length: length == len(sender))
-    offset = _column(frame, "sent/offset", "<i8", lambda length: length == len(sender) + 1)
-    data = _column(frame, "sent/data", "|u1", lambda _: True)
+    sender = _column(frame, "sent/sender", "<i8")
+    to = _column(frame, "sent/to", "<i8", len(sender))
+    offset = _column(frame, "sent/offset", "<i8", len(sender) + 1)
+    data = _column(frame, "sent/data", "|u1")
     if offset[0] != 0 or offset[-1] != len(data) or (offset[1:] < offset[:-1]).any():
         raise BadFrame("malformed", "sent/offset: expected rising offsets into sent/data")
     known = np.sort(rows)
@@ -98,8 +83,9 @@ def _sent(frame: Frame, rows: IntArray) -> Sent:
     return Sent(sender, to, Payloads(data, offset))
 
 
-def _column(frame: Frame, name: str, code: str, fits: Callable[[int], bool]) -> AnyArray:
+def _column(frame: Frame, name: str, code: str, length: int | None = None) -> AnyArray:
     array = frame.arrays.get(name)
-    if array is None or array.ndim != 1 or array.dtype.str != code or not fits(len(array)):
+    fits = array is not None and array.ndim == 1 and (length is None or len(array) == length)
+    if array is None or not fits or array.dtype != frames.DTYPES[code]:
         raise BadFrame("malformed", f"{name}: expected a column of {code} of the right length")
     return array
