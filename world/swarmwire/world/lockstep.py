@@ -13,10 +13,10 @@ Whatever does not fit is counted by name and dropped; it never changes the state
 import re
 from collections import Counter
 from dataclasses import dataclass
-from typing import cast
 
 import msgpack
 import numpy as np
+from msgpack.exceptions import UnpackException
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
@@ -76,7 +76,7 @@ class Lockstep:
         """Give the next free robots to a runner: its name and the reply; Refused with a reason for the runner."""
         try:
             asked: object = msgpack.unpackb(request)
-        except (ValueError, frames.UnpackException):
+        except (ValueError, UnpackException):
             asked = None
         match asked:
             case {"v": frames.VERSION, "runner": str(runner)} if NAME.fullmatch(runner):
@@ -90,7 +90,7 @@ class Lockstep:
             raise Refused("this name is in use" if runner in self._by_runner else "all robots are taken")
         free.runner, free.state = runner, "joined"
         self._by_runner[runner] = free
-        return runner, cast(bytes, msgpack.packb(free.assignment.as_mapping()))
+        return runner, msgpack.packb(free.assignment.as_mapping())
 
     def gone(self, runner: str, reason: str) -> None:
         """A runner's token vanished: RunnerLost if it plays robots."""
