@@ -9,7 +9,7 @@ SPEED_MPS = 0.05
 
 
 def diffusion(robots: int, steps: int, duration_s: float, *, radio: bool) -> dict[str, Any]:
-    """Foot-bots with 24 rays and ARGoS's diffusion rule, one per square metre; with radio, a broadcast in every tick."""
+    """Foot-bots with 24 rays and ARGoS's diffusion rule, one per square metre; with radio, a broadcast a tick."""
     side_m = math.sqrt(robots / DENSITY_PER_M2)
     agent = "benchmarks.agents:TalkingDiffusion" if radio else "swarmwire.agent.behaviours:Diffusion"
     scenario: dict[str, Any] = {

@@ -1,10 +1,12 @@
 """The flocking rule as a user would write it: an Agent that decides for one robot.
 
-Run it with a process per robot:
+Run it with a process per robot, from the project's root:
 
-    swarmwire run scenarios/flocking-lossy.toml --set robots.flock.agent=../examples/flocking_agent.py:MyFlocking --runners per-robot
+    mine=../examples/flocking_agent.py:MyFlocking
+    uv run swarmwire run scenarios/flocking-lossy.toml --runners per-robot --set robots.flock.agent=$mine
 
-The arithmetic is that of `swarmwire.agent.behaviours:Flocking`, in numpy functions, so the swarm moves the same bit for bit.
+The arithmetic is that of `swarmwire.agent.behaviours:Flocking`, in numpy functions, so the swarm moves the same, bit
+for bit.
 """
 
 import numpy as np
@@ -46,6 +48,6 @@ class MyFlocking(Agent):
         x = self.forward + x / neighbours - self.avoidance * near_x
         y = y / neighbours - self.avoidance * near_y
 
-        angle = np.arctan2(y, x)
-        robot.drive(self.speed_mps * max(np.cos(angle), 0.0), self.turn_gain_per_s * angle)
+        angle = float(np.arctan2(y, x))
+        robot.drive(self.speed_mps * max(float(np.cos(angle)), 0.0), self.turn_gain_per_s * angle)
         robot.radio.send(Heading(heading_rad=heading))

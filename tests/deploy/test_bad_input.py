@@ -3,10 +3,10 @@
 import socket
 
 import pytest
-from tests.deploy.commands import LOSSY, swarmwire
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
+from tests.deploy.commands import LOSSY, swarmwire
 
 AGENTS = """
 import no_such_module_anywhere

@@ -6,6 +6,7 @@ import signal
 
 import psutil
 import pytest
+
 from tests.deploy.commands import LOSSY, family, runners_of, started, swarmwire
 
 LONG = ["--set", "duration_s=3600", "--runners", "4", "--set", "robots.flock.count=8"]

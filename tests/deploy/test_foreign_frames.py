@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import zenoh
-from tests.deploy.commands import LOSSY
 
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.comms.wire import frames
@@ -13,6 +12,7 @@ from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.deploy import run
 from swarmwire.deploy.run import Execution
 from swarmwire.world.scenario_file import load_scenario
+from tests.deploy.commands import LOSSY
 
 
 class Vandal:
@@ -39,6 +39,8 @@ class Vandal:
                 (answer, frames.encode("dance", 4, {})),
                 (answer, frames.encode("actions", 1, nothing)),
                 (self.keys.answer("stranger"), frames.encode("actions", 4, {})),
+                (self.keys.frame("r1"), b"\x00garbage"),
+                (self.keys.frame("r1"), frames.encode("tick", 0, {})),
                 ("swarmwire/*/answer/r0", frames.encode("failed", 4, {}, {"robots": "all", "traceback": "lies"})),
             ):
                 session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
@@ -64,6 +66,9 @@ def test_a_stranger_cannot_stop_or_change_a_run(tmp_path):
     assert counts["unexpected_frame_frames"] == 1
     assert counts["wrong_tick_frames"] == 1
     assert counts["unknown_runner_frames"] == 2
+    assert counts["frames_dropped_by_runners"] == 2
+    assert counts["bad_join"] == 1
+    assert vandal.refusals == ["expected a request of version 1 with a runner's name"]
 
 
 NAN = """

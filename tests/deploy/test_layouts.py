@@ -1,7 +1,6 @@
 """Law 2: the same scenario and seed give the same run bit for bit, in every layout, over real processes."""
 
 import pytest
-from tests.deploy.commands import LOSSY, ROOT
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.deploy import Result, run
@@ -13,6 +12,7 @@ from swarmwire.world import assignments
 from swarmwire.world.loop import Loop
 from swarmwire.world.remote_crew import RemoteCrew
 from swarmwire.world.scenario_file import load_scenario
+from tests.deploy.commands import LOSSY, ROOT
 
 SHORT = ["duration_s=3"]
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))

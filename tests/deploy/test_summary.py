@@ -3,10 +3,10 @@
 import json
 
 import pytest
-from tests.deploy.commands import LOSSY, swarmwire
 from scipy.stats import binomtest
 
 from swarmwire.deploy import run
+from tests.deploy.commands import LOSSY, swarmwire
 
 REQUIRED = {
     "scenario",
@@ -36,7 +36,9 @@ def test_the_summary_of_the_command_is_the_result_from_python(tmp_path):
     result = run(LOSSY, overrides=["duration_s=4"])
     measured = ("wall_time_s", "start_time_s", "realtime_factor")
     same = {key: value for key, value in summary.items() if key not in measured}
-    assert same == {key: value for key, value in json.loads(json.dumps(result.summary())).items() if key not in measured}
+    assert same == {
+        key: value for key, value in json.loads(json.dumps(result.summary())).items() if key not in measured
+    }
     assert (tmp_path / "run" / "run.rrd").stat().st_size > 10_000
 
 

@@ -26,7 +26,7 @@ class Parameter:
 
 
 def parameters_of(kind: type) -> dict[str, Parameter]:
-    """The parameters that an agent class declares, bases first; TypeError if one has a type that no scenario can give."""
+    """The parameters that an agent class declares, bases first; TypeError if a type is one that no scenario gives."""
     found: dict[str, Parameter] = {}
     for name, hint in get_type_hints(kind).items():
         if name.startswith("_") or get_origin(hint) is ClassVar or hint is ClassVar:

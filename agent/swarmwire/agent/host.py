@@ -2,7 +2,7 @@
 
 import traceback
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -30,7 +30,7 @@ class Host:
         self._groups = {group.name: hosted(group, load_agent(group.agent)) for group in assignment.groups}
 
     def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
-        """What the robots do in this tick; AgentFailed with the robot's name and the agent's traceback if one raises."""
+        """What the robots do in this tick; AgentFailed with the robot and the agent's traceback if one raises."""
         time_ns = tick_start_ns(tick, self._rate_hz)
         time = (tick, time_ns, tick_start_ns(tick + 1, self._rate_hz) - time_ns)
         return Actions.joined([self._groups[name].act(time, group, heard) for name, group in senses.items()])
@@ -95,9 +95,9 @@ class _Single(Hosted):
         self._agents = {int(row): make(kind, group.params) for row in group.rows}
 
     def step(self, turn: Turn) -> None:
-        for at, row in enumerate(turn.senses.rows):
+        for at, row in enumerate(cast("list[int]", turn.senses.rows.tolist())):
             try:
-                self._agents[int(row)].step(Robot(turn, at))
+                self._agents[row].step(Robot(turn, at))
             except Exception as error:
                 name = self.group.robot_names[int(np.searchsorted(self.group.rows, row))]
                 raise AgentFailed(name, traceback.format_exc()) from error

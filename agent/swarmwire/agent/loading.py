@@ -5,7 +5,7 @@ import importlib
 import importlib.util
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from swarmwire.agent.agent import Agent
 from swarmwire.agent.declared import parameters_of
@@ -34,19 +34,20 @@ def load_agent(spec: str) -> AgentClass:
         raise NoAgent(f"there is no file {place}")
     try:
         module = _load_file(Path(place)) if of_file else importlib.import_module(place)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise NoAgent(f"{place} does not import: {type(error).__name__}: {error}") from error
-    found = getattr(module, name, None)
+    found: object = getattr(module, name, None)
     if not isinstance(found, type) or not issubclass(found, Agent | VectorAgent):
         what = "no such name" if found is None else "no Agent or VectorAgent"
         raise NoAgent(f"{place} holds {what}: {name!r}")
-    if getattr(found, "__abstractmethods__", None):
+    kind = cast(AgentClass, found)
+    if getattr(kind, "__abstractmethods__", None):
         raise NoAgent(f"{name} has no step method")
     try:
-        parameters_of(found)
+        parameters_of(kind)
     except (TypeError, NameError) as error:
         raise NoAgent(str(error)) from error
-    return found
+    return kind
 
 
 def _load_file(path: Path) -> Any:

@@ -1,8 +1,8 @@
 """A nursery: one process that imports what runners need, then forks a runner for each name it is given.
 
-Forking after the import makes a thousand runners cheap: they start in milliseconds and share the memory of the code. The
-nursery itself never opens a zenoh session (one opened in a child of a process that has had one hangs). It is a program of
-its own rather than multiprocessing's fork server, which would run the user's script again in every runner.
+Forking after the import makes a thousand runners cheap: they start in milliseconds and share the code's memory. The
+nursery itself never opens a zenoh session (one opened in a child of a process that has had one hangs). It is a program
+of its own rather than multiprocessing's fork server, which would run the user's script again in every runner.
 
 Standard input is the life line: when it ends, the world is gone, and so are all runners. A runner that ends badly is
 reported as one line on standard output: its name and its exit code.
@@ -63,7 +63,7 @@ def _watch(children: dict[int, str]) -> None:
         while child:
             name, code = children.pop(child), os.waitstatus_to_exitcode(status)
             if code != 0:
-                print(name, code, flush=True)
+                os.write(1, f"{name} {code}\n".encode())
             child, status = os.waitpid(-1, os.WNOHANG) if children else (0, 0)
 
 

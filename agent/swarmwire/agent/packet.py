@@ -1,6 +1,6 @@
 """Packets as agents see them: one object each for an Agent, columns for a VectorAgent."""
 
-from typing import Generic, TypeVar
+from typing import Generic, TypeVar, cast
 
 import numpy as np
 
@@ -77,7 +77,7 @@ class Packets(Generic[M]):
 
     def sum(self, values: FloatArray) -> FloatArray:
         """The sum of `values` (k,) over the packets of each robot, in their order, (n,)."""
-        return np.bincount(self.row, weights=values, minlength=self._robots)
+        return cast(FloatArray, np.bincount(self.row, weights=values, minlength=self._robots))
 
     def _given(self, need: str, column: str) -> FloatArray:
         if need not in self._needs:

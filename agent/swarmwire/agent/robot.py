@@ -75,7 +75,7 @@ class RadioPort:
     @overload
     def heard(self, kind: type[dict[str, Any]]) -> "list[Packet[dict[str, Any]]]": ...
     def heard(self, kind: type[Any]) -> "list[Packet[Any]]":
-        """The packets of a message class (or `dict`) heard since the robot's last step, by time; messages decode when asked for."""
+        """The packets of a message class (or `dict`) heard since the robot's last step, by time."""
         if issubclass(kind, Message):
             packets = self._turn.packets(kind)
             columns = {name: getattr(packets.message, name) for name in kind.ranges}

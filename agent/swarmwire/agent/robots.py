@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from swarmwire.agent.draw import Draws
 from swarmwire.agent.packet import Packets
-from swarmwire.agent.readings import CompassReadings, OdometryReadings, ProximityReading
+from swarmwire.agent.readings import CompassReadings, OdometryReadings, ProximityReadings
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.body import Body
@@ -47,10 +47,10 @@ class Robots:
         return self._turn.group.body
 
     @property
-    def proximity(self) -> ProximityReading:
+    def proximity(self) -> ProximityReadings:
         """Rays around the bodies: value and distance_m (n, rays), angle_rad (rays,)."""
         value = self._turn.field("proximity", "value")
-        return ProximityReading(value, proximity_sheet(self.body))
+        return ProximityReadings(value, proximity_sheet(self.body))
 
     @property
     def compass(self) -> CompassReadings:
@@ -63,7 +63,7 @@ class Robots:
         return OdometryReadings(self._turn.field("odometry", "left_m"), self._turn.field("odometry", "right_m"))
 
     def drive(self, linear_mps: ArrayLike, angular_radps: ArrayLike, rows: BoolArray | None = None) -> None:
-        """Wanted forward speed and turn rate (positive to the left), (n,) or one number; those not in the mask `rows` keep theirs."""
+        """Wanted forward speed and turn rate, (n,) or one number; outside the mask `rows` the last ones hold."""
         turn = self._turn
         moved = True if rows is None else rows
         np.copyto(turn.drive, True, where=moved)
@@ -88,7 +88,9 @@ class RadioRows:
         to: IntArray | int | None = None,
         **fields: FloatArray | float,
     ) -> IntArray:
-        """Send a message from each robot (or those of the mask `rows`), fields (n,) or one number; to all, or to the index `to` (n,).
+        """Send a message from each robot, or those of the mask `rows`; each field is (n,) or one number.
+
+        It goes to all who hear it, or to the robot of index `to` in the arena, one number or (n,).
 
         Returns the ids of the packets, in the order of the robots that sent.
         """

@@ -5,10 +5,12 @@ It joins (gets robots), declares its token, builds the agents, says "ready", the
 thread itself: no Python thread per subscription, so a runner stays small.
 """
 
+# zenoh's stubs leave out the return types of put, reply and close.
+# pyright: reportUnknownMemberType=false, reportMissingModuleSource=false
+
 import queue
 import traceback
-from collections.abc import Callable
-from typing import cast
+from collections.abc import Iterator
 
 import msgpack
 import zenoh
@@ -16,8 +18,9 @@ from zenoh.handlers import Callback
 
 from swarmwire.agent.host import Host
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.errors import AgentFailed, RunnerLost
+from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
@@ -29,7 +32,7 @@ def run(endpoint: str, run_id: str, runner: str) -> None:
     """Play robots of the run at `endpoint` until it ends; RunnerLost if there is no world or it gives no robots."""
     keys = Keys(run_id)
     with open_runner(endpoint) as session:
-        inbox: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
+        inbox = _Inbox(keys)
         arrived = Callback(inbox.put, indirect=False)
         declared = (  # zenoh takes back what nobody holds on to
             session.liveliness().declare_subscriber(keys.world, arrived, history=True),
@@ -40,17 +43,54 @@ def run(endpoint: str, run_id: str, runner: str) -> None:
         answer = session.declare_publisher(
             keys.answer(runner), congestion_control=zenoh.CongestionControl.BLOCK, express=True
         )
-        _serve(assignment, inbox, lambda data: cast(None, answer.put(data)))
+        for data in _answers(assignment, inbox):
+            answer.put(data)
         del declared
 
 
-def _join(session: zenoh.Session, keys: Keys, runner: str, inbox: "queue.SimpleQueue[zenoh.Sample]") -> Assignment:
-    try:
-        inbox.get(
-            timeout=JOIN_S
-        )  # the world's token, declared last: one that has only just begun to listen cannot answer
-    except queue.Empty:
-        raise RunnerLost(runner, "none yet", "there is no world") from None
+class _Inbox:
+    """What arrives from the world, put in by the network thread."""
+
+    def __init__(self, keys: Keys) -> None:
+        self._samples: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
+        self._world = keys.world
+        self.put = self._samples.put
+        self.dropped = 0  # frames that were no tick to come
+
+    def wait_for_world(self) -> bool:
+        """Whether the world's token appeared in time; it declares it last, when it can answer."""
+        try:
+            self._samples.get(timeout=JOIN_S)
+        except queue.Empty:
+            return False
+        return True
+
+    def ticks(self) -> Iterator[Frame]:
+        """The `tick` frames, in order, until the world says "end" or is gone."""
+        tick = -1
+        while True:
+            sample = self._samples.get()
+            if str(sample.key_expr) == self._world:
+                if sample.kind == zenoh.SampleKind.DELETE:
+                    return
+                continue
+            try:
+                frame = frames.decode(sample.payload.to_bytes())
+            except BadFrame:
+                self.dropped += 1
+                continue
+            if frame.kind == "end":
+                return
+            if frame.kind != "tick" or frame.tick <= tick:
+                self.dropped += 1
+                continue
+            tick = frame.tick
+            yield frame
+
+
+def _join(session: zenoh.Session, keys: Keys, runner: str, inbox: _Inbox) -> Assignment:
+    if not inbox.wait_for_world():
+        raise RunnerLost(runner, "none yet", "there is no world")
     request = msgpack.packb({"v": frames.VERSION, "runner": runner})
     for reply in session.get(keys.join, payload=request, timeout=JOIN_S):
         if reply.ok is None:
@@ -59,40 +99,22 @@ def _join(session: zenoh.Session, keys: Keys, runner: str, inbox: "queue.SimpleQ
     raise RunnerLost(runner, "none yet", "the world did not answer to join")
 
 
-def _serve(assignment: Assignment, inbox: "queue.SimpleQueue[zenoh.Sample]", answer: Callable[[bytes], None]) -> None:
+def _answers(assignment: Assignment, inbox: _Inbox) -> Iterator[bytes]:
+    """A frame "ready", then an answer to every tick; a failure, if there is one, is the last."""
     gives = assignment.gives or ()
-    tick = -1
     try:
         host = Host(assignment)
-        answer(frames.encode("ready", tick, {}))
-        while True:
-            sample = inbox.get()
-            if sample.kind == zenoh.SampleKind.DELETE:  # the world's token: the world is gone
-                return
-            payload = sample.payload.to_bytes()
-            if not payload:  # the token's own announcement
-                continue
-            frame = frames.decode(payload)
-            if frame.kind == "end":
-                return
-            tick = frame.tick
-            answer(encode_actions(tick, host.act(tick, *decode_tick(frame, gives))))
+        yield frames.encode("ready", -1, {})
+        for frame in inbox.ticks():
+            actions = host.act(frame.tick, *decode_tick(frame, gives))
+            dropped, inbox.dropped = inbox.dropped, 0
+            yield encode_actions(frame.tick, actions, dropped)
+        return
     except AgentFailed as error:
-        answer(frames.encode("failed", tick, {}, {"robots": error.robots, "traceback": error.traceback}))
-        _wait_for_end(inbox)
-    except Exception:
-        answer(
-            frames.encode("failed", tick, {}, {"robots": assignment.robots_text, "traceback": traceback.format_exc()})
-        )
-        _wait_for_end(inbox)
-
-
-def _wait_for_end(inbox: "queue.SimpleQueue[zenoh.Sample]") -> None:
-    # The world must read the failure before this runner's token vanishes, or it would report a lost runner instead.
-    while True:
-        sample = inbox.get()
-        if sample.kind == zenoh.SampleKind.DELETE:
-            return
-        payload = sample.payload.to_bytes()
-        if payload and frames.decode(payload).kind == "end":
-            return
+        failure = {"robots": error.robots, "traceback": error.traceback}
+    except Exception:  # noqa: BLE001 - whatever it is, the world must learn of it
+        failure = {"robots": assignment.robots_text, "traceback": traceback.format_exc()}
+    yield frames.encode("failed", -1, {}, failure)
+    # The world must read this before the runner's token vanishes, or it would report a lost runner instead.
+    for _ in inbox.ticks():
+        continue

@@ -37,7 +37,7 @@ class Turn:
         self.angular_radps = np.zeros(self.n)
         self._sent_before = sent_before  # (n,) packets that each robot has sent up to now; written to
         self._outbox: list[Sent] = []
-        self._packets: dict[int, Packets[Any]] = {}
+        self._packets: dict[type[Message], Packets[Any]] = {}
 
     def field(self, sense: str, name: str) -> FloatArray:
         """A field of a sense, (n, …); NotDeclared if the agent's needs do not name the sense."""
@@ -47,11 +47,11 @@ class Turn:
 
     def packets(self, kind: type[M]) -> Packets[M]:
         """All packets of a message class that these robots heard."""
-        known = self._packets.get(kind.tag)
+        known = self._packets.get(kind)
         if known is None:
             table = self.tagged(kind.tag, kind.size_bytes)
             fields = decode_rows(kind, table.payloads, table.payload)
-            known = self._packets[kind.tag] = Packets[M](self.n, table, fields, self.needs)
+            known = self._packets[kind] = Packets[M](self.n, table, fields, self.needs)
         return known
 
     def tagged(self, tag: int, size_bytes: int | None = None) -> Heard:

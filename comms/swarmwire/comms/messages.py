@@ -101,7 +101,7 @@ def encode_rows(kind: type[Message], rows: int, fields: dict[str, Any]) -> Paylo
     table["tag"] = kind.tag
     for name, (lowest, highest, whole) in kind.ranges.items():
         values = np.rint(fields[name]) if whole else np.asarray(fields[name], np.float64)
-        beyond = (values < lowest) | (values > highest) | (values != values if whole else False)
+        beyond = ~((values >= lowest) & (values <= highest))
         if beyond.any() and (whole or (beyond & np.isfinite(values)).any()):
             what = "whole numbers" if whole else "numbers"
             raise OverflowError(f"{kind.__name__}.{name}: expected {what} from {lowest:g} to {highest:g}")
@@ -119,13 +119,15 @@ def decode_rows(kind: type[Message], payloads: Payloads, index: IntArray) -> dic
 
 
 def encode_dict(message: dict[str, Any]) -> bytes:
-    """A dict on air: the dict tag, then msgpack."""
+    """A dict on air: the dict tag, then msgpack; TypeError unless its keys are texts and msgpack takes its values."""
+    if not all(type(key) is str for key in message):
+        raise TypeError(f"a dict message has texts as keys, got {list(message)}")
     return DICT_TAG.to_bytes(TAG_BYTES, "little") + msgpack.packb(message)
 
 
 def decode_dict(payload: bytes) -> dict[str, Any]:
     """The dict of these bytes; ValueError if they hold none."""
-    message: object = msgpack.unpackb(payload[TAG_BYTES:])
+    message: object = msgpack.unpackb(payload[TAG_BYTES:], strict_map_key=False)
     if not isinstance(message, dict):
         raise ValueError("the payload holds no dict")
     return cast("dict[str, Any]", message)

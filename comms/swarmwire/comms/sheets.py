@@ -61,7 +61,6 @@ class Proximity:
         wrapped.setflags(write=False)
         return wrapped
 
-
     @cached_property
     def direction(self) -> tuple[FloatArray, FloatArray]:
         """Cosine and sine of `angle_rad`, (rays,) each."""

@@ -1,4 +1,4 @@
-"""Agents at the door: a scenario's agents must import, take their parameters, and find what they need on body and radio."""
+"""Agents at the door: they must import, take their parameters, and find what they need on body and radio."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -26,7 +26,11 @@ app = typer.Typer(
 ScenarioFile = Annotated[Path, typer.Argument(help="The scenario, a TOML file.", metavar="SCENARIO")]
 Overrides = Annotated[
     list[str] | None,
-    typer.Option("--set", help="Set a value by its path, e.g. robots.flock.params.separation_m=0.3. Repeatable.", metavar="PATH=VALUE"),
+    typer.Option(
+        "--set",
+        help="Set a value by its path, e.g. robots.flock.params.separation_m=0.3. Repeatable.",
+        metavar="PATH=VALUE",
+    ),
 ]
 
 
@@ -36,7 +40,9 @@ def run_command(
     runners: Annotated[
         str, typer.Option(help='Processes that run the agents: "none" (all in this one), a number, or "per-robot".')
     ] = "none",
-    out: Annotated[Path | None, typer.Option(help="The run folder, new or empty. Default: runs/<scenario>-s<seed>-<UTC>.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The run folder, new or empty. Default: runs/<scenario>-s<seed>-<UTC>.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed instead of the scenario's.")] = None,
     seeds: Annotated[str | None, typer.Option(help="One arena per seed, side by side: 1:9 (1 to 8) or 1,5,7.")] = None,
     overrides: Overrides = None,
@@ -68,7 +74,7 @@ def run_command(
 
 @app.command("check")
 def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
-    """Check a scenario without running it: keys, values, agents, what they need, and whether everything finds its place."""
+    """Check a scenario without running it: keys, values, agents, what they need, and room for everything."""
     from swarmwire.deploy.run import Execution, choose_seeds
     from swarmwire.world.scenario_file import load_scenario
 
@@ -76,6 +82,19 @@ def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     static = Execution(checked, choose_seeds(checked, None, None)).world.static
     groups = ", ".join(f"{group.stop - group.start} {group.body.name} ({group.name})" for group in static.groups)
     typer.echo(f"{scenario}: good: {groups}, {checked.duration_s:g} s at {static.rate_hz} Hz")
+
+
+@app.command("screenshot")
+def screenshot_command(
+    recording: Annotated[Path, typer.Argument(help="A run folder, or its run.rrd.", metavar="RUN")],
+    to: Annotated[Path, typer.Option(help="The PNG to write.")],
+    tick: Annotated[int | None, typer.Option(help="The tick to show. Default: the last.")] = None,
+) -> None:
+    """Draw a recording as rerun's viewer shows it, without a screen. Needs a Vulkan driver; Mesa's will do."""
+    from swarmwire.metrics.picture import render_png
+
+    render_png(recording / "run.rrd" if recording.is_dir() else recording, to, tick)
+    typer.echo(f"written: {to}")
 
 
 @app.command("schema")
@@ -87,7 +106,7 @@ def schema_command() -> None:
 
 
 def main() -> None:
-    """Entry point of `swarmwire`: every error of ours is one line (an agent's failure keeps the agent's own traceback)."""
+    """Entry point of `swarmwire`: every error of ours is one line; a failed agent's traceback is its own."""
     try:
         app()
     except BadInput as error:

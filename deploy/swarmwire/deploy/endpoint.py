@@ -3,7 +3,7 @@
 import os
 import secrets
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def new_run_id() -> str:
 
 
 @contextmanager
-def local_endpoint(socket: Path | None) -> Iterator[str]:
+def local_endpoint(socket: Path | None) -> Generator[str]:
     """An endpoint at `socket`, or in a new directory that is gone afterwards; BadInput if the path will not do."""
     if socket is not None:
         path = str(socket.absolute())

@@ -13,7 +13,7 @@ PLAIN_SHARE = 0.25  # without a terminal: a line each time that so much more is 
 
 
 class ProgressLine:
-    """Observer that shows how far a run is and how fast it goes: a line that moves, or a few plain ones without a terminal."""
+    """Observer that shows how far a run is and how fast: a line that moves, or a few plain ones without a terminal."""
 
     def __init__(self, ticks: int, clock: Clock, console: Console) -> None:
         self._ticks, self._clock, self._console = ticks, clock, console

@@ -14,7 +14,9 @@ def print_result(result: Result, console: Console) -> None:
     table.add_column(style="cyan")
     table.add_column()
     who = f"{result.runners} processes, lockstep" if result.runners else "all agents in this process"
-    table.add_row("robots", f"{result.robots}, {who}" + (f", {len(result.arenas)} arenas" if len(result.arenas) > 1 else ""))
+    table.add_row(
+        "robots", f"{result.robots}, {who}" + (f", {len(result.arenas)} arenas" if len(result.arenas) > 1 else "")
+    )
     speed = f"{result.sim_time_s:g} s in {result.wall_time_s:.2f} s: {result.realtime_factor:.1f} x real time"
     table.add_row("simulated", f"{speed} (start took {result.start_time_s:.2f} s)")
     if result.ended != "duration":
@@ -38,9 +40,13 @@ def _add_radio(table: Table, arena: ArenaResult) -> None:
     if radio is None:
         return
     share = "none in range" if radio.pdr is None else f"{radio.pdr:.1%} of those in range heard it"
-    table.add_row("radio", f"{radio.sent} packets, {radio.intended} intended receivers, {radio.in_range} in range; {share}")
+    table.add_row(
+        "radio", f"{radio.sent} packets, {radio.intended} intended receivers, {radio.in_range} in range; {share}"
+    )
     table.add_row("fates", ", ".join(f"{name} {count}" for name, count in radio.fates.items() if count))
-    table.add_row("latency", f"on air {_percentiles(radio.latency_air_s)}; to the agent {_percentiles(radio.latency_agent_s)}")
+    table.add_row(
+        "latency", f"on air {_percentiles(radio.latency_air_s)}; to the agent {_percentiles(radio.latency_agent_s)}"
+    )
 
 
 def _percentiles(value: Percentiles) -> str:

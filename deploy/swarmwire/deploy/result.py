@@ -127,17 +127,10 @@ class Result:
 
 def arena_result(seed: int, sha256: str, radio: dict[str, Any] | None, metrics: dict[str, Any]) -> ArenaResult:
     """The parts of the observers' summaries that belong to one arena, typed."""
-    return ArenaResult(
-        seed,
-        sha256,
-        None
-        if radio is None
-        else RadioResult(
-            **{
-                **radio,
-                "latency_air_s": Percentiles(**radio["latency_air_s"]),
-                "latency_agent_s": Percentiles(**radio["latency_agent_s"]),
-            }
-        ),
-        {name: Statistics(**value) for name, value in metrics.items()},
-    )
+    of_metrics = {name: Statistics(**value) for name, value in metrics.items()}
+    return ArenaResult(seed, sha256, None if radio is None else _radio_result(**radio), of_metrics)
+
+
+def _radio_result(latency_air_s: dict[str, Any], latency_agent_s: dict[str, Any], **counts: Any) -> RadioResult:
+    air, agent = Percentiles(**latency_air_s), Percentiles(**latency_agent_s)
+    return RadioResult(**counts, latency_air_s=air, latency_agent_s=agent)

@@ -1,6 +1,6 @@
 """One execution of a scenario: wires the parts together, runs the loop, and gives back what came of it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -82,6 +82,7 @@ class Execution:
         metrics, radio_tally = Metrics(), RadioTally()
         recorders = [RerunRecording(self.folder / "run.rrd", metrics)] if self.folder else []
         watching: list[Observer] = [metrics, radio_tally, *recorders, *observers]
+        parts: dict[str, Any] = {}
         with self._crew() as crew, Interrupt() as interrupt:
             air = self.air()
             crew.start()
@@ -89,12 +90,13 @@ class Execution:
             started_ns = self._clock.now_ns()
             for observer in watching:
                 observer.begin(self.world.static)
-            loop.run(self.ticks, stopped=lambda: interrupt.asked)
-            ended_ns = self._clock.now_ns()
-            last = air.end() if air else None
-            parts: dict[str, Any] = {}
-            for observer in watching:
-                parts.update(observer.end(last))
+            try:
+                loop.run(self.ticks, stopped=lambda: interrupt.asked)
+            finally:  # also of a run that failed: a recording is worth most then
+                ended_ns = self._clock.now_ns()
+                last = air.end() if air else None
+                for observer in watching:
+                    parts.update(observer.end(last))
         result = self._result(loop, parts, started_ns, ended_ns)
         if self.folder:
             result.write(self.folder / "summary.json")
@@ -109,7 +111,7 @@ class Execution:
         return Air(radio, self.world.keys, static.robots, static.arena_size_m, obstacles, static.rate_hz)
 
     @contextmanager
-    def _crew(self) -> Iterator[Crew]:
+    def _crew(self) -> Generator[Crew]:
         whole = assignments.whole(self.scenario, self.world.static, self._specs)
         if not self.runners:
             local = LocalCrew(whole)
@@ -181,8 +183,6 @@ def _runner_count(runners: Runners, robots: int) -> int:
         return robots
     if isinstance(runners, str) and runners.isdecimal():
         runners = int(runners)
-    if isinstance(runners, str) or isinstance(runners, bool) or not 1 <= runners <= robots:
+    if isinstance(runners, str | bool) or not 1 <= runners <= robots:
         raise BadInput("--runners", "", f'expected "none", "per-robot" or 1 to {robots} (the robots), got {runners!r}')
     return runners
-
-

@@ -16,8 +16,8 @@ class RunnerProcesses:
 
     def __init__(self, endpoint: str, run_id: str, agents: Sequence[str], names: Sequence[str]) -> None:
         command = [sys.executable, "-m", "swarmwire.agent.nursery", endpoint, run_id, ",".join(agents), *names]
-        # A session of its own: Ctrl-C is for the world alone, and the whole group can be ended at once. One BLAS thread:
-        # a runner's arrays are small, and idle threads would double its memory. What this process can import, they can.
+        # A session of its own: Ctrl-C is for the world alone, and the whole group can be ended at once. One BLAS
+        # thread: a runner's arrays are small, idle threads double its memory. What this process can import, they can.
         self._nursery = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,

@@ -128,6 +128,9 @@ class Lockstep:
             else:
                 slot.actions = decode_actions(frame, slot.rows)
                 slot.state = "ready"
+                dropped = frame.values.get("dropped", 0)
+                if type(dropped) is int and dropped > 0:
+                    self._counts["frames_dropped_by_runners"] += dropped
         except BadFrame as fault:
             self._counts[f"{fault.fault}_frames"] += 1
 

@@ -19,7 +19,7 @@ class Flocking(VectorAgent):
     """Attraction, repulsion and alignment (Reynolds 1987) from neighbours' beacons, avoidance by proximity.
 
     Each neighbour heard since the last step pulls along its bearing if it is farther than `separation_m` and pushes if
-    it is nearer, in proportion to the relative difference, at most 1 either way; its heading relative to the own compass
+    it is nearer, in proportion to the relative difference, at most 1 either way; its heading against the own compass
     adds a unit vector. Both are averaged over the neighbours heard. The rays push away from what is near. The robot
     turns towards the sum, and drives the slower the more it has to turn.
     """

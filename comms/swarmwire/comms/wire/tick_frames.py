@@ -9,6 +9,7 @@ from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame
 
+
 def encode_tick(tick: int, senses: Senses, heard: Heard) -> bytes:
     """A `tick` frame: what a runner's robots sense and heard."""
     arrays: dict[str, AnyArray] = {}
@@ -43,8 +44,8 @@ def decode_tick(frame: Frame, gives: tuple[str, ...]) -> tuple[Senses, Heard]:
     return senses, Heard(receiver, sender, sequence, heard_at_ns, given, payload, payloads)
 
 
-def encode_actions(tick: int, actions: Actions) -> bytes:
-    """An `actions` frame: what a runner's robots do and send."""
+def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
+    """An `actions` frame: what a runner's robots do and send, and how many frames to it were none that it could use."""
     arrays: dict[str, AnyArray] = {
         "rows": actions.rows,
         "drive": actions.drive,
@@ -56,11 +57,11 @@ def encode_actions(tick: int, actions: Actions) -> bytes:
         arrays["sent/to"] = actions.sent.to
         arrays["sent/data"] = actions.sent.payloads.data
         arrays["sent/offset"] = actions.sent.payloads.offset
-    return frames.encode("actions", tick, arrays)
+    return frames.encode("actions", tick, arrays, {"dropped": dropped} if dropped else None)
 
 
 def decode_actions(frame: Frame, rows: IntArray) -> Actions:
-    """The actions of the robots `rows`; BadFrame if the frame's arrays are not for exactly these or contradict themselves."""
+    """The actions of the robots `rows`; BadFrame if the frame is not for exactly these or contradicts itself."""
     n = len(rows)
     if (_column(frame, "rows", "<i8", n) != rows).any():
         raise BadFrame("malformed", "rows: expected the runner's own robots")
