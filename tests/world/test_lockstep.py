@@ -143,15 +143,15 @@ def test_who_comes_too_late_gets_no_robots() -> None:
 
 def test_the_first_tick_may_begin_once_all_are_ready() -> None:
     lockstep = two()
-    assert not lockstep.complete
+    assert lockstep.waiting
     assert lockstep.missing == ("that did not join", "flock-0 … lone-3 (4 robots)")
     joined(lockstep, "a", "b")
     assert lockstep.missing[0] == "a"
     ready(lockstep, "a")
-    assert not lockstep.complete
+    assert lockstep.waiting
     assert lockstep.missing == ("b", "flock-4 … lone-7 (4 robots)")
     ready(lockstep, "b")
-    assert lockstep.complete
+    assert not lockstep.waiting
     assert not lockstep.counts()
 
 
@@ -162,10 +162,10 @@ def test_a_tick_is_complete_once_all_have_answered() -> None:
         assert list(out) == ["a", "b"]
         assert {frames.decode(data).tick for data in out.values()} == {tick}
         for name in ("a", "b"):
-            assert not lockstep.complete
+            assert lockstep.waiting
             assert lockstep.missing[0] == name
             lockstep.answer(name, encode_actions(tick, actions(rows_of(out[name]))))
-        assert lockstep.complete
+        assert not lockstep.waiting
         assert sorted(lockstep.take().rows.tolist()) == list(range(8))
     assert not lockstep.counts()
 
@@ -216,7 +216,7 @@ def test_what_does_not_fit_is_counted_by_name_and_changes_nothing(runner: str, d
     assert state(lockstep) == before
     assert lockstep.counts() == {f"{name}_frames": 1}
     lockstep.answer("a", sound())
-    assert lockstep.complete
+    assert not lockstep.waiting
 
 
 @pytest.mark.parametrize("kind", ["actions", "ready"])
@@ -279,7 +279,7 @@ def test_robots_that_do_not_act_are_neither_sent_nor_expected() -> None:
     assert {name: rows_of(data) for name, data in out.items()} == {"a": [1], "b": [4, 7]}
     lockstep.answer("b", encode_actions(0, actions([4, 7])))
     lockstep.answer("a", encode_actions(0, actions([1])))
-    assert lockstep.complete
+    assert not lockstep.waiting
     assert sorted(lockstep.take().rows.tolist()) == [1, 4, 7]
 
 
@@ -342,7 +342,7 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
     assert seen == expected
     for name, answer in data.draw(st.permutations(answers)):
         lockstep.answer(name, answer)
-    assert lockstep.complete
+    assert not lockstep.waiting
     assert not lockstep.counts()
     assert plain(lockstep.take()) == plain(actions(sorted(expected)))
 

@@ -46,10 +46,12 @@ class Hosted(ABC):
 
     def act(self, time: tuple[int, int, int], senses: GroupSenses, heard: Heard) -> Actions:
         """What the robots `senses.rows` do; `time` is the tick, its start and its length in ns."""
-        place = np.searchsorted(self.group.rows, senses.rows)
+        # As many rows as the group has are all of them; most ticks are so.
+        everyone = len(senses.rows) == len(self.group.rows)
+        place = slice(None) if everyone else np.searchsorted(self.group.rows, senses.rows)
         sent_before = self._sent_before[place]
         turn = Turn(self.group, self.needs, time, senses, _own(heard, senses.rows), self.group.keys[place], sent_before)
-        if len(senses.rows) != len(self.rows) or not np.array_equal(senses.rows, self.rows):
+        if not (everyone and len(self.rows) == len(senses.rows)) and not np.array_equal(senses.rows, self.rows):
             self.keep(senses.rows)
             self.rows = senses.rows
         if turn.n:  # no step for nobody: an agent must not tell whether others share its process
@@ -122,7 +124,7 @@ def _own(heard: Heard, rows: IntArray) -> Heard:
     if not len(heard) or not len(rows):
         return heard.select(np.empty(0, np.int64))
     place = np.searchsorted(rows, heard.receiver)
-    place = np.minimum(place, len(rows) - 1)
-    mine = rows[place] == heard.receiver
-    own = heard if mine.all() else heard.select(np.flatnonzero(mine))
-    return Heard(place[mine], own.sender, own.sequence, own.heard_at_ns, own.given, own.payload, own.payloads)
+    if place[-1] == len(rows) or not (rows[place] == heard.receiver).all():  # some is for robots of other groups
+        mine = np.flatnonzero(np.isin(heard.receiver, rows))
+        heard, place = heard.select(mine), place[mine]
+    return Heard(place, heard.sender, heard.sequence, heard.heard_at_ns, heard.given, heard.payload, heard.payloads)

@@ -96,7 +96,7 @@ class RadioRows:
         """
         n = self._turn.n
         if rows is None:
-            return self._turn.send(np.arange(n), to, encode_rows(kind, n, fields))
+            return self._turn.send(None, to, encode_rows(kind, n, fields))
         row = np.flatnonzero(rows)
         columns = {name: _of(rows, value) for name, value in fields.items()}
         return self._turn.send(row, None if to is None else _of(rows, to), encode_rows(kind, len(row), columns))

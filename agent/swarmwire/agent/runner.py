@@ -32,11 +32,12 @@ def run(endpoint: str, run_id: str, runner: str) -> None:
     """Play robots of the run at `endpoint` until it ends; RunnerLost if there is no world or it gives no robots."""
     keys = Keys(run_id)
     with open_runner(endpoint) as session:
-        inbox = _Inbox(keys)
-        arrived = Callback(inbox.put, indirect=False)
+        inbox = _Inbox()
         declared = (  # zenoh takes back what nobody holds on to
-            session.liveliness().declare_subscriber(keys.world, arrived, history=True),
-            session.declare_subscriber(keys.frame(runner), arrived),
+            session.liveliness().declare_subscriber(
+                keys.world, Callback(inbox.put_token, indirect=False), history=True
+            ),
+            session.declare_subscriber(keys.frame(runner), Callback(inbox.put_frame, indirect=False)),
             session.liveliness().declare_token(keys.alive(runner)),
         )
         assignment = _join(session, keys, runner, inbox)
@@ -49,33 +50,35 @@ def run(endpoint: str, run_id: str, runner: str) -> None:
 
 
 class _Inbox:
-    """What arrives from the world, put in by the network thread."""
+    """What arrives from the world, put in by the network thread: frames, and whether the world is there."""
 
-    def __init__(self, keys: Keys) -> None:
-        self._samples: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
-        self._world = keys.world
-        self.put = self._samples.put
+    def __init__(self) -> None:
+        self._arrived: queue.SimpleQueue[zenoh.Sample | bool] = queue.SimpleQueue()
+        self.put_frame = self._arrived.put
         self.dropped = 0  # frames that were no tick to come
+
+    def put_token(self, token: zenoh.Sample) -> None:
+        """The world's liveliness token appeared or vanished."""
+        self._arrived.put(token.kind == zenoh.SampleKind.PUT)
 
     def wait_for_world(self) -> bool:
         """Whether the world's token appeared in time; it declares it last, when it can answer."""
         try:
-            self._samples.get(timeout=JOIN_S)
+            return self._arrived.get(timeout=JOIN_S) is True
         except queue.Empty:
             return False
-        return True
 
     def ticks(self) -> Iterator[Frame]:
         """The `tick` frames, in order, until the world says "end" or is gone."""
         tick = -1
         while True:
-            sample = self._samples.get()
-            if str(sample.key_expr) == self._world:
-                if sample.kind == zenoh.SampleKind.DELETE:
+            arrived = self._arrived.get()
+            if isinstance(arrived, bool):
+                if not arrived:
                     return
                 continue
             try:
-                frame = frames.decode(sample.payload.to_bytes())
+                frame = frames.decode(arrived.payload.to_bytes())
             except BadFrame:
                 self.dropped += 1
                 continue

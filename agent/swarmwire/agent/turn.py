@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.agent.packet import NotDeclared, Packets
 from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
-from swarmwire.comms.messages import Message, decode_rows
+from swarmwire.comms.messages import Message, decode_alike, decode_rows
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
 
@@ -33,8 +33,7 @@ class Turn:
         self.keys = keys  # (n,) of the robots' draws
         self.n = len(senses.rows)
         self.drive = np.zeros(self.n, np.bool_)
-        self.linear_mps = np.zeros(self.n)
-        self.angular_radps = np.zeros(self.n)
+        self.linear_mps, self.angular_radps = np.zeros((2, self.n))
         self._sent_before = sent_before  # (n,) packets that each robot has sent up to now; written to
         self._outbox: list[Sent] = []
         self._packets: dict[type[Message], Packets[Any]] = {}
@@ -49,8 +48,11 @@ class Turn:
         """All packets of a message class that these robots heard."""
         known = self._packets.get(kind)
         if known is None:
-            table = self.tagged(kind.tag, kind.size_bytes)
-            fields = decode_rows(kind, table.payloads, table.payload)
+            table = self.heard
+            fields = decode_alike(kind, table.payloads, table.payload)
+            if fields is None:  # messages of several kinds were heard
+                table = self.tagged(kind.tag, kind.size_bytes)
+                fields = decode_rows(kind, table.payloads, table.payload)
             known = self._packets[kind] = Packets[M](self.n, table, fields, self.needs)
         return known
 
@@ -59,18 +61,21 @@ class Turn:
         wanted = self.heard.payloads.tags() == tag
         if size_bytes is not None:
             wanted &= self.heard.payloads.sizes == size_bytes
-        mask = wanted[self.heard.payload]
-        return self.heard if mask.all() else self.heard.select(np.flatnonzero(mask))
+        if wanted.all():
+            return self.heard
+        return self.heard.select(np.flatnonzero(wanted[self.heard.payload]))
 
-    def send(self, row: IntArray, to: IntArray | int | None, payloads: Payloads) -> IntArray:
-        """Queue a packet for each of the robots `row` (rising, each once); returns their ids."""
-        receiver = np.empty(len(row), np.int64)
-        receiver[:] = BROADCAST if to is None else to
-        if to is not None and (receiver < 0).any():
-            raise ValueError("send(to=…): expected the index of a robot in the arena, 0 or more")
-        self._outbox.append(Sent(self.senses.rows[row], receiver, payloads))
-        ids = self._sent_before[row]
-        self._sent_before[row] += 1
+    def send(self, row: IntArray | None, to: IntArray | int | None, payloads: Payloads) -> IntArray:
+        """Queue a packet for each of the robots `row` (rising, each once; None: for all); returns their ids."""
+        place = slice(None) if row is None else row
+        receiver = np.full(len(payloads), BROADCAST)
+        if to is not None:
+            receiver[:] = to
+            if (receiver < 0).any():
+                raise ValueError("send(to=…): expected the index of a robot in the arena, 0 or more")
+        self._outbox.append(Sent(self.senses.rows[place], receiver, payloads))
+        ids = self._sent_before[place].copy()
+        self._sent_before[place] += 1
         return ids
 
     def actions(self) -> Actions:

@@ -58,9 +58,9 @@ class Lockstep:
         self._counts: Counter[str] = Counter()
 
     @property
-    def complete(self) -> bool:
-        """Whether every runner is ready: before the first tick, and once all have answered."""
-        return all(slot.state == "ready" for slot in self._slots)
+    def waiting(self) -> int:
+        """How many runners are not ready: 0 before the first tick, once all are there, and when all have answered."""
+        return sum(slot.state != "ready" for slot in self._slots)
 
     @property
     def missing(self) -> tuple[str, str]:

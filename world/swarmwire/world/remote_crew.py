@@ -95,16 +95,26 @@ class RemoteCrew:
         session.close()
 
     def _wait(self) -> None:
-        """Take in what arrives until every runner is ready; RunnerLost if one takes too long."""
+        """Take in what arrives until every runner is ready; RunnerLost if one takes too long.
+
+        Samples are handled together once there may be one from each runner: one by one, the caches of this process
+        would be cold for each, since the runners use the cores in between.
+        """
         deadline_ns = self._clock.now_ns() + to_ns(self._timeout_s)
-        while not self._lockstep.complete:
-            item = self._next()
-            if item is not None:
+        arrived: list[zenoh.Sample | zenoh.Query] = []
+        while waiting := self._lockstep.waiting:
+            while len(arrived) < waiting:
+                item = self._next()
+                if item is None:
+                    break
+                arrived.append(item)
+            trouble = None if arrived else self._trouble()
+            for item in arrived:
                 self._handle(item)
-            trouble = self._trouble() if item is None else None
+            arrived.clear()
             if trouble is None and self._clock.now_ns() > deadline_ns:
                 trouble = f"no answer for {self._timeout_s:g} s"
-            if trouble is not None and not self._lockstep.complete:
+            if trouble is not None and self._lockstep.waiting:
                 raise RunnerLost(*self._lockstep.missing, trouble)
 
     def _next(self) -> zenoh.Sample | zenoh.Query | None:

@@ -48,13 +48,10 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
     """An `actions` frame: what a runner's robots do and send, and how many frames to it were none that it could use."""
     arrays: dict[str, AnyArray] = {
         "rows": actions.rows,
-        "drive": actions.drive,
-        "linear_mps": actions.linear_mps,
-        "angular_radps": actions.angular_radps,
+        "command": np.array((actions.drive, actions.linear_mps, actions.angular_radps)),
     }
     if len(actions.sent):
-        arrays["sent/sender"] = actions.sent.sender
-        arrays["sent/to"] = actions.sent.to
+        arrays["sent"] = np.array((actions.sent.sender, actions.sent.to))
         arrays["sent/data"] = actions.sent.payloads.data
         arrays["sent/offset"] = actions.sent.payloads.offset
     return frames.encode("actions", tick, arrays, {"dropped": dropped} if dropped else None)
@@ -63,30 +60,31 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
 def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     """The actions of the robots `rows`; BadFrame if the frame is not for exactly these or contradicts itself."""
     n = len(rows)
-    if (_column(frame, "rows", "<i8", n) != rows).any():
+    if (_checked(frame, "rows", "<i8", (n,)) != rows).any():
         raise BadFrame("malformed", "rows: expected the runner's own robots")
-    drive = _column(frame, "drive", "|b1", n)
-    linear = _column(frame, "linear_mps", "<f8", n)
-    angular = _column(frame, "angular_radps", "<f8", n)
-    return Actions(rows, drive, linear, angular, _sent(frame, rows) if "sent/sender" in frame.arrays else Sent.none())
+    drive, linear_mps, angular_radps = _checked(frame, "command", "<f8", (3, n))
+    sent = _sent(frame, rows) if "sent" in frame.arrays else Sent.none()
+    return Actions(rows, drive != 0.0, linear_mps, angular_radps, sent)
 
 
 def _sent(frame: Frame, rows: IntArray) -> Sent:
-    sender = _column(frame, "sent/sender", "<i8")
-    to = _column(frame, "sent/to", "<i8", len(sender))
-    offset = _column(frame, "sent/offset", "<i8", len(sender) + 1)
-    data = _column(frame, "sent/data", "|u1")
+    sender, to = _checked(frame, "sent", "<i8", (2, None))
+    offset = _checked(frame, "sent/offset", "<i8", (len(sender) + 1,))
+    data = _checked(frame, "sent/data", "|u1", (None,))
     if offset[0] != 0 or offset[-1] != len(data) or (offset[1:] < offset[:-1]).any():
         raise BadFrame("malformed", "sent/offset: expected rising offsets into sent/data")
     known = np.sort(rows)
+    if len(sender) and not len(known):
+        raise BadFrame("malformed", "sent: expected no packets of no robots")
     if (known[np.searchsorted(known[:-1], sender)] != sender).any() or (to < BROADCAST).any():
         raise BadFrame("malformed", "sent: expected packets of the runner's own robots")
     return Sent(sender, to, Payloads(data, offset))
 
 
-def _column(frame: Frame, name: str, code: str, length: int | None = None) -> AnyArray:
+def _checked(frame: Frame, name: str, code: str, shape: tuple[int | None, ...]) -> AnyArray:
+    """An array of the frame, of this dtype and shape (None: any length)."""
     array = frame.arrays.get(name)
-    fits = array is not None and array.ndim == 1 and (length is None or len(array) == length)
-    if array is None or not fits or array.dtype != frames.DTYPES[code]:
-        raise BadFrame("malformed", f"{name}: expected a column of {code} of the right length")
+    fits = array is not None and array.dtype == frames.DTYPES[code] and array.ndim == len(shape)
+    if array is None or not fits or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True)):
+        raise BadFrame("malformed", f"{name}: expected {code} of shape {shape}")
     return array
