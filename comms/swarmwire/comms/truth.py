@@ -19,6 +19,15 @@ class Obstacle:
 
 
 @dataclass(frozen=True, slots=True)
+class Light:
+    """A light that bodies may sense."""
+
+    x_m: float
+    y_m: float
+    intensity_m: float  # reach of its glow: ARGoS's I, in exp(-2 d / I)
+
+
+@dataclass(frozen=True, slots=True)
 class Group:
     """Robots of one kind: indices start to stop - 1 within every arena."""
 
@@ -41,6 +50,7 @@ class Static:
     groups: tuple[Group, ...]
     robot_names: tuple[str, ...]  # of each index within an arena
     range_m: float | None = None  # of the radio, where there is one
+    lights: tuple[tuple[Light, ...], ...] = ()  # of each arena
 
     @property
     def arenas(self) -> int:
