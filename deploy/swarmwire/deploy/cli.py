@@ -134,5 +134,8 @@ def _seed_list(text: str) -> list[int]:
 def _say_where(result: Result, folder: Path, console: Console) -> None:
     recorded = f" of seed {result.arenas[0].seed}" if len(result.arenas) > 1 else ""
     console.print(f"written: {folder}/summary.json and the recording{recorded} {folder}/run.rrd", soft_wrap=True)
-    console.print(f"look at it: uv run rerun {folder}/run.rrd", soft_wrap=True)
-    console.print(f"  without a screen: uv run rerun --serve-web --bind 127.0.0.1 {folder}/run.rrd", soft_wrap=True)
+    viewer = Path(sys.executable).with_name("rerun")
+    if viewer.is_relative_to(Path.cwd()):
+        viewer = viewer.relative_to(Path.cwd())
+    console.print(f"look at it: {viewer} {folder}/run.rrd", soft_wrap=True)
+    console.print(f"  without a screen: {viewer} --serve-web --bind 127.0.0.1 {folder}/run.rrd", soft_wrap=True)

@@ -29,8 +29,9 @@ def print_result(result: Result, console: Console) -> None:
             table.add_row(name, f"final {_number(value.final)}, mean {_number(value.mean)}, min {_number(value.min)}")
     for body, senses in result.global_senses.items():
         table.add_row("global senses", f"{body}: {', '.join(senses)}")
-    if result.counts:
-        table.add_row("counts", ", ".join(f"{name} {count}" for name, count in result.counts.items()))
+    counts = [f"{name} {count}" for name, count in result.counts.items() if count]
+    if counts:
+        table.add_row("counts", ", ".join(counts))
     table.add_row("trajectory", f"{arena.trajectory_sha256[:16]}… (seed {arena.seed})")
     console.print(table)
 
