@@ -147,3 +147,35 @@ def test_the_command_says_one_line_and_exits_with_2(arguments, tmp_path):
     assert ended.stderr.startswith("error: ")
     assert ended.stderr.count("\n") == 1
     assert not (tmp_path / "runs").exists()
+
+
+def test_a_path_that_holds_something_is_not_touched(tmp_path):
+    notes = tmp_path / "notes.txt"
+    notes.write_text("mine")
+    assert "something else is there" in refused(LOSSY, runners=1, socket=notes)
+    assert notes.read_text() == "mine"
+    with socket.socket(socket.AF_UNIX) as busy:
+        busy.bind(str(tmp_path / "busy"))
+        busy.listen()
+        assert "in use" in refused(LOSSY, runners=1, socket=tmp_path / "busy")
+        assert (tmp_path / "busy").is_socket()
+
+
+@pytest.mark.parametrize(
+    ("setting", "expected"),
+    [
+        ("robots.flock.params.separation_m=nan", "finite"),
+        ("robots.flock.params.separation_m=99999999999999999999", "64 bits"),
+        ("radio.bit_rate_bps=1000000000000000000000", "at most 1000000000000"),
+        ("radio.queue_limit=1000000000000000000000", "at most 1000000"),
+    ],
+)
+def test_numbers_that_nothing_could_work_with_are_refused(setting, expected):
+    assert expected in refused(LOSSY, setting)
+
+
+def test_needs_that_are_no_names_are_refused(tmp_path):
+    for needs in ("None", "(3,)", '"proximity"'):
+        agent = tmp_path / f"odd{len(needs)}.py"
+        agent.write_text(f"{NEEDY}\nclass Odd(Needy):\n    needs = {needs}\n")
+        assert "a tuple of texts" in refused(LOSSY, f"robots.flock.agent={agent}:Odd", "robots.flock.params={}")

@@ -92,3 +92,27 @@ def test_an_agent_that_raises_ends_the_run_with_its_robots_name_and_its_own_trac
     assert "the agent of flock-" in ended.stderr
     assert 'raise ZeroDivisionError("the third step is too much")' in ended.stderr
     assert "faulty.py" in ended.stderr
+
+
+STUCK = """
+import threading
+from swarmwire.agent import Agent, Robot
+
+class Stuck(Agent):
+    def step(self, robot: Robot) -> None:
+        threading.Event().wait()
+"""
+
+
+def test_an_interrupt_ends_a_run_that_waits_for_an_agent(tmp_path):
+    agent = tmp_path / "stuck.py"
+    agent.write_text(STUCK)
+    setting = ["--set", f"robots.flock.agent={agent}:Stuck", "--set", "robots.flock.params={}", "--runners", "2"]
+    process = started(LOSSY, *setting, "--out", tmp_path / "run")
+    children = family(process)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=20)
+    assert (process.returncode, errors) == (130, "")
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["ended"] == "interrupted"
+    _, alive = psutil.wait_procs(children, timeout=GONE_S)
+    assert not alive

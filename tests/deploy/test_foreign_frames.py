@@ -63,7 +63,7 @@ def test_a_stranger_cannot_stop_or_change_a_run(tmp_path):
     counts = result.counts
     assert counts["malformed_frames"] == 2
     assert counts["oversized_frames"] == 1
-    assert counts["unexpected_frame_frames"] == 1
+    assert counts["unexpected_kind_frames"] == 1
     assert counts["wrong_tick_frames"] == 1
     assert counts["unknown_runner_frames"] == 2
     assert counts["frames_dropped_by_runners"] == 2

@@ -17,6 +17,7 @@ from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.lockstep import Lockstep, Refused
 from tests.agent.hosts import GIVES, assignment, group, heard_from, plain, senses
 
+GROUPS = ("flock", "scouts", "lone")
 FLOCK, SCOUTS = [0, 1, 4, 5], [2, 6]  # rows of the two groups; robot 3 and 7 are a third
 
 
@@ -65,7 +66,7 @@ def actions(rows: list[int]) -> Actions:
 
 
 def rows_of(frame: bytes) -> list[int]:
-    found, _ = decode_tick(frames.decode(frame), GIVES)
+    found, _ = decode_tick(frames.decode(frame), GIVES, GROUPS)
     return [row for part in found.values() for row in part.rows.tolist()]
 
 
@@ -201,9 +202,9 @@ def sound(name: str = "a") -> bytes:
         ("a", frames.encode("actions", 4, {}), "malformed"),
         ("a", encode_actions(3, actions([0, 1, 2, 3])), "wrong_tick"),
         ("a", encode_actions(5, actions([0, 1, 2, 3])), "wrong_tick"),
-        ("a", frames.encode("ready", -1, {}), "unexpected_frame"),
-        ("a", frames.encode("tick", 4, {}), "unexpected_frame"),
-        ("a", frames.encode("end", -1, {}), "unexpected_frame"),
+        ("a", frames.encode("ready", -1, {}), "unexpected_kind"),
+        ("a", frames.encode("tick", 4, {}), "unexpected_kind"),
+        ("a", frames.encode("end", -1, {}), "unexpected_kind"),
         ("b", sound("b"), "wrong_tick"),  # it has answered already
     ],
 )
@@ -227,7 +228,7 @@ def test_before_the_first_tick_only_a_first_ready_counts(kind: str) -> None:
     before = state(lockstep)
     lockstep.answer("a", frames.encode(kind, -1, {}))
     assert state(lockstep) == before
-    assert lockstep.counts() == {{"ready": "unexpected_frame_frames", "actions": "wrong_tick_frames"}[kind]: 1}
+    assert lockstep.counts() == {{"ready": "unexpected_kind_frames", "actions": "wrong_tick_frames"}[kind]: 1}
 
 
 def test_random_answers_never_raise_and_never_count_as_an_answer() -> None:
@@ -286,7 +287,7 @@ def test_robots_that_do_not_act_are_neither_sent_nor_expected() -> None:
 def test_a_runner_none_of_whose_robots_acts_gets_its_groups_empty_so_that_they_forget() -> None:
     lockstep = playing()
     out = dict(lockstep.open_tick(0, {"flock": senses(0, [4]), "scouts": senses(0, [])}, Heard.none(GIVES)))
-    found, _ = decode_tick(frames.decode(out["a"]), GIVES)
+    found, _ = decode_tick(frames.decode(out["a"]), GIVES, GROUPS)
     assert {name: part.rows.tolist() for name, part in found.items()} == {"flock": [], "scouts": []}
     lockstep.answer("a", encode_actions(0, actions([])))
     lockstep.answer("b", encode_actions(0, actions([4])))
@@ -317,7 +318,7 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
     packets: list[Any] = []
     answers: list[tuple[str, bytes]] = []
     for (name, frame), own in zip(out, owned, strict=True):
-        got_senses, got = decode_tick(frames.decode(frame), GIVES)
+        got_senses, got = decode_tick(frames.decode(frame), GIVES, GROUPS)
         rows: list[int] = []
         for part_name, part in got_senses.items():
             rows += part.rows.tolist()

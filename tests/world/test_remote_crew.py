@@ -44,7 +44,7 @@ def parts(agent: str, *rows: list[int]) -> list[Assignment]:
 
 @contextmanager
 def opened(endpoint: str, slots: list[Assignment], timeout_s: float = TIMEOUT_S) -> Generator[RemoteCrew]:
-    crew = RemoteCrew(endpoint, RUN, slots, timeout_s, WallClock())
+    crew = RemoteCrew(endpoint, RUN, slots, timeout_s, WallClock(), start_s=timeout_s)
     try:
         crew.open()
         yield crew
@@ -138,7 +138,7 @@ def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
                     msgpack.packb({"v": 1, "runner": "x"}),
                 )
             ]
-            names = {"malformed_frames", "unknown_runner_frames", "wrong_tick_frames", "unexpected_frame_frames"}
+            names = {"malformed_frames", "unknown_runner_frames", "wrong_tick_frames", "unexpected_kind_frames"}
             tick = 0
             while not names | {"bad_join", "refused_join"} <= set(crew.counts()) or crew.counts()["bad_join"] < 2:
                 got = crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))

@@ -1,5 +1,6 @@
 """Parameters of an agent class: its annotated attributes, typed, with defaults; values are checked when it is made."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar, get_origin, get_type_hints
 
@@ -60,7 +61,11 @@ def make(kind: type[T], params: dict[str, Any]) -> T:
 
 def _value(parameter: Parameter, value: Any) -> Any:
     whole_number = isinstance(value, int) and not isinstance(value, bool)
+    if whole_number and not -(2**63) <= value < 2**63:
+        raise BadParameter(parameter.name, f"expected a number of at most 64 bits, got {value}")
     if parameter.type is float and (whole_number or isinstance(value, float)):
+        if not math.isfinite(value):
+            raise BadParameter(parameter.name, f"expected a finite number, got {value}")
         return float(value)
     if (parameter.type is int and whole_number) or (parameter.type in (bool, str) and type(value) is parameter.type):
         return value

@@ -79,7 +79,7 @@ class _Vector(Hosted):
     def step(self, turn: Turn) -> None:
         try:
             self._agent.step(Robots(turn), self._state)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             place = np.searchsorted(self.group.rows, turn.senses.rows)
             names = robots_text([self.group.robot_names[at] for at in place])
             raise AgentFailed(names, traceback.format_exc()) from error
@@ -100,7 +100,7 @@ class _Single(Hosted):
         for at, row in enumerate(cast("list[int]", turn.senses.rows.tolist())):
             try:
                 self._agents[row].step(Robot(turn, at))
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 name = self.group.robot_names[int(np.searchsorted(self.group.rows, row))]
                 raise AgentFailed(name, traceback.format_exc()) from error
 
@@ -115,7 +115,7 @@ def hosted(group: GroupAssignment, kind: AgentClass) -> Hosted:
     """The agents of a group, of this class; AgentFailed if one cannot be made."""
     try:
         return _Vector(group, kind) if issubclass(kind, VectorAgent) else _Single(group, kind)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise AgentFailed(robots_text(list(group.robot_names)), traceback.format_exc()) from error
 
 

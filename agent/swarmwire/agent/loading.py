@@ -43,6 +43,9 @@ def load_agent(spec: str) -> AgentClass:
     kind = cast(AgentClass, found)
     if getattr(kind, "__abstractmethods__", None):
         raise NoAgent(f"{name} has no step method")
+    needs: Any = kind.needs  # the user's: it may be anything
+    if type(needs) is not tuple or not all(type(need) is str for need in cast("tuple[object, ...]", needs)):
+        raise NoAgent(f'{name}.needs: expected a tuple of texts such as ("proximity",), got {needs!r}')
     try:
         parameters_of(kind)
     except (TypeError, NameError) as error:

@@ -1,9 +1,10 @@
 """The local crew: all agents of a run in this process."""
 
 from swarmwire.agent.host import Host
+from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.packets import Heard, Payloads
+from swarmwire.comms.senses import Actions, GroupSenses, Senses
 
 
 class LocalCrew:
@@ -21,7 +22,7 @@ class LocalCrew:
         """What every robot does in this tick."""
         if self._host is None:
             raise RuntimeError("the crew has not been started")
-        return self._host.act(tick, senses, heard)
+        return self._host.act(tick, _read_only(senses), _heard_read_only(heard))
 
     def counts(self) -> dict[str, int]:
         """Nothing is lost within a process."""
@@ -30,3 +31,31 @@ class LocalCrew:
     def close(self) -> None:
         """Forget the agents."""
         self._host = None
+
+
+# What comes over the wire cannot be written to; what is handed over here must not be either, since it is the world's.
+
+
+def _frozen(array: AnyArray) -> AnyArray:
+    view = array.view()
+    view.setflags(write=False)
+    return view
+
+
+def _read_only(senses: Senses) -> Senses:
+    return {
+        name: GroupSenses(_frozen(group.rows), {field: _frozen(column) for field, column in group.fields.items()})
+        for name, group in senses.items()
+    }
+
+
+def _heard_read_only(heard: Heard) -> Heard:
+    return Heard(
+        _frozen(heard.receiver),
+        _frozen(heard.sender),
+        _frozen(heard.sequence),
+        _frozen(heard.heard_at_ns),
+        {name: _frozen(column) for name, column in heard.given.items()},
+        _frozen(heard.payload),
+        Payloads(_frozen(heard.payloads.data), _frozen(heard.payloads.offset)),
+    )

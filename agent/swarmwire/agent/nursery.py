@@ -16,8 +16,11 @@ import sys
 import traceback
 from contextlib import suppress
 
+import zenoh
+
 from swarmwire.agent import host, runner
 from swarmwire.agent.loading import NoAgent, load_agent
+from swarmwire.comms.errors import SwarmwireError
 
 __all__ = ["host", "main"]  # the host is imported here so that its code is shared
 
@@ -27,6 +30,8 @@ POLL_MS = 50
 def main(arguments: list[str]) -> int:
     """`endpoint run_id agent,agent,… runner runner …`: fork the runners and wait for them all."""
     endpoint, run_id, agents, *names = arguments
+    reports = os.dup(1)
+    os.dup2(2, 1)  # what agents print is for people, not for the world that reads the reports
     for agent in agents.split(","):
         with suppress(NoAgent):  # the runner finds it again and reports it
             load_agent(agent)
@@ -35,9 +40,10 @@ def main(arguments: list[str]) -> int:
     for name in names:
         child = os.fork()
         if child == 0:
+            os.close(reports)
             os._exit(_runner(endpoint, run_id, name))
         children[child] = name
-    _watch(children)
+    _watch(children, reports)
     return 0
 
 
@@ -45,13 +51,16 @@ def _runner(endpoint: str, run_id: str, name: str) -> int:
     os.close(0)
     try:
         runner.run(endpoint, run_id, name)
+    except (SwarmwireError, zenoh.ZError) as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
     except BaseException:  # noqa: BLE001 - the last frame of this process: whatever it is, show it and end
         traceback.print_exc()
         return 1
     return 0
 
 
-def _watch(children: dict[int, str]) -> None:
+def _watch(children: dict[int, str], reports: int) -> None:
     lifeline = select.poll()
     lifeline.register(0, select.POLLIN | select.POLLHUP)
     while children:
@@ -63,7 +72,7 @@ def _watch(children: dict[int, str]) -> None:
         while child:
             name, code = children.pop(child), os.waitstatus_to_exitcode(status)
             if code != 0:
-                os.write(1, f"{name} {code}\n".encode())
+                os.write(reports, f"{name} {code}\n".encode())
             child, status = os.waitpid(-1, os.WNOHANG) if children else (0, 0)
 
 

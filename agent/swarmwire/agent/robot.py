@@ -83,6 +83,8 @@ class RadioPort:
                 Packet(packets, at, kind(**{name: float(column[at]) for name, column in columns.items()}))
                 for at in self._mine(packets)
             ]
+        if not issubclass(kind, dict):
+            raise TypeError(f"expected a class of Message, or dict, got {kind}")
         table = self._turn.tagged(DICT_TAG)
         dicts = Packets[dict[str, Any]](self._turn.n, table, {}, self._turn.needs)
         return [Packet(dicts, at, decode_dict(table.payloads.row(int(table.payload[at])))) for at in self._mine(dicts)]

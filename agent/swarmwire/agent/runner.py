@@ -19,8 +19,9 @@ from zenoh.handlers import Callback
 from swarmwire.agent.host import Host
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.senses import Senses
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
@@ -64,13 +65,16 @@ class _Inbox:
     def wait_for_world(self) -> bool:
         """Whether the world's token appeared in time; it declares it last, when it can answer."""
         try:
-            return self._arrived.get(timeout=JOIN_S) is True
+            while not isinstance(arrived := self._arrived.get(timeout=JOIN_S), bool):
+                self.dropped += 1
         except queue.Empty:
             return False
+        return arrived
 
-    def ticks(self) -> Iterator[Frame]:
-        """The `tick` frames, in order, until the world says "end" or is gone."""
-        tick = -1
+    def ticks(self, assignment: Assignment) -> Iterator[tuple[int, Senses, Heard]]:
+        """What each tick brings, in order and without a gap, until the world says "end" or is gone."""
+        gives, groups = assignment.gives or (), {group.name for group in assignment.groups}
+        tick: int | None = None
         while True:
             arrived = self._arrived.get()
             if isinstance(arrived, bool):
@@ -79,16 +83,16 @@ class _Inbox:
                 continue
             try:
                 frame = frames.decode(arrived.payload.to_bytes())
+                if frame.kind == "end":
+                    return
+                if frame.kind != "tick" or (tick is not None and frame.tick != tick + 1):
+                    raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
+                senses, heard = decode_tick(frame, gives, groups)
             except BadFrame:
                 self.dropped += 1
                 continue
-            if frame.kind == "end":
-                return
-            if frame.kind != "tick" or frame.tick <= tick:
-                self.dropped += 1
-                continue
             tick = frame.tick
-            yield frame
+            yield tick, senses, heard
 
 
 def _join(session: zenoh.Session, keys: Keys, runner: str, inbox: _Inbox) -> Assignment:
@@ -104,14 +108,13 @@ def _join(session: zenoh.Session, keys: Keys, runner: str, inbox: _Inbox) -> Ass
 
 def _answers(assignment: Assignment, inbox: _Inbox) -> Iterator[bytes]:
     """A frame "ready", then an answer to every tick; a failure, if there is one, is the last."""
-    gives = assignment.gives or ()
     try:
         host = Host(assignment)
         yield frames.encode("ready", -1, {})
-        for frame in inbox.ticks():
-            actions = host.act(frame.tick, *decode_tick(frame, gives))
+        for tick, senses, heard in inbox.ticks(assignment):
+            actions = host.act(tick, senses, heard)
             dropped, inbox.dropped = inbox.dropped, 0
-            yield encode_actions(frame.tick, actions, dropped)
+            yield encode_actions(tick, actions, dropped)
         return
     except AgentFailed as error:
         failure = {"robots": error.robots, "traceback": error.traceback}
@@ -119,5 +122,5 @@ def _answers(assignment: Assignment, inbox: _Inbox) -> Iterator[bytes]:
         failure = {"robots": assignment.robots_text, "traceback": traceback.format_exc()}
     yield frames.encode("failed", -1, {}, failure)
     # The world must read this before the runner's token vanishes, or it would report a lost runner instead.
-    for _ in inbox.ticks():
+    for _ in inbox.ticks(assignment):
         continue

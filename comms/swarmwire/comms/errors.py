@@ -4,6 +4,7 @@ SwarmwireError
 ├── BadInput            a scenario, a body, an option: refused at the door (exit code 2)
 ├── AgentFailed         the user's agent raised (exit code 1)
 ├── RunnerLost          a runner's process or link is gone (exit code 1)
+├── Interrupted         somebody asked for the end of the run (exit code 130)
 └── BadFrame            a message on the wire breaks the protocol: counted and dropped, never fatal
 """
 
@@ -37,6 +38,10 @@ class RunnerLost(SwarmwireError):
     def __init__(self, runner: str, robots: str, reason: str) -> None:
         self.runner, self.robots, self.reason = runner, robots, reason
         super().__init__(f"runner {runner} ({robots}) was lost: {reason}")
+
+
+class Interrupted(SwarmwireError):
+    """Somebody asked for the end of the run while it waited for its runners."""
 
 
 class BadFrame(SwarmwireError):

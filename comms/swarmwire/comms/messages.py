@@ -134,9 +134,10 @@ def decode_rows(kind: type[Message], payloads: Payloads, index: IntArray) -> dic
 
 def encode_dict(message: dict[str, Any]) -> bytes:
     """A dict on air: the dict tag, then msgpack; TypeError unless its keys are texts and msgpack takes its values."""
-    if not all(type(key) is str for key in message):
+    payload = DICT_TAG.to_bytes(TAG_BYTES, "little") + msgpack.packb(message)
+    if not all(type(key) is str for key in decode_dict(payload)):  # what cannot be read is refused here, not there
         raise TypeError(f"a dict message has texts as keys, got {list(message)}")
-    return DICT_TAG.to_bytes(TAG_BYTES, "little") + msgpack.packb(message)
+    return payload
 
 
 def decode_dict(payload: bytes) -> dict[str, Any]:

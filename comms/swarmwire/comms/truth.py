@@ -91,6 +91,15 @@ class Tally:
     in_range: IntArray  # (arenas,) receivers in range after path loss and walls, of fates that became final
     fates: IntArray  # (arenas, fates) fates that became final
 
+    def __add__(self, other: "Tally") -> "Tally":
+        """Both together."""
+        return Tally(
+            self.sent + other.sent,
+            self.intended + other.intended,
+            self.in_range + other.in_range,
+            self.fates + other.fates,
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Truth:

@@ -9,12 +9,13 @@ import typer
 from rich.console import Console
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.folder import default_folder, make_folder
 from swarmwire.deploy.report import print_result
 from swarmwire.deploy.result import Result
 
 FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
+MOST_SEEDS = 10_000
 
 app = typer.Typer(
     help="A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own.",
@@ -111,6 +112,8 @@ def main() -> None:
         app()
     except BadInput as error:
         sys.exit(_fail(error, BAD_INPUT))
+    except Interrupted as error:
+        sys.exit(_fail(error, INTERRUPTED))
     except SwarmwireError as error:
         sys.exit(_fail(error, FAILED))
 
@@ -123,12 +126,13 @@ def _fail(error: SwarmwireError, code: int) -> int:
 def _seed_list(text: str) -> list[int]:
     first, colon, last = text.partition(":")
     try:
-        found = list(range(int(first), int(last))) if colon else [int(item) for item in text.split(",")]
+        found = range(int(first), int(last)) if colon else [int(item) for item in text.split(",")]
     except ValueError:
         found = []
-    if not found:
-        raise BadInput("--seeds", "", f"expected FIRST:END (END left out) or a list such as 1,5,7; got {text!r}")
-    return found
+    if not 0 < len(found) <= MOST_SEEDS:
+        expected = f"expected FIRST:END (END left out) or a list such as 1,5,7, {MOST_SEEDS} at most; got {text!r}"
+        raise BadInput("--seeds", "", expected)
+    return list(found)
 
 
 def _say_where(result: Result, folder: Path, console: Console) -> None:

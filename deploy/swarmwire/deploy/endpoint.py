@@ -2,9 +2,10 @@
 
 import os
 import secrets
+import socket
 import tempfile
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from swarmwire.comms.errors import BadInput
@@ -19,16 +20,29 @@ def new_run_id() -> str:
 
 
 @contextmanager
-def local_endpoint(socket: Path | None) -> Generator[str]:
-    """An endpoint at `socket`, or in a new directory that is gone afterwards; BadInput if the path will not do."""
-    if socket is not None:
-        path = str(socket.absolute())
-        if not socket.absolute().parent.is_dir():
-            raise BadInput("--socket", path, "expected a path in a directory that exists")
-        if len(os.fsencode(path)) > LONGEST_PATH:
-            raise BadInput("--socket", path, f"expected a path of at most {LONGEST_PATH} bytes")
-        yield unix_endpoint(path)
+def local_endpoint(path: Path | None) -> Generator[str]:
+    """An endpoint at `path`, or in a new directory that is gone afterwards; BadInput if the path will not do."""
+    if path is not None:
+        _check(path.absolute())
+        yield unix_endpoint(str(path.absolute()))
         return
     base = tempfile.gettempdir()
     with tempfile.TemporaryDirectory(prefix="sw-", dir=base if len(base) < 60 else "/tmp") as directory:
         yield unix_endpoint(f"{directory}/world")
+
+
+def _check(path: Path) -> None:
+    if not path.parent.is_dir():
+        raise BadInput("--socket", str(path), "expected a path in a directory that exists")
+    if len(os.fsencode(path)) > LONGEST_PATH:
+        raise BadInput("--socket", str(path), f"expected a path of at most {LONGEST_PATH} bytes")
+    if not path.exists():
+        return
+    if not path.is_socket():
+        raise BadInput("--socket", str(path), "expected a path that is free; something else is there")
+    with (
+        socket.socket(socket.AF_UNIX) as probe,
+        suppress(ConnectionRefusedError),
+    ):  # refused: nobody listens, it is stale
+        probe.connect(str(path))
+        raise BadInput("--socket", str(path), "expected a path that is free; the socket is in use")

@@ -1,20 +1,21 @@
 """One execution of a scenario: wires the parts together, runs the loop, and gives back what came of it."""
 
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
 from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.clock import WallClock, tick_start_ns, to_ns, to_s
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.deploy import machine
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.endpoint import local_endpoint, new_run_id
 from swarmwire.deploy.folder import make_folder
+from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.result import Result, arena_result
 from swarmwire.deploy.runner_processes import RunnerProcesses
@@ -80,24 +81,27 @@ class Execution:
     def run(self, observers: Sequence[Observer] = ()) -> Result:
         """Run to the end of the scenario, or until an interrupt."""
         metrics, radio_tally = Metrics(), RadioTally()
-        recorders = [RerunRecording(self.folder / "run.rrd", metrics)] if self.folder else []
-        watching: list[Observer] = [metrics, radio_tally, *recorders, *observers]
+        recorders: list[Observer] = [RerunRecording(self.folder / "run.rrd", metrics)] if self.folder else []
+        guarded = [Guarded(observer) for observer in (*recorders, *observers)]
+        watching: list[Observer] = [metrics, radio_tally, *guarded]
         parts: dict[str, Any] = {}
-        with self._crew() as crew, Interrupt() as interrupt:
-            air = self.air()
+        with Interrupt() as interrupt, self._crew(interrupt) as crew:
+            loop = Loop(self.world, self.air(), crew, watching)
             crew.start()
-            loop = Loop(self.world, air, crew, watching)
             started_ns = self._clock.now_ns()
             for observer in watching:
                 observer.begin(self.world.static)
             try:
                 loop.run(self.ticks, stopped=lambda: interrupt.asked)
+            except Interrupted:
+                pass  # the summary says how far it came
             finally:  # also of a run that failed: a recording is worth most then
                 ended_ns = self._clock.now_ns()
-                last = air.end() if air else None
+                last = loop.end()
                 for observer in watching:
                     parts.update(observer.end(last))
-        result = self._result(loop, parts, started_ns, ended_ns)
+        failed = {f"observer_failed_{observer.name}": 1 for observer in guarded if observer.failed}
+        result = self._result(loop, parts, failed, started_ns, ended_ns)
         if self.folder:
             result.write(self.folder / "summary.json")
         return result
@@ -111,12 +115,11 @@ class Execution:
         return Air(radio, self.world.keys, static.robots, static.arena_size_m, obstacles, static.rate_hz)
 
     @contextmanager
-    def _crew(self) -> Generator[Crew]:
+    def _crew(self, interrupt: Interrupt) -> Generator[Crew]:
         whole = assignments.whole(self.scenario, self.world.static, self._specs)
         if not self.runners:
-            local = LocalCrew(whole)
-            yield local
-            local.close()
+            with closing(LocalCrew(whole)) as local:
+                yield local
             return
         parts = assignments.split(whole, self.runners)
         names = [f"r{i}" for i in range(len(parts))]
@@ -127,7 +130,7 @@ class Execution:
 
         with local_endpoint(self._socket) as endpoint:
             timeout_s = self.scenario.run.runner_timeout_s
-            crew = RemoteCrew(endpoint, self.run_id, parts, timeout_s, self._clock, trouble)
+            crew = RemoteCrew(endpoint, self.run_id, parts, timeout_s, self._clock, trouble, lambda: interrupt.asked)
             try:
                 crew.open()
                 processes.append(RunnerProcesses(endpoint, self.run_id, sorted(set(self._specs.values())), names))
@@ -137,7 +140,9 @@ class Execution:
                 for process in processes:
                     process.stop()
 
-    def _result(self, loop: Loop, parts: dict[str, Any], started_ns: int, ended_ns: int) -> Result:
+    def _result(
+        self, loop: Loop, parts: dict[str, Any], failed: dict[str, int], started_ns: int, ended_ns: int
+    ) -> Result:
         static = self.world.static
         radios: list[Any] = parts.get("radio", [None] * static.arenas)
         arenas = zip(static.seeds, loop.hexdigests(), radios, parts["metrics"], strict=True)
@@ -154,7 +159,7 @@ class Execution:
             start_time_s=to_s(started_ns - self._called_ns),
             arenas=tuple(arena_result(*arena) for arena in arenas),
             global_senses={body: found for body, found in senses.items() if found},
-            counts=loop.counts(),
+            counts={**loop.counts(), **failed},
             cpu=machine.cpu(),
             versions=machine.versions(),
             out=self.folder,
@@ -162,8 +167,8 @@ class Execution:
 
 
 def _ticks(scenario: Scenario) -> int:
-    """Ticks that start before the scenario's duration is over."""
-    return -(-to_ns(scenario.duration_s) * scenario.time.rate_hz // 10**9)
+    """Ticks that start before the scenario's duration is over; the first always does."""
+    return max(1, -(-to_ns(scenario.duration_s) * scenario.time.rate_hz // 10**9))
 
 
 def choose_seeds(scenario: Scenario, seed: int | None, seeds: Sequence[int] | None) -> tuple[int, ...]:

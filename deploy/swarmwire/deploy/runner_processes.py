@@ -29,11 +29,6 @@ class RunnerProcesses:
         if self._nursery.stdout is not None:
             self._reports.register(self._nursery.stdout, selectors.EVENT_READ)
 
-    @property
-    def nursery_pid(self) -> int:
-        """Process id of the nursery; runners are its children."""
-        return self._nursery.pid
-
     def trouble(self) -> str | None:
         """What happened to a runner that ended badly, in words; None while all is well."""
         if self._nursery.poll() is not None:

@@ -35,6 +35,8 @@ def render_png(rrd: Path, png: Path, tick: int | None = None, size: tuple[int, i
     need_view_extra("picture")
     if not rrd.is_file():
         raise BadInput(str(rrd), "", "there is no such recording")
+    if not png.parent.is_dir():
+        raise BadInput(str(png), "", "expected a path in a folder that exists")
     with _viewer(rrd, size) as viewer:
         client = viewer.wait(viewer.connected)
         state = viewer.wait(lambda: _opened(client))

@@ -122,7 +122,7 @@ class Lockstep:
             elif frame.kind == "ready" and slot.state == "joined":
                 slot.state = "ready"
             elif frame.kind != "actions":
-                raise BadFrame("unexpected_frame", frame.kind)
+                raise BadFrame("unexpected_kind", frame.kind)
             elif frame.tick != self._tick or slot.state != "waiting":
                 raise BadFrame("wrong_tick", str(frame.tick))
             else:

@@ -1,5 +1,6 @@
 """The loop: one tick, written once. What differs between modes is only the crew."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -8,7 +9,7 @@ from swarmwire.comms.air.air import Air
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.protocols import Crew, Observer
-from swarmwire.comms.truth import Truth
+from swarmwire.comms.truth import Tally, Truth
 from swarmwire.world.trajectory import TrajectoryHash
 from swarmwire.world.world import World
 
@@ -19,7 +20,8 @@ class Loop:
     def __init__(self, world: World, air: Air | None, crew: Crew, observers: Sequence[Observer]) -> None:
         self.world, self.air, self.crew, self.observers = world, air, crew, observers
         self.ticks_done = 0
-        self.packets_to_nobody = 0
+        self._lost: Counter[str] = Counter()  # packets that never came to the air, by why
+        self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
 
     def run(self, ticks: int, stopped: Callable[[], bool] = lambda: False) -> None:
@@ -33,21 +35,32 @@ class Loop:
         start_ns = tick_start_ns(tick, world.static.rate_hz)
         news = self.air.advance(start_ns) if self.air else None
         heard = news.heard if news else Heard.none()
+        self._open = news.tally if news else None
         actions = self.crew.act(tick, world.sense(tick), heard)
 
-        pose, velocity, alive = world.pose.copy(), world.velocity.copy(), world.alive.copy()
+        pose, velocity, alive = world.pose, world.velocity, world.alive.copy()
         if self.air:
             self.air.hold(pose, alive)
             self.air.send(start_ns, tick, self._addressable(actions.sent))
+        elif len(actions.sent):
+            self._lost["packets_without_radio"] += len(actions.sent)
         onsets = world.move(actions)
-        command = world.command.copy()
+        command = world.command
         self._hash.add(pose, velocity, command, heard)
         edges = self.air.edges(pose, alive) if self.air else None
         tally, finished = (news.tally, news.finished) if news else (None, None)
+        self._open = None
         truth = Truth(tick, start_ns, alive, pose, velocity, command, onsets, edges, tally, finished)
         for observer in self.observers:
             observer.see(truth)
         self.ticks_done += 1
+
+    def end(self) -> Tally | None:
+        """End the air: what was in flight, and what no observer has seen of a tick that was broken off."""
+        if self.air is None:
+            return None
+        last = self.air.end()
+        return last if self._open is None else last + self._open
 
     def hexdigests(self) -> list[str]:
         """`trajectory_sha256` of each arena so far."""
@@ -55,8 +68,7 @@ class Loop:
 
     def counts(self) -> dict[str, int]:
         """Faults on the way between agents and world so far, by name."""
-        to_nobody = {"packets_to_nobody": self.packets_to_nobody} if self.packets_to_nobody else {}
-        return {**self.crew.counts(), **self.world.counts(), **to_nobody}
+        return {**self.crew.counts(), **self.world.counts(), **self._lost}
 
     def _addressable(self, sent: Sent) -> Sent:
         """Without packets for a robot that is not there, or for the sender itself: counted, never on air."""
@@ -64,6 +76,6 @@ class Loop:
         nobody = (sent.to >= robots) | (sent.to == sent.sender % robots)
         if not nobody.any():
             return sent
-        self.packets_to_nobody += int(nobody.sum())
+        self._lost["packets_to_nobody"] += int(nobody.sum())
         keep = np.flatnonzero(~nobody)
         return Sent(sent.sender[keep], sent.to[keep], sent.payloads.rows(keep))

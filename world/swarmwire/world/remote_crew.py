@@ -10,7 +10,7 @@ import zenoh
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock, to_ns
-from swarmwire.comms.errors import BadInput, RunnerLost
+from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
@@ -19,13 +19,15 @@ from swarmwire.comms.wire.sessions import open_world
 from swarmwire.world.lockstep import Lockstep, Refused
 
 POLL_S = 0.2  # how often a wait looks up whether to go on waiting
+START_S = 60.0  # how long runners may take to join and build their agents
 FAREWELL_S = 3.0  # how long runners may take to leave after the end
 
 
 class RemoteCrew:
     """All agents of a run in runners that join at `endpoint`; the loop waits for every one of them.
 
-    `trouble` is asked while waiting, and says why there is no more point in it (a process that exited), or None.
+    While it waits it asks `trouble`, which says why there is no more point in it (a process that exited), or None, and
+    `stopped`, whether somebody asked for the end: Interrupted. Until the first tick it waits `start_s`.
     """
 
     def __init__(
@@ -36,10 +38,13 @@ class RemoteCrew:
         timeout_s: float,
         clock: Clock,
         trouble: Callable[[], str | None] = lambda: None,
+        stopped: Callable[[], bool] = lambda: False,
+        start_s: float = START_S,
     ) -> None:
         self._endpoint, self._keys = endpoint, Keys(run_id)
         self._lockstep = Lockstep(assignments)
-        self._timeout_s, self._clock, self._trouble = timeout_s, clock, trouble
+        self._timeout_s, self._start_s, self._clock = timeout_s, start_s, clock
+        self._trouble, self._stopped = trouble, stopped
         self._inbox: queue.SimpleQueue[zenoh.Sample | zenoh.Query] = queue.SimpleQueue()
         self._session: zenoh.Session | None = None
         self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to
@@ -49,7 +54,7 @@ class RemoteCrew:
     def open(self) -> None:
         """Listen at the endpoint, so that runners may join; BadInput if it is taken."""
         try:
-            session = self._session = open_world(self._endpoint)
+            session = self._session = open_world(self._endpoint, self._timeout_s)
         except zenoh.ZError as error:
             reason = str(error).split(" at ")[0]
             raise BadInput(
@@ -67,13 +72,13 @@ class RemoteCrew:
         """Wait until runners have taken all robots and built their agents."""
         if self._session is None:
             self.open()
-        self._wait()
+        self._wait(self._start_s)
 
     def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
         """One frame to every runner, one answer from each."""
         for runner, data in self._lockstep.open_tick(tick, senses, heard):
             self._frames[runner].put(data)
-        self._wait()
+        self._wait(self._timeout_s)
         return self._lockstep.take()
 
     def counts(self) -> dict[str, int]:
@@ -94,13 +99,13 @@ class RemoteCrew:
                 self._present.discard(runner_of(str(item.key_expr)))
         session.close()
 
-    def _wait(self) -> None:
+    def _wait(self, timeout_s: float) -> None:
         """Take in what arrives until every runner is ready; RunnerLost if one takes too long.
 
         Samples are handled together once there may be one from each runner: one by one, the caches of this process
         would be cold for each, since the runners use the cores in between.
         """
-        deadline_ns = self._clock.now_ns() + to_ns(self._timeout_s)
+        deadline_ns = self._clock.now_ns() + to_ns(timeout_s)
         arrived: list[zenoh.Sample | zenoh.Query] = []
         while waiting := self._lockstep.waiting:
             while len(arrived) < waiting:
@@ -108,12 +113,14 @@ class RemoteCrew:
                 if item is None:
                     break
                 arrived.append(item)
+            if not arrived and self._stopped():
+                raise Interrupted("interrupted while it waited for its runners")
             trouble = None if arrived else self._trouble()
             for item in arrived:
                 self._handle(item)
             arrived.clear()
             if trouble is None and self._clock.now_ns() > deadline_ns:
-                trouble = f"no answer for {self._timeout_s:g} s"
+                trouble = f"no answer for {timeout_s:g} s"
             if trouble is not None and self._lockstep.waiting:
                 raise RunnerLost(*self._lockstep.missing, trouble)
 

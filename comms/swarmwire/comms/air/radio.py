@@ -59,14 +59,16 @@ class Radio:
     jitter_s: float = parameter(
         0.0, help="further delay, uniform from 0 to this, for each receiver", unit="s", at_least=0, at_most=3600
     )
-    bit_rate_bps: int = parameter(250_000, help="bits on air per second", unit="bit/s", at_least=1)
+    bit_rate_bps: int = parameter(250_000, help="bits on air per second", unit="bit/s", at_least=1, at_most=10**12)
     overhead_bytes: int = parameter(
         0, help="bytes on air beyond the payload (preamble, headers)", unit="byte", at_least=0, at_most=65535
     )
     max_payload_bytes: int = parameter(
         100, help="a larger payload is refused by the radio", unit="byte", at_least=2, at_most=65535
     )
-    queue_limit: int = parameter(20, help="packets that may wait at a sender for its radio to become free", at_least=0)
+    queue_limit: int = parameter(
+        20, help="packets that may wait at a sender for its radio to become free", at_least=0, at_most=10**6
+    )
     send_offset: str | float = parameter(
         "uniform",
         help='when in its tick a robot sends: "uniform" (keyed phase, jitter), "tick" (its start), or an offset in s',

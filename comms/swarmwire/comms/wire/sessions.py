@@ -2,7 +2,7 @@
 
 Two peers on one hub are not routed by zenoh, or link past it; so the world is a router and runners are clients. The
 start-up delay of scouting is set to 0 even where it is off (it costs half a second otherwise). Frames in lockstep block
-rather than drop; a put that blocks closes its link after `BLOCK_S`, which lies below a runner's time-out.
+rather than drop; a put that blocks closes its link after `BLOCK_S` or half a runner's time-out.
 """
 
 import json
@@ -16,9 +16,9 @@ LEASE_MS = 10_000  # a frozen peer is noticed after this; a dead one at once, by
 SMALL_RUNTIME = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app),app:(worker_threads:1))"
 
 
-def open_world(endpoint: str) -> zenoh.Session:
-    """A router that listens on `endpoint`; zenoh.ZError if it is taken."""
-    return zenoh.open(_config("router", {"listen": {"endpoints": [endpoint]}}))
+def open_world(endpoint: str, runner_timeout_s: float) -> zenoh.Session:
+    """A router that listens on `endpoint`, for runners that may be silent so long; zenoh.ZError if it is taken."""
+    return zenoh.open(_config("router", {"listen": {"endpoints": [endpoint]}}, runner_timeout_s))
 
 
 def open_runner(endpoint: str, connect_s: float = 10.0) -> zenoh.Session:
@@ -37,8 +37,9 @@ def unix_endpoint(path: str) -> str:
     return f"unixsock-stream/{path}"
 
 
-def _config(mode: str, more: dict[str, object]) -> zenoh.Config:
-    block = {"wait_before_close": round(BLOCK_S * 1e6)}
+def _config(mode: str, more: dict[str, object], runner_timeout_s: float = 2 * BLOCK_S) -> zenoh.Config:
+    block = {"wait_before_close": round(min(BLOCK_S, runner_timeout_s / 2) * 1e6)}
+    lease_ms = max(LEASE_MS, round(runner_timeout_s * 1000))
     return zenoh.Config.from_json5(
         json.dumps(
             {
@@ -46,7 +47,7 @@ def _config(mode: str, more: dict[str, object]) -> zenoh.Config:
                 "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
                 "transport": {
                     "shared_memory": {"enabled": False},
-                    "link": {"tx": {"lease": LEASE_MS, "queue": {"congestion_control": {"block": block}}}},
+                    "link": {"tx": {"lease": lease_ms, "queue": {"congestion_control": {"block": block}}}},
                 },
                 **more,
             }

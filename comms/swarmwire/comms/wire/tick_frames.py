@@ -1,5 +1,7 @@
 """What a tick carries across the wire: senses and heard packets to a runner, actions back; checked on arrival."""
 
+from collections.abc import Collection, Mapping
+
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, IntArray
@@ -27,21 +29,29 @@ def encode_tick(tick: int, senses: Senses, heard: Heard) -> bytes:
     return frames.encode("tick", tick, arrays)
 
 
-def decode_tick(frame: Frame, gives: tuple[str, ...]) -> tuple[Senses, Heard]:
-    """Senses and heard packets of a `tick` frame; a runner trusts its world."""
+def decode_tick(frame: Frame, gives: tuple[str, ...], known: Collection[str]) -> tuple[Senses, Heard]:
+    """Senses and heard packets of a `tick` frame; BadFrame if it holds none, or some of groups that are not known."""
     groups: dict[str, dict[str, AnyArray]] = {}
-    for key, array in frame.arrays.items():
-        if key.startswith("sense/"):
-            _, name, sense = key.split("/", 2)
-            groups.setdefault(name, {})[sense] = array
-    senses = {name: GroupSenses(fields.pop("rows"), fields) for name, fields in groups.items()}
-    arrays = frame.arrays
+    try:
+        for key, array in frame.arrays.items():
+            if key.startswith("sense/"):
+                _, name, sense = key.split("/", 2)
+                groups.setdefault(name, {})[sense] = array
+        senses = {name: GroupSenses(fields.pop("rows"), fields) for name, fields in groups.items()}
+        if not senses or any(name not in known for name in senses):
+            raise BadFrame("malformed", "sense: expected groups of this runner")
+        return senses, _heard(frame.arrays, gives)
+    except (KeyError, ValueError) as error:
+        raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error
+
+
+def _heard(arrays: Mapping[str, AnyArray], gives: tuple[str, ...]) -> Heard:
     if "heard/numbers" not in arrays:
-        return senses, Heard.none(gives)
+        return Heard.none(gives)
     receiver, sender, sequence, heard_at_ns, payload = arrays["heard/numbers"]
     given = dict(zip(gives, arrays["heard/given"], strict=True))
     payloads = Payloads(arrays["heard/data"], arrays["heard/offset"])
-    return senses, Heard(receiver, sender, sequence, heard_at_ns, given, payload, payloads)
+    return Heard(receiver, sender, sequence, heard_at_ns, given, payload, payloads)
 
 
 def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:

@@ -1,0 +1,45 @@
+"""Observers cannot break a run: one that raises is reported, counted and left out from then on."""
+
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+from rich.console import Console
+
+from swarmwire.comms.protocols import Observer
+from swarmwire.comms.truth import Static, Tally, Truth
+
+
+class Guarded:
+    """An observer whose errors end with it."""
+
+    def __init__(self, observer: Observer) -> None:
+        self._observer = observer
+        self.failed = False
+
+    @property
+    def name(self) -> str:
+        """The observer's class."""
+        return type(self._observer).__name__
+
+    def begin(self, static: Static) -> None:
+        """The run is about to start."""
+        self._try(lambda: self._observer.begin(static))
+
+    def see(self, truth: Truth) -> None:
+        """One tick is over."""
+        if not self.failed:
+            self._try(lambda: self._observer.see(truth))
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """The run is over; also an observer that failed may close its files."""
+        return self._try(lambda: self._observer.end(last)) or {}
+
+    def _try(self, call: Callable[[], Any]) -> Any:
+        try:
+            return call()
+        except Exception:  # noqa: BLE001 - whatever it is, the run goes on without it
+            if not self.failed:
+                Console(stderr=True).print(f"observer {self.name} failed:\n{traceback.format_exc()}", markup=False)
+            self.failed = True
+            return None
