@@ -124,7 +124,7 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("drive.wheel_base_m", None, "drive.wheel_base_m: is missing"),
         ("colour", "red", "colour: unknown key; expected one of name, source, radius_m"),
         ("drive.gears", 3, "drive.gears: unknown key; expected one of wheel_base_m"),
-        ("senses.lidar", {}, "senses.lidar: unknown sense; expected one of proximity, compass, odometry"),
+        ("senses.lidar", {}, "senses.lidar: unknown sense; expected one of proximity, compass, odometry, light"),
         ("senses", 3, "senses: expected a table, got 3"),
         ("senses.compass", True, "senses.compass: expected a table, got True"),
         ("drive", [], "drive: expected a table, got []"),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry import is_blocked, obstacle_arrays, ray_to_box, ray_to_circle
+from swarmwire.comms.geometry import is_blocked, obstacle_arrays, ray_to_circle, ray_to_polygon
 from swarmwire.comms.truth import Obstacle
 
 FAR_M = 20.0
@@ -28,6 +28,10 @@ def box_depth(box: FloatArray) -> Depth:
         return np.maximum(np.abs(c * ox + s * oy) - box[2], np.abs(c * oy - s * ox) - box[3])
 
     return depth
+
+
+def ray_to(obstacle: Obstacle, px: float, py: float, dx: float, dy: float) -> float:
+    return ray_to_polygon(px, py, dx, dy, obstacle_arrays(((obstacle,),)), 0)
 
 
 def check_ray(distance: float, depth: Depth, px: float, py: float, angle: float) -> None:
@@ -58,7 +62,8 @@ def test_rays_end_where_they_first_meet_a_box() -> None:
     for px, py, angle, *rest in random.uniform([-3, -3, -4, -3, -3, 0.1, 0.1, -4], [3, 3, 4, 3, 3, 2, 2, 4], (300, 8)):
         cx, cy, half_length, half_width, heading = rest
         box = np.array([cx, cy, half_length, half_width, math.cos(heading), math.sin(heading)])
-        distance = ray_to_box(px, py, math.cos(angle), math.sin(angle), box)
+        obstacle = Obstacle("box", cx, cy, heading, size_m=(2 * half_length, 2 * half_width))
+        distance = ray_to(obstacle, px, py, math.cos(angle), math.sin(angle))
         check_ray(distance, box_depth(box), px, py, angle)
         outcomes.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
     assert outcomes == {"inside", "miss", "hit"}
@@ -76,7 +81,7 @@ def test_rays_end_where_they_first_meet_a_box() -> None:
     ],
 )
 def test_rays_along_the_sides_of_a_box(x: float, y: float, dx: float, dy: float, expected: float) -> None:
-    assert ray_to_box(x, y, dx, dy, np.array([0.0, 0.0, 1.0, 0.5, 1.0, 0.0])) == expected
+    assert ray_to(Obstacle("box", 0.0, 0.0, size_m=(2.0, 1.0)), x, y, dx, dy) == expected
 
 
 @pytest.mark.parametrize(
@@ -125,6 +130,7 @@ def test_a_line_is_blocked_from_both_ends_alike() -> None:
 def test_obstacles_of_each_arena_stand_together() -> None:
     obstacles = obstacle_arrays(ARENAS)
     assert obstacles.circle_start.tolist() == [0, 1, 1, 1]
-    assert obstacles.box_start.tolist() == [0, 1, 1, 2]
+    assert obstacles.polygon_start.tolist() == [0, 1, 1, 2]
     assert obstacles.circle.shape == (1, 3)
-    assert obstacle_arrays(((), ())).box.shape == (0, 6)
+    assert obstacle_arrays(((), ())).polygon.shape == (0, 3)
+    assert obstacles.side_start.tolist() == [0, 4, 8]

@@ -33,9 +33,11 @@ def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: 
         size_m=(size_m, size_m),
         walled=more.get("walled", True),
         obstacles=obstacle_arrays((obstacles,)),
+        lights=(more.get("lights", ()),),
         radius_m=np.full(len(poses), body.radius_m),
         state=state,
         travel_m=np.zeros((1, len(poses), 2)),
+        touched=np.zeros((1, len(poses))),
     )
 
 
@@ -227,5 +229,5 @@ def test_encoders_slip_by_tick_and_show_whole_steps() -> None:
 
 
 def test_the_sheets_of_the_bodies_have_a_sensor_each() -> None:
-    assert EPUCK.senses.keys() == {"proximity", "compass", "odometry"}
+    assert EPUCK.senses.keys() == FOOTBOT.senses.keys() == {"proximity", "compass", "odometry", "light", "bumper"}
     assert isinstance(EPUCK.proximity, Proximity)

@@ -54,6 +54,8 @@ def test_senses_have_a_row_per_robot_of_the_group_over_all_arenas() -> None:
         "compass.heading_rad": (6,),
         "odometry.left_m": (6,),
         "odometry.right_m": (6,),
+        "light.value": (6, 24),
+        "bumper.pressed": (6,),
     }
     for name, field in senses["flock"].fields.items():
         assert field.flags.c_contiguous, name
@@ -69,7 +71,7 @@ def test_only_what_is_needed_is_sensed() -> None:
 
 
 def test_a_sense_that_the_body_lacks_is_refused() -> None:
-    text = "^f: robots.flock.agent: the agent needs the sense 'sonar'; the body epuck has proximity, compass, odometry$"
+    text = "^f: robots.flock.agent: the agent needs the sense 'sonar'; the body epuck has proximity, compass, odometry, light, bumper$"
     with pytest.raises(BadInput, match=text):
         World(scenario_from(SAMPLE, "f"), [1], {"flock": ("sonar",)})
 
