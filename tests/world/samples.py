@@ -20,6 +20,7 @@ SAMPLE: dict[str, Any] = {
         "obstacles": [
             {"shape": "cylinder", "radius_m": 0.1, "count": 4, "place": "random"},
             {"shape": "box", "size_m": [0.5, 0.1], "at": [1.0, 1.0]},
+            {"shape": "polygon", "points": [[0, 0], [0.3, 0], [0, 0.3]], "count": 2, "place": "random"},
         ],
         "lights": [{"intensity": 2.0, "place": "random", "count": 2}],
     },

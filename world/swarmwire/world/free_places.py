@@ -73,7 +73,7 @@ def _disc_clear_of_obstacles(taken, x, y, radius):
         dx, dy, apart = x - taken.circle[i, 0], y - taken.circle[i, 1], reach + taken.circle[i, 2]
         if dx * dx + dy * dy < apart * apart:
             return False
-    for k in range(len(taken.side_start) - 1):  # noqa: SIM110 - compiled: no generators
+    for k in range(len(taken.side_start) - 1):
         if _distance(x, y, taken.side[taken.side_start[k] : taken.side_start[k + 1]]) < reach:
             return False
     return True
