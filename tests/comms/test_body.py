@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.body import Body, body_from, body_names, load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.sheets import Proximity
+from swarmwire.comms.sheets import Positioning, Proximity
 
 
 def proximity_of(name: str) -> Proximity:
@@ -122,9 +122,14 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("radius_m", None, "radius_m: is missing"),
         ("drive", None, "drive: is missing"),
         ("drive.wheel_base_m", None, "drive.wheel_base_m: is missing"),
+        ("like", "roomba", "like: expected one of epuck, epuck-gps, footbot; got 'roomba'"),
+        ("like", 3, "like: expected one of epuck, epuck-gps, footbot; got 3"),
+        ("senses.light.noise", 2, "senses.light.noise: expected at most 1, got 2.0"),
+        ("senses.bumper.noise", 1, "senses.bumper.noise: unknown key; expected one of"),
+        ("senses.positioning", {"noise_m": -1}, "senses.positioning.noise_m: expected at least 0 m, got -1.0"),
         ("colour", "red", "colour: unknown key; expected one of name, source, radius_m"),
         ("drive.gears", 3, "drive.gears: unknown key; expected one of wheel_base_m"),
-        ("senses.lidar", {}, "senses.lidar: unknown sense; expected one of proximity, compass, odometry"),
+        ("senses.lidar", {}, "senses.lidar: unknown sense; expected one of proximity, compass, odometry, light"),
         ("senses", 3, "senses: expected a table, got 3"),
         ("senses.compass", True, "senses.compass: expected a table, got True"),
         ("drive", [], "drive: expected a table, got []"),
@@ -154,3 +159,28 @@ def test_whole_numbers_serve_as_numbers() -> None:
     body = body_from(changed("mass_kg", 2), "mine.toml")
     assert isinstance(body, Body)
     assert (body.mass_kg, type(body.mass_kg)) == (2.0, float)
+
+
+def test_a_body_like_another_differs_only_in_what_it_says() -> None:
+    gps, epuck = load_body("epuck-gps"), load_body("epuck")
+    assert {**gps.as_mapping(), "name": "epuck", "source": epuck.source, "senses": None} == {
+        **epuck.as_mapping(),
+        "senses": None,
+    }
+    assert gps.senses == {**epuck.senses, "positioning": Positioning(0.01)}
+    mine = body_from({"like": "epuck-gps", "name": "mine", "drive": {"wheel_base_m": 0.06}}, "mine.toml")
+    assert (mine.drive.wheel_base_m, mine.drive.max_force_n) == (0.06, epuck.drive.max_force_n)
+    assert (mine.name, mine.senses) == ("mine", gps.senses)
+
+
+def test_bodies_know_no_global_position_unless_they_say_so() -> None:
+    assert [name for name in body_names() if "positioning" in load_body(name).senses] == ["epuck-gps"]
+
+
+def test_photocells_are_argos_s() -> None:
+    epuck, footbot = load_body("epuck").light, load_body("footbot").light
+    assert epuck
+    assert footbot
+    assert epuck.angles_deg == tuple(22.5 + 45.0 * k for k in range(8))
+    assert footbot.angles_deg == proximity_of("footbot").angles_deg
+    assert (epuck.noise, footbot.noise) == (0.05, 0.0)

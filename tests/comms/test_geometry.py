@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry import is_blocked, obstacle_arrays, ray_to_box, ray_to_circle
+from swarmwire.comms.geometry import is_blocked, obstacle_arrays, ray_to_circle, ray_to_polygon
 from swarmwire.comms.truth import Obstacle
 
 FAR_M = 20.0
@@ -28,6 +28,10 @@ def box_depth(box: FloatArray) -> Depth:
         return np.maximum(np.abs(c * ox + s * oy) - box[2], np.abs(c * oy - s * ox) - box[3])
 
     return depth
+
+
+def ray_to(obstacle: Obstacle, px: float, py: float, dx: float, dy: float) -> float:
+    return ray_to_polygon(px, py, dx, dy, obstacle_arrays(((obstacle,),)), 0)
 
 
 def check_ray(distance: float, depth: Depth, px: float, py: float, angle: float) -> None:
@@ -58,7 +62,8 @@ def test_rays_end_where_they_first_meet_a_box() -> None:
     for px, py, angle, *rest in random.uniform([-3, -3, -4, -3, -3, 0.1, 0.1, -4], [3, 3, 4, 3, 3, 2, 2, 4], (300, 8)):
         cx, cy, half_length, half_width, heading = rest
         box = np.array([cx, cy, half_length, half_width, math.cos(heading), math.sin(heading)])
-        distance = ray_to_box(px, py, math.cos(angle), math.sin(angle), box)
+        obstacle = Obstacle("box", cx, cy, heading, size_m=(2 * half_length, 2 * half_width))
+        distance = ray_to(obstacle, px, py, math.cos(angle), math.sin(angle))
         check_ray(distance, box_depth(box), px, py, angle)
         outcomes.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
     assert outcomes == {"inside", "miss", "hit"}
@@ -76,7 +81,7 @@ def test_rays_end_where_they_first_meet_a_box() -> None:
     ],
 )
 def test_rays_along_the_sides_of_a_box(x: float, y: float, dx: float, dy: float, expected: float) -> None:
-    assert ray_to_box(x, y, dx, dy, np.array([0.0, 0.0, 1.0, 0.5, 1.0, 0.0])) == expected
+    assert ray_to(Obstacle("box", 0.0, 0.0, size_m=(2.0, 1.0)), x, y, dx, dy) == expected
 
 
 @pytest.mark.parametrize(
@@ -125,6 +130,50 @@ def test_a_line_is_blocked_from_both_ends_alike() -> None:
 def test_obstacles_of_each_arena_stand_together() -> None:
     obstacles = obstacle_arrays(ARENAS)
     assert obstacles.circle_start.tolist() == [0, 1, 1, 1]
-    assert obstacles.box_start.tolist() == [0, 1, 1, 2]
+    assert obstacles.polygon_start.tolist() == [0, 1, 1, 2]
     assert obstacles.circle.shape == (1, 3)
-    assert obstacle_arrays(((), ())).box.shape == (0, 6)
+    assert obstacle_arrays(((), ())).polygon.shape == (0, 3)
+    assert obstacles.side_start.tolist() == [0, 4, 8]
+
+
+def test_rays_end_where_they_first_meet_a_polygon() -> None:
+    random = np.random.default_rng(4)
+    outcomes = set[str]()
+    for px, py, angle, x, y, heading in random.uniform([-3, -3, -4, -3, -3, -4], [3, 3, 4, 3, 3, 4], (300, 6)):
+        around = np.sort(random.uniform(0.0, 2.0 * np.pi, random.integers(3, 9)))  # corners on a circle: convex
+        points = tuple((1.5 * math.cos(a), 1.5 * math.sin(a)) for a in around)
+        obstacle = Obstacle("polygon", x, y, heading, points_m=points)
+        distance = ray_to(obstacle, px, py, math.cos(angle), math.sin(angle))
+        check_ray(distance, polygon_depth(obstacle), px, py, angle)
+        outcomes.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
+    assert outcomes == {"inside", "miss", "hit"}
+
+
+def polygon_depth(obstacle: Obstacle) -> Depth:
+    """How far outside the polygon points are, along the normal of their worst side, in m; negative inside."""
+    corners = obstacle.corners_m
+    along = np.roll(corners, -1, axis=0) - corners
+    along /= np.hypot(*along.T)[:, None]
+
+    def depth(x: FloatArray, y: FloatArray) -> FloatArray:
+        ox, oy = x[..., None] - corners[:, 0], y[..., None] - corners[:, 1]
+        return (ox * along[:, 1] - oy * along[:, 0]).max(-1)
+
+    return depth
+
+
+def test_a_box_is_a_polygon_with_its_corners() -> None:
+    box = Obstacle("box", 0.3, -0.2, 0.7, size_m=(1.0, 0.4))
+    polygon = Obstacle("polygon", 0.3, -0.2, 0.7, points_m=((-0.5, -0.2), (0.5, -0.2), (0.5, 0.2), (-0.5, 0.2)))
+    assert np.array_equal(box.corners_m, polygon.corners_m)
+    for one, other in zip(obstacle_arrays(((box,),)), obstacle_arrays(((polygon,),)), strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_a_polygon_blocks_the_line_through_it() -> None:
+    triangle = Obstacle("polygon", 0.0, 0.0, points_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    obstacles = obstacle_arrays(((triangle,),))
+    assert is_blocked(obstacles, 0, 0.6, 0.6, 0.2, 0.2)
+    assert not is_blocked(obstacles, 0, 0.6, 0.6, 1.0, 0.1)
+    assert not is_blocked(obstacles, 0, -0.1, -1.0, -0.1, 2.0)
+    assert Obstacle("cylinder", 0.0, 0.0, radius_m=1.0).corners_m.shape == (0, 2)

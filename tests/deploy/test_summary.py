@@ -96,3 +96,39 @@ def test_schema_is_json_schema_with_units_and_bounds():
     schema = json.loads(swarmwire("schema").stdout)
     assert schema["properties"]["duration_s"]["exclusiveMinimum"] == 0
     assert {"time", "physics", "arena", "robots", "radio", "run"} <= set(schema["properties"])
+
+
+SEEKER = """
+from swarmwire.agent import Agent
+
+class Seeker(Agent):
+    needs = ("light", "bumper", "positioning")
+
+    def step(self, robot):
+        x, y = robot.light.vector_sum()
+        turn = 1.0 if robot.bumper.pressed else y - 0.1 * robot.positioning.x_m
+        robot.drive(linear_mps=0.05 + 0.05 * x, angular_radps=turn)
+"""
+LIT = """
+format = 1
+name = "to the light"
+duration_s = 3
+[arena]
+size_m = [3, 3]
+lights = [{ intensity = 2.0, place = "random" }]
+obstacles = [{ shape = "polygon", points = [[0, 0], [0.4, 0], [0, 0.4]], count = 3, place = "random" }]
+[robots.moths]
+body = "epuck-gps"
+count = 10
+agent = "seeker.py:Seeker"
+"""
+
+
+def test_senses_of_light_touch_and_place_are_alike_in_every_layout_and_global_ones_are_named(tmp_path):
+    (tmp_path / "seeker.py").write_text(SEEKER)
+    (tmp_path / "lit.toml").write_text(LIT)
+    alone = run(tmp_path / "lit.toml", seed=2)
+    assert alone.global_senses == {"epuck-gps": ["compass", "positioning"]}
+    assert run(tmp_path / "lit.toml", seed=2, runners=3).trajectory_sha256 == alone.trajectory_sha256
+    many = run(tmp_path / "lit.toml", seeds=[1, 2])
+    assert many.arenas[1].trajectory_sha256 == alone.arenas[0].trajectory_sha256

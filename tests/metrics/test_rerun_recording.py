@@ -5,7 +5,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.truth import Obstacle
+from swarmwire.comms.truth import Light, Obstacle
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.rerun_recording import RerunRecording
 from tests.metrics.truths import edges, static, tally, truth
@@ -132,6 +132,19 @@ def test_a_run_without_a_radio_has_no_links_and_no_plot_of_packets(tmp_path):
     assert column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips") == {}
     assert column(tmp_path / "run.rrd", "/plots/packets", "Scalars:scalars") == {}
     assert column(tmp_path / "run.rrd", "/plots/shares", "SeriesLines:names") == {None: ["order", "largest_component"]}
+
+
+def test_obstacles_and_lights_are_drawn_once_where_they_are(tmp_path):
+    triangle = Obstacle("polygon", 1.0, -1.0, np.pi / 2, points_m=((0.0, 0.0), (1.0, 0.0), (0.0, 0.5)))
+    of = static(2, obstacles=(*OBSTACLES, triangle), lights=(Light(0.5, -0.25, 2.0), Light(1.0, 1.5, 1.0)))
+    record(tmp_path / "run.rrd", of, moving(of, 2))
+    (outlines,) = column(tmp_path / "run.rrd", "/world/obstacles", "LineStrips2D:strips").values()
+    assert [len(outline) for outline in outlines] == [49, 5, 4]
+    assert np.allclose(outlines[2], [[1.0, -1.0], [1.0, 0.0], [0.5, -1.0], [1.0, -1.0]], atol=1e-6)
+    assert column(tmp_path / "run.rrd", "/world/lights", "Points2D:positions") == {None: [[0.5, -0.25], [1.0, 1.5]]}
+    dark = static(2)
+    record(tmp_path / "dark.rrd", dark, moving(dark, 2))
+    assert column(tmp_path / "dark.rrd", "/world/lights", "Points2D:positions") == {}
 
 
 def test_an_arena_that_is_not_there_is_refused(tmp_path):

@@ -20,7 +20,9 @@ SAMPLE: dict[str, Any] = {
         "obstacles": [
             {"shape": "cylinder", "radius_m": 0.1, "count": 4, "place": "random"},
             {"shape": "box", "size_m": [0.5, 0.1], "at": [1.0, 1.0]},
+            {"shape": "polygon", "points": [[0, 0], [0.3, 0], [0, 0.3]], "count": 2, "place": "random"},
         ],
+        "lights": [{"intensity": 2.0, "place": "random", "count": 2}],
     },
     "robots": {
         "flock": {"body": "epuck", "count": 12, "agent": "a:B", "place": {"how": "disc", "radius_m": 1.5}},
@@ -28,7 +30,8 @@ SAMPLE: dict[str, Any] = {
     },
     "radio": {"range_m": 2.0, "loss": 0.3, "gives": {"range": {"noise_m": 0.02}, "bearing": {}}},
 }
-ALL_SENSES = {"flock": ("proximity", "compass", "odometry"), "big": ("proximity", "compass", "odometry")}
+SENSES = ("proximity", "compass", "odometry", "light", "bumper")
+ALL_SENSES = {"flock": SENSES, "big": SENSES}
 
 
 def changed(path: str, value: Any) -> dict[str, Any]:

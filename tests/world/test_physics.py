@@ -53,13 +53,38 @@ def test_a_robot_that_drives_at_a_wall_stops_there(body: str, steps: int) -> Non
     assert onsets.tolist() == [0, 1]
 
 
-@pytest.mark.parametrize("shape", [{"shape": "cylinder", "radius_m": 0.3}, {"shape": "box", "size_m": [0.6, 0.6]}])
+WALL = [[-0.3, -0.5], [0.1, -0.5], [0.1, 0.5], [-0.3, 0.5]]
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {"shape": "cylinder", "radius_m": 0.3},
+        {"shape": "box", "size_m": [0.6, 0.6]},
+        {"shape": "polygon", "points": WALL},
+    ],
+)
 def test_obstacles_hold_robots_back(shape: dict[str, object]) -> None:
     arena = {"size_m": [4.0, 4.0], "obstacles": [{**shape, "at": [0.0, 0.0]}]}
     world = World(posed([[-0.5, 0.0, 0.0]], arena=arena), [1], {})
     onsets = sum(world.move(commanded(world, 0.12, 0.0)) for _ in range(40))
     assert world.pose[0, 0] == pytest.approx(-0.3 - EPUCK.radius_m, abs=0.02 * EPUCK.radius_m)
     assert np.array_equal(onsets, [[0, 1]])
+
+
+def test_a_polygon_with_a_box_s_corners_moves_robots_as_the_box_does() -> None:
+    square = [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]]
+    worlds = [
+        World(posed([[-0.5, 0.1, 0.1]], arena={"size_m": [4.0, 4.0], "obstacles": [shape]}), [1], {})
+        for shape in (
+            {"shape": "box", "size_m": [0.6, 0.6], "heading_rad": 0.2, "at": [0.0, 0.0]},
+            {"shape": "polygon", "points": square, "heading_rad": 0.2, "at": [0.0, 0.0]},
+        )
+    ]
+    for _ in range(60):
+        onsets = [world.move(commanded(world, 0.12, 0.0)) for world in worlds]
+        assert np.array_equal(*onsets)
+        assert np.array_equal(worlds[0].pose, worlds[1].pose)
 
 
 def test_an_open_arena_holds_nobody_back() -> None:

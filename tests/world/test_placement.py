@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Obstacle, Static
+from swarmwire.comms.truth import Light, Obstacle, Static
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.world.samples import SAMPLE, changed
@@ -27,29 +27,22 @@ def outline(obstacle: Obstacle) -> FloatArray:
         return np.stack(
             [obstacle.x_m + obstacle.radius_m * np.cos(angle), obstacle.y_m + obstacle.radius_m * np.sin(angle)], 1
         )
-    along, across = 0.5 * obstacle.size_m[0], 0.5 * obstacle.size_m[1]
-    t = np.linspace(-1.0, 1.0, 100)
-    sides = [
-        (t * along, across + 0 * t),
-        (t * along, -across + 0 * t),
-        (along + 0 * t, t * across),
-        (-along + 0 * t, t * across),
-    ]
-    x, y = np.concatenate(sides, axis=1)
-    c, s = np.cos(obstacle.heading_rad), np.sin(obstacle.heading_rad)
-    return np.stack([obstacle.x_m + c * x - s * y, obstacle.y_m + s * x + c * y], axis=1)
+    corners, share = obstacle.corners_m, np.linspace(0.0, 1.0, 100)[:, None]
+    ends = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+    return np.concatenate([start + share * (end - start) for start, end in ends])
 
 
 def depth(obstacle: Obstacle, points: FloatArray) -> FloatArray:
     """How far outside an obstacle points (k, 2) are, in m; negative within."""
-    x, y = points[:, 0] - obstacle.x_m, points[:, 1] - obstacle.y_m
     if obstacle.shape == "cylinder":
-        return np.hypot(x, y) - obstacle.radius_m
-    c, s = np.cos(obstacle.heading_rad), np.sin(obstacle.heading_rad)
-    along, across = np.abs(c * x + s * y) - 0.5 * obstacle.size_m[0], np.abs(c * y - s * x) - 0.5 * obstacle.size_m[1]
-    return np.where(
-        (along < 0) & (across < 0), np.maximum(along, across), np.hypot(np.maximum(along, 0), np.maximum(across, 0))
-    )
+        return np.hypot(points[:, 0] - obstacle.x_m, points[:, 1] - obstacle.y_m) - obstacle.radius_m
+    corners = obstacle.corners_m
+    along = np.roll(corners, -1, axis=0) - corners
+    to = points[:, None] - corners
+    beyond = (to[..., 0] * along[:, 1] - to[..., 1] * along[:, 0]) / np.hypot(*along.T)
+    share = np.clip((to * along).sum(2) / (along**2).sum(1), 0.0, 1.0)
+    rim = np.hypot(*(to - share[..., None] * along).transpose(2, 0, 1)).min(1)
+    return np.where(beyond.max(1) <= 0.0, -rim, rim)
 
 
 def radii(static: Static) -> FloatArray:
@@ -67,6 +60,8 @@ def check_apart(world: World) -> None:
         for i, obstacle in enumerate(obstacles):
             assert np.all(np.abs(outline(obstacle)) <= half + 1e-9)
             assert np.all(depth(obstacle, xy) >= radius)
+            lit = np.array([[light.x_m, light.y_m] for light in static.lights[arena]])
+            assert np.all(depth(obstacle, lit) > 0.0)
             for other in obstacles[:i]:
                 assert np.all(depth(other, outline(obstacle)) > 0.0)
                 assert np.all(depth(obstacle, outline(other)) > 0.0)
@@ -82,6 +77,8 @@ OBSTACLES = st.lists(
             {"shape": "box", "size_m": [0.4, 0.1], "count": 4, "place": "random"},
             {"shape": "box", "size_m": [0.3, 0.3], "heading_rad": 0.5, "count": 2, "place": "random"},
             {"shape": "box", "size_m": [0.1, 2.0], "at": [1.4, 0.0]},
+            {"shape": "polygon", "points": [[0.1, 0.0], [0.4, 0.0], [0.2, 0.3]], "count": 5, "place": "random"},
+            {"shape": "polygon", "points": [[0, 1], [0, 0], [0.3, 0.3]], "at": [-2.0, 0.5], "heading_rad": 1.0},
         ]
     ),
     max_size=3,
@@ -112,6 +109,32 @@ def test_robots_stand_where_they_stood_whatever_groups_follow() -> None:
     before, after = built(SAMPLE, 1), built(changed("robots.big.count", 6), 1)
     assert np.array_equal(before.pose[:12], after.pose[:12])
     assert np.array_equal(before.pose[12:15], after.pose[12:15])
+
+
+def test_lights_change_nothing_else_and_stand_by_the_seed_alone() -> None:
+    lights = [{"intensity": 1.0, "at": [0.5, 0.0]}, {"intensity": 3.0, "place": "random", "count": 3}]
+    lit, dark = built(changed("arena.lights", lights), 1, 2), built(changed("arena.lights", []), 1, 2)
+    assert lit.static.obstacles == dark.static.obstacles
+    assert np.array_equal(lit.pose, dark.pose)
+    assert dark.static.lights == ((), ())
+    one, other = lit.static.lights
+    assert [light.intensity_m for light in one] == [1.0, 3.0, 3.0, 3.0]
+    assert one[0] == other[0] == Light(0.5, 0.0, 1.0)
+    assert len({(light.x_m, light.y_m) for light in (*one, *other)}) == 7
+    assert built(changed("arena.lights", lights), 2).static.lights[0] == other
+    assert built(changed("arena.lights", [{**lights[1], "count": 1}]), 1).static.lights[0] != one[1:2]
+
+
+def test_a_polygon_with_a_box_s_corners_stands_where_the_box_would() -> None:
+    box = {"shape": "box", "size_m": [0.4, 0.1], "count": 12, "place": "random"}
+    corners = [[-0.2, -0.05], [-0.2, 0.05], [0.2, 0.05], [0.2, -0.05]]  # clockwise
+    polygon = {**{key: box[key] for key in ("count", "place")}, "shape": "polygon", "points": corners}
+    boxes, polygons = (built(changed("arena.obstacles", [kind]), 4) for kind in (box, polygon))
+    for one, other in zip(boxes.static.obstacles[0], polygons.static.obstacles[0], strict=True):
+        assert (one.x_m, one.y_m, one.heading_rad) == (other.x_m, other.y_m, other.heading_rad)
+        assert (one.shape, other.shape) == ("box", "polygon")
+        assert {tuple(corner) for corner in one.corners_m} == {tuple(corner) for corner in other.corners_m}
+    assert np.array_equal(boxes.pose, polygons.pose)
 
 
 def test_robots_fill_the_disc_and_all_headings_evenly() -> None:
@@ -156,6 +179,12 @@ NO_ROOM = [
         1.5,
         "arena.obstacles.0: no room for cylinder 2 of 4 with seed 1: none of 1000 places",
     ),
+    (
+        "arena.lights",
+        [{"intensity": 1.0, "at": [1.0, 1.04]}],
+        r"arena.lights.0: no room for light 1 of 1 with seed 1: at \(1, 1.04\) it is outside or in an obstacle",
+    ),
+    ("arena.lights", [{"intensity": 1.0, "at": [3.1, 0]}], r"at \(3.1, 0\) it is outside or in an obstacle"),
     ("robots.flock.place", {"how": "grid", "spacing_m": 2.0}, "no room for flock-0 with seed 1: at "),
     (
         "robots.flock.place",

@@ -15,6 +15,8 @@ COUNT = "expected a whole number of at least 1 and at most 1000000"
 OFFSET = "expected uniform, tick, or an offset in s from 0 to below the period of a tick"
 NUMBER = "expected a number above 0 and at most 10000 (m)"
 STEPS = "so that a robot of flock at full speed moves at most a quarter of its radius in one step"
+CONVEX = "expected the corners of a convex polygon in order"
+POLYGON = {"shape": "polygon", "at": [0.0, 0.0]}
 FAULTS: list[tuple[str, Any, str]] = [
     ("format", 2, "format: expected 1, got 2"),
     ("name", "", "name: expected a text that is not empty, got ''"),
@@ -27,8 +29,37 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("arena.size_m", [1.0], f"arena.size_m.1: is missing; {NUMBER}"),
     ("arena.size_m", [1.0, float("nan")], f"arena.size_m.1: {NUMBER}, got nan"),
     ("arena.boundary", "torus", "arena.boundary: expected one of walls, open, got 'torus'"),
-    ("arena.lights", [], "arena.lights: unknown key; expected one of size_m, boundary, obstacles"),
-    ("arena.obstacles.0.shape", "ring", "arena.obstacles.0.shape: expected one of box, cylinder; got 'ring'"),
+    ("arena.windows", [], "arena.windows: unknown key; expected one of size_m, boundary, obstacles, lights"),
+    ("arena.lights", [{"at": [0, 0]}], f"arena.lights.0.intensity: is missing; {NUMBER}"),
+    ("arena.lights", [{"intensity": 1.0}], 'arena.lights.0: expected either at = [x, y] or place = "random"'),
+    ("arena.lights", [{"intensity": 0, "at": [0, 0]}], f"arena.lights.0.intensity: {NUMBER}, got 0"),
+    ("arena.obstacles.0", {**POLYGON, "points": 3}, "arena.obstacles.0.points: expected a list (m), got 3"),
+    (
+        "arena.obstacles.0",
+        {**POLYGON, "points": [[0, 0], [1, 0]]},
+        "arena.obstacles.0.points: expected 3 to 100 points, got 2",
+    ),
+    (
+        "arena.obstacles.0",
+        {**POLYGON, "points": [[0, 0], [1, 0], [0.2, 0.2], [0, 1]]},
+        f"arena.obstacles.0.points: {CONVEX}; (0, 1) lies on or beyond the side from (1, 0) to (0.2, 0.2)",
+    ),
+    (
+        "arena.obstacles.0",
+        {**POLYGON, "points": [[0, 0], [1, 0], [2, 0]]},
+        f"arena.obstacles.0.points: {CONVEX}; (0, 0) lies on or beyond the side from (2, 0) to (1, 0)",
+    ),
+    (
+        "arena.obstacles.0",
+        {**POLYGON, "points": [[0, 0], [3, 0], [0, 1]], "at": [0.1, 0.0]},
+        "arena.obstacles.0: expected the polygon to lie within the arena of 6 x 4 m",
+    ),
+    (
+        "arena.obstacles.0",
+        {"shape": "polygon", "points": [[0, 0], [6.1, 0], [0, 1]], "place": "random"},
+        "arena.obstacles.0: expected the polygon to lie within the arena of 6 x 4 m",
+    ),
+    ("arena.obstacles.0.shape", "ring", "arena.obstacles.0.shape: expected one of box, cylinder, polygon; got 'ring'"),
     (
         "arena.obstacles.0.size_m",
         [1, 1],
@@ -38,7 +69,7 @@ FAULTS: list[tuple[str, Any, str]] = [
     (
         "arena.obstacles.1.count",
         4,
-        'arena.obstacles.1: expected place = "random" with a count; at = [x, y] sets one obstacle',
+        'arena.obstacles.1: expected place = "random" with a count; at = [x, y] sets only one',
     ),
     ("arena.obstacles.1.at", [2.9, 0], "arena.obstacles.1: expected the box to lie within the arena of 6 x 4 m"),
     ("arena.obstacles.0.radius_m", 3, "arena.obstacles.0: expected the cylinder to lie within the arena of 6 x 4 m"),
@@ -51,7 +82,7 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("robots.flock.count", "x", f"robots.flock.count: {COUNT}, got 'x'"),
     ("robots.flock.count", 0, f"robots.flock.count: {COUNT}, got 0"),
     ("robots.flock.count", True, f"robots.flock.count: {COUNT}, got True"),
-    ("robots.flock.body", "car", "robots.flock.body: expected one of epuck, footbot; got 'car'"),
+    ("robots.flock.body", "car", "robots.flock.body: expected one of epuck, epuck-gps, footbot; got 'car'"),
     (
         "robots.flock.colour",
         "red",

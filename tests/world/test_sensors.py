@@ -33,9 +33,11 @@ def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: 
         size_m=(size_m, size_m),
         walled=more.get("walled", True),
         obstacles=obstacle_arrays((obstacles,)),
+        lights=(more.get("lights", ()),),
         radius_m=np.full(len(poses), body.radius_m),
         state=state,
         travel_m=np.zeros((1, len(poses), 2)),
+        touched=np.zeros((1, len(poses))),
     )
 
 
@@ -116,10 +118,13 @@ def marched(looked_at: Scene, body: Body, own: int, obstacles: tuple[Obstacle, .
             if other != own:
                 hit |= np.hypot(px - looked_at.state[0, other, 0], py - looked_at.state[0, other, 1]) <= body.radius_m
         for o in obstacles:
-            c, s = np.cos(o.heading_rad), np.sin(o.heading_rad)
-            ox, oy = c * (px - o.x_m) + s * (py - o.y_m), c * (py - o.y_m) - s * (px - o.x_m)
-            box = (np.abs(ox) <= o.size_m[0] / 2) & (np.abs(oy) <= o.size_m[1] / 2)
-            hit |= box if o.shape == "box" else np.hypot(ox, oy) <= o.radius_m
+            if o.shape == "cylinder":
+                hit |= np.hypot(px - o.x_m, py - o.y_m) <= o.radius_m
+                continue
+            within = np.ones_like(hit)
+            for (ax, ay), (bx, by) in zip(o.corners_m, np.roll(o.corners_m, -1, axis=0), strict=True):
+                within &= (bx - ax) * (py - ay) >= (by - ay) * (px - ax)
+            hit |= within
         if hit.any():
             found[ray] = along[np.argmax(hit)]
     return found
@@ -127,7 +132,11 @@ def marched(looked_at: Scene, body: Body, own: int, obstacles: tuple[Obstacle, .
 
 def test_rays_end_at_the_nearest_robot_obstacle_or_wall() -> None:
     poses = np.random.default_rng(2).uniform(-1, 1, (40, 3)) * [0.6, 0.6, np.pi]
-    obstacles = (Obstacle("cylinder", 0.3, 0.3, radius_m=0.1), Obstacle("box", -0.3, 0.1, 0.4, size_m=(0.3, 0.1)))
+    obstacles = (
+        Obstacle("cylinder", 0.3, 0.3, radius_m=0.1),
+        Obstacle("box", -0.3, 0.1, 0.4, size_m=(0.3, 0.1)),
+        Obstacle("polygon", 0.2, -0.3, 0.7, points_m=((0.0, -0.1), (0.2, 0.0), (0.1, 0.15), (-0.1, 0.1))),
+    )
     looked_at = scene(poses, EPUCK, obstacles, size_m=1.3)
     near = proximity(looked_at, EPUCK).distance_m()[0]
     for own in range(len(poses)):
@@ -227,5 +236,5 @@ def test_encoders_slip_by_tick_and_show_whole_steps() -> None:
 
 
 def test_the_sheets_of_the_bodies_have_a_sensor_each() -> None:
-    assert EPUCK.senses.keys() == {"proximity", "compass", "odometry"}
+    assert EPUCK.senses.keys() == FOOTBOT.senses.keys() == {"proximity", "compass", "odometry", "light", "bumper"}
     assert isinstance(EPUCK.proximity, Proximity)

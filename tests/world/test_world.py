@@ -54,6 +54,8 @@ def test_senses_have_a_row_per_robot_of_the_group_over_all_arenas() -> None:
         "compass.heading_rad": (6,),
         "odometry.left_m": (6,),
         "odometry.right_m": (6,),
+        "light.value": (6, 24),
+        "bumper.pressed": (6,),
     }
     for name, field in senses["flock"].fields.items():
         assert field.flags.c_contiguous, name
@@ -69,7 +71,8 @@ def test_only_what_is_needed_is_sensed() -> None:
 
 
 def test_a_sense_that_the_body_lacks_is_refused() -> None:
-    text = "^f: robots.flock.agent: the agent needs the sense 'sonar'; the body epuck has proximity, compass, odometry$"
+    has = "the body epuck has proximity, compass, odometry, light, bumper"
+    text = f"^f: robots.flock.agent: the agent needs the sense 'sonar'; {has}$"
     with pytest.raises(BadInput, match=text):
         World(scenario_from(SAMPLE, "f"), [1], {"flock": ("sonar",)})
 
@@ -83,7 +86,8 @@ def test_static_says_what_the_scenario_says() -> None:
         ("big", "footbot", 12, 15),
     ]
     assert static.robot_names[:2] == ("flock-0", "flock-1")
-    assert [o.shape for o in static.obstacles[0]] == ["cylinder"] * 4 + ["box"]
+    assert [o.shape for o in static.obstacles[0]] == ["cylinder"] * 4 + ["box"] + ["polygon"] * 2
+    assert [[light.intensity_m for light in some] for some in static.lights] == [[2.0, 2.0]] * 2
     assert World(scenario_from(changed("arena.boundary", "open"), "f"), [1], {}).static.walled is False
 
 

@@ -7,8 +7,15 @@ import numpy as np
 
 from swarmwire.agent.draw import Draw
 from swarmwire.agent.packet import Packet, Packets
-from swarmwire.agent.readings import CompassReading, OdometryReading, ProximityReading
-from swarmwire.agent.robots import proximity_sheet
+from swarmwire.agent.readings import (
+    BumperReading,
+    CompassReading,
+    LightReading,
+    OdometryReading,
+    PositioningReading,
+    ProximityReading,
+)
+from swarmwire.agent.robots import had
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.body import Body
 from swarmwire.comms.clock import to_s
@@ -44,7 +51,7 @@ class Robot:
     @property
     def proximity(self) -> ProximityReading:
         """Rays around the body: value, distance_m and angle_rad, (rays,)."""
-        return ProximityReading(self._turn.field("proximity", "value")[self._row], proximity_sheet(self.body))
+        return ProximityReading(self._turn.field("proximity", "value")[self._row], had(self.body.proximity))
 
     @property
     def compass(self) -> CompassReading:
@@ -56,6 +63,22 @@ class Robot:
         """Wheel encoders."""
         left, right = self._turn.field("odometry", "left_m"), self._turn.field("odometry", "right_m")
         return OdometryReading(float(left[self._row]), float(right[self._row]))
+
+    @property
+    def light(self) -> LightReading:
+        """Photocells around the body: value and angle_rad, (cells,)."""
+        return LightReading(self._turn.field("light", "value")[self._row], had(self.body.light))
+
+    @property
+    def bumper(self) -> BumperReading:
+        """Whether the body touched anything."""
+        return BumperReading(bool(self._turn.field("bumper", "pressed")[self._row]))
+
+    @property
+    def positioning(self) -> PositioningReading:
+        """Position in the arena's frame."""
+        x, y = self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m")
+        return PositioningReading(float(x[self._row]), float(y[self._row]))
 
     def drive(self, linear_mps: float, angular_radps: float) -> None:
         """Wanted forward speed and turn rate (positive to the left); it holds until the next call."""

@@ -7,15 +7,23 @@ from numpy.typing import ArrayLike
 
 from swarmwire.agent.draw import Draws
 from swarmwire.agent.packet import Packets
-from swarmwire.agent.readings import CompassReadings, OdometryReadings, ProximityReadings
+from swarmwire.agent.readings import (
+    BumperReadings,
+    CompassReadings,
+    LightReadings,
+    OdometryReadings,
+    PositioningReadings,
+    ProximityReadings,
+)
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.body import Body
 from swarmwire.comms.clock import to_s
 from swarmwire.comms.messages import Message, encode_rows
-from swarmwire.comms.sheets import Proximity
+from swarmwire.comms.sheets import Ring
 
 M = TypeVar("M", bound=Message)
+S = TypeVar("S", bound=Ring)
 
 
 class Robots:
@@ -50,7 +58,7 @@ class Robots:
     def proximity(self) -> ProximityReadings:
         """Rays around the bodies: value and distance_m (n, rays), angle_rad (rays,)."""
         value = self._turn.field("proximity", "value")
-        return ProximityReadings(value, proximity_sheet(self.body))
+        return ProximityReadings(value, had(self.body.proximity))
 
     @property
     def compass(self) -> CompassReadings:
@@ -61,6 +69,21 @@ class Robots:
     def odometry(self) -> OdometryReadings:
         """Wheel encoders: left_m and right_m (n,)."""
         return OdometryReadings(self._turn.field("odometry", "left_m"), self._turn.field("odometry", "right_m"))
+
+    @property
+    def light(self) -> LightReadings:
+        """Photocells around the bodies: value (n, cells), angle_rad (cells,)."""
+        return LightReadings(self._turn.field("light", "value"), had(self.body.light))
+
+    @property
+    def bumper(self) -> BumperReadings:
+        """Bumpers: pressed (n,), 1 or 0."""
+        return BumperReadings(self._turn.field("bumper", "pressed"))
+
+    @property
+    def positioning(self) -> PositioningReadings:
+        """Positions in the arena's frame: x_m and y_m (n,)."""
+        return PositioningReadings(self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m"))
 
     def drive(self, linear_mps: ArrayLike, angular_radps: ArrayLike, rows: BoolArray | None = None) -> None:
         """Wanted forward speed and turn rate, (n,) or one number; outside the mask `rows` the last ones hold."""
@@ -107,9 +130,8 @@ def _of(rows: BoolArray, value: Any) -> Any:
     return value if np.ndim(value) == 0 else np.asarray(value)[rows]
 
 
-def proximity_sheet(body: Body) -> Proximity:
-    """The data sheet of the body's proximity sensor, which it has (needs are checked before a run)."""
-    sheet = body.proximity
+def had(sheet: S | None) -> S:
+    """The data sheet of a sense that the body has (needs are checked before a run)."""
     if sheet is None:
-        raise AttributeError(f"the body {body.name} has no proximity sensor")
+        raise AttributeError("the body does not have this sense")
     return sheet

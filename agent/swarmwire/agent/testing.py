@@ -109,6 +109,13 @@ def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatA
     if body.odometry is not None:
         for side in ("left_m", "right_m"):
             fields[f"odometry.{side}"] = tick * 0.01 + _uniform(key, tick, side, (n,)) * 0.01
+    if body.light is not None:
+        fields["light.value"] = _uniform(key, tick, "light", (n, len(body.light.angles_deg)))
+    if "bumper" in body.senses:
+        fields["bumper.pressed"] = np.round(_uniform(key, tick, "bumper", (n,)))
+    if "positioning" in body.senses:
+        for axis in ("x_m", "y_m"):
+            fields[f"positioning.{axis}"] = _uniform(key, tick, axis, (n,)) * 4.0 - 2.0
     return fields
 
 

@@ -1,15 +1,20 @@
-"""Bodies: kinds of robot, each a TOML data sheet. Those that come with swarmwire lie in `bodies/`."""
+"""Bodies: kinds of robot, each a TOML data sheet. Those that come with swarmwire lie in `bodies/`.
+
+A sheet with `like = "epuck"` starts from that body's sheet, table by table, and says only what differs.
+"""
 
 import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
 from importlib.resources import files
 from math import isfinite
-from typing import Any, cast, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import fault_of, limits_of, parameter
-from swarmwire.comms.sheets import SHEETS, Compass, Odometry, Proximity
+from swarmwire.comms.sheets import SHEETS, Compass, Light, Odometry, Proximity, Sheet
+
+S = TypeVar("S", bound=Sheet)
 
 
 @dataclass(frozen=True)
@@ -32,25 +37,30 @@ class Body:
     height_m: float = parameter(help="height of the body", unit="m", above=0)
     mass_kg: float = parameter(help="mass", unit="kg", above=0)
     drive: DifferentialDrive = parameter(help="how it moves")
-    senses: dict[str, Proximity | Compass | Odometry] = field(default_factory=dict[str, Proximity | Compass | Odometry])
+    senses: dict[str, Sheet] = field(default_factory=dict[str, Sheet])
 
     @property
     def proximity(self) -> Proximity | None:
         """The proximity sensor's sheet."""
-        sheet = self.senses.get("proximity")
-        return sheet if isinstance(sheet, Proximity) else None
+        return self._sheet(Proximity)
 
     @property
     def compass(self) -> Compass | None:
         """The compass's sheet."""
-        sheet = self.senses.get("compass")
-        return sheet if isinstance(sheet, Compass) else None
+        return self._sheet(Compass)
 
     @property
     def odometry(self) -> Odometry | None:
         """The wheel encoders' sheet."""
-        sheet = self.senses.get("odometry")
-        return sheet if isinstance(sheet, Odometry) else None
+        return self._sheet(Odometry)
+
+    @property
+    def light(self) -> Light | None:
+        """The photocells' sheet."""
+        return self._sheet(Light)
+
+    def _sheet(self, kind: type[S]) -> S | None:
+        return next((sheet for sheet in self.senses.values() if isinstance(sheet, kind)), None)
 
     @property
     def max_linear_mps(self) -> float:
@@ -74,21 +84,33 @@ def body_names() -> list[str]:
 
 def load_body(name: str) -> Body:
     """A body that comes with swarmwire, by name; BadInput if there is none."""
-    if name not in body_names():
-        raise BadInput("", "body", f"expected one of {', '.join(body_names())}; got {name!r}")
-    text = files("swarmwire.comms").joinpath("bodies", f"{name}.toml").read_text(encoding="utf-8")
-    return body_from(tomllib.loads(text), where=f"{name}.toml")
+    return body_from(_shipped(name, "", "body"), where=f"{name}.toml")
 
 
 def body_from(sheet: Mapping[str, Any], where: str) -> Body:
     """The body of a data sheet; BadInput names `where` and the key of what is wrong."""
-    rest = dict(sheet)
+    like, rest = sheet.get("like"), {key: value for key, value in sheet.items() if key != "like"}
+    if like is not None:
+        return body_from(_merged(_shipped(like, where, "like"), rest), where)
     senses = _mapping(where, "senses", rest.pop("senses", {}))
     unknown = [name for name in senses if name not in SHEETS]
     if unknown:
         raise BadInput(where, f"senses.{unknown[0]}", f"unknown sense; expected one of {', '.join(SHEETS)}")
     built = {name: _build(SHEETS[name], value, where, f"senses.{name}") for name, value in senses.items()}
     return _build(Body, {**rest, "senses": built}, where, "")
+
+
+def _shipped(name: object, where: str, key: str) -> dict[str, Any]:
+    """The sheet of a body that comes with swarmwire; BadInput names `where` and `key` if there is none."""
+    if name not in body_names():
+        raise BadInput(where, key, f"expected one of {', '.join(body_names())}; got {name!r}")
+    return tomllib.loads(files("swarmwire.comms").joinpath("bodies", f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """`base` with what `over` says in its place; tables that both have are merged."""
+    both = {key for key in over if isinstance(over[key], Mapping) and isinstance(base.get(key), Mapping)}
+    return {**base, **over, **{key: _merged(base[key], over[key]) for key in both}}
 
 
 def _mapping(where: str, key: str, value: object) -> dict[str, Any]:

@@ -1,4 +1,7 @@
-"""Obstacles as arrays, and rays against them. Compiled; shared by the world's sensors and the air's line of sight."""
+"""Obstacles as arrays, and rays against them. Compiled; shared by the world's sensors and the air's line of sight.
+
+A box is a polygon with four sides: there are circles and convex polygons, nothing else.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -16,28 +19,52 @@ class Obstacles(NamedTuple):
 
     circle_start: IntArray  # (arenas + 1,)
     circle: FloatArray  # (circles, 3) x, y, radius in m
-    box_start: IntArray  # (arenas + 1,)
-    box: FloatArray  # (boxes, 6) x, y, half length, half width in m, cosine and sine of the heading
+    polygon_start: IntArray  # (arenas + 1,)
+    polygon: FloatArray  # (polygons, 3) x, y, radius in m of a circle around it
+    side_start: IntArray  # (polygons + 1,) polygon k has the sides side_start[k] to side_start[k + 1] - 1
+    side: FloatArray  # (sides, 5) as `sides_of` has them
+
+
+@njit(cache=True)
+def sides_of(corners):
+    """Sides of a convex polygon with these corners (k, 2), counter-clockwise, as rows (k, 5).
+
+    Each is the corner x, y where it starts, its outward unit normal, and the normal's product with the corner: points
+    of the polygon have no greater product with any side's normal.
+    """
+    sides = np.empty((len(corners), 5))
+    for i in range(len(corners)):
+        x, y = corners[i]
+        along, up = corners[(i + 1) % len(corners)] - corners[i]
+        length = np.sqrt(along * along + up * up)
+        nx, ny = up / length, -along / length
+        sides[i] = x, y, nx, ny, nx * x + ny * y
+    return sides
 
 
 def obstacle_arrays(arenas: tuple[tuple[Obstacle, ...], ...]) -> Obstacles:
     """The obstacles of each arena as arrays."""
-    circles, boxes = [], []
-    circle_start, box_start = [0], [0]
+    circles, polygons, sides = [], [], []
+    circle_start, polygon_start, side_start = [0], [0], [0]
     for obstacles in arenas:
         for o in obstacles:
             if o.shape == "cylinder":
                 circles.append((o.x_m, o.y_m, o.radius_m))
-            else:
-                half = 0.5 * o.size_m[0], 0.5 * o.size_m[1]
-                boxes.append((o.x_m, o.y_m, *half, np.cos(o.heading_rad), np.sin(o.heading_rad)))
+                continue
+            corners = o.corners_m
+            centre = corners.mean(axis=0)
+            polygons.append((*centre, np.hypot(*(corners - centre).T).max()))
+            sides.append(sides_of(corners))
+            side_start.append(side_start[-1] + len(corners))
         circle_start.append(len(circles))
-        box_start.append(len(boxes))
+        polygon_start.append(len(polygons))
     return Obstacles(
         np.array(circle_start, np.int64),
         np.array(circles, np.float64).reshape(-1, 3),
-        np.array(box_start, np.int64),
-        np.array(boxes, np.float64).reshape(-1, 6),
+        np.array(polygon_start, np.int64),
+        np.array(polygons, np.float64).reshape(-1, 3),
+        np.array(side_start, np.int64),
+        np.concatenate([np.empty((0, 5)), *sides]),
     )
 
 
@@ -56,20 +83,20 @@ def ray_to_circle(px, py, dx, dy, cx, cy, radius):
 
 
 @njit(cache=True)
-def ray_to_box(px, py, dx, dy, box):
-    """As `ray_to_circle`, to a box (a row of `Obstacles.box`)."""
-    c, s = box[4], box[5]
-    ox, oy = px - box[0], py - box[1]
-    x, y = c * ox + s * oy, c * oy - s * ox
-    u, v = c * dx + s * dy, c * dy - s * dx
+def ray_to_polygon(px, py, dx, dy, obstacles, k):
+    """As `ray_to_circle`, to polygon k: the ray is clipped by one side after the other (Cyrus and Beck, 1978)."""
     enter, leave = 0.0, np.inf
-    for at, step, half in ((x, u, box[2]), (y, v, box[3])):
-        if abs(step) < 1e-12:
-            if abs(at) > half:
+    for i in range(obstacles.side_start[k], obstacles.side_start[k + 1]):
+        nx, ny = obstacles.side[i, 2], obstacles.side[i, 3]
+        outside = nx * px + ny * py - obstacles.side[i, 4]
+        speed = nx * dx + ny * dy
+        if abs(speed) < 1e-12:
+            if outside > 0.0:
                 return np.inf
+        elif speed < 0.0:
+            enter = max(enter, -outside / speed)
         else:
-            near, far = (-half - at) / step, (half - at) / step
-            enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
+            leave = min(leave, -outside / speed)
     return enter if enter <= leave else np.inf
 
 
@@ -85,7 +112,7 @@ def is_blocked(obstacles, arena, x0, y0, x1, y1):
         circle = obstacles.circle[i]
         if ray_to_circle(x0, y0, dx, dy, circle[0], circle[1], circle[2]) <= length:
             return True
-    for i in range(obstacles.box_start[arena], obstacles.box_start[arena + 1]):
-        if ray_to_box(x0, y0, dx, dy, obstacles.box[i]) <= length:
+    for k in range(obstacles.polygon_start[arena], obstacles.polygon_start[arena + 1]):
+        if ray_to_polygon(x0, y0, dx, dy, obstacles, k) <= length:
             return True
     return False

@@ -45,17 +45,14 @@ class ResponseCurve:
 
 
 @dataclass(frozen=True)
-class Proximity:
-    """Rays from the body's rim that answer to the nearest thing on them. Sense: value (n, rays), 0 to 1."""
+class Ring:
+    """Sensors around the body that look outwards."""
 
-    angles_deg: tuple[float, ...] = parameter(help="directions of the rays, counter-clockwise from ahead", unit="deg")
-    range_m: float = parameter(help="length of a ray from the rim", unit="m", above=0)
-    response: ResponseCurve = parameter(help="answer to distance")
-    noise: float = parameter(0.0, help="half width of the uniform noise added to the response", at_least=0, at_most=1)
+    angles_deg: tuple[float, ...] = parameter(help="where each sensor looks, counter-clockwise from ahead", unit="deg")
 
     @cached_property
     def angle_rad(self) -> FloatArray:
-        """Directions of the rays in the body's frame, in (-pi, pi], (rays,)."""
+        """Where the sensors look in the body's frame, in (-pi, pi], (sensors,)."""
         angle = np.deg2rad(np.array(self.angles_deg, np.float64))
         wrapped = np.arctan2(np.sin(angle), np.cos(angle))
         wrapped.setflags(write=False)
@@ -63,8 +60,24 @@ class Proximity:
 
     @cached_property
     def direction(self) -> tuple[FloatArray, FloatArray]:
-        """Cosine and sine of `angle_rad`, (rays,) each."""
+        """Cosine and sine of `angle_rad`, (sensors,) each."""
         return np.cos(self.angle_rad), np.sin(self.angle_rad)
+
+
+@dataclass(frozen=True)
+class Proximity(Ring):
+    """Rays from the body's rim that answer to the nearest thing on them. Sense: value (n, rays), 0 to 1."""
+
+    range_m: float = parameter(help="length of a ray from the rim", unit="m", above=0)
+    response: ResponseCurve = parameter(help="answer to distance")
+    noise: float = parameter(0.0, help="half width of the uniform noise added to the response", at_least=0, at_most=1)
+
+
+@dataclass(frozen=True)
+class Light(Ring):
+    """Photocells that answer to the arena's lights. Sense: value (n, sensors), 0 dark to 1."""
+
+    noise: float = parameter(0.0, help="half width of the uniform noise added to the response", at_least=0, at_most=1)
 
 
 @dataclass(frozen=True)
@@ -82,5 +95,26 @@ class Odometry:
     step_m: float = parameter(0.0, help="travel per encoder step; 0: not quantised", unit="m", at_least=0)
 
 
-Sheet = Proximity | Compass | Odometry
-SHEETS: dict[str, type[Any]] = {"proximity": Proximity, "compass": Compass, "odometry": Odometry}
+@dataclass(frozen=True)
+class Bumper:
+    """A touch-sensitive rim. Sense: pressed (n,), 1 if the body touched anything in the tick before, else 0."""
+
+
+@dataclass(frozen=True)
+class Positioning:
+    """The position in the arena's frame, as a tracking camera tells it. Sense: x_m, y_m (n,)."""
+
+    noise_m: float = parameter(
+        0.0, help="standard deviation of the error along each axis, new in each tick", unit="m", at_least=0
+    )
+
+
+Sheet = Proximity | Compass | Odometry | Light | Bumper | Positioning
+SHEETS: dict[str, type[Any]] = {
+    "proximity": Proximity,
+    "compass": Compass,
+    "odometry": Odometry,
+    "light": Light,
+    "bumper": Bumper,
+    "positioning": Positioning,
+}

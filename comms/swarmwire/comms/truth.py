@@ -2,20 +2,33 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.body import Body
 
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """A fixed thing that bodies hit and rays end at; a cylinder has radius_m, a box size_m."""
+    """A fixed thing that bodies hit and rays end at; a cylinder has radius_m, a box size_m, a polygon points_m."""
 
-    shape: str  # "cylinder" | "box"
+    shape: str  # "cylinder" | "box" | "polygon"
     x_m: float
     y_m: float
     heading_rad: float = 0.0
     radius_m: float = 0.0
     size_m: tuple[float, float] = (0.0, 0.0)
+    points_m: tuple[tuple[float, float], ...] = ()  # convex, counter-clockwise, around (x_m, y_m) at heading 0
+
+    @property
+    def corners_m(self) -> FloatArray:
+        """Corners of a box or polygon in the arena's frame, counter-clockwise, (k, 2); a cylinder has none."""
+        along, across = 0.5 * self.size_m[0], 0.5 * self.size_m[1]
+        box = ((-along, -across), (along, -across), (along, across), (-along, across))
+        points = np.array(box if self.shape == "box" else self.points_m, np.float64).reshape(-1, 2)
+        c, s = np.cos(self.heading_rad), np.sin(self.heading_rad)
+        x, y = points[:, 0], points[:, 1]
+        return np.stack([self.x_m + (c * x - s * y), self.y_m + (s * x + c * y)], axis=1)
 
 
 @dataclass(frozen=True, slots=True)

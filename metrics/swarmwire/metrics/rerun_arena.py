@@ -1,4 +1,4 @@
-"""The arena of a recording: boundary and obstacles once; robots, headings, trails and links per tick."""
+"""The arena of a recording: boundary, obstacles and lights once; robots, headings, trails and links per tick."""
 
 import math
 from typing import Any
@@ -14,9 +14,10 @@ THINNED_LINKS_EVERY_TICKS = 10
 _GROUP_COLORS = ((86, 180, 233), (240, 160, 50), (0, 200, 140), (230, 110, 180), (240, 228, 66), (160, 140, 250))
 _DEAD_COLOR = (95, 95, 100)
 _WALL_COLOR = (150, 155, 170)
+_LIGHT_COLOR = (255, 220, 60)
 _LINK_COLOR = (130, 145, 180, 50)
 _TRAIL_ALPHA = 170
-_LINKS, _TRAILS, _HEADINGS, _ROBOTS = 1.0, 2.0, 3.0, 4.0  # drawn in this order
+_LIGHTS, _LINKS, _TRAILS, _HEADINGS, _ROBOTS = 0.5, 1.0, 2.0, 3.0, 4.0  # drawn in this order
 _HEADING_RADII = 2.5  # length of a heading's arrow in body radii, from the centre
 _LEAST_HEADING = 0.025  # and at least this share of the arena's larger side, so that it can be seen,
 _CROWDED = 0.25  # or this share / sqrt(robots) if that is less, so that a thousand do not cover one another
@@ -53,6 +54,11 @@ class RerunArena:
         if outlines:
             thin = rr.Radius.ui_points(1.2)
             rec.log("world/obstacles", rr.LineStrips2D(outlines, radii=thin, colors=_WALL_COLOR), static=True)
+        lights = [(light.x_m, light.y_m) for light in static.lights[self._arena]] if static.lights else []
+        if lights:
+            disc = rr.Radius.ui_points(6.0)
+            points = rr.Points2D(lights, radii=disc, colors=_LIGHT_COLOR, draw_order=_LIGHTS)
+            rec.log("world/lights", points, static=True)
         names = list(static.robot_names)
         robots = rr.Points2D.from_fields(radii=self._radius_m, labels=names, show_labels=False, draw_order=_ROBOTS)
         rec.log("world/robots", robots, static=True)
@@ -108,14 +114,11 @@ def _by_group(static: Static) -> tuple[Any, FloatArray]:
 
 def _outline(obstacle: Obstacle) -> FloatArray:
     """A closed line around an obstacle, (points, 2) in m, arena frame."""
-    centre = np.array([obstacle.x_m, obstacle.y_m])
     if obstacle.shape == "cylinder":
+        centre = np.array([obstacle.x_m, obstacle.y_m])
         angle = np.linspace(0.0, 2.0 * np.pi, 49)
         return centre + obstacle.radius_m * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    half_x, half_y = obstacle.size_m[0] / 2, obstacle.size_m[1] / 2
-    corners = np.array([[-half_x, -half_y], [half_x, -half_y], [half_x, half_y], [-half_x, half_y]])
-    cos, sin = np.cos(obstacle.heading_rad), np.sin(obstacle.heading_rad)
-    return centre + _closed(corners) @ np.array([[cos, sin], [-sin, cos]])
+    return _closed(obstacle.corners_m)
 
 
 def _closed(corners: FloatArray) -> FloatArray:

@@ -14,6 +14,7 @@ GIVES = Gives(RangeGiven(), BearingGiven())
 BETWEEN = {
     "cylinder": Obstacle("cylinder", 0.0, 0.0, radius_m=0.2),
     "box": Obstacle("box", 0.0, 0.0, np.pi / 4, size_m=(0.6, 0.1)),
+    "polygon": Obstacle("polygon", 0.0, -0.1, 0.3, points_m=((-0.1, 0.0), (0.2, 0.0), (0.0, 0.3))),
 }
 
 

@@ -2,9 +2,12 @@
 
 import math
 
+import numpy as np
+
 from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.scenario import BoxTable, CylinderTable, Scenario
+from swarmwire.world.obstacles import extent, heading_of, obstacle_at
+from swarmwire.world.scenario import ObstacleTable, Scenario
 
 MOST_OF_RADIUS = 0.25  # how far a robot at full speed may move in one physics step
 
@@ -38,23 +41,14 @@ def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> Non
             raise BadInput(where, "physics.steps", f"expected at least {needed}, {text}; got {scenario.physics.steps}")
 
 
-def _check_obstacle(scenario: Scenario, obstacle: CylinderTable | BoxTable, key: str, where: str) -> None:
-    """A fixed obstacle lies within the arena; a random one would fit into it at heading 0."""
-    half_x, half_y = 0.5 * scenario.arena.size_m[0], 0.5 * scenario.arena.size_m[1]
-    reach_x, reach_y = reach(obstacle)
-    x, y = obstacle.at or (0.0, 0.0)
-    if abs(x) + reach_x > half_x + 1e-9 or abs(y) + reach_y > half_y + 1e-9:
-        size = " x ".join(f"{extent:g}" for extent in scenario.arena.size_m)
-        raise BadInput(where, key, f"expected the {obstacle.shape} to lie within the arena of {size} m")
-
-
-def reach(obstacle: CylinderTable | BoxTable) -> tuple[float, float]:
-    """How far an obstacle reaches from its centre along the arena's x and y, in m."""
-    if isinstance(obstacle, CylinderTable):
-        return obstacle.radius_m, obstacle.radius_m
-    c, s = abs(math.cos(obstacle.heading_rad or 0.0)), abs(math.sin(obstacle.heading_rad or 0.0))
-    length, width = obstacle.size_m
-    return 0.5 * (c * length + s * width), 0.5 * (s * length + c * width)
+def _check_obstacle(scenario: Scenario, table: ObstacleTable, key: str, where: str) -> None:
+    """A fixed obstacle lies within the arena; a random one would fit into it somewhere at heading 0."""
+    size_m = np.array(scenario.arena.size_m)
+    least, greatest = extent(obstacle_at(table, *(table.at or (0.0, 0.0)), heading_of(table) or 0.0))
+    fits = np.all(greatest - least <= size_m + 2e-9)
+    if not fits or (table.at and (np.any(greatest > 0.5 * size_m + 1e-9) or np.any(least < -0.5 * size_m - 1e-9))):
+        size = " x ".join(f"{side:g}" for side in size_m)
+        raise BadInput(where, key, f"expected the {table.shape} to lie within the arena of {size} m")
 
 
 def _check_send_offset(scenario: Scenario, where: str) -> None:

@@ -1,11 +1,11 @@
-"""Which contacts began: pairs that touch now and did not before. Compiled."""
+"""Which contacts began, pairs that touch now and did not before, and who touches anything. Compiled."""
 
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.arrays import AnyArray, IntArray
+from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 
 
 @njit(cache=True)
@@ -39,3 +39,14 @@ def count_began(now: IntArray, before: IntArray, bodies: int, onsets: IntArray) 
             at += 1
         if at == len(before) or before[at] != code:
             onsets[1 if code % bodies == bodies - 1 else 0] += 1
+
+
+@njit(cache=True)
+def mark(now: IntArray, touched: FloatArray) -> None:
+    """Set touched (robots,) to 1 for each robot in the pairs of `now`, else to 0."""
+    touched[:] = 0.0
+    bodies = len(touched) + 1  # the highest index is the static body's
+    for code in now:
+        for body in (code // bodies, code % bodies):
+            if body < len(touched):
+                touched[body] = 1.0

@@ -49,7 +49,7 @@ def _explained(error: ErrorDetails, schema: Node) -> tuple[str, str]:
         return f"{key}.{tag}", f"{choices}; got {_shown(given[tag])}" if tag in given else f"is missing; {choices}"
     if error["loc"][-1] == "[key]":
         return key, f"expected a name of at most 40 letters, digits and _ that starts with a letter, got {got}"
-    if kind in ("place", "poses"):  # worded by the scenario's own validators
+    if kind in ("place", "poses", "points"):  # worded by the scenario's own validators
         return key, error["msg"]
     return key, f"expected {_words(node, schema)}, got {got}"
 

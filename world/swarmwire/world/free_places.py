@@ -9,6 +9,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.draws_compiled import uniform
+from swarmwire.comms.geometry import sides_of
 from swarmwire.comms.grid import cell_of
 
 MOST_CANDIDATES = 1000
@@ -32,7 +33,8 @@ class Taken(NamedTuple):
     half_x_m: float  # of the arena
     half_y_m: float
     circle: FloatArray  # (circles, 3) x, y, radius of round obstacles
-    box: FloatArray  # (boxes, 6) x, y, half length, half width, cosine and sine of the heading
+    side_start: IntArray  # (polygons + 1,) polygon k has the sides side_start[k] to side_start[k + 1] - 1
+    side: FloatArray  # (sides, 5) as `sides_of` has them
     cell_m: float
     head: IntArray  # (ny, nx) last robot put into a cell
     follow: IntArray  # (robots,) the robot put there before
@@ -49,12 +51,17 @@ def candidate(region, key, entity, attempt, purpose):
 
 
 @njit(cache=True)
-def _distance_to_box(x, y, box):
-    """Distance in m of a point from a box, 0 within."""
-    ox, oy = x - box[0], y - box[1]
-    along = max(abs(box[4] * ox + box[5] * oy) - box[2], 0.0)
-    across = max(abs(box[4] * oy - box[5] * ox) - box[3], 0.0)
-    return np.sqrt(along * along + across * across)
+def _distance(x, y, sides):
+    """Distance in m of a point from a convex polygon, 0 within."""
+    within, least2 = True, np.inf
+    for i in range(len(sides)):
+        ax, ay = sides[i, 0], sides[i, 1]
+        bx, by = sides[(i + 1) % len(sides), 0] - ax, sides[(i + 1) % len(sides), 1] - ay
+        within = within and sides[i, 2] * x + sides[i, 3] * y <= sides[i, 4]
+        share = min(max(((x - ax) * bx + (y - ay) * by) / (bx * bx + by * by), 0.0), 1.0)
+        dx, dy = x - ax - share * bx, y - ay - share * by
+        least2 = min(least2, dx * dx + dy * dy)
+    return 0.0 if within else np.sqrt(least2)
 
 
 @njit(cache=True)
@@ -66,8 +73,8 @@ def _disc_clear_of_obstacles(taken, x, y, radius):
         dx, dy, apart = x - taken.circle[i, 0], y - taken.circle[i, 1], reach + taken.circle[i, 2]
         if dx * dx + dy * dy < apart * apart:
             return False
-    for i in range(len(taken.box)):  # noqa: SIM110 - compiled: no generators
-        if _distance_to_box(x, y, taken.box[i]) < reach:
+    for k in range(len(taken.side_start) - 1):
+        if _distance(x, y, taken.side[taken.side_start[k] : taken.side_start[k + 1]]) < reach:
             return False
     return True
 
@@ -90,26 +97,28 @@ def _disc_clear_of_robots(taken, x, y, radius):
 
 
 @njit(cache=True)
-def _axis_parts(a, b, ux, uy):
-    """Whether the line along the unit vector (ux, uy) shows a gap between two boxes (separating axis theorem)."""
-    reach_a = a[2] * abs(a[4] * ux + a[5] * uy) + a[3] * abs(a[4] * uy - a[5] * ux)
-    reach_b = b[2] * abs(b[4] * ux + b[5] * uy) + b[3] * abs(b[4] * uy - b[5] * ux)
-    return abs((b[0] - a[0]) * ux + (b[1] - a[1]) * uy) >= reach_a + reach_b + GAP_M
+def _parted(a, b):
+    """Whether a side of polygon a has all of b beyond it, with a gap (half of the separating axis theorem)."""
+    for i in range(len(a)):
+        least = np.inf
+        for j in range(len(b)):
+            least = min(least, a[i, 2] * b[j, 0] + a[i, 3] * b[j, 1])
+        if least - a[i, 4] >= GAP_M:
+            return True
+    return False
 
 
 @njit(cache=True)
-def _box_clear_of_obstacles(taken, box):
-    reach_x = box[2] * abs(box[4]) + box[3] * abs(box[5]) + GAP_M
-    reach_y = box[2] * abs(box[5]) + box[3] * abs(box[4]) + GAP_M
-    if abs(box[0]) + reach_x > taken.half_x_m or abs(box[1]) + reach_y > taken.half_y_m:
-        return False
-    for i in range(len(taken.circle)):
-        if _distance_to_box(taken.circle[i, 0], taken.circle[i, 1], box) < taken.circle[i, 2] + GAP_M:
+def _polygon_clear_of_obstacles(taken, sides):
+    for i in range(len(sides)):
+        if abs(sides[i, 0]) + GAP_M > taken.half_x_m or abs(sides[i, 1]) + GAP_M > taken.half_y_m:
             return False
-    for i in range(len(taken.box)):
-        b = taken.box[i]
-        parted = _axis_parts(box, b, box[4], box[5]) or _axis_parts(box, b, -box[5], box[4])
-        if not (parted or _axis_parts(box, b, b[4], b[5]) or _axis_parts(box, b, -b[5], b[4])):
+    for i in range(len(taken.circle)):
+        if _distance(taken.circle[i, 0], taken.circle[i, 1], sides) < taken.circle[i, 2] + GAP_M:
+            return False
+    for k in range(len(taken.side_start) - 1):
+        other = taken.side[taken.side_start[k] : taken.side_start[k + 1]]
+        if not (_parted(sides, other) or _parted(other, sides)):
             return False
     return True
 
@@ -118,7 +127,7 @@ def _box_clear_of_obstacles(taken, box):
 def free_circle(
     taken: Taken, region: Region, key: np.uint64, entity: int, purpose: int, radius: float
 ) -> tuple[float, float]:
-    """x, y of the first candidate where a round obstacle is clear of all obstacles; nan if there is none."""
+    """x, y of the first candidate where a disc is clear of all obstacles; nan if there is none."""
     for attempt in range(MOST_CANDIDATES):
         x, y, inside = candidate(region, key, entity, attempt, purpose)
         if inside and _disc_clear_of_obstacles(taken, x, y, radius):
@@ -127,30 +136,24 @@ def free_circle(
 
 
 @njit(cache=True)
-def free_box(
-    taken: Taken,
-    region: Region,
-    key: np.uint64,
-    entity: int,
-    purpose: int,
-    half_length: float,
-    half_width: float,
-    heading: float,
+def free_polygon(
+    taken: Taken, region: Region, key: np.uint64, entity: int, purpose: int, corners: FloatArray, heading: float
 ) -> tuple[float, float, float]:
-    """x, y, heading of the first candidate where a box is clear of all obstacles; nan if there is none.
+    """x, y, heading of the first candidate where a polygon is clear of all obstacles; nan if there is none.
 
-    A heading that is not finite is drawn with each candidate.
+    `corners` (k, 2) are those at the origin and heading 0. A heading that is not finite is drawn with each candidate.
     """
-    box = np.empty(6)
-    box[2], box[3] = half_length, half_width
+    placed = np.empty_like(corners)
     for attempt in range(MOST_CANDIDATES):
         turn = heading
         if not np.isfinite(heading):
             turn = (uniform(key, entity, attempt, 2, purpose) - 0.5) * TURN_RAD
-        box[0], box[1], inside = candidate(region, key, entity, attempt, purpose)
-        box[4], box[5] = np.cos(turn), np.sin(turn)
-        if inside and _box_clear_of_obstacles(taken, box):
-            return box[0], box[1], turn
+        x, y, inside = candidate(region, key, entity, attempt, purpose)
+        c, s = np.cos(turn), np.sin(turn)
+        placed[:, 0] = x + c * corners[:, 0] - s * corners[:, 1]
+        placed[:, 1] = y + s * corners[:, 0] + c * corners[:, 1]
+        if inside and _polygon_clear_of_obstacles(taken, sides_of(placed)):
+            return x, y, turn
     return np.nan, np.nan, np.nan
 
 

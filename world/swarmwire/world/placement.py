@@ -1,7 +1,8 @@
-"""Where things stand at the start of an arena: fixed obstacles, then random ones, then robots, in the file's order.
+"""Where things stand at the start of an arena: fixed obstacles, then random ones, lights and robots, in file order.
 
 Candidate j of a thing is a draw keyed by the arena, the thing and j; it takes the first candidate that is free. So a
-robot's place depends on its arena's seed and on what was put before it, never on what comes after.
+robot's place depends on its arena's seed and on what was put before it, never on what comes after. Lights have no body:
+they keep clear of obstacles, and nothing keeps clear of them.
 """
 
 from collections.abc import Sequence
@@ -14,10 +15,11 @@ from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.grid import MOST_CELLS_PER_SIDE
-from swarmwire.comms.truth import Group, Obstacle
+from swarmwire.comms.truth import Group, Light, Obstacle
 from swarmwire.world.angles import wrapped
-from swarmwire.world.free_places import GAP_M, MOST_CANDIDATES, Region, Taken, free_box, free_circle, put_robots
-from swarmwire.world.scenario import AtPoses, BoxTable, CylinderTable, InDisc, OnGrid, RobotsTable, Scenario
+from swarmwire.world.free_places import GAP_M, MOST_CANDIDATES, Region, Taken, free_circle, free_polygon, put_robots
+from swarmwire.world.obstacles import heading_of, obstacle_at
+from swarmwire.world.scenario import AtPoses, CylinderTable, InDisc, ObstacleTable, OnGrid, RobotsTable, Scenario
 
 ROBOT, HEADING = purpose("place of a robot"), purpose("heading of a robot")
 TRIED = f"none of {MOST_CANDIDATES} places tried is free"
@@ -28,13 +30,15 @@ class Placed:
     """Where everything of one arena stands at the start."""
 
     obstacles: tuple[Obstacle, ...]  # in the file's order
+    lights: tuple[Light, ...]  # in the file's order
     pose: FloatArray  # (robots, 3) x, y in m, heading in rad, in (-pi, pi]
 
 
 def place(scenario: Scenario, groups: Sequence[Group], seed: int, key: np.uint64) -> Placed:
-    """The obstacles and robots of the arena with this seed and key; BadInput names what finds no room."""
+    """The obstacles, lights and robots of the arena with this seed and key; BadInput names what finds no room."""
     standing = _Standing(scenario)
     obstacles = _place_obstacles(scenario, standing, seed, key)
+    lights = _place_lights(scenario, standing.taken(), seed, key)
     taken = standing.taken(groups)
     pose = np.empty((groups[-1].stop, 3))
     for group in groups:
@@ -49,7 +53,7 @@ def place(scenario: Scenario, groups: Sequence[Group], seed: int, key: np.uint64
             raise _no_room(scenario, f"robots.{group.name}.place", f"{group.name}-{i}", why, seed)
         pose[group.start : group.stop, 2] = _headings(table, group, key)
     pose[:, :2] = taken.robot[:, :2]
-    return Placed(obstacles, pose)
+    return Placed(obstacles, lights, pose)
 
 
 def _no_room(scenario: Scenario, key: str, what: str, why: str, seed: int) -> BadInput:
@@ -62,9 +66,12 @@ class _Standing:
     def __init__(self, scenario: Scenario) -> None:
         self._size_m = scenario.arena.size_m
         tables = scenario.arena.obstacles
-        self._circle = np.empty((sum(table.count for table in tables if table.shape == "cylinder"), 3))
-        self._box = np.empty((sum(table.count for table in tables if table.shape == "box"), 6))
-        self._circles = self._boxes = 0
+        round_ones = [table.count for table in tables if isinstance(table, CylinderTable)]
+        sides = [_sides(table) * table.count for table in tables]
+        self._circle = np.empty((sum(round_ones), 3))
+        self._side = np.empty((sum(sides), 5))
+        self._side_start = np.zeros(sum(table.count for table in tables) + 1, np.int64)
+        self._circles = self._polygons = 0
 
     def add(self, obstacle: Obstacle) -> Obstacle:
         """Note an obstacle."""
@@ -73,8 +80,10 @@ class _Standing:
             self._circle[self._circles] = shape.circle[0]
             self._circles += 1
         else:
-            self._box[self._boxes] = shape.box[0]
-            self._boxes += 1
+            first = self._side_start[self._polygons]
+            self._side[first : first + len(shape.side)] = shape.side
+            self._polygons += 1
+            self._side_start[self._polygons] = first + len(shape.side)
         return obstacle
 
     def taken(self, groups: Sequence[Group] = ()) -> Taken:
@@ -84,14 +93,18 @@ class _Standing:
         cell_m = max(2.0 * widest + GAP_M, max(width, height) / MOST_CELLS_PER_SIDE)
         head = np.full((int(np.ceil(height / cell_m)), int(np.ceil(width / cell_m))), -1, np.int64)
         robots = groups[-1].stop if groups else 0
-        circle, box = self._circle[: self._circles], self._box[: self._boxes]
+        circle, side_start = self._circle[: self._circles], self._side_start[: self._polygons + 1]
+        side = self._side[: side_start[-1]]
         follow = np.full(robots, -1, np.int64)
-        return Taken(0.5 * width, 0.5 * height, circle, box, cell_m, head, follow, np.zeros((robots, 3)))
+        return Taken(0.5 * width, 0.5 * height, circle, side_start, side, cell_m, head, follow, np.zeros((robots, 3)))
 
 
 def _place_obstacles(scenario: Scenario, standing: _Standing, seed: int, key: np.uint64) -> tuple[Obstacle, ...]:
     tables = scenario.arena.obstacles
-    placed = [[standing.add(_fixed_obstacle(table, *table.at))] if table.at else [] for table in tables]
+    placed: list[list[Obstacle]] = [[] for _ in tables]
+    for i, table in enumerate(tables):
+        if table.at:
+            placed[i].append(standing.add(obstacle_at(table, *table.at, heading_of(table) or 0.0)))
     for i, table in enumerate(tables):
         for copy in range(table.count if table.at is None else 0):
             found = _random_obstacle(table, standing.taken(), key, copy, purpose(f"place of obstacle {i}"))
@@ -102,23 +115,37 @@ def _place_obstacles(scenario: Scenario, standing: _Standing, seed: int, key: np
     return tuple(obstacle for some in placed for obstacle in some)
 
 
-def _fixed_obstacle(table: CylinderTable | BoxTable, x_m: float, y_m: float) -> Obstacle:
+def _random_obstacle(table: ObstacleTable, taken: Taken, key: np.uint64, copy: int, of: int) -> Obstacle | None:
+    heading, wanted = 0.0, heading_of(table)
     if isinstance(table, CylinderTable):
-        return Obstacle("cylinder", x_m, y_m, radius_m=table.radius_m)
-    return Obstacle("box", x_m, y_m, table.heading_rad or 0.0, size_m=table.size_m)
+        x, y = free_circle(taken, _anywhere(taken), key, copy, of, table.radius_m)
+    else:
+        corners = obstacle_at(table, 0.0, 0.0, 0.0).corners_m
+        wanted = np.nan if wanted is None else wanted
+        x, y, heading = free_polygon(taken, _anywhere(taken), key, copy, of, corners, wanted)
+    return obstacle_at(table, x, y, heading) if np.isfinite(x) else None
 
 
-def _random_obstacle(
-    table: CylinderTable | BoxTable, taken: Taken, key: np.uint64, copy: int, of: int
-) -> Obstacle | None:
-    anywhere = Region(False, 0.0, 0.0, taken.half_x_m, taken.half_y_m)
-    if isinstance(table, CylinderTable):
-        x, y = free_circle(taken, anywhere, key, copy, of, table.radius_m)
-        return Obstacle("cylinder", x, y, radius_m=table.radius_m) if np.isfinite(x) else None
-    half = 0.5 * table.size_m[0], 0.5 * table.size_m[1]
-    wanted = np.nan if table.heading_rad is None else table.heading_rad
-    x, y, heading = free_box(taken, anywhere, key, copy, of, *half, wanted)
-    return Obstacle("box", x, y, heading, size_m=table.size_m) if np.isfinite(x) else None
+def _sides(table: ObstacleTable) -> int:
+    return 0 if isinstance(table, CylinderTable) else len(obstacle_at(table, 0.0, 0.0, 0.0).corners_m)
+
+
+def _anywhere(taken: Taken) -> Region:
+    return Region(False, 0.0, 0.0, taken.half_x_m, taken.half_y_m)
+
+
+def _place_lights(scenario: Scenario, taken: Taken, seed: int, key: np.uint64) -> tuple[Light, ...]:
+    placed: list[Light] = []
+    for i, table in enumerate(scenario.arena.lights):
+        region = Region(False, *table.at, 0.0, 0.0) if table.at else _anywhere(taken)
+        for copy in range(table.count):
+            x, y = free_circle(taken, region, key, copy, purpose(f"place of light {i}"), 0.0)
+            if not np.isfinite(x):
+                why = f"at ({table.at[0]:g}, {table.at[1]:g}) it is outside or in an obstacle" if table.at else TRIED
+                what = f"light {copy + 1} of {table.count}"
+                raise _no_room(scenario, f"arena.lights.{i}", what, why, seed)
+            placed.append(Light(x, y, table.intensity))
+    return tuple(placed)
 
 
 def _region(scenario: Scenario, table: RobotsTable) -> Region:

@@ -2,10 +2,11 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, PrivateAttr, StringConstraints, model_validator
+from pydantic import BaseModel, Field, PrivateAttr, StringConstraints, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from swarmwire.comms.air.radio import Radio
+from swarmwire.world.convex import counter_clockwise
 from swarmwire.world.schema import TABLE, AsTable
 
 
@@ -45,12 +46,12 @@ class PhysicsTable(Table):
 
 
 class _StandingTable(Table):
-    """Where an obstacle stands: either one at a point, or several at random."""
+    """Where a thing stands: either one at a point, or several at random."""
 
     at: Point | None = None
-    """The centre of the one obstacle, in the arena's frame."""
+    """Where the one thing stands, in the arena's frame."""
     place: Literal["random"] | None = None
-    """"random": anywhere in the arena, free of other things, by the seed."""
+    """"random": anywhere in the arena, free of obstacles, by the seed."""
     count: int = Field(default=1, ge=1, le=100_000)
     """How many; only with place = "random"."""
 
@@ -59,7 +60,7 @@ class _StandingTable(Table):
         if (self.at is None) == (self.place is None):
             raise PydanticCustomError("place", 'expected either at = [x, y] or place = "random"')
         if self.at is not None and self.count != 1:
-            raise PydanticCustomError("place", 'expected place = "random" with a count; at = [x, y] sets one obstacle')
+            raise PydanticCustomError("place", 'expected place = "random" with a count; at = [x, y] sets only one')
         return self
 
 
@@ -72,18 +73,47 @@ class CylinderTable(_StandingTable):
     """Its radius."""
 
 
-class BoxTable(_StandingTable):
+class _TurnedTable(_StandingTable):
+    """An obstacle with a heading."""
+
+    heading_rad: Heading | None = None
+    """Counter-clockwise turn; 0 if left out, or a random one with place = "random"."""
+
+
+class BoxTable(_TurnedTable):
     """A rectangular obstacle."""
 
     shape: Literal["box"]
     """Its shape."""
     size_m: Extents
     """Full extents along and across its heading."""
-    heading_rad: Heading | None = None
-    """Counter-clockwise turn; 0 if left out, or a random one with place = "random"."""
 
 
-ObstacleTable = Annotated[CylinderTable | BoxTable, Field(discriminator="shape")]
+class PolygonTable(_TurnedTable):
+    """A convex obstacle with straight sides."""
+
+    shape: Literal["polygon"]
+    """Its shape."""
+    points: Annotated[tuple[Point, ...], Field(strict=False, json_schema_extra={"unit": "m"})]
+    """Its corners in order, around its own origin, which `at` puts somewhere and about which it turns."""
+
+    @field_validator("points")
+    @classmethod
+    def _convex(cls, points: tuple[Point, ...]) -> tuple[Point, ...]:
+        try:
+            return counter_clockwise(points)
+        except ValueError as error:
+            raise PydanticCustomError("points", "{fault}", {"fault": str(error)}) from None
+
+
+ObstacleTable = CylinderTable | BoxTable | PolygonTable
+
+
+class LightTable(_StandingTable):
+    """A light: it has no body, so that it neither holds robots back nor keeps them away from its place."""
+
+    intensity: Length
+    """How far it reaches: seen as exp(-2 d / intensity) at d m, and not at all beyond 2.5 of it."""
 
 
 class ArenaTable(Table):
@@ -93,8 +123,10 @@ class ArenaTable(Table):
     """Full extents along x and y."""
     boundary: Literal["walls", "open"] = "walls"
     """Walls that bodies hit and sensors see, or nothing at all."""
-    obstacles: tuple[ObstacleTable, ...] = Field(default=(), strict=False)
+    obstacles: tuple[Annotated[ObstacleTable, Field(discriminator="shape")], ...] = Field(default=(), strict=False)
     """Fixed things that bodies hit, sensors see and radio signals are blocked by."""
+    lights: tuple[LightTable, ...] = Field(default=(), strict=False)
+    """Lights that sensors see."""
 
 
 class InDisc(Table):

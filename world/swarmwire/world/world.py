@@ -55,6 +55,7 @@ class World:
             groups=groups,
             robot_names=scenario.robot_names(),
             range_m=scenario.radio.range_m if scenario.radio else None,
+            lights=tuple(p.lights for p in placed),
         )
         tick_s, steps = 1.0 / scenario.time.rate_hz, scenario.physics.steps
         self._physics = Physics(scenario.arena.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
@@ -110,8 +111,18 @@ class World:
     def _scene(self) -> Scene:
         radius_m = np.concatenate([np.full(g.stop - g.start, g.body.radius_m) for g in self.static.groups])
         obstacles = obstacle_arrays(self.static.obstacles)
-        size_m, physics = self.static.arena_size_m, self._physics
-        return Scene(self.keys, size_m, self.static.walled, obstacles, radius_m, physics.state, physics.travel_m)
+        static, physics = self.static, self._physics
+        return Scene(
+            keys=self.keys,
+            size_m=static.arena_size_m,
+            walled=static.walled,
+            obstacles=obstacles,
+            lights=static.lights,
+            radius_m=radius_m,
+            state=physics.state,
+            travel_m=physics.travel_m,
+            touched=physics.touched,
+        )
 
 
 def _groups(scenario: Scenario, bodies: Mapping[str, Body]) -> tuple[Group, ...]:

@@ -14,7 +14,7 @@ from swarmwire.comms.geometry import is_blocked
 
 def stage(medium: Medium) -> Stage | None:
     """The stage, where the radio needs a line of sight and there are obstacles."""
-    any_obstacle = len(medium.obstacles.circle) or len(medium.obstacles.box)
+    any_obstacle = len(medium.obstacles.circle) or len(medium.obstacles.polygon)
     return LineOfSight(medium) if medium.radio.line_of_sight and any_obstacle else None
 
 

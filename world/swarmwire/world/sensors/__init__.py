@@ -4,8 +4,11 @@ from collections.abc import Callable
 from typing import Any
 
 from swarmwire.comms.truth import Group
+from swarmwire.world.sensors.bumper import BumperSensor
 from swarmwire.world.sensors.compass import CompassSensor
+from swarmwire.world.sensors.light import LightSensor
 from swarmwire.world.sensors.odometry import OdometrySensor
+from swarmwire.world.sensors.positioning import PositioningSensor
 from swarmwire.world.sensors.proximity import ProximitySensor
 from swarmwire.world.sensors.scene import Scene, Sensor
 
@@ -13,6 +16,9 @@ SENSORS: dict[str, Callable[[Scene, Group, Any], Sensor]] = {
     "proximity": ProximitySensor,
     "compass": CompassSensor,
     "odometry": OdometrySensor,
+    "light": LightSensor,
+    "bumper": BumperSensor,
+    "positioning": PositioningSensor,
 }
 
 __all__ = ["SENSORS", "Scene", "Sensor"]

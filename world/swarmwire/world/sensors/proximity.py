@@ -10,7 +10,7 @@ from numba import njit
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.geometry import ray_to_box, ray_to_circle
+from swarmwire.comms.geometry import ray_to_circle, ray_to_polygon
 from swarmwire.comms.grid import build, cell_of
 from swarmwire.comms.sheets import Proximity
 from swarmwire.comms.truth import Group
@@ -100,14 +100,14 @@ def _meet_obstacles(rays, x, y, rim, dx, dy, range_m, obstacles, arena):
     for k in range(obstacles.circle_start[arena], obstacles.circle_start[arena + 1]):
         circle = obstacles.circle[k]
         _meet_circle(rays, x, y, rim, dx, dy, range_m, circle[0], circle[1], circle[2])
-    for k in range(obstacles.box_start[arena], obstacles.box_start[arena + 1]):
-        box = obstacles.box[k]
-        reach = rim + range_m + np.sqrt(box[2] * box[2] + box[3] * box[3])
-        ox, oy = box[0] - x, box[1] - y
+    for k in range(obstacles.polygon_start[arena], obstacles.polygon_start[arena + 1]):
+        around = obstacles.polygon[k]
+        reach = rim + range_m + around[2]
+        ox, oy = around[0] - x, around[1] - y
         if ox * ox + oy * oy < reach * reach:
             for ray in range(len(rays)):
                 px, py = x + rim * dx[ray], y + rim * dy[ray]
-                rays[ray] = min(rays[ray], ray_to_box(px, py, dx[ray], dy[ray], box))
+                rays[ray] = min(rays[ray], ray_to_polygon(px, py, dx[ray], dy[ray], obstacles, k))
 
 
 @njit(cache=True)

@@ -5,6 +5,7 @@ from typing import Protocol
 
 from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.geometry import Obstacles
+from swarmwire.comms.truth import Light
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,9 +16,11 @@ class Scene:
     size_m: tuple[float, float]  # full extents of an arena
     walled: bool
     obstacles: Obstacles
+    lights: tuple[tuple[Light, ...], ...]  # of each arena
     radius_m: FloatArray  # (robots,) of each robot index
     state: FloatArray  # (arenas, robots, 6) x, y in m, heading in rad (not wrapped), velocities; arena frame
     travel_m: FloatArray  # (arenas, robots, 2) rolled by the left and right wheel since the start
+    touched: FloatArray  # (arenas, robots) 1 if it touched anything in the tick before, else 0
 
 
 class Sensor(Protocol):

@@ -1,0 +1,17 @@
+"""The bumper: whether the body touched anything in the tick before."""
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.sheets import Bumper
+from swarmwire.comms.truth import Group
+from swarmwire.world.sensors.scene import Scene
+
+
+class BumperSensor:
+    """Sense `bumper`: pressed (n,), 1 if the body touched a robot, an obstacle or a wall in the tick before, else 0."""
+
+    def __init__(self, scene: Scene, group: Group, sheet: Bumper) -> None:
+        self._scene, self._group = scene, group
+
+    def read(self, tick: int) -> dict[str, FloatArray]:
+        """Which robots of the group touched anything."""
+        return {"bumper.pressed": self._scene.touched[:, self._group.start : self._group.stop].flatten()}
