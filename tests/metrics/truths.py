@@ -7,11 +7,17 @@ import numpy as np
 
 from swarmwire.comms.body import load_body
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.truth import Finished, Group, Obstacle, Static, Tally, Truth
+from swarmwire.comms.truth import Finished, Group, Light, Obstacle, Static, Tally, Truth
 from swarmwire.metrics.metrics import Metrics
 
 
-def static(robots: int = 4, arenas: int = 1, radio: bool = True, obstacles: Sequence[Obstacle] = ()) -> Static:
+def static(
+    robots: int = 4,
+    arenas: int = 1,
+    radio: bool = True,
+    obstacles: Sequence[Obstacle] = (),
+    lights: Sequence[Sequence[Light]] = (),
+) -> Static:
     return Static(
         name="test",
         seeds=tuple(range(1, arenas + 1)),
@@ -22,6 +28,7 @@ def static(robots: int = 4, arenas: int = 1, radio: bool = True, obstacles: Sequ
         groups=(Group("flock", load_body("epuck"), 0, robots),),
         robot_names=tuple(f"flock-{i}" for i in range(robots)),
         range_m=2.0 if radio else None,
+        lights=tuple(map(tuple, lights)),
     )
 
 

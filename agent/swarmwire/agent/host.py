@@ -31,9 +31,12 @@ class Host:
 
     def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
         """What the robots do in this tick; AgentFailed with the robot and the agent's traceback if one raises."""
+        acting = ((self._groups[name], group) for name, group in senses.items())
+        return Actions.joined([agents.act(self._time(tick, agents.group), group, heard) for agents, group in acting])
+
+    def _time(self, tick: int, group: GroupAssignment) -> tuple[int, int, int]:
         time_ns = tick_start_ns(tick, self._rate_hz)
-        time = (tick, time_ns, tick_start_ns(tick + 1, self._rate_hz) - time_ns)
-        return Actions.joined([self._groups[name].act(time, group, heard) for name, group in senses.items()])
+        return tick, time_ns, tick_start_ns(tick + group.act_every_ticks, self._rate_hz) - time_ns
 
 
 class Hosted(ABC):
@@ -45,7 +48,7 @@ class Hosted(ABC):
         self._sent_before = np.zeros(len(group.rows), np.int64)
 
     def act(self, time: tuple[int, int, int], senses: GroupSenses, heard: Heard) -> Actions:
-        """What the robots `senses.rows` do; `time` is the tick, its start and its length in ns."""
+        """What the robots `senses.rows` do; `time` is the tick, its start and the robots' period in ns."""
         # As many rows as the group has are all of them; most ticks are so.
         everyone = len(senses.rows) == len(self.group.rows)
         place = slice(None) if everyone else np.searchsorted(self.group.rows, senses.rows)

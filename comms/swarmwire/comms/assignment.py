@@ -20,6 +20,7 @@ class GroupAssignment:
     rows: IntArray  # (n,) robot row: arena x robots + index, rising
     robot_names: tuple[str, ...]  # (n,) for messages to people
     keys: KeyArray  # (n,) for the agents' draws; derived one way, they tell nothing of the arena's seed
+    act_every_ticks: int = 1  # the robots' period
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ class Assignment:
                     "rows": group.rows.tolist(),
                     "robot_names": list(group.robot_names),
                     "keys": group.keys.tolist(),
+                    "act_every_ticks": group.act_every_ticks,
                 }
                 for group in self.groups
             ],
@@ -66,6 +68,7 @@ class Assignment:
                 rows=np.array(group["rows"], np.int64),
                 robot_names=tuple(group["robot_names"]),
                 keys=np.array(group["keys"], np.uint64),
+                act_every_ticks=group["act_every_ticks"],
             )
             for group in given["groups"]
         )

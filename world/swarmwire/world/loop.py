@@ -9,6 +9,7 @@ from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.comms.truth import Truth
+from swarmwire.world.mailbox import Mailbox
 from swarmwire.world.trajectory import TrajectoryHash
 from swarmwire.world.world import World
 
@@ -20,6 +21,7 @@ class Loop:
         self.world, self.air, self.crew, self.observers = world, air, crew, observers
         self.ticks_done = 0
         self.packets_to_nobody = 0
+        self._mailbox = Mailbox(world.static)
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
 
     def run(self, ticks: int, stopped: Callable[[], bool] = lambda: False) -> None:
@@ -33,7 +35,7 @@ class Loop:
         start_ns = tick_start_ns(tick, world.static.rate_hz)
         news = self.air.advance(start_ns) if self.air else None
         heard = news.heard if news else Heard.none()
-        actions = self.crew.act(tick, world.sense(tick), heard)
+        actions = self.crew.act(tick, world.sense(tick), self._mailbox.hand_over(tick, heard, world.alive))
 
         pose, velocity, alive = world.pose.copy(), world.velocity.copy(), world.alive.copy()
         if self.air:

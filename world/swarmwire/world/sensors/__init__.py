@@ -7,7 +7,7 @@ from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.compass import CompassSensor
 from swarmwire.world.sensors.odometry import OdometrySensor
 from swarmwire.world.sensors.proximity import ProximitySensor
-from swarmwire.world.sensors.scene import Scene, Sensor
+from swarmwire.world.sensors.scene import Accumulating, Scene, Sensor
 
 SENSORS: dict[str, Callable[[Scene, Group, Any], Sensor]] = {
     "proximity": ProximitySensor,
@@ -15,4 +15,4 @@ SENSORS: dict[str, Callable[[Scene, Group, Any], Sensor]] = {
     "odometry": OdometrySensor,
 }
 
-__all__ = ["SENSORS", "Scene", "Sensor"]
+__all__ = ["SENSORS", "Accumulating", "Scene", "Sensor"]
