@@ -1,6 +1,7 @@
 """The smallest gap: how near two robots have come to each other."""
 
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -41,9 +42,9 @@ def smallest_gap_m(position_m: FloatArray, radius_m: FloatArray) -> float:
     radii = np.unique(radius_m).tolist()
     for i, large in enumerate(radii):
         of = position_m[radius_m == large]
-        tree = KDTree(of)
+        tree = cast(Any, KDTree)(of)  # its stub types the answers in part only
         for small in radii[: i + 1]:
             # Among its own kind the nearest to a disc is the disc itself.
-            nearest_m, _ = tree.query(position_m[radius_m == small], k=[2 if small == large else 1])
+            nearest_m: FloatArray = tree.query(position_m[radius_m == small], k=[2 if small == large else 1])[0]
             gap_m = min(gap_m, float(np.min(nearest_m)) - large - small)
     return gap_m if np.isfinite(gap_m) else np.nan

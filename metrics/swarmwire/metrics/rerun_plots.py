@@ -26,7 +26,8 @@ class RerunPlots:
     """Four plots, each one entity with a series per number, so that a tick costs one call per plot.
 
     shares: the metrics within 0 and 1, and `delivery` (heard / in range, over the last second); distances: those
-    in m; numbers: the other metrics; packets: receivers per second that heard a packet, and that were in range and did not.
+    in m; numbers: the other metrics; packets: receivers per second that heard a packet, and that were in range and did
+    not.
     """
 
     def __init__(self, static: Static, metrics: Sequence[Metric], arena: int) -> None:
