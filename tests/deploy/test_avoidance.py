@@ -34,7 +34,6 @@ def test_twenty_epucks_wander_for_a_minute_with_few_collisions(seed):
     assert metrics["collisions"].final <= 3
     assert metrics["wall_contacts"].final <= 3
     straight_m = SPEED_MPS * DURATION_S / 2
-    assert (travel.gone_m.mean(axis=1) > 0.4 * straight_m).all()
-    assert np.median(travel.gone_m[1]) > 0.4 * straight_m
-    assert travel.gone_m.sum(axis=0).min() > 0.05 * straight_m
-    print(travel.gone_m / straight_m)
+    share = travel.gone_m / (SPEED_MPS * DURATION_S / 2)  # of the way without an obstacle
+    assert share.mean(axis=1).min() > 0.6
+    assert share.min() > 0.2
