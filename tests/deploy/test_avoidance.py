@@ -33,7 +33,6 @@ def test_twenty_epucks_wander_for_a_minute_with_few_collisions(seed):
     assert metrics["wall_contacts"].final is not None
     assert metrics["collisions"].final <= 3
     assert metrics["wall_contacts"].final <= 3
-    straight_m = SPEED_MPS * DURATION_S / 2
     share = travel.gone_m / (SPEED_MPS * DURATION_S / 2)  # of the way without an obstacle
     assert share.mean(axis=1).min() > 0.6
     assert share.min() > 0.2

@@ -7,13 +7,13 @@ from typing import Any, cast
 import numpy as np
 
 from swarmwire.agent.agent import Agent
-from swarmwire.agent.declared import make
+from swarmwire.agent.declared import make, parameters_of
 from swarmwire.agent.loading import AgentClass, load_agent
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.turn import Turn
 from swarmwire.agent.vector_agent import State, VectorAgent, state_of
-from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import AgentFailed
@@ -76,10 +76,14 @@ class _Vector(Hosted):
 
     def __init__(self, group: GroupAssignment, kind: type[VectorAgent[Any]]) -> None:
         super().__init__(group, kind.needs)
-        self._agent = make(kind, group.params)
+        self._agent = make(kind, group.params, len(group.rows))
+        per_robot = [name for name, parameter in parameters_of(kind).items() if parameter.per_robot]
+        self._per_robot: dict[str, FloatArray | IntArray] = {name: getattr(self._agent, name) for name in per_robot}
         self._state: State = state_of(kind).fresh(len(group.rows))
 
     def step(self, turn: Turn) -> None:
+        for name, values in self._per_robot.items():
+            setattr(self._agent, name, values[np.searchsorted(self.group.rows, turn.senses.rows)])
         try:
             self._agent.step(Robots(turn), self._state)
         except Exception as error:

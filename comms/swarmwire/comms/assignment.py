@@ -1,7 +1,7 @@
 """Which robots a crew or a runner plays, and all that its agents may know before the first tick."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -15,7 +15,7 @@ class GroupAssignment:
 
     name: str
     agent: str  # "package.module:Class" or "/path/file.py:Class"
-    params: dict[str, Any]
+    params: dict[str, Any]  # a list has a value for each of the rows
     body: Body
     rows: IntArray  # (n,) robot row: arena x robots + index, rising
     robot_names: tuple[str, ...]  # (n,) for messages to people
@@ -73,6 +73,14 @@ class Assignment:
             for group in given["groups"]
         )
         return cls(groups, given["rate_hz"], None if given["gives"] is None else tuple(given["gives"]))
+
+
+def params_of(params: dict[str, Any], index: IntArray) -> dict[str, Any]:
+    """The parameters of the robots `index` alone: of a list, which has a value for each robot, theirs."""
+    return {
+        name: [cast("list[Any]", value)[i] for i in index.tolist()] if isinstance(value, list) else value
+        for name, value in params.items()
+    }
 
 
 def robots_text(names: list[str]) -> str:

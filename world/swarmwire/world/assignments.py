@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.assignment import Assignment, GroupAssignment
+from swarmwire.comms.assignment import Assignment, GroupAssignment, params_of
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.truth import Static
 from swarmwire.world.scenario import Scenario
@@ -19,7 +19,7 @@ def whole(scenario: Scenario, static: Static, agents: Mapping[str, str]) -> Assi
         GroupAssignment(
             name=group.name,
             agent=agents[group.name],
-            params=scenario.robots[group.name].params,
+            params=params_of(scenario.robots[group.name].params, rows % static.robots - group.start),
             body=group.body,
             rows=rows,
             robot_names=tuple(_name(static, int(row)) for row in rows),
@@ -44,7 +44,15 @@ def _part(assignment: Assignment, rows: IntArray) -> Assignment:
         at = np.flatnonzero(np.isin(group.rows, rows))
         if len(at):
             names = tuple(group.robot_names[i] for i in at)
-            groups.append(replace(group, rows=group.rows[at], robot_names=names, keys=group.keys[at]))
+            groups.append(
+                replace(
+                    group,
+                    params=params_of(group.params, at),
+                    rows=group.rows[at],
+                    robot_names=names,
+                    keys=group.keys[at],
+                )
+            )
     return Assignment(tuple(groups), assignment.rate_hz, assignment.gives)
 
 
