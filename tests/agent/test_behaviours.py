@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent.behaviours import Diffusion, Flocking
+from swarmwire.agent.behaviours import Avoidance, Diffusion, Flocking
 from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.agent.host import hosted
+from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.body import load_body
@@ -171,3 +172,67 @@ def test_flocking_is_the_same_in_a_mirror(neighbours: list[tuple[float, float, f
     assert got[0] == pytest.approx(linear, abs=1e-6)
     # Behind is both +pi and -pi: there a mirror image may turn either way.
     assert got[1] == pytest.approx(-angular, abs=1e-6) or abs(angular) > 2.0 * np.pi - 1e-3
+
+
+AHEAD, AWAY_RADPS = (0.05, 0.0), 1.5
+
+
+def one_ray(angle_deg: float, distance_m: float) -> FloatArray:
+    """The foot-bot's ray nearest to an angle sees something, the others nothing."""
+    value = np.zeros(24)
+    assert FOOTBOT.proximity is not None
+    turned = (ANGLES - np.deg2rad(angle_deg) + np.pi) % (2.0 * np.pi) - np.pi
+    value[np.argmin(np.abs(turned))] = FOOTBOT.proximity.response.value(np.array(distance_m))
+    return value
+
+
+@pytest.mark.parametrize(
+    ("angle_deg", "distance_m", "turns"),
+    [
+        (37.5, 0.05, False),  # ahead, and far
+        (37.5, 0.02, True),  # ahead, and near
+        (52.5, 0.09, True),  # at the side, however far
+        (142.5, 0.09, True),
+        (142.5, 0.01, True),
+        (157.5, 0.01, False),  # behind, however near
+        (172.5, 0.01, False),
+    ],
+)
+def test_avoidance_turns_from_what_is_near_ahead_or_at_a_side(angle_deg: float, distance_m: float, turns: bool) -> None:
+    for side in (1.0, -1.0):
+        expected = (0.0, -side * AWAY_RADPS) if turns else AHEAD
+        assert command(Avoidance, one_ray(side * angle_deg, distance_m)) == expected
+
+
+def test_avoidance_goes_by_the_sum_of_all_rays() -> None:
+    """Two things at 60 degrees to the left and to the right add up to one ahead, as far as the nearest of them."""
+    both = one_ray(60.0, 0.05) + one_ray(-60.0, 0.06)
+    assert command(Avoidance, both) == AHEAD
+    assert command(Avoidance, both, safe_m=0.055) == (0.0, -AWAY_RADPS)
+
+
+def test_avoidance_takes_faint_answers_for_noise() -> None:
+    noise = 0.09 * one_ray(60.0, 0.005)
+    assert command(Avoidance, noise) == command(Avoidance, NOTHING) == AHEAD
+    assert command(Avoidance, noise, faint=0.05) == (0.0, -AWAY_RADPS)
+
+
+def test_avoidance_turns_on_an_arc_if_asked_to() -> None:
+    assert command(Avoidance, one_ray(60.0, 0.05), turn_mps=0.02, turn_radps=0.5) == (0.02, -0.5)
+
+
+@given(st.lists(st.sampled_from([0.0, 0.0, 0.3, 0.6, 1.0]), min_size=24, max_size=24), st.floats(0.0, 0.1))
+def test_avoidance_is_the_same_in_a_mirror(value: list[float], safe_m: float) -> None:
+    rays = np.array(value)
+    x, y = np.sum(rays * np.cos(ANGLES)), np.sum(rays * np.sin(ANGLES))
+    degrees = abs(np.rad2deg(np.arctan2(y, x)))
+    # On a border of the rule the last bits decide.
+    if abs(y) > 1e-9 and min(abs(degrees - 45.0), abs(degrees - 150.0)) > 1e-6:
+        linear, angular = command(Avoidance, rays, safe_m=safe_m)
+        assert command(Avoidance, rays[::-1], safe_m=safe_m) == (linear, -angular)
+
+
+@pytest.mark.parametrize("body", ["epuck", "footbot"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_avoidance_decides_for_each_robot_alone(body: str, seed: int) -> None:
+    assert_rows_independent(Avoidance, Trial(seed=seed, body=body))

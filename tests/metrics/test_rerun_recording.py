@@ -92,13 +92,19 @@ def test_plots_hold_what_the_metrics_measured_and_the_delivery_of_the_last_secon
     record(tmp_path / "run.rrd", of, ticks)
     shares = column(tmp_path / "run.rrd", "/plots/shares", "Scalars:scalars")
     assert column(tmp_path / "run.rrd", "/plots/shares", "SeriesLines:names") == {
-        None: ["order", "largest_component", "delivery"]
+        None: ["order", "order_velocity", "largest_component", "unrejoined", "delivery"]
     }
-    assert shares[0] == pytest.approx([1.0, 0.5, 0.25])
-    assert shares[14] == pytest.approx([1.0, 0.5, (5 * 4 + 5 * 1) / 40])
-    assert shares[20] == pytest.approx([1.0, 0.5, 1.0])
+    assert shares[0] == pytest.approx([1.0, 0.0, 0.5, np.nan, 0.25], nan_ok=True)
+    assert shares[14] == pytest.approx([1.0, 0.0, 0.5, np.nan, (5 * 4 + 5 * 1) / 40], nan_ok=True)
+    assert shares[20] == pytest.approx([1.0, 0.0, 0.5, np.nan, 1.0], nan_ok=True)
     assert column(tmp_path / "run.rrd", "/plots/packets", "Scalars:scalars")[20] == [40.0, 0.0]
-    assert column(tmp_path / "run.rrd", "/plots/numbers", "Scalars:scalars")[20] == [3.0, 21.0, 0.0]
+    assert column(tmp_path / "run.rrd", "/plots/numbers", "Scalars:scalars")[20] == pytest.approx(
+        [3.0, 0.0, np.nan, np.nan, 21.0, 0.0], nan_ok=True
+    )
+    assert column(tmp_path / "run.rrd", "/plots/distances", "SeriesLines:names") == {
+        None: ["min_gap", "target_best", "target_mean"]
+    }
+    assert column(tmp_path / "run.rrd", "/plots/distances", "Scalars:scalars")[20][0] == pytest.approx(-0.07)
 
 
 def test_the_dead_change_colour_and_back(tmp_path):
@@ -121,7 +127,7 @@ def test_a_recording_has_no_wall_clock_time_and_equal_runs_have_equal_contents(t
         assert {name for chunk in chunks for name in chunk.timeline_names} == {"tick", "sim_time"}
         columns = {(chunk.entity_path, name) for chunk in chunks for name in chunk.to_record_batch().schema.names}
         logged = {key for key in columns if key[1] not in {"rerun.controls.RowId", "tick", "sim_time"}}
-        contents.append({key: column(path, *key) for key in logged})
+        contents.append({key: repr(column(path, *key)) for key in logged})  # NaN is no NaN's equal
     assert contents[0] == contents[1]
     assert len(contents[0]) > 20
 
@@ -131,12 +137,14 @@ def test_a_run_without_a_radio_has_no_links_and_no_plot_of_packets(tmp_path):
     record(tmp_path / "run.rrd", of, moving(of, 3))
     assert column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips") == {}
     assert column(tmp_path / "run.rrd", "/plots/packets", "Scalars:scalars") == {}
-    assert column(tmp_path / "run.rrd", "/plots/shares", "SeriesLines:names") == {None: ["order", "largest_component"]}
+    assert column(tmp_path / "run.rrd", "/plots/shares", "SeriesLines:names") == {
+        None: ["order", "order_velocity", "largest_component", "unrejoined"]
+    }
 
 
 def test_obstacles_and_lights_are_drawn_once_where_they_are(tmp_path):
     triangle = Obstacle("polygon", 1.0, -1.0, np.pi / 2, points_m=((0.0, 0.0), (1.0, 0.0), (0.0, 0.5)))
-    of = static(2, obstacles=(*OBSTACLES, triangle), lights=(Light(0.5, -0.25, 2.0), Light(1.0, 1.5, 1.0)))
+    of = static(2, obstacles=(*OBSTACLES, triangle), lights=((Light(0.5, -0.25, 2.0), Light(1.0, 1.5, 1.0)),))
     record(tmp_path / "run.rrd", of, moving(of, 2))
     (outlines,) = column(tmp_path / "run.rrd", "/world/obstacles", "LineStrips2D:strips").values()
     assert [len(outline) for outline in outlines] == [49, 5, 4]

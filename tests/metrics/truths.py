@@ -16,7 +16,7 @@ def static(
     arenas: int = 1,
     radio: bool = True,
     obstacles: Sequence[Obstacle] = (),
-    lights: Sequence[Light] = (),
+    lights: Sequence[Sequence[Light]] = (),
 ) -> Static:
     return Static(
         name="test",
@@ -28,7 +28,7 @@ def static(
         groups=(Group("flock", load_body("epuck"), 0, robots),),
         robot_names=tuple(f"flock-{i}" for i in range(robots)),
         range_m=2.0 if radio else None,
-        lights=(tuple(lights),) * arenas,
+        lights=tuple(map(tuple, lights)),
     )
 
 

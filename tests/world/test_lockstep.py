@@ -352,3 +352,18 @@ def listed(heard: Heard) -> list[Any]:
     columns = [heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, *heard.given.values()]
     payloads = [heard.payloads.row(int(p)) for p in heard.payload]
     return list(zip(*(column.tolist() for column in columns), payloads, strict=True))
+
+
+def test_a_runner_none_of_whose_groups_acts_gets_no_frame_and_is_not_waited_for() -> None:
+    lockstep = ready(joined(Lockstep(parts({0: 0, 1: 0, 4: 0, 5: 0, 2: 1, 6: 1, 3: 1, 7: 1})), "a", "b"), "a", "b")
+    frames_out = lockstep.open_tick(0, {"flock": senses(0, FLOCK)}, Heard.none(GIVES))
+    assert [runner for runner, _ in frames_out] == ["a"]
+    assert lockstep.waiting == 1
+    lockstep.answer("b", encode_actions(0, actions([])))
+    assert lockstep.counts() == {"wrong_tick_frames": 1}
+    lockstep.answer("a", encode_actions(0, actions(FLOCK)))
+    assert lockstep.waiting == 0
+    assert sorted(lockstep.take().rows.tolist()) == FLOCK
+    assert lockstep.open_tick(1, {}, Heard.none(GIVES)) == []
+    assert lockstep.waiting == 0
+    assert len(lockstep.take().rows) == 0

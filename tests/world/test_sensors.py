@@ -235,6 +235,24 @@ def test_encoders_slip_by_tick_and_show_whole_steps() -> None:
     assert np.array_equal(slipping.read(20)["odometry.left_m"], slipping.read(20)["odometry.left_m"])
 
 
+def test_odometry_is_the_same_however_often_an_agent_looks() -> None:
+    """The slip is that of every tick; a robot that acts in every third one reads what it would have read anyway."""
+    needs = {"a": ("odometry",)}
+    poses = [[0.0, 0.0, 0.0], [1.0, 0.0, 2.0]]
+    every, third = (World(posed(poses), [1], needs) for _ in range(2))
+    third.static = replace(third.static, groups=(replace(third.static.groups[0], act_every_ticks=3),))
+    for tick in range(13):
+        read, now_and_then = every.sense(tick), third.sense(tick)
+        if tick == 12:
+            assert read["a"].fields["odometry.left_m"].min() > 0.0
+        assert now_and_then.keys() == (set() if tick % 3 else {"a"})
+        for name, group in now_and_then.items():
+            for field, column in group.fields.items():
+                assert np.array_equal(column, read[name].fields[field])
+        for world in (every, third):
+            world.move(commanded(world, 0.1, 1.0))
+
+
 def test_the_sheets_of_the_bodies_have_a_sensor_each() -> None:
     assert EPUCK.senses.keys() == FOOTBOT.senses.keys() == {"proximity", "compass", "odometry", "light", "bumper"}
     assert isinstance(EPUCK.proximity, Proximity)

@@ -2,6 +2,7 @@
 
 from swarmwire.agent.agent import Agent
 from swarmwire.agent.packet import Packet
+from swarmwire.agent.per_robot import PerRobot, per_robot
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, IntColumn, State, VectorAgent, column
@@ -14,6 +15,7 @@ __all__ = [
     "IntColumn",
     "Message",
     "Packet",
+    "PerRobot",
     "Robot",
     "Robots",
     "State",
@@ -24,6 +26,7 @@ __all__ = [
     "i1",
     "i2",
     "i4",
+    "per_robot",
     "u1",
     "u2",
     "u4",

@@ -7,13 +7,13 @@ from typing import Any, cast
 import numpy as np
 
 from swarmwire.agent.agent import Agent
-from swarmwire.agent.declared import make
+from swarmwire.agent.declared import make, parameters_of
 from swarmwire.agent.loading import AgentClass, load_agent
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.turn import Turn
 from swarmwire.agent.vector_agent import State, VectorAgent, state_of
-from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import AgentFailed
@@ -31,9 +31,12 @@ class Host:
 
     def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
         """What the robots do in this tick; AgentFailed with the robot and the agent's traceback if one raises."""
+        acting = ((self._groups[name], group) for name, group in senses.items())
+        return Actions.joined([agents.act(self._time(tick, agents.group), group, heard) for agents, group in acting])
+
+    def _time(self, tick: int, group: GroupAssignment) -> tuple[int, int, int]:
         time_ns = tick_start_ns(tick, self._rate_hz)
-        time = (tick, time_ns, tick_start_ns(tick + 1, self._rate_hz) - time_ns)
-        return Actions.joined([self._groups[name].act(time, group, heard) for name, group in senses.items()])
+        return tick, time_ns, tick_start_ns(tick + group.act_every_ticks, self._rate_hz) - time_ns
 
 
 class Hosted(ABC):
@@ -45,7 +48,7 @@ class Hosted(ABC):
         self._sent_before = np.zeros(len(group.rows), np.int64)
 
     def act(self, time: tuple[int, int, int], senses: GroupSenses, heard: Heard) -> Actions:
-        """What the robots `senses.rows` do; `time` is the tick, its start and its length in ns."""
+        """What the robots `senses.rows` do; `time` is the tick, its start and the robots' period in ns."""
         # As many rows as the group has are all of them; most ticks are so.
         everyone = len(senses.rows) == len(self.group.rows)
         place = slice(None) if everyone else np.searchsorted(self.group.rows, senses.rows)
@@ -73,10 +76,14 @@ class _Vector(Hosted):
 
     def __init__(self, group: GroupAssignment, kind: type[VectorAgent[Any]]) -> None:
         super().__init__(group, kind.needs)
-        self._agent = make(kind, group.params)
+        self._agent = make(kind, group.params, len(group.rows))
+        per_robot = [name for name, parameter in parameters_of(kind).items() if parameter.per_robot]
+        self._per_robot: dict[str, FloatArray | IntArray] = {name: getattr(self._agent, name) for name in per_robot}
         self._state: State = state_of(kind).fresh(len(group.rows))
 
     def step(self, turn: Turn) -> None:
+        for name, values in self._per_robot.items():
+            setattr(self._agent, name, values[np.searchsorted(self.group.rows, turn.senses.rows)])
         try:
             self._agent.step(Robots(turn), self._state)
         except (Exception, SystemExit) as error:

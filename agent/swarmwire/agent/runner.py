@@ -72,9 +72,10 @@ class _Inbox:
         return arrived
 
     def ticks(self, assignment: Assignment) -> Iterator[tuple[int, Senses, Heard]]:
-        """What each tick brings, in order and without a gap, until the world says "end" or is gone."""
+        """What each tick brings, in order, until the world says "end" or is gone."""
         gives, groups = assignment.gives or (), {group.name for group in assignment.groups}
-        tick: int | None = None
+        periods = {group.act_every_ticks for group in assignment.groups}
+        tick = -1
         while True:
             arrived = self._arrived.get()
             if isinstance(arrived, bool):
@@ -85,7 +86,7 @@ class _Inbox:
                 frame = frames.decode(arrived.payload.to_bytes())
                 if frame.kind == "end":
                     return
-                if frame.kind != "tick" or (tick is not None and frame.tick != tick + 1):
+                if frame.kind != "tick" or frame.tick <= tick or all(frame.tick % every for every in periods):
                     raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
                 senses, heard = decode_tick(frame, gives, groups)
             except BadFrame:

@@ -16,7 +16,7 @@ from swarmwire.agent.loading import AgentClass
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.assignment import GroupAssignment
+from swarmwire.comms.assignment import GroupAssignment, params_of
 from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import Heard, Payloads, Sent
@@ -36,7 +36,7 @@ class Trial:
     ticks: int = 12
     seed: int = 1
     body: str = "epuck"
-    params: dict[str, Any] | None = None
+    params: dict[str, Any] | None = None  # a list has a value for each robot
 
 
 def assert_equivalent(single: type[Agent], vector: type[VectorAgent[Any]], trial: Trial | None = None) -> None:
@@ -65,7 +65,8 @@ def assert_rows_independent(vector: type[VectorAgent[Any]], trial: Trial | None 
 def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> Hosted:
     keys = np.array([draws.derive_key("trial", trial.seed, int(row)) for row in rows], np.uint64)
     names = tuple(f"robot-{row}" for row in rows)
-    group = GroupAssignment("trial", "", trial.params or {}, load_body(trial.body), rows, names, keys)
+    params = params_of(trial.params or {}, rows)
+    group = GroupAssignment("trial", "", params, load_body(trial.body), rows, names, keys)
     return hosted(group, kind)
 
 

@@ -84,7 +84,8 @@ class VectorAgent(ABC, Generic[S]):
     """Decides for the robots of a group, n at a time, each row from its own senses and packets alone.
 
     One instance serves all robots of a group in a process, over all arenas; so nothing may be kept on `self` but
-    parameters (annotated class attributes, as for Agent). `class Search(VectorAgent[Memory])` names its State.
+    parameters (annotated class attributes, as for Agent, or `PerRobot`). `class Search(VectorAgent[Memory])` names its
+    State.
     """
 
     needs: ClassVar[tuple[str, ...]] = ()

@@ -1,7 +1,7 @@
 """Which robots a crew or a runner plays, and all that its agents may know before the first tick."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -15,11 +15,12 @@ class GroupAssignment:
 
     name: str
     agent: str  # "package.module:Class" or "/path/file.py:Class"
-    params: dict[str, Any]
+    params: dict[str, Any]  # a list has a value for each of the rows
     body: Body
     rows: IntArray  # (n,) robot row: arena x robots + index, rising
     robot_names: tuple[str, ...]  # (n,) for messages to people
     keys: KeyArray  # (n,) for the agents' draws; derived one way, they tell nothing of the arena's seed
+    act_every_ticks: int = 1  # the robots' period
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ class Assignment:
                     "rows": group.rows.tolist(),
                     "robot_names": list(group.robot_names),
                     "keys": group.keys.tolist(),
+                    "act_every_ticks": group.act_every_ticks,
                 }
                 for group in self.groups
             ],
@@ -66,10 +68,19 @@ class Assignment:
                 rows=np.array(group["rows"], np.int64),
                 robot_names=tuple(group["robot_names"]),
                 keys=np.array(group["keys"], np.uint64),
+                act_every_ticks=group["act_every_ticks"],
             )
             for group in given["groups"]
         )
         return cls(groups, given["rate_hz"], None if given["gives"] is None else tuple(given["gives"]))
+
+
+def params_of(params: dict[str, Any], index: IntArray) -> dict[str, Any]:
+    """The parameters of the robots `index` alone: of a list, which has a value for each robot, theirs."""
+    return {
+        name: [cast("list[Any]", value)[i] for i in index.tolist()] if isinstance(value, list) else value
+        for name, value in params.items()
+    }
 
 
 def robots_text(names: list[str]) -> str:

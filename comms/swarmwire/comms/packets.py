@@ -1,6 +1,6 @@
 """Packets as tables: what agents hand to the air, and what the air hands to agents."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -139,3 +139,19 @@ class Heard:
             self.payload[index],
             self.payloads,
         )
+
+    def merged(self, other: "Heard") -> "Heard":
+        """Both, in the order that `Heard` promises; `other` was heard over the same medium."""
+        mine = (self.receiver, self.sender, self.sequence, self.heard_at_ns)
+        its = (other.receiver, other.sender, other.sequence, other.heard_at_ns)
+        receiver, sender, sequence, heard_at_ns = (np.concatenate(pair) for pair in zip(mine, its, strict=True))
+        given = {name: np.concatenate([column, other.given[name]]) for name, column in self.given.items()}
+        payload = np.concatenate([self.payload, other.payload + len(self.payloads)])
+        payloads = Payloads.joined([self.payloads, other.payloads])
+        both = Heard(receiver, sender, sequence, heard_at_ns, given, payload, payloads)
+        return both.select(np.lexsort((sequence, sender, heard_at_ns, receiver)))
+
+    def compacted(self) -> "Heard":
+        """The same with those payloads only that somebody heard."""
+        used, payload = np.unique(self.payload, return_inverse=True)
+        return replace(self, payload=payload.reshape(-1), payloads=self.payloads.rows(used))

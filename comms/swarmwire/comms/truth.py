@@ -48,6 +48,7 @@ class Group:
     body: Body
     start: int
     stop: int
+    act_every_ticks: int = 1  # it acts when the tick modulo this is 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +75,11 @@ class Static:
     def robots(self) -> int:
         """Robots in each arena."""
         return len(self.robot_names)
+
+    @property
+    def act_every_ticks(self) -> IntArray:
+        """Each robot index acts when the tick modulo this is 0, (robots,)."""
+        return np.concatenate([np.full(group.stop - group.start, group.act_every_ticks) for group in self.groups])
 
 
 @dataclass(frozen=True, slots=True)

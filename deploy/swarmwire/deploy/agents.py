@@ -25,7 +25,7 @@ def _checked(scenario: Scenario, name: str, spec: str) -> AgentClass:
     group, where = scenario.robots[name], scenario.source
     try:
         kind = load_agent(spec)
-        checked(kind, group.params)
+        checked(kind, group.params, group.count)
     except NoAgent as error:
         raise BadInput(where, f"robots.{name}.agent", str(error)) from error
     except BadParameter as error:

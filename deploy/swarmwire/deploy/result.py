@@ -37,7 +37,7 @@ class RadioResult:
     fates: dict[str, int]  # receivers; they add up to `intended`
     pdr: float | None  # heard / in_range
     latency_air_s: Percentiles  # from sending to hearing
-    latency_agent_s: Percentiles  # from sending to the tick that handed it over
+    latency_agent_s: Percentiles  # from sending to the tick at which the receiver could act
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,8 @@ class Execution:
         if radio is None:
             return None
         obstacles = obstacle_arrays(static.obstacles)
-        return Air(radio, self.world.keys, static.robots, static.arena_size_m, obstacles, static.rate_hz)
+        size_m, every = static.arena_size_m, static.act_every_ticks
+        return Air(radio, self.world.keys, static.robots, size_m, obstacles, static.rate_hz, every)
 
     @contextmanager
     def _crew(self, interrupt: Interrupt) -> Generator[Crew]:

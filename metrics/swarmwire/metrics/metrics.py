@@ -49,7 +49,7 @@ class Metrics:
         self._sum += np.where(known, value, 0.0)
         self._min = np.fmin(self._min, value)
         self._max = np.fmax(self._max, value)
-        self._latest = np.where(self._counts[:, None], self._sum, value)
+        self._latest = np.where(self._counts[:, None] & (self._seen > 0), self._sum, value)
 
     @property
     def latest(self) -> dict[str, FloatArray]:

@@ -42,6 +42,16 @@ class Moment:
         """Headings in the arena's frame, (arenas, robots), of the dead too."""
         return self.truth.pose[:, 2].reshape(self._shape)
 
+    @property
+    def position_m(self) -> FloatArray:
+        """Where robots stand in the arena's frame, (arenas, robots, 2), the dead too."""
+        return self.truth.pose[:, :2].reshape(*self._shape, 2)
+
+    @property
+    def velocity_mps(self) -> FloatArray:
+        """Velocities in the arena's frame, (arenas, robots, 2), of the dead too."""
+        return self.truth.velocity[:, :2].reshape(*self._shape, 2)
+
     @cached_property
     def components(self) -> Components | None:
         """The radio graph's components; None without a radio. One pass over all arenas, O(rows + edges)."""

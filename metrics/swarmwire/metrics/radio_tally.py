@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.fates import FATE_NAMES, Fate
 from swarmwire.comms.truth import Finished, Static, Tally, Truth
 from swarmwire.metrics.log_histogram import LogHistogram
@@ -18,13 +18,15 @@ class RadioTally:
 
     sent (packets), intended and in_range (receivers), fates {name: receivers}, pdr = heard / in_range (null if none was
     in range), and of the packets heard the p50, p90 and p99 of two latencies in s, within 0.5 % (null if none was
-    heard): latency_air_s from sending to hearing, latency_agent_s from sending to the tick that handed it over.
+    heard): latency_air_s from sending to hearing, latency_agent_s from sending to the first tick at which the receiver
+    acts.
     """
 
     def begin(self, static: Static) -> None:
         """Start afresh."""
         arenas = static.arenas
         self._has_radio = False
+        self._rate_hz, self._act_every_ticks = static.rate_hz, static.act_every_ticks
         self._sent = np.zeros(arenas, np.int64)
         self._intended = np.zeros(arenas, np.int64)
         self._in_range = np.zeros(arenas, np.int64)
@@ -37,7 +39,7 @@ class RadioTally:
         if truth.tally is not None:
             self._add(truth.tally)
         if truth.finished is not None:
-            self._time(truth.finished, truth.time_ns)
+            self._time(truth.finished, truth.tick)
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """The account; with `last`, in which what is still in flight has its fate, the fates add up to intended."""
@@ -52,11 +54,15 @@ class RadioTally:
         self._in_range += tally.in_range
         self._fates += tally.fates
 
-    def _time(self, finished: Finished, handed_over_ns: int) -> None:
+    def _time(self, finished: Finished, tick: int) -> None:
         heard = finished.fate == Fate.HEARD
         arena, sent_at_ns = finished.arena[heard], finished.sent_at_ns[heard]
         self._air.add(arena, finished.final_at_ns[heard] - sent_at_ns)
-        self._agent.add(arena, handed_over_ns - sent_at_ns)
+        every = self._act_every_ticks[finished.receiver[heard]]
+        for period in np.unique(every).tolist():  # a few at most: groups share theirs
+            of = every == period
+            acts_at_ns = tick_start_ns(-(-tick // period) * period, self._rate_hz)
+            self._agent.add(arena[of], acts_at_ns - sent_at_ns[of])
 
     def _arena(self, arena: int) -> dict[str, Any]:
         fates = [int(count) for count in self._fates[arena]]

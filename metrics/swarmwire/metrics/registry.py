@@ -5,18 +5,34 @@ from collections.abc import Sequence
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.components import ComponentCount
 from swarmwire.metrics.contacts import Collisions, WallContacts
+from swarmwire.metrics.fragmentations import Fragmentations
 from swarmwire.metrics.largest_component import LargestComponent
 from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.min_gap import MinGap
 from swarmwire.metrics.order import Order
+from swarmwire.metrics.order_velocity import OrderVelocity
+from swarmwire.metrics.rejoin_median import RejoinMedian
+from swarmwire.metrics.rejoin_worst import RejoinWorst
+from swarmwire.metrics.target_best import TargetBest
+from swarmwire.metrics.target_mean import TargetMean
+from swarmwire.metrics.unrejoined import Unrejoined
 
 METRICS: dict[str, type[Metric]] = {
     kind.name: kind
     for kind in (
         Order,
+        OrderVelocity,
         ComponentCount,
         LargestComponent,
+        Fragmentations,
+        RejoinMedian,
+        RejoinWorst,
+        Unrejoined,
         Collisions,
         WallContacts,
+        MinGap,
+        TargetBest,
+        TargetMean,
     )
 }
 

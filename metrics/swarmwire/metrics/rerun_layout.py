@@ -14,7 +14,11 @@ def layout(static: Static) -> Any:
     """The blueprint for recordings of this run; without a radio it has no plot of packets."""
     import rerun.blueprint as rrb
 
-    plots = [_plot("shares", "Order and connectivity, as shares", (-0.03, 1.03)), _plot("numbers", "Counts")]
+    plots = [
+        _plot("shares", "Order and connectivity, as shares", (-0.03, 1.03)),
+        _plot("distances", "Distances in m"),
+        _plot("numbers", "Counts"),
+    ]
     if static.range_m is not None:
         plots.insert(1, _plot("packets", "Packets per second, over the last second"))
     return rrb.Blueprint(

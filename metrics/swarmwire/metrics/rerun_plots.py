@@ -23,24 +23,26 @@ _WIDEST = 3.0  # of a series' line; each is drawn over those before it, and is t
 
 
 class RerunPlots:
-    """Three plots, each one entity with a series per number, so that a tick costs one call per plot.
+    """Four plots, each one entity with a series per number, so that a tick costs one call per plot.
 
-    shares: the metrics within 0 and 1, and `delivery` (heard / in range, over the last second); numbers: the other
-    metrics; packets: receivers per second that heard a packet, and that were in range and did not.
+    shares: the metrics within 0 and 1, and `delivery` (heard / in range, over the last second); distances: those
+    in m; numbers: the other metrics; packets: receivers per second that heard a packet, and that were in range and did
+    not.
     """
 
     def __init__(self, static: Static, metrics: Sequence[Metric], arena: int) -> None:
         """Plots of one arena."""
         self._arena, self._rate_hz, self._radio = arena, static.rate_hz, static.range_m is not None
         self._shares = [metric.name for metric in metrics if metric.bounds == (0.0, 1.0)]
-        self._numbers = [metric.name for metric in metrics if metric.bounds != (0.0, 1.0)]
+        self._distances = [metric.name for metric in metrics if metric.unit == "m"]
+        self._numbers = [m.name for m in metrics if m.name not in (*self._shares, *self._distances)]
         self._second: deque[IntArray] = deque(maxlen=static.rate_hz)  # per tick: heard, in range
 
     def begin(self, rec: Any) -> None:
         """Log names and colours of the series, which do not change."""
         import rerun as rr
 
-        names = {"shares": list(self._shares), "numbers": self._numbers}
+        names = {"shares": list(self._shares), "numbers": self._numbers, "distances": self._distances}
         if self._radio:
             names["shares"].append("delivery")
             names["packets"] = ["heard", "in range, not heard"]
@@ -59,6 +61,7 @@ class RerunPlots:
             shares.append(heard / in_range if in_range > 0 else np.nan)
             rec.log("plots/packets", rr.Scalars([heard, in_range - heard]))
         rec.log("plots/shares", rr.Scalars(shares))
+        rec.log("plots/distances", rr.Scalars([latest[name][self._arena] for name in self._distances]))
         rec.log("plots/numbers", rr.Scalars([latest[name][self._arena] for name in self._numbers]))
 
     def _per_second(self, tally: Tally | None) -> FloatArray:

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.send_times import SendTimes
 from swarmwire.comms.clock import to_ns
 from tests.comms.air.runs import TICK_NS, at, everybody, make_air, packets, run, scattered
 
@@ -71,6 +72,18 @@ def test_phase_spans_the_tick_and_jitter_a_fifth_of_it():
     assert offset_ns.min() >= 0
     assert offset_ns.max() < 1.2 * TICK_NS
     assert np.histogram(offset_ns[:, 0], 4, (0, 1.1 * TICK_NS))[0].min() > 0
+
+
+def test_the_phase_of_a_slow_robot_spans_its_own_period():
+    """Of 200 robots with a period of 4 ticks all are in the same quarter of it by chance in none of 10^100 seeds."""
+    every, keys = np.where(np.arange(400) % 2, 4, 1), np.array([1], np.uint64)
+    mixed, alone = (SendTimes("uniform", keys, e, 10) for e in (every, np.ones(400, np.int64)))
+    sent_at_ns = np.stack([mixed.at(tick * TICK_NS, tick) - tick * TICK_NS for tick in range(0, 40, 4)])
+    slow, fast = sent_at_ns[:, 1::2], sent_at_ns[:, ::2]
+    assert np.histogram(slow[0], 4, (0, 4.4 * TICK_NS))[0].min() > 20
+    assert 0 <= slow.min() < slow.max() < 4.8 * TICK_NS
+    assert np.ptp(slow, axis=0).max() < 0.8 * TICK_NS
+    assert np.array_equal(fast[3], (alone.at(12 * TICK_NS, 12) - 12 * TICK_NS)[::2])
 
 
 @pytest.mark.parametrize(("send_offset", "sent_at_ns"), [("tick", 0), (0.03, 30_000_000), (0.25, 250_000_000)])

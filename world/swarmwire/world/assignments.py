@@ -1,11 +1,12 @@
 """Which robots go to which runner, with the keys of their draws."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from swarmwire.comms.arrays import IntArray, KeyArray
-from swarmwire.comms.assignment import Assignment, GroupAssignment
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.assignment import Assignment, GroupAssignment, params_of
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.truth import Static
 from swarmwire.world.scenario import Scenario
@@ -18,11 +19,12 @@ def whole(scenario: Scenario, static: Static, agents: Mapping[str, str]) -> Assi
         GroupAssignment(
             name=group.name,
             agent=agents[group.name],
-            params=scenario.robots[group.name].params,
+            params=params_of(scenario.robots[group.name].params, rows % static.robots - group.start),
             body=group.body,
             rows=rows,
             robot_names=tuple(_name(static, int(row)) for row in rows),
             keys=keys.reshape(-1)[rows],
+            act_every_ticks=group.act_every_ticks,
         )
         for group in static.groups
         for rows in [_rows(static, group.start, group.stop)]
@@ -42,9 +44,14 @@ def _part(assignment: Assignment, rows: IntArray) -> Assignment:
         at = np.flatnonzero(np.isin(group.rows, rows))
         if len(at):
             names = tuple(group.robot_names[i] for i in at)
-            keys: KeyArray = group.keys[at]
             groups.append(
-                GroupAssignment(group.name, group.agent, group.params, group.body, group.rows[at], names, keys)
+                replace(
+                    group,
+                    params=params_of(group.params, at),
+                    rows=group.rows[at],
+                    robot_names=names,
+                    keys=group.keys[at],
+                )
             )
     return Assignment(tuple(groups), assignment.rate_hz, assignment.gives)
 

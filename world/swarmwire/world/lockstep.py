@@ -2,7 +2,7 @@
 
     slot      joins         free -> joined        (a runner asks and gets the slot's robots)
               "ready"       joined -> ready       (its agents are built; all ready: the first tick may begin)
-    tick      open_tick     ready -> waiting      (one frame per runner is out)
+    tick      open_tick     ready -> waiting      (one frame is out to each runner of a group that acts)
               "actions"     waiting -> ready      (all ready: the tick is complete)
     any       "failed"      AgentFailed           (ends the run)
               token gone    RunnerLost            (ends the run)
@@ -99,14 +99,17 @@ class Lockstep:
             raise RunnerLost(runner, slot.assignment.robots_text, reason)
 
     def open_tick(self, tick: int, senses: Senses, heard: Heard) -> list[tuple[str, bytes]]:
-        """Begin a tick: one frame for each runner."""
+        """Begin a tick: one frame for each runner of a group that acts; the others stay ready."""
         self._tick = tick
         parts = self._split(senses)
         packets = _split_heard(heard, self._owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
         for slot, part, own in zip(self._slots, parts, packets, strict=True):
-            slot.state, slot.actions = "waiting", None
+            slot.actions = None
             slot.rows = np.concatenate([np.empty(0, np.int64), *(group.rows for group in part.values())])
+            if not part:
+                continue
+            slot.state = "waiting"
             out.append((slot.runner or "", encode_tick(tick, part, own)))
         return out
 

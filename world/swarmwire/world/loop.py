@@ -10,6 +10,7 @@ from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.comms.truth import Tally, Truth
+from swarmwire.world.mailbox import Mailbox
 from swarmwire.world.trajectory import TrajectoryHash
 from swarmwire.world.world import World
 
@@ -20,6 +21,7 @@ class Loop:
     def __init__(self, world: World, air: Air | None, crew: Crew, observers: Sequence[Observer]) -> None:
         self.world, self.air, self.crew, self.observers = world, air, crew, observers
         self.ticks_done = 0
+        self._mailbox = Mailbox(world.static)
         self._lost: Counter[str] = Counter()  # packets that never came to the air, by why
         self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
@@ -36,7 +38,7 @@ class Loop:
         news = self.air.advance(start_ns) if self.air else None
         heard = news.heard if news else Heard.none()
         self._open = news.tally if news else None
-        actions = self.crew.act(tick, world.sense(tick), heard)
+        actions = self.crew.act(tick, world.sense(tick), self._mailbox.hand_over(tick, heard, world.alive))
 
         pose, velocity, alive = world.pose, world.velocity, world.alive.copy()
         if self.air:

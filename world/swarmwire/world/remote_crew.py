@@ -75,7 +75,7 @@ class RemoteCrew:
         self._wait(self._start_s)
 
     def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
-        """One frame to every runner, one answer from each."""
+        """One frame to every runner whose robots act, one answer from each."""
         for runner, data in self._lockstep.open_tick(tick, senses, heard):
             self._frames[runner].put(data)
         self._wait(self._timeout_s)

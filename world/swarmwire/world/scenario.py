@@ -174,6 +174,8 @@ class RobotsTable(Table):
     """How many robots."""
     agent: str = Field(min_length=1)
     """The agent's class, as module:Class or file.py:Class."""
+    act_every_ticks: int = Field(default=1, ge=1, le=1_000_000, json_schema_extra={"unit": "ticks"})
+    """They act when the tick modulo this is 0, and hear then what has arrived since they last acted."""
     params: dict[str, Any] = Field(default_factory=dict)
     """The agent's parameters."""
     place: Annotated[InDisc | InArena | OnGrid | AtPoses, Field(discriminator="how")] = InArena(how="arena")

@@ -17,7 +17,7 @@ from swarmwire.world.drive import within_wheels
 from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
-from swarmwire.world.sensors import SENSORS, Scene, Sensor
+from swarmwire.world.sensors import SENSORS, Accumulating, Scene, Sensor
 
 
 class World:
@@ -67,9 +67,14 @@ class World:
         self._show()
 
     def sense(self, tick: int) -> Senses:
-        """What every robot senses in a tick, by group: rows rising, and the fields of the senses that are needed."""
+        """What the robots that act in a tick sense, by group: rows rising, and the fields of the senses needed."""
         senses: Senses = {}
         for group in self.static.groups:
+            if tick % group.act_every_ticks:
+                for sensor in self._sensors[group.name]:
+                    if isinstance(sensor, Accumulating):
+                        sensor.follow(tick)
+                continue
             index = np.arange(group.start, group.stop)
             rows = (np.arange(self.static.arenas)[:, None] * self.static.robots + index).ravel()
             fields: dict[str, FloatArray] = {}
@@ -129,7 +134,7 @@ def _groups(scenario: Scenario, bodies: Mapping[str, Body]) -> tuple[Group, ...]
     groups: list[Group] = []
     start = 0
     for name, table in scenario.robots.items():
-        groups.append(Group(name, bodies[name], start, start + table.count))
+        groups.append(Group(name, bodies[name], start, start + table.count, table.act_every_ticks))
         start += table.count
     return tuple(groups)
 

@@ -41,12 +41,21 @@ class Air:
     """
 
     def __init__(
-        self, radio: Radio, keys: KeyArray, robots: int, size_m: tuple[float, float], obstacles: Obstacles, rate_hz: int
+        self,
+        radio: Radio,
+        keys: KeyArray,
+        robots: int,
+        size_m: tuple[float, float],
+        obstacles: Obstacles,
+        rate_hz: int,
+        act_every_ticks: IntArray | None = None,
     ) -> None:
+        """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out."""
         rows = len(keys) * robots
         self._radio, self._robots = radio, robots
         self._channel = Channel(Medium(radio, keys, robots, obstacles), size_m)
-        self._senders = Senders(radio, keys, robots, rate_hz)
+        act_every_ticks = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
+        self._senders = Senders(radio, keys, act_every_ticks, rate_hz)
         self._accounts = Accounts(len(keys), robots)
         self._pose, self._alive = np.zeros((rows, 3)), np.zeros(rows, np.bool_)
         self._others_alive = np.zeros(rows, np.int64)

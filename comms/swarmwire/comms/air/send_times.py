@@ -17,17 +17,19 @@ JITTER_SHARE = 5  # the jitter spans a fifth of the period, so that a robot's pa
 class SendTimes:
     """`sent_at = tick start + phase + jitter`, in integer ns.
 
-    "uniform": phase keyed by robot, uniform over the tick period; jitter keyed by robot and tick, uniform over a fifth
-    of it. Without them all robots would send at once, and a medium with contention would lose everything, every time.
+    "uniform": phase keyed by robot, uniform over the period in which it acts; jitter keyed by robot and tick, uniform
+    over a fifth of it. Without them all robots would send at once, and a medium with contention would lose everything,
+    every time.
     "tick": neither. A number: that offset in s from the tick's start, the same for all.
     """
 
-    def __init__(self, send_offset: str | float, keys: KeyArray, robots: int, rate_hz: int) -> None:
-        self._keys, self._robots = keys, robots
-        self._period_ns = NS_PER_S // rate_hz
+    def __init__(self, send_offset: str | float, keys: KeyArray, act_every_ticks: IntArray, rate_hz: int) -> None:
+        """`act_every_ticks` (robots,): the period of each robot index, in ticks of `rate_hz`."""
+        self._keys, robots = keys, len(act_every_ticks)
+        self._period_ns = act_every_ticks * NS_PER_S // rate_hz
         self._uniform = send_offset == "uniform"
         if self._uniform:
-            self._phase_ns = keyed_ns(keys, robots, 0, PHASE, self._period_ns)
+            self._phase_ns = keyed_ns(keys, 0, PHASE, self._period_ns)
             return
         offset_s = 0.0 if send_offset == "tick" else send_offset
         if isinstance(offset_s, str) or not offset_s >= 0.0:
@@ -38,14 +40,15 @@ class SendTimes:
         """When each robot sends in this tick, in ns, (rows,)."""
         sent_at_ns = self._phase_ns + tick_start_ns
         if self._uniform:
-            sent_at_ns += keyed_ns(self._keys, self._robots, tick, JITTER, self._period_ns // JITTER_SHARE)
+            sent_at_ns += keyed_ns(self._keys, tick, JITTER, self._period_ns // JITTER_SHARE)
         return sent_at_ns
 
 
 @njit(cache=True)
-def keyed_ns(keys, robots, tick, what_for, width_ns):
-    """A draw for each robot, uniform over 0 to width_ns - 1; keyed by (robot, tick, 0, what_for), (rows,)."""
+def keyed_ns(keys, tick, what_for, width_ns):
+    """A draw for each robot, uniform over 0 to its width_ns (robots,) - 1; keyed by (robot, tick, 0, what_for)."""
+    robots = len(width_ns)
     drawn = np.empty(len(keys) * robots, np.int64)
     for row in range(len(drawn)):
-        drawn[row] = np.int64(uniform(keys[row // robots], row % robots, tick, 0, what_for) * width_ns)
+        drawn[row] = np.int64(uniform(keys[row // robots], row % robots, tick, 0, what_for) * width_ns[row % robots])
     return drawn

@@ -13,10 +13,10 @@ from swarmwire.comms.packets import BROADCAST, Sent
 class Senders:
     """Each robot's radio: a queue, first in, first out, and a count of the packets that it was handed."""
 
-    def __init__(self, radio: Radio, keys: KeyArray, robots: int, rate_hz: int) -> None:
+    def __init__(self, radio: Radio, keys: KeyArray, act_every_ticks: IntArray, rate_hz: int) -> None:
         self._radio = radio
-        self._send_times = SendTimes(radio.send_offset, keys, robots, rate_hz)
-        self._rows = len(keys) * robots
+        self._send_times = SendTimes(radio.send_offset, keys, act_every_ticks, rate_hz)
+        self._rows = len(keys) * len(act_every_ticks)
         self._sent_before = np.zeros(self._rows, np.int64)
         self._free_at_ns = np.zeros(self._rows, np.int64)
         self.queued = Transmissions.none()

@@ -10,7 +10,7 @@ from swarmwire.world.sensors.light import LightSensor
 from swarmwire.world.sensors.odometry import OdometrySensor
 from swarmwire.world.sensors.positioning import PositioningSensor
 from swarmwire.world.sensors.proximity import ProximitySensor
-from swarmwire.world.sensors.scene import Scene, Sensor
+from swarmwire.world.sensors.scene import Accumulating, Scene, Sensor
 
 SENSORS: dict[str, Callable[[Scene, Group, Any], Sensor]] = {
     "proximity": ProximitySensor,
@@ -21,4 +21,4 @@ SENSORS: dict[str, Callable[[Scene, Group, Any], Sensor]] = {
     "positioning": PositioningSensor,
 }
 
-__all__ = ["SENSORS", "Scene", "Sensor"]
+__all__ = ["SENSORS", "Accumulating", "Scene", "Sensor"]

@@ -26,12 +26,16 @@ class OdometrySensor:
     def _true(self) -> FloatArray:
         return self._scene.travel_m[:, self._group.start : self._group.stop].copy()
 
-    def read(self, tick: int) -> dict[str, FloatArray]:
-        """The travel that the encoders of every robot show; slip is drawn for the travel since the last reading."""
+    def follow(self, tick: int) -> None:
+        """Add the travel since the last tick, with a slip of its own: how often an agent looks changes nothing."""
         rolled_m = self._true()
         new_m, keys = rolled_m - self._rolled_m, self._scene.keys
         _add_travel(self._told_m, new_m, keys, self._group.start, tick, self._sheet.slip)
         self._rolled_m = rolled_m
+
+    def read(self, tick: int) -> dict[str, FloatArray]:
+        """The travel that the encoders of every robot show."""
+        self.follow(tick)
         step_m = self._sheet.step_m
         shown = np.floor(self._told_m / step_m) * step_m if step_m > 0.0 else self._told_m
         left, right = (np.ascontiguousarray(shown[:, :, wheel]).reshape(-1) for wheel in (0, 1))

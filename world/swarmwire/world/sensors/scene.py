@@ -1,7 +1,7 @@
 """What sensors look at, and what every sensor is."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.geometry import Obstacles
@@ -29,6 +29,16 @@ class Sensor(Protocol):
     def read(self, tick: int) -> dict[str, FloatArray]:
         """Fields "sense.field" -> (n,) or (n, width), a row per robot of the group, arena by arena.
 
-        Called once per tick. A value depends on the robot's own arena, its index and the tick, not on other arenas.
+        Called once in each tick in which the group acts. A value depends on the robot's own arena, its index and the
+        tick, not on other arenas.
         """
+        ...
+
+
+@runtime_checkable
+class Accumulating(Protocol):
+    """A sensor that adds up what happens from tick to tick, whether or not its group acts."""
+
+    def follow(self, tick: int) -> None:
+        """Add what the time since the last tick brought; called instead of `read` where the group does not act."""
         ...

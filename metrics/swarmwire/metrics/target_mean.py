@@ -1,0 +1,34 @@
+"""The swarm's mean distance to the target: the nearest light."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.light_distance import light_distance
+from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.moment import Moment
+
+
+@dataclass(frozen=True)
+class TargetMean(Metric):
+    """Mean over the robots alive of the distance in m from centre to nearest light of the arena.
+
+    At least `target_best`; NaN without lights, or if no robot is alive.
+    """
+
+    name = "target_mean"
+    help = "mean distance of the robots alive to the light nearest to each, in m"
+    unit = "m"
+    bounds = (0.0, None)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure; nothing is remembered."""
+        distance_m = light_distance(static)
+
+        def measure(moment: Moment) -> FloatArray:
+            n, sum_m = moment.robots_alive, np.sum(distance_m(moment), axis=1, where=moment.alive)
+            return np.where(np.isfinite(sum_m), sum_m, np.nan) / np.where(n > 0, n, np.nan)
+
+        return measure

@@ -1,0 +1,38 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.metrics.min_gap import smallest_gap_m
+from tests.metrics.truths import measured, static, truth
+
+places = st.tuples(st.floats(-4, 4), st.floats(-3, 3), st.sampled_from([0.035, 0.085, 0.2]))
+
+
+def gap(*at, arenas=1, **fields):
+    of = static(len(at) // arenas, arenas=arenas)
+    pose = np.zeros((len(at), 3))
+    pose[:, :2] = at
+    return measured("min_gap", of, truth(of, pose=pose, **fields))
+
+
+def test_it_is_from_surface_to_surface():
+    assert gap((0, 0), (3, 4), (0.3, 0.4)) == [pytest.approx(0.5 - 0.07)]
+
+
+def test_dead_robots_have_no_gap():
+    at = (0, 0), (0.1, 0), (1, 0)
+    assert gap(*at, alive=np.array([True, False, True])) == [pytest.approx(1.0 - 0.07)]
+    assert np.isnan(gap(*at, alive=np.array([True, False, False]))).all()
+    assert np.isnan(gap(*at, alive=np.zeros(3, np.bool_))).all()
+
+
+def test_robots_of_different_arenas_have_no_gap():
+    assert gap((0, 0), (1, 0), (0, 0), (2, 0), arenas=2) == [pytest.approx(0.93), pytest.approx(1.93)]
+
+
+@given(st.lists(places, min_size=2, max_size=20))
+def test_it_is_that_of_all_pairs_also_of_different_bodies(robots):
+    x, y, radius = np.array(robots).T
+    pairs = [np.hypot(x[i] - x[j], y[i] - y[j]) - radius[i] - radius[j] for i in range(len(robots)) for j in range(i)]
+    assert smallest_gap_m(np.stack([x, y], 1), radius) == pytest.approx(min(pairs), abs=1e-12)
