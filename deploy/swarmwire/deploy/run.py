@@ -16,8 +16,9 @@ from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.endpoint import local_endpoint, new_run_id
 from swarmwire.deploy.folder import make_folder
 from swarmwire.deploy.interrupt import Interrupt
-from swarmwire.deploy.result import Result, arena_result
+from swarmwire.deploy.result import EventResult, Result, arena_result
 from swarmwire.deploy.runner_processes import RunnerProcesses
+from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.radio_tally import RadioTally
 from swarmwire.metrics.rerun_recording import RerunRecording
@@ -79,14 +80,14 @@ class Execution:
 
     def run(self, observers: Sequence[Observer] = ()) -> Result:
         """Run to the end of the scenario, or until an interrupt."""
-        metrics, radio_tally = Metrics(), RadioTally()
+        metrics = Metrics()
         recorders = [RerunRecording(self.folder / "run.rrd", metrics)] if self.folder else []
-        watching: list[Observer] = [metrics, radio_tally, *recorders, *observers]
+        watching: list[Observer] = [metrics, RadioTally(), EventLog(), *recorders, *observers]
         parts: dict[str, Any] = {}
         with self._crew() as crew, Interrupt() as interrupt:
             air = self.air()
             crew.start()
-            loop = Loop(self.world, air, crew, watching)
+            loop = Loop(self.world, air, crew, watching, self.scenario.events)
             started_ns = self._clock.now_ns()
             for observer in watching:
                 observer.begin(self.world.static)
@@ -153,6 +154,7 @@ class Execution:
             wall_time_s=to_s(ended_ns - started_ns),
             start_time_s=to_s(started_ns - self._called_ns),
             arenas=tuple(arena_result(*arena) for arena in arenas),
+            events=tuple(EventResult(**event) for event in parts["events"]),
             global_senses={body: found for body, found in senses.items() if found},
             counts=loop.counts(),
             cpu=machine.cpu(),

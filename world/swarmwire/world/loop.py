@@ -6,9 +6,11 @@ import numpy as np
 
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.events.event import Event
 from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.comms.truth import Truth
+from swarmwire.world.events import Events
 from swarmwire.world.trajectory import TrajectoryHash
 from swarmwire.world.world import World
 
@@ -16,10 +18,13 @@ from swarmwire.world.world import World
 class Loop:
     """Drives world, air and crew through `ticks` ticks and shows each to the observers."""
 
-    def __init__(self, world: World, air: Air | None, crew: Crew, observers: Sequence[Observer]) -> None:
+    def __init__(
+        self, world: World, air: Air | None, crew: Crew, observers: Sequence[Observer], events: Sequence[Event] = ()
+    ) -> None:
         self.world, self.air, self.crew, self.observers = world, air, crew, observers
         self.ticks_done = 0
         self.packets_to_nobody = 0
+        self._events = Events(events, world.static, world.keys)
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
 
     def run(self, ticks: int, stopped: Callable[[], bool] = lambda: False) -> None:
@@ -28,9 +33,10 @@ class Loop:
             self.step()
 
     def step(self) -> None:
-        """One tick, in the order of the design: air, senses, crew, air, physics, observers."""
+        """One tick, in the order of the design: events, air, senses, crew, air, physics, observers."""
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
+        events = self._events.apply(start_ns, world, self.air)
         news = self.air.advance(start_ns) if self.air else None
         heard = news.heard if news else Heard.none()
         actions = self.crew.act(tick, world.sense(tick), heard)
@@ -44,7 +50,7 @@ class Loop:
         self._hash.add(pose, velocity, command, heard)
         edges = self.air.edges(pose, alive) if self.air else None
         tally, finished = (news.tally, news.finished) if news else (None, None)
-        truth = Truth(tick, start_ns, alive, pose, velocity, command, onsets, edges, tally, finished)
+        truth = Truth(tick, start_ns, alive, pose, velocity, command, onsets, edges, tally, finished, events)
         for observer in self.observers:
             observer.see(truth)
         self.ticks_done += 1
