@@ -46,14 +46,14 @@ FAULTS: list[tuple[Any, str]] = [
     (kill(names=["flock-1"], count=1), "events.0.robots: expected either names or some of group, share and count"),
     (kill(share=0.5, count=1), "events.0.robots: expected either share or count"),
     (kill(group="flock", share=0.0), "events.0.robots.share: expected a number above 0 and at most 1, got 0.0"),
-    (kill(group="flock", share=1.1), "events.0.robots.share: expected a number at most 1 and above 0, got 1.1"),
+    (kill(group="flock", share=1.1), "events.0.robots.share: expected a number above 0 and at most 1, got 1.1"),
     (kill(count=0), "events.0.robots.count: expected a whole number of at least 1, got 0"),
     (partition(["flock"]), "events.0.between: expected at least 2 sets of robots, got 1"),
     (partition(["flock"], []), "events.0.between.1: expected a list that is not empty, got []"),
     (partition(["flock"], ["small"]), f"events.0.between.1: {GROUPS} 'small'"),
     (
         partition(["flock"], ["flock-3", "big"]),
-        "events.0.between.1: expected sets that do not overlap; 'flock-3' is in",
+        "events.0.between.1: expected sets that do not overlap; 'flock-3'",
     ),
     (event("blackout", robots={"group": "x"}), "events.0.robots.group: expected one of flock, big; got 'x'"),
 ]

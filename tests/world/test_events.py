@@ -138,8 +138,9 @@ def test_all_may_be_dead_and_the_run_goes_on():
     world = World(scenario, [1], {})
     whole = assignments.whole(scenario, world.static, {"a": "swarmwire.agent.behaviours:Diffusion"})
     world.live(np.zeros(2, np.bool_))
-    actions = LocalCrew(whole).act(0, world.sense(0), Heard.none())
-    assert len(actions.rows) == 0
+    crew = LocalCrew(whole)
+    crew.start()
+    assert len(crew.act(0, world.sense(0), Heard.none()).rows) == 0
 
 
 def test_the_radio_graph_leaves_out_the_dead_radios_that_are_off_and_pairs_that_are_apart():

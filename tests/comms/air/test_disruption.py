@@ -68,11 +68,14 @@ def test_what_is_on_its_way_to_a_robot_that_dies_reaches_nobody_not_even_it_revi
 
 
 def test_a_broadcast_intends_those_alive_when_it_was_sent():
-    """Robot 1 dies and 2 is revived while packets wait: 1 was meant and is dead, 2 was not and does not hear."""
-    now = {0: disrupted(3, dead=[2]), 1: disrupted(3, dead=[1])}
-    told = ran(make_air(slow(), 3), THREE, {0: packets([0, 0, 0])}, now, 5)
-    assert told.tally.intended.tolist() == [3]
-    assert told.fates() == {"HEARD": 1, "RECEIVER_DEAD": 2}
+    """At 200 ms robot 1 dies and 2 is revived: 1 was meant and is dead, 2 was not and does not hear.
+
+    Packets end at 80, 160, 240 and 320 ms; the second reached robot 1, but was not yet handed over.
+    """
+    now = {0: disrupted(3, dead=[2]), 2: disrupted(3, dead=[1])}
+    told = ran(make_air(slow(), 3), THREE, {0: packets([0] * 4)}, now, 6)
+    assert told.tally.intended.tolist() == [4]
+    assert told.fates() == {"HEARD": 1, "RECEIVER_DEAD": 3}
     assert set(told.heard("receiver").tolist()) == {1}
 
 
