@@ -95,11 +95,12 @@ def test_an_event_takes_effect_at_the_first_tick_that_starts_at_its_time_or_late
 
 
 def test_a_dead_robot_is_an_obstacle_that_only_resists():
-    """The one that drives into it is slower than alone; the dead one is pushed, never turns back, and then stands."""
+    """The one that drives into it gets less far than alone, and the dead one is never faster than what pushes it."""
     seen = ran([[-1.0, 0.0, 0.0], [-0.8, 0.02, 0.0]], [at("kill", 0.0, "a-1")], ticks=60)
     alone = ran([[-1.0, 0.0, 0.0], [-0.8, 1.0, 0.0]], [], ticks=60)
     assert sum(truth.contact_onsets[0, 0] for truth in seen) >= 1
     assert seen[-1].pose[0, 0] < alone[-1].pose[0, 0]
+    assert max(np.hypot(*truth.velocity[1, :2]) for truth in seen) < 0.11
 
 
 def test_kills_that_overlap_do_not_undo_one_another_and_revive_lifts_all():
