@@ -104,9 +104,10 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("radio.send_offset", 0.1, f"radio.send_offset: {OFFSET}; got 0.1"),
     ("run.on_runner_loss", "wait", "run.on_runner_loss: expected stop, got 'wait'"),
     (
-        "events",
+        "wind",
         [],
-        "events: unknown key; expected one of format, name, seed, duration_s, time, physics, arena, robots, radio, run",
+        "wind: unknown key; expected one of "
+        "format, name, seed, duration_s, time, physics, arena, robots, radio, events, run",
     ),
 ]
 

@@ -13,6 +13,10 @@ class Fate(IntEnum):
     QUEUE_FULL = 4  # the sender's queue was full: never on air
     TOO_LARGE = 5  # above the medium's largest payload: never on air
     IN_FLIGHT = 6  # queued or on its way when the run ended
+    SENDER_DEAD = 7  # the sender died before the packet went on air
+    RECEIVER_DEAD = 8  # within reach, but dead when the packet went on air, or before it was handed over
+    BLACKOUT = 9  # the sender's radio was off, or that of a receiver within reach
+    PARTITIONED = 10  # within reach, but a partition kept the two apart when the packet went on air
 
 
 FATE_NAMES = tuple(fate.name.lower() for fate in Fate)

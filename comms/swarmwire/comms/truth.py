@@ -121,6 +121,17 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True)
+class Happened:
+    """An event that began in this tick, or one that ended after its time."""
+
+    serial: int  # its place in the scenario
+    at_s: float  # when the scenario lets it begin
+    do: str  # the action
+    ended: bool
+    changed: BoolArray  # (rows,) the robots for which it made a difference
+
+
+@dataclass(frozen=True, slots=True)
 class Truth:
     """One tick: the state at its start, what the robots did in it, and what came of the radio up to its start."""
 
@@ -134,3 +145,4 @@ class Truth:
     edges: IntArray | None  # (e, 2) robot rows joined in the radio graph at the tick's start; None without a radio
     tally: Tally | None  # None without a radio
     finished: Finished | None  # None without a radio
+    events: tuple[Happened, ...] = ()  # at the tick's start, in order

@@ -51,6 +51,17 @@ class ArenaResult:
 
 
 @dataclass(frozen=True)
+class EventResult:
+    """An event that took effect, or ended after its time."""
+
+    at_s: float  # of the scenario
+    tick: int  # in which it did
+    do: str
+    ended: bool
+    robots: list[list[str]]  # names of those that it changed, per arena
+
+
+@dataclass(frozen=True)
 class Result:
     """One execution: the same as `summary.json`."""
 
@@ -65,6 +76,7 @@ class Result:
     start_time_s: float  # from the call to the first tick
     arenas: tuple[ArenaResult, ...]
     global_senses: dict[str, list[str]]  # bodies that know more than their surroundings, and by which sense
+    events: tuple[EventResult, ...]  # in order
     counts: dict[str, int]  # late, missing, malformed, clipped: whatever was not as it should be, by name
     cpu: str
     versions: dict[str, str]
@@ -91,10 +103,11 @@ class Result:
         return self.arenas[0].metrics
 
     def summary(self) -> dict[str, Any]:
-        """The content of `summary.json`: with several arenas, `seed`, `radio` and `metrics` are lists."""
+        """The content of `summary.json`: with several arenas, what differs between them is a list, an item for each."""
         radios = [asdict(arena.radio) if arena.radio else None for arena in self.arenas]
         metrics = [{name: asdict(value) for name, value in arena.metrics.items()} for arena in self.arenas]
         one = len(self.arenas) == 1
+        events = [{**asdict(event), "robots": event.robots[0] if one else event.robots} for event in self.events]
         return {
             "format": SUMMARY_FORMAT,
             "scenario": self.scenario,
@@ -112,6 +125,7 @@ class Result:
             "trajectory_sha256": self.trajectory_sha256,
             "radio": radios[0] if one else radios,
             "metrics": metrics[0] if one else metrics,
+            "events": events,
             "global_senses": self.global_senses,
             "counts": self.counts,
             "cpu": self.cpu,

@@ -17,8 +17,9 @@ from swarmwire.deploy.endpoint import local_endpoint, new_run_id
 from swarmwire.deploy.folder import make_folder
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.interrupt import Interrupt
-from swarmwire.deploy.result import Result, arena_result
+from swarmwire.deploy.result import EventResult, Result, arena_result
 from swarmwire.deploy.runner_processes import RunnerProcesses
+from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.radio_tally import RadioTally
 from swarmwire.metrics.rerun_recording import RerunRecording
@@ -80,13 +81,13 @@ class Execution:
 
     def run(self, observers: Sequence[Observer] = ()) -> Result:
         """Run to the end of the scenario, or until an interrupt."""
-        metrics, radio_tally = Metrics(), RadioTally()
+        metrics = Metrics()
         recorders: list[Observer] = [RerunRecording(self.folder / "run.rrd", metrics)] if self.folder else []
         guarded = [Guarded(observer) for observer in (*recorders, *observers)]
-        watching: list[Observer] = [metrics, radio_tally, *guarded]
+        watching: list[Observer] = [metrics, RadioTally(), EventLog(), *guarded]
         parts: dict[str, Any] = {}
         with Interrupt() as interrupt, self._crew(interrupt) as crew:
-            loop = Loop(self.world, self.air(), crew, watching)
+            loop = Loop(self.world, self.air(), crew, watching, self.scenario.events)
             crew.start()
             started_ns = self._clock.now_ns()
             for observer in watching:
@@ -159,6 +160,7 @@ class Execution:
             wall_time_s=to_s(ended_ns - started_ns),
             start_time_s=to_s(started_ns - self._called_ns),
             arenas=tuple(arena_result(*arena) for arena in arenas),
+            events=tuple(EventResult(**event) for event in parts["events"]),
             global_senses={body: found for body, found in senses.items() if found},
             counts={**loop.counts(), **failed},
             cpu=machine.cpu(),

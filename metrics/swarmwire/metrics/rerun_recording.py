@@ -7,6 +7,7 @@ import numpy as np
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.metrics.event_log import names
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.rerun_arena import RerunArena
 from swarmwire.metrics.rerun_layout import layout
@@ -34,7 +35,7 @@ class RerunRecording:
 
         if not 0 <= self._arena < static.arenas:
             raise BadInput(f"recording {self._path.name}", "arena", f"expected 0 to {static.arenas - 1}")
-        seed = static.seeds[self._arena]
+        self._static, seed = static, static.seeds[self._arena]
         self._arena_view = RerunArena(static, self._arena)
         self._plots = RerunPlots(static, self._metrics.metrics, self._arena)
         self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
@@ -50,9 +51,14 @@ class RerunRecording:
 
     def see(self, truth: Truth) -> None:
         """Record one tick."""
+        import rerun as rr
+
         self._rec.set_time("tick", sequence=truth.tick)
         self._rec.set_time("sim_time", duration=np.timedelta64(truth.time_ns, "ns"))
         self._arena_view.log(self._rec, truth)
+        for event in truth.events:
+            robots = ", ".join(names(event, self._static)[self._arena])
+            self._rec.log("events", rr.TextLog(f"{event.do}{' ended' if event.ended else ''}: {robots or 'no robot'}"))
         self._plots.log(self._rec, self._metrics.latest, truth.tally)
 
     def end(self, last: Tally | None) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Checks that need more than one key of a scenario: bodies, physics steps, obstacles, the radio's offset."""
+"""Checks that need more than one key of a scenario: bodies, physics steps, obstacles, the radio's offset, events."""
 
 import math
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.events.event import Event
 from swarmwire.world.obstacles import extent, heading_of, obstacle_at
 from swarmwire.world.scenario import ObstacleTable, Scenario
 
@@ -19,6 +20,8 @@ def check(scenario: Scenario, where: str) -> None:
     for i, obstacle in enumerate(scenario.arena.obstacles):
         _check_obstacle(scenario, obstacle, f"arena.obstacles.{i}", where)
     _check_send_offset(scenario, where)
+    for i, event in enumerate(scenario.events):
+        _check_event(scenario, event, f"events.{i}", where)
 
 
 def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
@@ -57,3 +60,13 @@ def _check_send_offset(scenario: Scenario, where: str) -> None:
     if not known:
         expected = "expected uniform, tick, or an offset in s from 0 to below the period of a tick"
         raise BadInput(where, "radio.send_offset", f"{expected}; got {offset!r}")
+
+
+def _check_event(scenario: Scenario, event: Event, key: str, where: str) -> None:
+    """An event names robots that there are, and radios only where there is a radio."""
+    if event.needs_radio and scenario.radio is None:
+        raise BadInput(where, f"{key}.do", f"expected a scenario with a [radio] for {event.do!r}")
+    try:
+        event.check(scenario.groups())
+    except BadInput as error:
+        raise BadInput(where, ".".join(part for part in (key, error.key) if part), error.expected) from None

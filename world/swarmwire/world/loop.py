@@ -7,9 +7,11 @@ import numpy as np
 
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.events.event import Event
 from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.comms.truth import Tally, Truth
+from swarmwire.world.events import Events
 from swarmwire.world.mailbox import Mailbox
 from swarmwire.world.trajectory import TrajectoryHash
 from swarmwire.world.world import World
@@ -18,9 +20,12 @@ from swarmwire.world.world import World
 class Loop:
     """Drives world, air and crew through `ticks` ticks and shows each to the observers."""
 
-    def __init__(self, world: World, air: Air | None, crew: Crew, observers: Sequence[Observer]) -> None:
+    def __init__(
+        self, world: World, air: Air | None, crew: Crew, observers: Sequence[Observer], events: Sequence[Event] = ()
+    ) -> None:
         self.world, self.air, self.crew, self.observers = world, air, crew, observers
         self.ticks_done = 0
+        self._events = Events(events, world.static, world.keys)
         self._mailbox = Mailbox(world.static)
         self._lost: Counter[str] = Counter()  # packets that never came to the air, by why
         self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
@@ -32,9 +37,10 @@ class Loop:
             self.step()
 
     def step(self) -> None:
-        """One tick, in the order of the design: air, senses, crew, air, physics, observers."""
+        """One tick, in the order of the design: events, air, senses, crew, air, physics, observers."""
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
+        events = self._events.apply(start_ns, world, self.air)
         news = self.air.advance(start_ns) if self.air else None
         heard = news.heard if news else Heard.none()
         self._open = news.tally if news else None
@@ -52,7 +58,7 @@ class Loop:
         edges = self.air.edges(pose, alive) if self.air else None
         tally, finished = (news.tally, news.finished) if news else (None, None)
         self._open = None
-        truth = Truth(tick, start_ns, alive, pose, velocity, command, onsets, edges, tally, finished)
+        truth = Truth(tick, start_ns, alive, pose, velocity, command, onsets, edges, tally, finished, events)
         for observer in self.observers:
             observer.see(truth)
         self.ticks_done += 1

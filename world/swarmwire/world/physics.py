@@ -17,7 +17,7 @@ import numpy as np
 import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
 
-from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.contacts import count_began, mark, pairs_of
 from swarmwire.world.drive import Motors, push
@@ -37,6 +37,7 @@ class Physics:
     `state` is (arenas, robots, 6): x, y in m, heading in rad (not wrapped), velocity in m/s, m/s, rad/s, arena frame.
     `travel_m` is (arenas, robots, 2): how far the left and right wheel have rolled since the start.
     `touched` is (arenas, robots): 1 for a robot that touched anything in the last tick, else 0.
+    `braked` is (arenas, robots): motors that only resist, if their commands are 0; set from outside.
     """
 
     def __init__(
@@ -57,6 +58,7 @@ class Physics:
         self.travel_m = np.zeros((arenas, robots, 2))
         self.touched = np.zeros((arenas, robots))
         self._unhindered = np.zeros((arenas, robots))
+        self.braked: BoolArray = np.zeros((arenas, robots), np.bool_)
         self._force = np.zeros((arenas, robots + 1, 3))
         walls = _walls(size_m, groups) if walled else ()
         self._spaces = [
@@ -73,6 +75,8 @@ class Physics:
             touches in this tick and did not in the one before; all that is fixed counts as one thing.
         """
         for _ in range(self._steps):
+            # A turn that contacts gave to a robot that is braked is slowed down, but not made up for.
+            np.copyto(self._unhindered, self.state[:, :, 5], where=self.braked)
             push(self.motors, command, self.state, self._step_s, self._force, self.travel_m, self._unhindered)
             for space in self._spaces:
                 space.step(self._step_s)

@@ -1,13 +1,17 @@
 """The scenario: everything that a run's file may say, as frozen tables. Unknown keys are refused."""
 
+from itertools import accumulate
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, PrivateAttr, StringConstraints, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.events.event import Event
+from swarmwire.comms.events.registry import ACTIONS
+from swarmwire.comms.events.swarm import Groups
 from swarmwire.world.convex import counter_clockwise
-from swarmwire.world.schema import TABLE, AsTable
+from swarmwire.world.schema import TABLE, AsTable, OneOf
 
 
 def _metres(**bounds: Any) -> Any:
@@ -219,6 +223,8 @@ class Scenario(Table):
     """The groups of robots, by name."""
     radio: Annotated[Radio, AsTable()] | None = None
     """The radio; without it robots hear nothing."""
+    events: tuple[Annotated[Event, OneOf("do", ACTIONS)], ...] = Field(default=(), strict=False)
+    """What happens to robots and radios on the way."""
     run: RunTable = RunTable()
     """Runners."""
 
@@ -233,6 +239,13 @@ class Scenario(Table):
         """This scenario, which says that it comes from `source`."""
         self._source = source
         return self
+
+    def groups(self) -> Groups:
+        """The indices within an arena of each group's robots."""
+        stops = accumulate(table.count for table in self.robots.values())
+        return {
+            name: range(stop - self.robots[name].count, stop) for name, stop in zip(self.robots, stops, strict=True)
+        }
 
     def robot_names(self) -> tuple[str, ...]:
         """`group-i` for each robot index of an arena."""

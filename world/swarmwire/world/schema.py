@@ -27,6 +27,19 @@ class AsTable:
         return core_schema.no_info_after_validator_function(build, handler.generate_schema(table_of(source)))
 
 
+@dataclass(frozen=True)
+class OneOf:
+    """Annotation of a field that holds one of several parameter dataclasses: `tag` is the key that tells which."""
+
+    tag: str
+    kinds: tuple[type[Any], ...]
+
+    def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
+        """The schema of a table whose key `tag` chooses among those of the kinds."""
+        tables = Union[tuple(Annotated[kind, AsTable()] for kind in self.kinds)]  # noqa: UP007 - made at run time
+        return handler.generate_schema(Annotated[tables, pydantic.Field(discriminator=self.tag)])
+
+
 @cache
 def table_of(kind: type[Any]) -> type[BaseModel]:
     """The pydantic model of a dataclass made with `parameter`: same names, bounds, choices, units and help."""
@@ -48,7 +61,8 @@ def _readable(hint: Any) -> Any:
     if is_dataclass(hint):
         return Annotated[hint, AsTable()]
     if get_origin(hint) is tuple:
-        return Annotated[hint, pydantic.Field(strict=False)]  # TOML has lists only
+        items = tuple(item if item is ... else _readable(item) for item in get_args(hint))
+        return Annotated[tuple[items], pydantic.Field(strict=False)]  # TOML has lists only
     return hint
 
 

@@ -66,8 +66,14 @@ class World:
         self._clipped = self._not_finite = 0
         self._show()
 
+    def live(self, alive: BoolArray) -> None:
+        """These robots (rows,) are alive from now on; the others brake, and resist whatever pushes them."""
+        self.alive, self.command = alive.copy(), self.command.copy()
+        self.command[~alive] = 0.0
+        self._physics.braked = ~alive.reshape(self.static.arenas, self.static.robots)
+
     def sense(self, tick: int) -> Senses:
-        """What the robots that act in a tick sense, by group: rows rising, and the fields of the senses needed."""
+        """What the robots alive that act in a tick sense, by group: rows rising, and the fields that are needed."""
         senses: Senses = {}
         for group in self.static.groups:
             if tick % group.act_every_ticks:
@@ -80,6 +86,9 @@ class World:
             fields: dict[str, FloatArray] = {}
             for sensor in self._sensors[group.name]:
                 fields.update(sensor.read(tick))
+            here = self.alive[rows]
+            if not here.all():
+                rows, fields = rows[here], {name: values[here] for name, values in fields.items()}
             senses[group.name] = GroupSenses(rows, fields)
         return senses
 
@@ -91,7 +100,7 @@ class World:
         """
         finite = np.isfinite(actions.linear_mps) & np.isfinite(actions.angular_radps)
         self._not_finite += int(np.count_nonzero(actions.drive & ~finite))
-        given = actions.drive & finite
+        given = actions.drive & finite & self.alive[actions.rows]
         rows = actions.rows[given]
         linear_mps, angular_radps = actions.linear_mps[given], actions.angular_radps[given]
         index = rows % self.static.robots

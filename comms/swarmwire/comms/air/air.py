@@ -7,12 +7,15 @@ import numpy as np
 from swarmwire.comms.air import news
 from swarmwire.comms.air.accounts import Accounts
 from swarmwire.comms.air.channel import Channel
-from swarmwire.comms.air.links import Links
+from swarmwire.comms.air.disruption import Disruption
+from swarmwire.comms.air.links import HEARD, THE_REST, Links
+from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.senders import Senders
 from swarmwire.comms.air.stage import Medium
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry import Obstacles
 from swarmwire.comms.packets import BROADCAST, Heard, Sent
 from swarmwire.comms.truth import Finished, Tally
@@ -38,6 +41,10 @@ class Air:
 
     A fate is final when the reception ends: HEARD at `on_air_at + airtime + latency + jitter`, every other fate of a
     packet on air at `on_air_at + airtime`, a fate at the sender's radio at `sent_at`.
+
+    Events change who is alive and what is off or apart at the start of a tick (`disrupt`, before `advance`). What went
+    on air before stays on air, but the dead hear nothing any more and their queues end; a radio that is off loses what
+    it was receiving. A robot revived hears only what is sent from then on.
     """
 
     def __init__(
@@ -53,11 +60,13 @@ class Air:
         """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out."""
         rows = len(keys) * robots
         self._radio, self._robots = radio, robots
-        self._channel = Channel(Medium(radio, keys, robots, obstacles), size_m)
+        self._held, self._coming = Disruption.none(rows), Disruption.none(rows)
+        self._channel = Channel(Medium(radio, keys, robots, obstacles, self._held), size_m)
         act_every_ticks = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         self._senders = Senders(radio, keys, act_every_ticks, rate_hz)
         self._accounts = Accounts(len(keys), robots)
-        self._pose, self._alive = np.zeros((rows, 3)), np.zeros(rows, np.bool_)
+        self._lives = Lives(rows)
+        self._pose = np.zeros((rows, 3))
         self._others_alive = np.zeros(rows, np.int64)
         self._now_ns = 0
         self._on_air = Transmissions.none()  # packets of `_links`
@@ -65,9 +74,16 @@ class Air:
 
     def hold(self, pose: FloatArray, alive: BoolArray) -> None:
         """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive."""
-        self._pose, self._alive = pose.copy(), alive.copy()
+        self._pose = pose.copy()
+        self._lives.now(alive)
+        self._held.alive = alive.copy()
+        self._held.radio_on, self._held.sides = self._coming.radio_on, self._coming.sides
         in_arena = alive.reshape(-1, self._robots).sum(axis=1)
         self._others_alive = np.repeat(in_arena, self._robots) - alive
+
+    def disrupt(self, coming: Disruption) -> None:
+        """This holds from the end of the next `advance` on, until told otherwise."""
+        self._coming = coming
 
     def send(self, at_ns: int, tick: int, sent: Sent) -> None:
         """Queue the packets that agents sent in the tick that started at `at_ns`; `hold` has told the tick's poses.
@@ -79,7 +95,7 @@ class Air:
         self._refuse(at_ns, sent)
         if not len(sent):
             return
-        packets = self._senders.accept(at_ns, tick, sent, self._others_alive)
+        packets = self._senders.accept(at_ns, tick, sent, self._others_alive, self._lives.epoch)
         self._accounts.take_up(packets)
 
     def advance(self, until_ns: int) -> News:
@@ -90,7 +106,11 @@ class Air:
         if until_ns < self._now_ns:
             raise ValueError(f"until_ns: expected at least {self._now_ns}, got {until_ns}")
         self._now_ns = until_ns
-        self._put_on_air(until_ns)
+        self._put_on_air(self._senders.leave(until_ns, self._held))
+        if not (self._coming.alive.all() and self._coming.radio_on.all()):
+            self._put_on_air(self._senders.die(until_ns, self._coming.alive))
+            self._cut_off(until_ns)
+        self._lives.forget(self._senders.queued.epoch)
         final = self._links.final_at_ns <= until_ns
         ended = self._links.select(np.flatnonzero(final))
         self._accounts.settle(ended)
@@ -104,7 +124,7 @@ class Air:
 
     def end(self) -> Tally:
         """The run is over: what is queued or on its way ends as IN_FLIGHT."""
-        self._accounts.strand(self._links, self._senders.leave(NEVER_NS))
+        self._accounts.strand(self._links, self._senders.leave(NEVER_NS, self._held))
         self._keep(np.empty(0, np.int64))
         return self._accounts.close()
 
@@ -123,11 +143,17 @@ class Air:
         if wrong.any():
             raise ValueError(f"to: expected another robot of the arena's {self._robots}, got {sent.to[wrong][0]}")
 
-    def _put_on_air(self, until_ns: int) -> None:
-        packets = self._senders.leave(until_ns)
+    def _cut_off(self, now_ns: int) -> None:
+        """End receptions of robots that are dead now, and those still going on at radios that are off now."""
+        links, now = self._links, self._coming
+        open_ = (links.fate == HEARD) & (links.receiver != THE_REST)
+        links.fate[open_ & ~now.radio_on[links.receiver] & (links.final_at_ns > now_ns)] = Fate.BLACKOUT
+        links.fate[open_ & ~now.alive[links.receiver]] = Fate.RECEIVER_DEAD
+
+    def _put_on_air(self, packets: Transmissions) -> None:
         if not packets:
             return
-        links = self._channel.decide(packets, self._pose, self._alive)
+        links = self._channel.decide(packets, self._pose, self._lives)
         self._links = self._links.followed_by(links._replace(packet=links.packet + len(self._on_air.sender)))
         self._on_air = self._on_air.followed_by(packets)
 

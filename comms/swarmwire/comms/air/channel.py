@@ -3,6 +3,7 @@
 import numpy as np
 
 from swarmwire.comms.air.links import HEARD, THE_REST, Links
+from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.reach import links_in_range
 from swarmwire.comms.air.stage import Medium
 from swarmwire.comms.air.stages import chain
@@ -23,12 +24,16 @@ class Channel:
         self._columns = len(medium.radio.gives.columns)
         self._stages = chain(medium)
 
-    def decide(self, packets: Transmissions, pose: FloatArray, alive: BoolArray) -> Links:
+    def decide(self, packets: Transmissions, pose: FloatArray, lives: Lives) -> Links:
         """What becomes of packets that go on air, or are refused, while robots stand at `pose`."""
         # No geometry for what is too large; for a full queue it tells how many it would have reached.
         tried = np.flatnonzero(packets.fate != Fate.TOO_LARGE)
-        found, receiver = self._reach(pose, alive, packets.sender[tried], packets.to[tried])
+        everyone = np.ones(len(pose), np.bool_)  # some that are dead by now were meant, some alive by now were not
+        found, receiver = self._reach(pose, everyone, packets.sender[tried], packets.to[tried])
         packet = tried[found]
+        if lives.any_dead:
+            meant = lives.intended(packets.epoch[packet], receiver) | (packets.to[packet] != BROADCAST)
+            packet, receiver = packet[meant], receiver[meant]
         sender, sequence, end_ns = packets.sender[packet], packets.sequence[packet], packets.off_air_at_ns[packet]
         links = Links.under_way(packet, sender, receiver, sequence, end_ns, self._columns)
         for stage in self._stages:

@@ -3,10 +3,12 @@
 import numpy as np
 
 from swarmwire.comms.air import access
+from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.send_times import SendTimes
 from swarmwire.comms.air.transmissions import Transmissions
-from swarmwire.comms.arrays import IntArray, KeyArray
+from swarmwire.comms.arrays import BoolArray, IntArray, KeyArray
+from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST, Sent
 
 
@@ -21,10 +23,10 @@ class Senders:
         self._free_at_ns = np.zeros(self._rows, np.int64)
         self.queued = Transmissions.none()
 
-    def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray) -> Transmissions:
+    def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """The packets as the radios take them up, sorted by sender; also kept in `queued`.
 
-        `others_alive` (rows,) are the receivers that a robot's broadcast intends.
+        `others_alive` (rows,) are the receivers that a robot's broadcast intends, those of the epoch.
         """
         # By sender, so that nothing depends on how the crew was divided.
         order = np.argsort(sent.sender, kind="stable")
@@ -36,6 +38,7 @@ class Senders:
             to=to,
             sequence=self._numbers(sender),
             intended=np.where(to == BROADCAST, others_alive[sender], 1),
+            epoch=np.full(len(sender), epoch),
             tag=payloads.tags(),
             sent_at_ns=sent_at_ns[sender],
             on_air_at_ns=on_air_at_ns,
@@ -46,9 +49,29 @@ class Senders:
         self.queued = self.queued.followed_by(packets)
         return packets
 
-    def leave(self, until_ns: int) -> Transmissions:
-        """Take out of the queues what goes on air, or is refused, before `until_ns`."""
-        due = self.queued.on_air_at_ns < until_ns
+    def leave(self, until_ns: int, now: Disruption) -> Transmissions:
+        """Take out of the queues what goes on air, or is refused, before `until_ns`.
+
+        What a radio that is off should put on air ends at that moment as BLACKOUT: its queue drains at the usual pace.
+        """
+        packets = self._taken(self.queued.on_air_at_ns < until_ns)
+        accepted = packets.fate == access.ACCEPTED
+        off, dead = accepted & ~now.radio_on[packets.sender], accepted & ~now.alive[packets.sender]
+        if not (off | dead).any():
+            return packets
+        fate = np.where(dead, Fate.SENDER_DEAD, np.where(off, Fate.BLACKOUT, packets.fate))
+        off_air_at_ns = np.where(off | dead, packets.on_air_at_ns, packets.off_air_at_ns)
+        return packets._replace(fate=fate, off_air_at_ns=off_air_at_ns)
+
+    def die(self, at_ns: int, alive: BoolArray) -> Transmissions:
+        """Take out all that waits at radios of robots not alive (rows,): SENDER_DEAD now, and the radios are free."""
+        self._free_at_ns[~alive] = 0
+        packets = self._taken(~alive[self.queued.sender])
+        at = np.full(len(packets.sender), at_ns)
+        fate = np.where(packets.fate == access.ACCEPTED, Fate.SENDER_DEAD, packets.fate)
+        return packets._replace(fate=fate, on_air_at_ns=at, off_air_at_ns=at)
+
+    def _taken(self, due: BoolArray) -> Transmissions:
         packets = self.queued.select(np.flatnonzero(due))
         self.queued = self.queued.select(np.flatnonzero(~due))
         return packets

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import FloatArray, KeyArray
@@ -17,6 +18,7 @@ class Medium:
     keys: KeyArray  # (arenas,) for draws
     robots: int  # in each arena
     obstacles: Obstacles
+    disruption: Disruption  # kept up to date by the air
 
 
 class Stage(ABC):

@@ -9,14 +9,14 @@ To add a stage:
 2. Give `Radio` a field `<name>` with the stage's parameters (a frozen dataclass, None by default): the scenario's table
    `[radio.<name>]` follows from it. A new way to end a packet is a new `Fate`; a column that later stages read, a new
    field of `Links`.
-3. List the module below, where it belongs: propagation, interference, reception, bursts, what the receiver learns,
-   delay.
+3. List the module below, where it belongs: propagation, disruption (what it ends does not interfere either),
+   interference, reception, bursts, what the receiver learns, delay.
 """
 
-from swarmwire.comms.air import delay, fixed_loss, given_bearing, given_range, line_of_sight
+from swarmwire.comms.air import delay, disrupted, fixed_loss, given_bearing, given_range, line_of_sight
 from swarmwire.comms.air.stage import Medium, Stage
 
-ORDER = (line_of_sight, fixed_loss, given_range, given_bearing, delay)
+ORDER = (line_of_sight, disrupted, fixed_loss, given_range, given_bearing, delay)
 
 
 def chain(medium: Medium) -> tuple[Stage, ...]:

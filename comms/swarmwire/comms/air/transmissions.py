@@ -18,6 +18,7 @@ class Transmissions(NamedTuple):
     to: IntArray  # (k,) index in the arena of the one receiver, or BROADCAST
     sequence: IntArray  # (k,) packets that the sender had sent before this one, refused ones too
     intended: IntArray  # (k,) receivers that it is meant for
+    epoch: IntArray  # (k,) of `Lives` when it was sent: a broadcast is meant for those alive then
     tag: IntArray  # (k,) topic
     sent_at_ns: IntArray  # (k,) handed to the sender's radio
     on_air_at_ns: IntArray  # (k,) the first bit
@@ -28,7 +29,7 @@ class Transmissions(NamedTuple):
     @classmethod
     def none(cls) -> "Transmissions":
         """No packets."""
-        return cls._make([*[np.empty(0, np.int64)] * 9, Payloads.of([])])
+        return cls._make([*[np.empty(0, np.int64)] * 10, Payloads.of([])])
 
     def __bool__(self) -> bool:
         return len(self.sender) > 0

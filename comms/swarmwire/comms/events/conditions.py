@@ -1,0 +1,43 @@
+"""What events hold over robots and radios now, by the event that does."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from swarmwire.comms.air.disruption import Disruption
+from swarmwire.comms.arrays import BoolArray, IntArray
+
+
+class Conditions:
+    """Each event holds what it holds until it ends, so those that overlap do not undo one another.
+
+    A robot is dead while any kill holds it; a radio is off while any blackout does; two robots are apart while any
+    partition has them in different sets.
+    """
+
+    def __init__(self, rows: int) -> None:
+        self._rows = rows
+        self.kills: dict[int, BoolArray] = {}  # by event: (rows,) robots that it holds dead
+        self.blackouts: dict[int, BoolArray] = {}  # by event: (rows,) robots whose radios it holds off
+        self.partitions: dict[int, IntArray] = {}  # by event: (rows,) the set of each robot, from 1; 0: in none
+
+    @property
+    def alive(self) -> BoolArray:
+        """Which robots are alive, (rows,)."""
+        return ~self._any(self.kills.values())
+
+    @property
+    def radio_on(self) -> BoolArray:
+        """Which robots' radios are on, (rows,)."""
+        return ~self._any(self.blackouts.values())
+
+    def disruption(self) -> Disruption:
+        """All that matters to the air, as it is now."""
+        sides = np.array(list(self.partitions.values()), np.int64).reshape(-1, self._rows)
+        return Disruption(self.alive, self.radio_on, sides)
+
+    def _any(self, masks: Iterable[BoolArray]) -> BoolArray:
+        found = np.zeros(self._rows, np.bool_)
+        for mask in masks:
+            found |= mask
+        return found

@@ -1,0 +1,52 @@
+"""What an event is: a frozen dataclass of parameters that knows how to begin, and how to end if it lasts."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.events.conditions import Conditions
+from swarmwire.comms.events.swarm import Groups, Swarm
+from swarmwire.comms.parameters import parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Event(ABC):
+    """Something that happens to the robots of every arena at a time of the run.
+
+    It takes effect at the first tick that starts at `at_s` or later; one after the end of the run never does. What it
+    changes are the `Conditions` under which world and air then go on, so it need know neither.
+    """
+
+    at_s: float = parameter(help="when it happens", unit="s", at_least=0, at_most=1e9)
+    do: str = parameter(help="what happens")
+    needs_radio: ClassVar[bool] = False
+
+    @property
+    def lasts_s(self) -> float | None:
+        """How long until it is undone; None: never."""
+        return None
+
+    @abstractmethod
+    def check(self, groups: Groups) -> None:
+        """Raise BadInput, with a key within the event's table, for what does not fit these groups of robots."""
+
+    @abstractmethod
+    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
+        """Change `conditions`; `serial` is the event's place in the scenario. Which robots it changed, (rows,)."""
+
+    def end(self, serial: int, conditions: Conditions) -> BoolArray:
+        """Undo what `begin` did; only called if the event lasts for a time. Which robots that changed, (rows,)."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class LastingEvent(Event):
+    """An event that may be undone after a time."""
+
+    for_s: float | None = parameter(None, help="undone after this time; never if left out", unit="s", above=0)
+
+    @property
+    def lasts_s(self) -> float | None:
+        """`for_s`."""
+        return self.for_s

@@ -1,0 +1,12 @@
+"""Actions by the name that a scenario's `do` gives. A new one is a file like `kill.py` and its line here.
+
+What an action changes lies in `Conditions`: a new kind of effect is a new field there, read by world or air.
+"""
+
+from swarmwire.comms.events.blackout import Blackout
+from swarmwire.comms.events.event import Event
+from swarmwire.comms.events.kill import Kill
+from swarmwire.comms.events.partition import Partition
+from swarmwire.comms.events.revive import Revive
+
+ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Blackout, Partition)

@@ -1,0 +1,31 @@
+"""Revive: robots that were killed act again, with a fresh memory."""
+
+from dataclasses import dataclass
+
+from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.events.conditions import Conditions
+from swarmwire.comms.events.event import Event
+from swarmwire.comms.events.kill import check_robots
+from swarmwire.comms.events.selection import Selection
+from swarmwire.comms.events.swarm import Groups, Swarm
+from swarmwire.comms.parameters import parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Revive(Event):
+    """Whatever killed them, the robots are alive again; those that are so already do not notice."""
+
+    do: str = parameter("revive", help="robots that were killed act again", choices=("revive",))
+    robots: Selection = parameter(help="which robots; share and count choose among those dead")
+
+    def check(self, groups: Groups) -> None:
+        """Raise BadInput for robots that there are not."""
+        check_robots(self.robots, groups)
+
+    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
+        """Free the robots of every kill; changed are those that were dead."""
+        dead = ~conditions.alive
+        chosen = self.robots.rows(serial, swarm, dead)
+        for held in conditions.kills.values():
+            held[chosen] = False
+        return chosen & dead

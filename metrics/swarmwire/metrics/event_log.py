@@ -1,0 +1,38 @@
+"""The events of a run: what happened when, and to which robots."""
+
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.truth import Happened, Static, Tally, Truth
+
+
+class EventLog:
+    """Observer that keeps what happened. Summary part: `events`, in order.
+
+    Each: at_s (of the scenario), tick (in which it took effect), do, ended (whether it was undone then) and robots: the
+    names of those it changed, a list per arena.
+    """
+
+    def begin(self, static: Static) -> None:
+        """Start afresh."""
+        self._static = static
+        self._events: list[dict[str, Any]] = []
+
+    def see(self, truth: Truth) -> None:
+        """Add what happened in a tick."""
+        for event in truth.events:
+            robots = names(event, self._static)
+            self._events.append(
+                {"at_s": event.at_s, "tick": truth.tick, "do": event.do, "ended": event.ended, "robots": robots}
+            )
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """The events so far."""
+        return {"events": self._events}
+
+
+def names(event: Happened, static: Static) -> list[list[str]]:
+    """The names of the robots that an event changed, a list per arena."""
+    changed = event.changed.reshape(static.arenas, static.robots)
+    return [[static.robot_names[index] for index in np.flatnonzero(own)] for own in changed]

@@ -1,0 +1,82 @@
+"""An event that cannot be is refused at the door, in one line that names the file, the key and what was expected."""
+
+from typing import Any
+
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.events.kill import Kill
+from swarmwire.comms.events.partition import Partition
+from swarmwire.comms.events.selection import Selection
+from swarmwire.world.scenario_file import scenario_from
+from tests.world.samples import SAMPLE, changed
+
+FLOCK = {"group": "flock"}
+NAMES = "expected names of robots, such as flock-0; got"
+GROUPS = "expected groups (flock, big) or names of robots; got"
+
+
+def event(do: str = "kill", at_s: Any = 1.0, **keys: Any) -> dict[str, Any]:
+    return {"at_s": at_s, "do": do, **keys}
+
+
+def kill(**robots: Any) -> dict[str, Any]:
+    return event(robots=robots)
+
+
+def partition(*between: list[str]) -> dict[str, Any]:
+    return event("partition", between=list(between))
+
+
+FAULTS: list[tuple[Any, str]] = [
+    (3, "events.0: expected a table, got 3"),
+    ({"at_s": 1.0}, "events.0.do: is missing; expected one of blackout, kill, partition, revive"),
+    (event("burn"), "events.0.do: expected one of blackout, kill, partition, revive; got 'burn'"),
+    ({"do": "revive", "robots": FLOCK}, "events.0.at_s: is missing; expected a number of at least 0 and at most 10"),
+    (event(at_s=-1.0, robots=FLOCK), "events.0.at_s: expected a number of at least 0 and at most 1000000000 (s), got"),
+    (event(robots=FLOCK, for_s=-1.0), "events.0.for_s: expected a number above 0 (s), got -1.0"),
+    (event("revive", robots=FLOCK, for_s=1.0), "events.0.for_s: unknown key; expected one of at_s, do, robots"),
+    (event(), "events.0.robots: is missing; expected a table"),
+    (kill(), "events.0.robots: expected group, names, share or count"),
+    (kill(group="flok"), "events.0.robots.group: expected one of flock, big; got 'flok'"),
+    (kill(names=["flock-12"]), f"events.0.robots.names: {NAMES} 'flock-12'"),
+    (kill(names=["flock-01"]), f"events.0.robots.names: {NAMES} 'flock-01'"),
+    (kill(names=["flock"]), f"events.0.robots.names: {NAMES} 'flock'"),
+    (kill(names=[]), "events.0.robots.names: expected a list that is not empty, got []"),
+    (kill(names=["flock-1"], count=1), "events.0.robots: expected either names or some of group, share and count"),
+    (kill(share=0.5, count=1), "events.0.robots: expected either share or count"),
+    (kill(group="flock", share=0.0), "events.0.robots.share: expected a number above 0 and at most 1, got 0.0"),
+    (kill(group="flock", share=1.1), "events.0.robots.share: expected a number above 0 and at most 1, got 1.1"),
+    (kill(count=0), "events.0.robots.count: expected a whole number of at least 1, got 0"),
+    (partition(["flock"]), "events.0.between: expected at least 2 sets of robots, got 1"),
+    (partition(["flock"], []), "events.0.between.1: expected a list that is not empty, got []"),
+    (partition(["flock"], ["small"]), f"events.0.between.1: {GROUPS} 'small'"),
+    (
+        partition(["flock"], ["flock-3", "big"]),
+        "events.0.between.1: expected sets that do not overlap; 'flock-3'",
+    ),
+    (event("blackout", robots={"group": "x"}), "events.0.robots.group: expected one of flock, big; got 'x'"),
+]
+
+
+@pytest.mark.parametrize(("table", "text"), FAULTS)
+def test_a_fault_is_one_line_with_file_key_and_what_was_expected(table: Any, text: str):
+    with pytest.raises(BadInput) as caught:
+        scenario_from(changed("events", [table]), "f.toml")
+    assert str(caught.value).startswith(f"f.toml: {text}")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("table", [event("blackout", robots=FLOCK), partition(["flock"], ["big"])])
+def test_without_a_radio_there_is_nothing_to_disturb(table: Any):
+    mute = {**{key: value for key, value in SAMPLE.items() if key != "radio"}, "events": [table]}
+    with pytest.raises(BadInput, match=r"^f: events\.0\.do: expected a scenario with a \[radio\] for"):
+        scenario_from(mute, "f")
+
+
+def test_events_are_read_as_what_they_are_also_after_the_end():
+    tables = [event(at_s=1e6, robots={**FLOCK, "share": 0.05}, for_s=20.0), partition(["flock-1", "big"], ["flock-0"])]
+    assert scenario_from(changed("events", tables), "f").events == (
+        Kill(at_s=1e6, for_s=20.0, robots=Selection(group="flock", share=0.05)),
+        Partition(at_s=1.0, between=(("flock-1", "big"), ("flock-0",))),
+    )

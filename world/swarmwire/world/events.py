@@ -1,0 +1,45 @@
+"""The dispatcher of events: what is due at the start of a tick changes world and air before anything else."""
+
+from collections import deque
+from collections.abc import Sequence
+
+from swarmwire.comms.air.air import Air
+from swarmwire.comms.arrays import KeyArray
+from swarmwire.comms.clock import to_ns
+from swarmwire.comms.events.conditions import Conditions
+from swarmwire.comms.events.event import Event
+from swarmwire.comms.events.swarm import Swarm
+from swarmwire.comms.truth import Happened, Static
+from swarmwire.world.world import World
+
+
+class Events:
+    """The events of a run in order of time; at equal times those that end come first, then the scenario's order."""
+
+    def __init__(self, events: Sequence[Event], static: Static, keys: KeyArray) -> None:
+        self._events = tuple(events)
+        groups = {group.name: range(group.start, group.stop) for group in static.groups}
+        self._swarm = Swarm(groups, static.robots, keys)
+        self._conditions = Conditions(self._swarm.rows)
+        due = [(to_ns(event.at_s), True, serial) for serial, event in enumerate(events)]
+        for (at_ns, _, serial), event in zip(tuple(due), events, strict=True):
+            if event.lasts_s is not None:
+                due.append((at_ns + to_ns(event.lasts_s), False, serial))
+        self._coming = deque(sorted(due))  # (time in ns, whether it begins, place in the scenario)
+
+    def apply(self, start_ns: int, world: World, air: Air | None) -> tuple[Happened, ...]:
+        """Let happen what is due by the start of a tick, in ns; world and air go on under what holds after that."""
+        happened: list[Happened] = []
+        while self._coming and self._coming[0][0] <= start_ns:
+            _, begins, serial = self._coming.popleft()
+            happened.append(self._happen(serial, begins))
+        if happened:
+            world.live(self._conditions.alive)
+            if air:
+                air.disrupt(self._conditions.disruption())
+        return tuple(happened)
+
+    def _happen(self, serial: int, begins: bool) -> Happened:
+        event, conditions = self._events[serial], self._conditions
+        changed = event.begin(serial, self._swarm, conditions) if begins else event.end(serial, conditions)
+        return Happened(serial, event.at_s, event.do, not begins, changed)
