@@ -25,6 +25,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.world.remote_crew import RemoteCrew
+from swarmwire.world.runner_crew import Surroundings
 from tests.agent.hosts import GIVES, assignment, group, heard_from, one_group, plain, spec
 
 RUN = "r1"
@@ -225,7 +226,9 @@ def test_when_nobody_joins_the_wait_ends_at_the_time_out(endpoint: str) -> None:
 
 
 def test_trouble_ends_the_wait_at_once(endpoint: str) -> None:
-    crew = RemoteCrew(endpoint, RUN, parts("Counter", [0]), 600.0, WallClock(), lambda: "its process ended")
+    crew = RemoteCrew(
+        endpoint, RUN, parts("Counter", [0]), 600.0, WallClock(), Surroundings(lambda: "its process ended")
+    )
     try:
         with pytest.raises(RunnerLost, match="its process ended"):
             crew.start()
