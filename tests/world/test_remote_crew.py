@@ -8,10 +8,11 @@ import sys
 import tempfile
 import threading
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import msgpack
+import psutil
 import pytest
 
 from swarmwire.agent import runner
@@ -294,3 +295,37 @@ input()
                 assert ends.get(timeout=20.0) is None
         finally:
             world.kill()
+
+
+def kill_one(nursery: "subprocess.Popen[bytes]") -> None:
+    child = psutil.Process(nursery.pid).children()[0]
+    child.kill()
+    child.wait(20.0)
+
+
+def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
+    with ExitStack() as later, processes(endpoint, ["a", "b"]) as nursery:
+        around = Surroundings(lost=lambda _: (later.enter_context(thread(endpoint, "c")), None)[1])
+        crew = RemoteCrew(endpoint, RUN, parts("Counter", [0, 1], [2]), TIMEOUT_S, WallClock(), around, "wait")
+        later.callback(crew.close)
+        crew.start()
+        for tick in range(2):
+            crew.act(tick, one_group(tick, [0, 1, 2]), Heard.none(GIVES))
+        kill_one(nursery)
+        got = crew.act(2, one_group(2, [0, 1, 2]), Heard.none(GIVES))
+        steps = dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True))
+        assert steps in ({0: 1.0, 1: 1.0, 2: 3.0}, {0: 3.0, 1: 3.0, 2: 1.0})
+        assert crew.counts() == {"runners_lost": 1}
+        crew.close()
+
+
+def test_a_run_that_waits_for_a_runner_can_be_ended(endpoint: str) -> None:
+    with processes(endpoint, ["a", "b"]) as nursery:
+        around = Surroundings(stopped=lambda: True)
+        crew = RemoteCrew(endpoint, RUN, parts("Counter", [0], [1]), TIMEOUT_S, WallClock(), around, "wait")
+        try:
+            crew.start()
+            kill_one(nursery)
+            assert len(crew.act(0, one_group(0, [0, 1]), Heard.none(GIVES)).rows) <= 1
+        finally:
+            crew.close()
