@@ -111,7 +111,7 @@ def test_robots_of_a_runner_that_is_killed_stand_still_if_the_scenario_says_so(s
     watcher = Watcher(
         (lambda truth: not still(truth), lambda: [runner.kill() for runner in runners_here()[:1]]),
         *[(lambda truth: still(truth) == 5, lambda: None)] * 20,
-        (lambda truth: True, lambda: signal.raise_signal(signal.SIGINT)),
+        (lambda truth: still(truth) == 5, lambda: signal.raise_signal(signal.SIGINT)),
     )
     setting = [*steady, "duration_s=500", "run.on_runner_loss=dead", "run.watchdog_s=1000"]
     result = run(LOSSY, overrides=setting, runners=4, realtime=realtime, observers=[watcher])
