@@ -31,8 +31,12 @@ def parts(owners: dict[int, int]) -> list[Assignment]:
     return own
 
 
+def two_parts() -> list[Assignment]:
+    return parts({row: row // 4 for row in range(8)})
+
+
 def two() -> Lockstep:
-    return Lockstep(parts({0: 0, 1: 0, 2: 0, 3: 0, 4: 1, 5: 1, 6: 1, 7: 1}))
+    return Lockstep(two_parts())
 
 
 def request(runner: Any, version: Any = frames.VERSION) -> bytes:
@@ -367,3 +371,55 @@ def test_a_runner_none_of_whose_groups_acts_gets_no_frame_and_is_not_waited_for(
     assert lockstep.open_tick(1, {}, Heard.none(GIVES)) == []
     assert lockstep.waiting == 0
     assert len(lockstep.take().rows) == 0
+
+
+def test_robots_of_a_dead_runner_stand_still_and_nobody_waits_for_them() -> None:
+    lockstep = ready(joined(Lockstep(two_parts(), "dead"), "a", "b"), "a", "b")
+    lockstep.open_tick(0, all_senses(), Heard.none(GIVES))
+    lockstep.gone("b", "its link is gone")
+    assert (lockstep.waiting, lockstep.missing[0]) == (1, "a")
+    for tick in range(2):
+        lockstep.answer("a", encode_actions(tick, actions([0, 1, 2, 3])))
+        assert not lockstep.waiting
+        got = lockstep.take()
+        still = got.rows > 3
+        assert sorted(got.rows.tolist()) == list(range(8))
+        assert got.drive[still].all()
+        assert not got.linear_mps[still].any()
+        assert not got.angular_radps[still].any()
+        out = lockstep.open_tick(tick + 1, all_senses(tick + 1), Heard.none(GIVES))
+        assert [name for name, _ in out] == ["a"]
+    assert [loss.runner for loss in lockstep.losses] == ["b"]
+    assert lockstep.counts() == {"runners_lost": 1}
+    with pytest.raises(Refused, match="all robots are taken"):
+        lockstep.join(request("c"))
+
+
+@pytest.mark.parametrize("answered", [False, True])
+def test_whoever_takes_over_gets_the_open_tick_unless_it_was_answered(answered: bool) -> None:
+    lockstep = ready(joined(Lockstep(two_parts(), "wait"), "a", "b"), "a", "b")
+    out = dict(lockstep.open_tick(0, all_senses(), Heard.none(GIVES)))
+    lockstep.answer("a", encode_actions(0, actions([0, 1, 2, 3])))
+    if answered:
+        lockstep.answer("b", encode_actions(0, actions([4, 5, 6, 7])))
+    lockstep.gone("b", "its link is gone")
+    lockstep.lose_silent("no answer")  # nobody is there to be silent
+    assert (lockstep.waiting, lockstep.vacant, len(lockstep.losses)) == (1, True, 1)
+    joined(lockstep, "c")
+    again = lockstep.answer("c", frames.encode("ready", -1, {}))
+    assert again == ([] if answered else [("c", out["b"])])
+    if not answered:
+        assert lockstep.waiting
+        lockstep.answer("c", encode_actions(0, actions([4, 5, 6, 7])))
+    assert not lockstep.waiting
+    assert plain(lockstep.take()) == plain(actions(list(range(8))))
+    assert [name for name, _ in lockstep.open_tick(1, all_senses(1), Heard.none(GIVES))] == ["a", "c"]
+
+
+@pytest.mark.parametrize("on_loss", ["dead", "wait"])
+def test_before_the_first_tick_every_loss_ends_the_run(on_loss: Any) -> None:
+    lockstep = joined(Lockstep(two_parts(), on_loss), "a")
+    with pytest.raises(RunnerLost):
+        lockstep.gone("a", "its link is gone")
+    with pytest.raises(RunnerLost, match="no answer"):
+        lockstep.lose_silent("no answer")

@@ -8,23 +8,25 @@ import sys
 import tempfile
 import threading
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import msgpack
+import psutil
 import pytest
 
 from swarmwire.agent import runner
 from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import AgentFailed, BadInput, RunnerLost
+from swarmwire.comms.errors import AgentFailed, BadInput, Interrupted, RunnerLost
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.world.remote_crew import RemoteCrew
+from swarmwire.world.runner_crew import Surroundings
 from tests.agent.hosts import GIVES, assignment, group, heard_from, one_group, plain, spec
 
 RUN = "r1"
@@ -225,7 +227,9 @@ def test_when_nobody_joins_the_wait_ends_at_the_time_out(endpoint: str) -> None:
 
 
 def test_trouble_ends_the_wait_at_once(endpoint: str) -> None:
-    crew = RemoteCrew(endpoint, RUN, parts("Counter", [0]), 600.0, WallClock(), lambda: "its process ended")
+    crew = RemoteCrew(
+        endpoint, RUN, parts("Counter", [0]), 600.0, WallClock(), Surroundings(lambda: "its process ended")
+    )
     try:
         with pytest.raises(RunnerLost, match="its process ended"):
             crew.start()
@@ -291,3 +295,40 @@ input()
                 assert ends.get(timeout=20.0) is None
         finally:
             world.kill()
+
+
+def kill_one(nursery: "subprocess.Popen[bytes]") -> None:
+    child = psutil.Process(nursery.pid).children()[0]
+    child.kill()
+    child.wait(20.0)
+
+
+def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
+    with ExitStack() as later, processes(endpoint, ["a", "b"]) as nursery:
+        around = Surroundings(lost=lambda _: (later.enter_context(thread(endpoint, "c")), None)[1])
+        crew = RemoteCrew(endpoint, RUN, parts("Counter", [0, 1], [2]), TIMEOUT_S, WallClock(), around, "wait")
+        later.callback(crew.close)
+        crew.start()
+        for tick in range(2):
+            crew.act(tick, one_group(tick, [0, 1, 2]), Heard.none(GIVES))
+        kill_one(nursery)
+        got = crew.act(2, one_group(2, [0, 1, 2]), Heard.none(GIVES))
+        steps = dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True))
+        assert steps in ({0: 1.0, 1: 1.0, 2: 3.0}, {0: 3.0, 1: 3.0, 2: 1.0})
+        assert crew.counts() == {"runners_lost": 1}
+        crew.close()
+
+
+def test_a_run_that_waits_for_a_runner_can_be_ended(endpoint: str) -> None:
+    with processes(endpoint, ["a", "b"]) as nursery:
+        asked: list[bool] = []
+        around = Surroundings(stopped=lambda: bool(asked))
+        crew = RemoteCrew(endpoint, RUN, parts("Counter", [0], [1]), TIMEOUT_S, WallClock(), around, "wait")
+        try:
+            crew.start()
+            kill_one(nursery)
+            asked.append(True)
+            with pytest.raises(Interrupted):
+                crew.act(0, one_group(0, [0, 1]), Heard.none(GIVES))
+        finally:
+            crew.close()

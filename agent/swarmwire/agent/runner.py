@@ -1,8 +1,8 @@
-"""A runner: a process that plays some robots of a world behind zenoh, in lockstep.
+"""A runner: a process that plays some robots of a world behind zenoh, in lockstep or in real time.
 
-It joins (gets robots), declares its token, builds the agents, says "ready", then answers every `tick` frame with one
-`actions` frame until the world says "end" or is gone. All that arrives lands in one queue, put there by the network
-thread itself: no Python thread per subscription, so a runner stays small.
+It joins (gets robots), declares its token, builds the agents, says "ready", then answers `tick` frames with one
+`actions` frame each until the world says "end" or is gone. All that arrives lands in one queue, put there by the
+network thread itself: no Python thread per subscription, so a runner stays small.
 """
 
 # zenoh's stubs leave out the return types of put, reply and close.
@@ -56,7 +56,7 @@ class _Inbox:
     def __init__(self) -> None:
         self._arrived: queue.SimpleQueue[zenoh.Sample | bool] = queue.SimpleQueue()
         self.put_frame = self._arrived.put
-        self.dropped = 0  # frames that were no tick to come
+        self.dropped = 0  # frames that were no tick to come, or not acted on since a newer one was there
 
     def put_token(self, token: zenoh.Sample) -> None:
         """The world's liveliness token appeared or vanished."""
@@ -72,11 +72,15 @@ class _Inbox:
         return arrived
 
     def ticks(self, assignment: Assignment) -> Iterator[tuple[int, Senses, Heard]]:
-        """What each tick brings, in order, until the world says "end" or is gone."""
+        """What the newest tick brings, each time, until the world says "end" or is gone; lockstep has but one."""
         gives, groups = assignment.gives or (), {group.name for group in assignment.groups}
         periods = {group.act_every_ticks for group in assignment.groups}
+        newest: tuple[int, Senses, Heard] | None = None
         tick = -1
         while True:
+            if newest is not None and self._arrived.empty():
+                yield newest
+                newest = None
             arrived = self._arrived.get()
             if isinstance(arrived, bool):
                 if not arrived:
@@ -92,8 +96,8 @@ class _Inbox:
             except BadFrame:
                 self.dropped += 1
                 continue
-            tick = frame.tick
-            yield tick, senses, heard
+            self.dropped += newest is not None
+            newest, tick = (frame.tick, senses, heard), frame.tick
 
 
 def _join(session: zenoh.Session, keys: Keys, runner: str, inbox: _Inbox) -> Assignment:

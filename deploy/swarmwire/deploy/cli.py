@@ -50,11 +50,18 @@ def run_command(
     socket: Annotated[
         Path | None, typer.Option(help="Unix socket at which runners meet the world. Default: a private temporary one.")
     ] = None,
+    realtime: Annotated[
+        str | None,
+        typer.Option(
+            help="Keep to the wall clock, FACTOR (1 if left out) simulated seconds per second; wait for no runner.",
+            metavar="[FACTOR]",
+        ),
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Run a scenario, print what came of it, and write summary.json and run.rrd into the run folder.
 
-    The same scenario and seed give the same run bit for bit, whatever --runners says.
+    Without --realtime the same scenario and seed give the same run bit for bit, whatever --runners says.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.progress import ProgressLine
@@ -64,7 +71,7 @@ def run_command(
     console = Console(quiet=quiet, highlight=False)
     checked = load_scenario(scenario, overrides or [])
     chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
-    execution = Execution(checked, chosen, runners, socket=socket)
+    execution = Execution(checked, chosen, runners, socket=socket, realtime=realtime)
     folder = execution.folder = make_folder(out or default_folder(scenario.stem, chosen))
     result = execution.run([ProgressLine(execution.ticks, WallClock(), console)])
     print_result(result, console)
@@ -109,13 +116,34 @@ def schema_command() -> None:
 def main() -> None:
     """Entry point of `swarmwire`: every error of ours is one line; a failed agent's traceback is its own."""
     try:
-        app()
+        app(_with_factor(sys.argv[1:]))
     except BadInput as error:
         sys.exit(_fail(error, BAD_INPUT))
     except Interrupted as error:
         sys.exit(_fail(error, INTERRUPTED))
     except SwarmwireError as error:
         sys.exit(_fail(error, FAILED))
+
+
+def _with_factor(arguments: list[str]) -> list[str]:
+    """The arguments, where a bare `--realtime` means 1: typer knows no option whose value may be left out."""
+    whole: list[str] = []
+    for argument in arguments:
+        if whole and whole[-1] == "--realtime":
+            factor = argument if _is_number(argument) else None
+            whole[-1] += f"={factor or 1}"
+            if factor:
+                continue
+        whole.append(argument)
+    return [*whole[:-1], "--realtime=1"] if whole and whole[-1] == "--realtime" else whole
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _fail(error: SwarmwireError, code: int) -> int:

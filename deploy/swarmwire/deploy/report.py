@@ -13,7 +13,7 @@ def print_result(result: Result, console: Console) -> None:
     table = Table(title=Text(result.scenario), show_header=False, title_justify="left", title_style="bold")
     table.add_column(style="cyan")
     table.add_column()
-    who = f"{result.runners} processes, lockstep" if result.runners else "all agents in this process"
+    who = f"{result.runners} processes, {result.mode}" if result.runners else "all agents in this process"
     table.add_row(
         "robots", f"{result.robots}, {who}" + (f", {len(result.arenas)} arenas" if len(result.arenas) > 1 else "")
     )
@@ -32,8 +32,24 @@ def print_result(result: Result, console: Console) -> None:
     counts = [f"{name} {count}" for name, count in result.counts.items() if count]
     if counts:
         table.add_row("counts", ", ".join(counts))
+    for loss in result.lost_runners:
+        table.add_row("lost runner", loss)
+    _add_real_time(table, result)
     table.add_row("trajectory", f"{arena.trajectory_sha256[:16]}… (seed {arena.seed})")
     console.print(table)
+
+
+def _add_real_time(table: Table, result: Result) -> None:
+    real = result.realtime
+    if real is None:
+        return
+    missed = f"{real.missed_ticks} of {result.ticks} ticks missed"
+    lag = f", worst lag {real.worst_lag_s * 1000:.1f} ms" if real.missed_ticks else ""
+    table.add_row("real time", f"x {real.factor:g}; {missed}{lag}")
+    if result.runners:
+        late, stops = sum(real.late_answers.values()), sum(real.watchdog_stops.values())
+        drops = f"{real.frames_dropped} frames with {real.packets_dropped} packets dropped"
+        table.add_row("runners", f"{late} late answers (per robot), {stops} watchdog stops, {drops}")
 
 
 def _add_radio(table: Table, arena: ArenaResult) -> None:

@@ -5,6 +5,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from swarmwire.world.realtime_crew import RealTimeReport
+
 SUMMARY_FORMAT = 1
 
 
@@ -68,7 +70,7 @@ class Result:
     scenario: str
     robots: int  # in each arena
     runners: int  # 0: all agents in the world's process
-    mode: str  # "local" | "lockstep"
+    mode: str  # "local" | "lockstep" | "realtime"
     ended: str  # "duration" | "interrupted"
     ticks: int
     sim_time_s: float
@@ -80,6 +82,8 @@ class Result:
     counts: dict[str, int]  # late, missing, malformed, clipped: whatever was not as it should be, by name
     cpu: str
     versions: dict[str, str]
+    lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
+    realtime: RealTimeReport | None = None
     out: Path | None = field(default=None, compare=False)  # the run folder
 
     @property
@@ -128,6 +132,8 @@ class Result:
             "events": events,
             "global_senses": self.global_senses,
             "counts": self.counts,
+            "lost_runners": list(self.lost_runners),
+            "realtime": asdict(self.realtime) if self.realtime else None,
             "cpu": self.cpu,
             "versions": self.versions,
         }

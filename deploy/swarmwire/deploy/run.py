@@ -1,5 +1,6 @@
 """One execution of a scenario: wires the parts together, runs the loop, and gives back what came of it."""
 
+import sys
 from collections.abc import Generator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Any
 
 from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.air.air import Air
+from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import WallClock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.geometry import obstacle_arrays
@@ -25,11 +27,16 @@ from swarmwire.metrics.radio_tally import RadioTally
 from swarmwire.metrics.rerun_recording import RerunRecording
 from swarmwire.world import assignments
 from swarmwire.world.loop import Loop
+from swarmwire.world.pace import Pace
+from swarmwire.world.realtime_crew import PacedCrew, RealTimeCrew, RealTimeReport
 from swarmwire.world.remote_crew import RemoteCrew
+from swarmwire.world.roster import Loss
+from swarmwire.world.runner_crew import Surroundings
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.world import World
 
+FASTEST = 1e6  # factor in real time
 GLOBAL_SENSES = ("compass", "positioning")
 Runners = int | str | None  # how many, "per-robot", or None for a local crew
 
@@ -44,11 +51,14 @@ def run(
     out: Path | str | None = None,
     observers: Sequence[Observer] = (),
     socket: Path | None = None,
+    realtime: float | None = None,
 ) -> Result:
     """Run a scenario and return its result; with `seeds`, one arena per seed, side by side in one world.
 
     `runners` is None (all agents in this process), a number of runner processes, or "per-robot". `overrides` are
     "path=value" as for `--set`. With `out`, a new or empty folder, `summary.json` and `run.rrd` are written there.
+    `realtime` keeps the run to the wall clock, so many simulated seconds per second, and waits for no runner; None runs
+    as fast as the machine allows.
 
     Raises BadInput for anything wrong with the scenario or these arguments, AgentFailed with the agent's traceback, and
     RunnerLost if a runner's process or link is gone.
@@ -56,7 +66,7 @@ def run(
     checked = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
     if isinstance(scenario, Scenario) and overrides:
         raise BadInput("overrides", "", "expected a path of a scenario; a Scenario is complete as it is")
-    execution = Execution(checked, choose_seeds(checked, seed, seeds), runners, socket)
+    execution = Execution(checked, choose_seeds(checked, seed, seeds), runners, socket, realtime)
     if out is not None:
         execution.folder = make_folder(Path(out))
     return execution.run(observers)
@@ -66,9 +76,16 @@ class Execution:
     """A checked scenario on its way to a result."""
 
     def __init__(
-        self, scenario: Scenario, seeds: tuple[int, ...], runners: Runners = None, socket: Path | None = None
+        self,
+        scenario: Scenario,
+        seeds: tuple[int, ...],
+        runners: Runners = None,
+        socket: Path | None = None,
+        realtime: float | str | None = None,
     ) -> None:
         self.scenario, self.seeds = scenario, seeds
+        self._factor = None if realtime is None else _factor(realtime)
+        self._losses: list[Loss] = []
         self.folder: Path | None = None  # where summary and recording go, if anywhere
         self.ticks = _ticks(scenario)
         self.run_id = new_run_id()
@@ -101,8 +118,9 @@ class Execution:
                 last = loop.end()
                 for observer in watching:
                     parts.update(observer.end(last))
+            report = crew.report() if isinstance(crew, PacedCrew | RealTimeCrew) else None
         failed = {f"observer_failed_{observer.name}": 1 for observer in guarded if observer.failed}
-        result = self._result(loop, parts, failed, started_ns, ended_ns)
+        result = self._result(loop, parts, {**loop.counts(), **failed}, started_ns, ended_ns, report)
         if self.folder:
             result.write(self.folder / "summary.json")
         return result
@@ -121,7 +139,7 @@ class Execution:
         whole = assignments.whole(self.scenario, self.world.static, self._specs)
         if not self.runners:
             with closing(LocalCrew(whole)) as local:
-                yield local
+                yield local if self._factor is None else PacedCrew(local, self._pace(self._factor))
             return
         parts = assignments.split(whole, self.runners)
         names = [f"r{i}" for i in range(len(parts))]
@@ -131,8 +149,8 @@ class Execution:
             return processes[0].trouble() if processes else None
 
         with local_endpoint(self._socket) as endpoint:
-            timeout_s = self.scenario.run.runner_timeout_s
-            crew = RemoteCrew(endpoint, self.run_id, parts, timeout_s, self._clock, trouble, lambda: interrupt.asked)
+            around = Surroundings(trouble, lambda: interrupt.asked, lambda loss: self._survive(loss, endpoint))
+            crew = self._remote_crew(endpoint, parts, around)
             try:
                 crew.open()
                 processes.append(RunnerProcesses(endpoint, self.run_id, sorted(set(self._specs.values())), names))
@@ -142,8 +160,34 @@ class Execution:
                 for process in processes:
                     process.stop()
 
+    def _remote_crew(self, endpoint: str, parts: list[Assignment], around: Surroundings) -> RemoteCrew | RealTimeCrew:
+        table = self.scenario.run
+        common = endpoint, self.run_id, parts, table.runner_timeout_s, self._clock, around, table.on_runner_loss
+        if self._factor is None:
+            return RemoteCrew(*common)
+        return RealTimeCrew(*common, self._pace(self._factor), table.watchdog_s)
+
+    def _pace(self, factor: float) -> Pace:
+        return Pace(self._clock, self.scenario.time.rate_hz, factor, _say)
+
+    def _survive(self, loss: Loss, endpoint: str) -> None:
+        """Tell people of a runner that was lost, and of what they can do."""
+        self._losses.append(loss)
+        if self.scenario.run.on_runner_loss == "dead":
+            _say(f"lost runner {loss}; its robots stand still")
+            return
+        agents = ",".join(sorted(set(self._specs.values())))
+        takeover = f"python -m swarmwire.agent.nursery {endpoint} {self.run_id} {agents} NAME"
+        _say(f"lost runner {loss}; waiting for another, such as: {takeover}")
+
     def _result(
-        self, loop: Loop, parts: dict[str, Any], failed: dict[str, int], started_ns: int, ended_ns: int
+        self,
+        loop: Loop,
+        parts: dict[str, Any],
+        counts: dict[str, int],
+        started_ns: int,
+        ended_ns: int,
+        report: RealTimeReport | None,
     ) -> Result:
         static = self.world.static
         radios: list[Any] = parts.get("radio", [None] * static.arenas)
@@ -153,7 +197,7 @@ class Execution:
             scenario=static.name,
             robots=static.robots,
             runners=self.runners,
-            mode="lockstep" if self.runners else "local",
+            mode="realtime" if report else "lockstep" if self.runners else "local",
             ended="duration" if loop.ticks_done == self.ticks else "interrupted",
             ticks=loop.ticks_done,
             sim_time_s=to_s(tick_start_ns(loop.ticks_done, static.rate_hz)),
@@ -162,9 +206,11 @@ class Execution:
             arenas=tuple(arena_result(*arena) for arena in arenas),
             events=tuple(EventResult(**event) for event in parts["events"]),
             global_senses={body: found for body, found in senses.items() if found},
-            counts={**loop.counts(), **failed},
+            counts=counts,
             cpu=machine.cpu(),
             versions=machine.versions(),
+            lost_runners=tuple(str(loss) for loss in self._losses),
+            realtime=report,
             out=self.folder,
         )
 
@@ -172,6 +218,21 @@ class Execution:
 def _ticks(scenario: Scenario) -> int:
     """Ticks that start before the scenario's duration is over; the first always does."""
     return max(1, -(-to_ns(scenario.duration_s) * scenario.time.rate_hz // 10**9))
+
+
+def _say(text: str) -> None:
+    """Something that people should know at once, while a run goes on."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def _factor(realtime: float | str) -> float:
+    try:
+        factor = float(realtime)
+    except ValueError:
+        factor = 0.0
+    if not 0 < factor <= FASTEST:
+        raise BadInput("--realtime", "", f"expected a factor above 0 and at most {FASTEST:g}, got {realtime!r}")
+    return factor
 
 
 def choose_seeds(scenario: Scenario, seed: int | None, seeds: Sequence[int] | None) -> tuple[int, ...]:

@@ -196,10 +196,12 @@ class RobotsTable(Table):
 class RunTable(Table):
     """[run]: what the loop does about runners."""
 
-    on_runner_loss: Literal["stop"] = "stop"
-    """What to do when a runner is lost."""
+    on_runner_loss: Literal["stop", "dead", "wait"] = "stop"
+    """A lost runner ends the run, its robots stand still, or they wait until another runner takes over."""
     runner_timeout_s: float = Field(default=30.0, gt=0, le=86_400, json_schema_extra={"unit": "s"})
     """A runner is lost if it gives no answer for so long."""
+    watchdog_s: float = Field(default=0.5, gt=0, le=86_400, json_schema_extra={"unit": "s"})
+    """In real time: a robot without fresh commands for so long, in simulated time, stops."""
 
 
 class Scenario(Table):

@@ -1,0 +1,58 @@
+"""A runner's inbox: it acts on the newest frame only, and counts what it passes over."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from swarmwire.agent.runner import _Inbox
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.tick_frames import encode_tick
+from tests.agent.hosts import GIVES, assignment, group, senses
+
+
+@dataclass
+class Bytes:
+    data: bytes
+
+    def to_bytes(self) -> bytes:
+        return self.data
+
+
+@dataclass
+class Sample:
+    payload: Bytes
+
+
+def inbox_of(*arrived: Any) -> _Inbox:
+    inbox = _Inbox()
+    for item in arrived:
+        inbox._arrived.put(item if isinstance(item, bool) else Sample(Bytes(item)))
+    return inbox
+
+
+def tick(number: int) -> bytes:
+    return encode_tick(number, {"flock": senses(number, [0])}, Heard.none(GIVES))
+
+
+ASSIGNMENT = assignment(group("unused:Agent", [0]))
+END = frames.encode("end", -1, {})
+
+
+def test_of_frames_that_wait_the_newest_is_acted_on_and_the_others_are_counted() -> None:
+    inbox = inbox_of(True, tick(0), tick(1), tick(2))
+    ticks = inbox.ticks(ASSIGNMENT)
+    assert next(ticks)[0] == 2
+    assert inbox.dropped == 2
+    strange = encode_tick(9, {"others": senses(9, [1])}, Heard.none(GIVES))
+    for data in (tick(2), tick(1), b"\xc1", strange, tick(3), tick(5), tick(4)):
+        inbox.put_frame(Sample(Bytes(data)))
+    assert next(ticks)[0] == 5
+    assert inbox.dropped == 2 + 6
+    inbox.put_frame(Sample(Bytes(tick(6))))
+    assert next(ticks)[0] == 6
+    assert inbox.dropped == 8
+
+
+def test_nothing_is_acted_on_once_the_run_is_over() -> None:
+    assert list(inbox_of(tick(0), END).ticks(ASSIGNMENT)) == []
+    assert list(inbox_of(tick(0), tick(1), False).ticks(ASSIGNMENT)) == []

@@ -1,0 +1,47 @@
+"""The pace of a run in real time: when each tick is over by the wall clock, and how far the loop lags behind."""
+
+from collections.abc import Callable
+
+from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
+
+REPEAT_S = 5.0  # wall time: not to be told more often that the machine does not keep up
+
+
+class Pace:
+    """Tick k is over its end / factor after the first `begin`. A loop that lags does not wait until it is level again.
+
+    Attributes:
+        missed_ticks: ticks that were over before the loop came to wait for it, so the next one started late.
+        worst_lag_ns: by how much at most, wall time.
+    """
+
+    def __init__(self, clock: Clock, rate_hz: int, factor: float, say: Callable[[str], None]) -> None:
+        """`factor` simulated seconds per second of wall time; `say` is told at once when the loop falls behind."""
+        self.factor, self._clock, self._rate_hz, self._say = factor, clock, rate_hz, say
+        self._first_ns: int | None = None
+        self._quiet_until_ns: int | None = None
+        self.missed_ticks = self.worst_lag_ns = 0
+
+    def begin(self) -> int:
+        """A tick begins; the first sets the schedule. Returns the wall time in ns."""
+        now_ns = self._clock.now_ns()
+        if self._first_ns is None:
+            self._first_ns = now_ns
+        return now_ns
+
+    def hold(self, tick: int) -> None:
+        """Return once the tick is over by the wall clock."""
+        first_ns = self.begin() if self._first_ns is None else self._first_ns
+        over_ns = first_ns + round(tick_start_ns(tick + 1, self._rate_hz) / self.factor)
+        lag_ns = self._clock.now_ns() - over_ns
+        if lag_ns <= 0:
+            self._clock.sleep_until(over_ns)
+            return
+        self.missed_ticks += 1
+        self.worst_lag_ns = max(self.worst_lag_ns, lag_ns)
+        if self._quiet_until_ns is None or over_ns + lag_ns >= self._quiet_until_ns:
+            self._quiet_until_ns = over_ns + lag_ns + to_ns(REPEAT_S)
+            self._say(
+                f"real time: this machine does not keep up with {self.factor:g} x real time: "
+                f"at tick {tick} the loop is {to_s(lag_ns):.3f} s behind"
+            )
