@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+from pathlib import Path
 
 import psutil
 import pytest
@@ -25,11 +26,15 @@ def long_run(tmp_path):
     process.communicate()
 
 
-def test_killing_the_world_leaves_no_process(long_run):
+def test_killing_the_world_leaves_no_process_and_no_socket(long_run):
     process, children = long_run
+    endpoint = next(word for word in children[0].cmdline() if word.startswith("unixsock-stream/"))
+    directory = Path(endpoint.partition("/")[2]).parent
+    assert directory.is_dir()
     process.kill()
     _, alive = psutil.wait_procs(children, timeout=GONE_S)
     assert not alive
+    assert not directory.exists()
 
 
 def test_killing_a_runner_ends_the_run_and_names_its_robots(long_run):

@@ -11,16 +11,19 @@ reported as one line on standard output: its name and its exit code.
 import gc
 import os
 import select
+import shutil
 import signal
 import sys
 import traceback
 from contextlib import suppress
+from pathlib import Path
 
 import zenoh
 
 from swarmwire.agent import host, runner
 from swarmwire.agent.loading import NoAgent, load_agent
 from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.wire.sessions import PRIVATE
 
 __all__ = ["host", "main"]  # the host is imported here so that its code is shared
 
@@ -43,7 +46,8 @@ def main(arguments: list[str]) -> int:
             os.close(reports)
             os._exit(_runner(endpoint, run_id, name))
         children[child] = name
-    _watch(children, reports)
+    if not _watch(children, reports):
+        _remove_socket(endpoint)
     return 0
 
 
@@ -60,20 +64,29 @@ def _runner(endpoint: str, run_id: str, name: str) -> int:
     return 0
 
 
-def _watch(children: dict[int, str], reports: int) -> None:
+def _watch(children: dict[int, str], reports: int) -> bool:
+    """Whether all runners ended; False: the world did, and they were ended with it."""
     lifeline = select.poll()
     lifeline.register(0, select.POLLIN | select.POLLHUP)
     while children:
         if lifeline.poll(POLL_MS):
             for child in children:
                 os.kill(child, signal.SIGKILL)
-            return
+            return False
         child, status = os.waitpid(-1, os.WNOHANG)
         while child:
             name, code = children.pop(child), os.waitstatus_to_exitcode(status)
             if code != 0:
                 os.write(reports, f"{name} {code}\n".encode())
             child, status = os.waitpid(-1, os.WNOHANG) if children else (0, 0)
+    return True
+
+
+def _remove_socket(endpoint: str) -> None:
+    """A world that was killed cannot take away the private directory of its socket."""
+    directory = Path(endpoint.partition("/")[2]).parent
+    if directory.name.startswith(PRIVATE):
+        shutil.rmtree(directory, ignore_errors=True)
 
 
 if __name__ == "__main__":

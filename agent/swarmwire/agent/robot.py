@@ -6,6 +6,7 @@ from typing import Any, TypeVar, overload
 import numpy as np
 
 from swarmwire.agent.draw import Draw
+from swarmwire.agent.handle import Handle
 from swarmwire.agent.packet import Packet, Packets
 from swarmwire.agent.readings import (
     BumperReading,
@@ -17,36 +18,20 @@ from swarmwire.agent.readings import (
 )
 from swarmwire.agent.robots import had
 from swarmwire.agent.turn import Turn
-from swarmwire.comms.body import Body
-from swarmwire.comms.clock import to_s
 from swarmwire.comms.messages import DICT_TAG, Message, decode_dict, encode_dict
 from swarmwire.comms.packets import Payloads
 
 M = TypeVar("M", bound=Message)
 
 
-class Robot:
+class Robot(Handle):
     """One robot in one tick. Senses raise NotDeclared unless the agent's `needs` name them."""
 
     def __init__(self, turn: Turn, row: int) -> None:
-        self._turn, self._row = turn, row
+        super().__init__(turn)
+        self._row = row
         self.radio = RadioPort(turn, row)
         self.draw = Draw(turn.keys[row : row + 1], turn.tick)
-
-    @property
-    def time_s(self) -> float:
-        """Time since the start of the run, at this tick."""
-        return to_s(self._turn.time_ns)
-
-    @property
-    def period_s(self) -> float:
-        """Time between two steps of this robot."""
-        return to_s(self._turn.period_ns)
-
-    @property
-    def body(self) -> Body:
-        """Geometry and limits of this robot."""
-        return self._turn.group.body
 
     @property
     def proximity(self) -> ProximityReading:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.draw import Draws
+from swarmwire.agent.handle import Handle
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.readings import (
     BumperReadings,
@@ -17,8 +18,6 @@ from swarmwire.agent.readings import (
 )
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.body import Body
-from swarmwire.comms.clock import to_s
 from swarmwire.comms.messages import Message, encode_rows
 from swarmwire.comms.sheets import Ring
 
@@ -26,11 +25,11 @@ M = TypeVar("M", bound=Message)
 S = TypeVar("S", bound=Ring)
 
 
-class Robots:
+class Robots(Handle):
     """n robots of one group in one tick; every array has a leading axis n. Senses raise NotDeclared unless needed."""
 
     def __init__(self, turn: Turn) -> None:
-        self._turn = turn
+        super().__init__(turn)
         self.radio = RadioRows(turn)
         self.draw = Draws(turn.keys, turn.tick)
 
@@ -38,21 +37,6 @@ class Robots:
     def n(self) -> int:
         """How many robots act in this tick in this process: says nothing about the swarm."""
         return self._turn.n
-
-    @property
-    def time_s(self) -> float:
-        """Time since the start of the run, at this tick."""
-        return to_s(self._turn.time_ns)
-
-    @property
-    def period_s(self) -> float:
-        """Time between two steps of these robots."""
-        return to_s(self._turn.period_ns)
-
-    @property
-    def body(self) -> Body:
-        """Geometry and limits of these robots."""
-        return self._turn.group.body
 
     @property
     def proximity(self) -> ProximityReadings:

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.sessions import unix_endpoint
+from swarmwire.comms.wire.sessions import PRIVATE, unix_endpoint
 
 LONGEST_PATH = 107  # of a unix socket, in bytes (sun_path has 108 with its end mark)
 
@@ -27,7 +27,7 @@ def local_endpoint(path: Path | None) -> Generator[str]:
         yield unix_endpoint(str(path.absolute()))
         return
     base = tempfile.gettempdir()
-    with tempfile.TemporaryDirectory(prefix="sw-", dir=base if len(base) < 60 else "/tmp") as directory:
+    with tempfile.TemporaryDirectory(prefix=PRIVATE, dir=base if len(base) < 60 else "/tmp") as directory:
         yield unix_endpoint(f"{directory}/world")
 
 

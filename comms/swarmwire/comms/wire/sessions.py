@@ -10,6 +10,7 @@ import os
 
 import zenoh
 
+PRIVATE = "sw-"  # how the name of a private directory for a socket begins
 BLOCK_S = 5.0
 LEASE_MS = 10_000  # a frozen peer is noticed after this; a dead one at once, by its closed socket
 # A runner has one session and little traffic: three threads instead of ten, and half the memory.
