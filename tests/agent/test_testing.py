@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from swarmwire.agent import VectorAgent
-from swarmwire.agent.behaviours import Diffusion, Flocking
+from swarmwire.agent.behaviours import Diffusion, Flocking, PsoSearch, PsoSearchPositioned
 from swarmwire.agent.loading import load_agent
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.errors import AgentFailed
@@ -29,6 +29,13 @@ TRIALS = [Trial(), Trial(robots=1), Trial(robots=40, ticks=8, seed=7, body="foot
 @pytest.mark.parametrize("kind", [Diffusion, Flocking, VectorCounter])
 def test_honest_rows_are_independent(kind: type[VectorAgent], trial: Trial) -> None:
     assert_rows_independent(kind, trial)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned])
+def test_particles_are_independent_but_for_what_they_hear(kind: type[VectorAgent], seed: int) -> None:
+    often = {"update_every_ticks": 4, "tell_before_ticks": 1}
+    assert_rows_independent(kind, Trial(ticks=20, seed=seed, body="epuck-gps", params=often))
 
 
 @pytest.mark.parametrize("kind", [Means, Neighbour, Crowd, Remembering, Ageing, Reply])

@@ -1,0 +1,57 @@
+"""Particle swarm search by what a robot itself can sense: wheels, compass, and a radio that tells range and bearing."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from swarmwire.agent.behaviours.pso import Particle, ParticleSwarm, Vectors
+from swarmwire.agent.robots import Robots
+from swarmwire.agent.vector_agent import FloatColumn, column
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.messages import Message, f4
+
+
+class BestVector(Message):
+    """The brightest place that a robot has seen, as a vector from where it is now."""
+
+    brightness: f4
+    x_m: f4  # along the axes of the compass
+    y_m: f4
+
+
+class WheeledParticle(Particle):
+    """A particle that counts the turns of its wheels."""
+
+    left_m: FloatColumn = column(np.nan)  # as in its last step
+    right_m: FloatColumn = column(np.nan)
+
+
+class PsoSearch(ParticleSwarm[WheeledParticle]):
+    """Neighbours are those whose broadcast is heard; a best comes as a vector from its sender.
+
+    The receiver adds where it hears the sender. Places are kept by dead reckoning: the mean way of both wheels, along
+    the compass' heading.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("light", "proximity", "compass", "odometry", "radio.range", "radio.bearing")
+
+    def moved(self, robots: Robots, state: WheeledParticle) -> Vectors:
+        """By the wheels, along the heading of now."""
+        wheels = robots.odometry
+        forward = np.nan_to_num(0.5 * ((wheels.left_m - state.left_m) + (wheels.right_m - state.right_m)))
+        state.left_m[:] = wheels.left_m
+        state.right_m[:] = wheels.right_m
+        heading = robots.compass.heading_rad
+        return forward * np.cos(heading), forward * np.sin(heading)
+
+    def tell(self, robots: Robots, state: WheeledParticle, rows: BoolArray) -> None:
+        """The own best, as a vector from here."""
+        robots.radio.send(BestVector, rows=rows, brightness=state.own_brightness, x_m=state.own_x, y_m=state.own_y)
+
+    def told(self, robots: Robots) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+        """Bests of those that were heard, seen from here."""
+        heard = robots.radio.heard(BestVector)
+        direction = heard.bearing_rad + robots.compass.heading_rad[heard.row]
+        x = heard.range_m * np.cos(direction) + heard.message.x_m
+        y = heard.range_m * np.sin(direction) + heard.message.y_m
+        return heard.row, heard.message.brightness, x, y
