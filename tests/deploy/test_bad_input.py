@@ -6,6 +6,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
+from swarmwire.world.scenario_file import load_scenario
 from tests.deploy.commands import LOSSY, swarmwire
 
 AGENTS = """
@@ -248,6 +249,10 @@ def test_seeds_must_be_different_and_not_negative():
     for seeds in ([], [1, 1], [-1]):
         assert "seeds" in refused(LOSSY, seeds=seeds)
     assert "seed" in refused(LOSSY, seed=1, seeds=[2])
+
+
+def test_overrides_are_of_a_file():
+    assert "a Scenario is complete as it is" in refused(load_scenario(LOSSY), "seed=2")
 
 
 def test_a_folder_that_holds_something_is_refused(tmp_path):
