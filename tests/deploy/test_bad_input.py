@@ -6,6 +6,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
+from swarmwire.world.scenario_file import load_scenario
 from tests.deploy.commands import LOSSY, swarmwire
 
 AGENTS = """
@@ -31,11 +32,25 @@ class Strict(Agent):
 
 helper = 3
 """
-FLOCK = "robots.flock"
+
+
+LANE_AGENTS = """
+from swarmwire.agent import Agent, PerRobot, Robot, Robots, State, VectorAgent
+
+class Lanes(VectorAgent):
+    lane: PerRobot[int]
+    def step(self, robots: Robots, state: State) -> None: ...
+
+class Lone(Agent):
+    lane: PerRobot[int]
+    def step(self, robot: Robot) -> None: ...
+"""
+LANES = "robots.flock={body='epuck', count=3, agent='lanes.py:Lanes'"
 
 
 @pytest.fixture
 def agents(tmp_path):
+    (tmp_path / "lanes.py").write_text(LANE_AGENTS)
     (tmp_path / "broken.py").write_text(AGENTS)
     (tmp_path / "needy.py").write_text(NEEDY)
     scenario = tmp_path / "scenario.toml"
@@ -91,6 +106,133 @@ def test_a_bad_value_is_named_with_its_key_and_what_was_expected(agents, setting
     assert "scenario.toml" in text or "--set" in text
 
 
+WIDER = [
+    ("events=3", "events: expected a list, got 3"),
+    ("events=[{at_s=1}]", "events.0.do: is missing; expected one of blackout, kill, partition, revive"),
+    ("events=[{at_s=1, do='burn'}]", "events.0.do: expected one of blackout, kill, partition, revive; got 'burn'"),
+    (
+        "events=[{at_s=nan, do='kill', robots={count=1}}]",
+        "events.0.at_s: expected a number of at least 0 and at most 1000000000 (s), got nan",
+    ),
+    (
+        "events=[{at_s=1, do='kill', robots={count=1}, for_s=0}]",
+        "events.0.for_s: expected a number above 0 (s), got 0",
+    ),
+    ("events=[{at_s=1, do='kill', robots=3}]", "events.0.robots: expected a table, got 3"),
+    (
+        "events=[{at_s=1, do='kill', robots={grup='flock'}}]",
+        "events.0.robots.grup: unknown key; expected one of group, names, share, count",
+    ),
+    (
+        "events=[{at_s=1, do='kill', robots={group='flok'}}]",
+        "events.0.robots.group: expected one of flock; got 'flok'",
+    ),
+    (
+        "events=[{at_s=1, do='revive', robots={names=['flock-20']}}]",
+        "events.0.robots.names: expected names of robots, such as flock-0; got 'flock-20'",
+    ),
+    (
+        "events=[{at_s=1, do='kill', robots={share=5}}]",
+        "events.0.robots.share: expected a number above 0 and at most 1, got 5",
+    ),
+    (
+        "events=[{at_s=1, do='partition', between=['flock-0', 'flock-1']}]",
+        "events.0.between.0: expected a list, got 'flock-0' (and 1 more fault)",
+    ),
+    (
+        "events=[{at_s=1, do='partition', between=[['flock'], ['flock-1']]}]",
+        "events.0.between.1: expected sets that do not overlap; 'flock-1' is in two",
+    ),
+    (
+        "arena.lights=[{intensity=1, at=[0, 0], place='random'}]",
+        'arena.lights.0: expected either at = [x, y] or place = "random"',
+    ),
+    (
+        "arena.lights=[{intensity=-1, at=[0, 0]}]",
+        "arena.lights.0.intensity: expected a number above 0 and at most 10000 (m), got -1",
+    ),
+    (
+        "arena.lights=[{intensity=1, at=[0, 0], colour='red'}]",
+        "arena.lights.0.colour: unknown key; expected one of at, place, count, intensity",
+    ),
+    (
+        "arena.lights=[{intensity=1, at=[9, 0]}]",
+        "arena.lights.0: no room for light 1 of 1 with seed 1: at (9, 0) it is outside or in an obstacle",
+    ),
+    (
+        "arena.obstacles=[{shape='polygon', at=[0, 0]}]",
+        "arena.obstacles.0.points: is missing; expected a list (m)",
+    ),
+    (
+        "arena.obstacles=[{shape='polygon', at=[0, 0], points=[[0, 0], [1, 0], ['x', 1]]}]",
+        "arena.obstacles.0.points.2.0: expected a number of at least -10000 and at most 10000 (m), got 'x'",
+    ),
+    (
+        "arena.obstacles=[{shape='polygon', at=[0, 0], points=[[0, 0], [1, 1], [1, 0], [0, 1]]}]",
+        "arena.obstacles.0.points: expected the corners of a convex polygon in order; "
+        "(0, 0) lies on or beyond the side from (0, 1) to (1, 0)",
+    ),
+    (
+        "arena.obstacles=[{shape='polygon', at=[4, 0], points=[[0, 0], [1, 0], [0, 1]]}]",
+        "arena.obstacles.0: expected the polygon to lie within the arena of 8 x 8 m",
+    ),
+    (
+        "arena.obstacles=[{shape='polygon', place='random', count=99, points=[[0, 0], [3, 0], [0, 3]]}]",
+        "arena.obstacles.0: no room for polygon ",
+    ),
+    (
+        "robots.flock.act_every_ticks=0",
+        "robots.flock.act_every_ticks: expected a whole number of at least 1 and at most 1000000 (ticks), got 0",
+    ),
+    (
+        "robots.flock.act_every_ticks=1.5",
+        "robots.flock.act_every_ticks: expected a whole number of at least 1 and at most 1000000 (ticks), got 1.5",
+    ),
+    (
+        f"{LANES}}}",
+        "robots.flock.params.lane: is missing: expected a whole number",
+    ),
+    (
+        f"{LANES}, params={{lane=[1, 2]}}}}",
+        "robots.flock.params.lane: expected a whole number, or a list with one for each of the 3 robots, "
+        "got a list of 2",
+    ),
+    (
+        f"{LANES}, params={{lane=[1, 2, 0.5]}}}}",
+        "robots.flock.params.lane: expected a whole number, or a list with one for each of the 3 robots, got 0.5",
+    ),
+    (
+        "robots.flock={body='epuck', count=3, agent='lanes.py:Lone'}",
+        "robots.flock.agent: Lone.lane: only a VectorAgent has parameters per robot",
+    ),
+]
+
+
+@pytest.mark.parametrize(("setting", "text"), WIDER)
+def test_events_lights_polygons_rates_and_numbers_per_robot_are_checked_at_the_door(agents, setting, text):
+    """One line: the file or the override that is at fault, then key and what was expected."""
+    place, _, rest = refused(agents, setting).partition(": ")
+    assert place in (str(agents), f"--set {setting}")
+    assert rest.startswith(text)
+
+
+@pytest.mark.parametrize("place", [5, 15, 21, 24])
+def test_the_check_command_refuses_them_in_the_same_words(agents, place):
+    setting, text = WIDER[place]
+    ended = swarmwire("check", agents, "--set", setting)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert text in ended.stderr
+    assert ended.stderr.startswith("error: ")
+    assert ended.stderr.count("\n") == 1
+
+
+def test_an_event_of_the_radio_needs_a_radio(agents):
+    text = agents.read_text()
+    agents.write_text(text[: text.index("[radio]")])
+    told = refused(agents, "events=[{at_s=1, do='blackout', robots={count=1}}]")
+    assert told == f"{agents}: events.0.do: expected a scenario with a [radio] for 'blackout'"
+
+
 def test_files_that_are_no_scenario_are_named(tmp_path):
     assert "absent.toml" in refused(tmp_path / "absent.toml")
     bad = tmp_path / "bad.toml"
@@ -107,6 +249,10 @@ def test_seeds_must_be_different_and_not_negative():
     for seeds in ([], [1, 1], [-1]):
         assert "seeds" in refused(LOSSY, seeds=seeds)
     assert "seed" in refused(LOSSY, seed=1, seeds=[2])
+
+
+def test_overrides_are_of_a_file():
+    assert "a Scenario is complete as it is" in refused(load_scenario(LOSSY), "seed=2")
 
 
 def test_a_folder_that_holds_something_is_refused(tmp_path):

@@ -1,0 +1,110 @@
+"""Every shipped scenario tells its story in its summary."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.deploy import ArenaResult, Result, run
+from tests.deploy.commands import ROOT
+
+SEEDS = range(1, 21)
+# 5th percentile of the final orders of five-percent.toml without deaths, seeds 1 to 20: the slow test measures it anew.
+# The 95th is 0.99941. Seed 1 ends with 0.999407, so close below it that another machine's last bits may decide.
+UNHARMED_LOW = 0.9977
+EVERYBODY_MUTE = ["events.0.do='blackout'", "events.0.robots={group='flock'}"]
+
+
+def shipped(name: str, overrides: Sequence[str] = (), seeds: Sequence[int] | None = None) -> Result:
+    return run(ROOT / "scenarios" / f"{name}.toml", overrides=overrides, seeds=seeds)
+
+
+def final(arena: Result | ArenaResult, metric: str) -> float:
+    value = arena.metrics[metric].final
+    assert value is not None, metric
+    return value
+
+
+def test_avoidance_wanderers_neither_touch_nor_flock():
+    """That they keep moving, `test_avoidance.py` tests."""
+    result = shipped("avoidance")
+    assert result.radio is None
+    assert final(result, "collisions") <= 3
+    assert final(result, "wall_contacts") <= 3
+    assert (result.metrics["min_gap"].min or 0.0) > 0.0
+    assert (result.metrics["order"].mean or 0.0) < 0.5
+
+
+@pytest.mark.parametrize(("name", "pdr", "latency_s"), [("flocking", 1.0, 0.0), ("flocking-lossy", 0.7, 0.11)])
+def test_a_flock_finds_one_heading_over_a_perfect_radio_and_over_a_lossy_one(name, pdr, latency_s):
+    result = shipped(name)
+    assert result.radio is not None
+    assert (result.metrics["order"].min or 0.0) < 0.3
+    assert final(result, "order") > 0.9
+    assert final(result, "largest_component") == 1.0
+    assert result.radio.pdr == pytest.approx(pdr, abs=0.005)
+    assert result.radio.latency_air_s.p50 == pytest.approx(latency_s, abs=0.001)
+
+
+def test_flocking_disrupted_shows_every_disruption_and_its_end():
+    result = shipped("flocking-disrupted")
+    assert result.radio is not None
+    fates = result.radio.fates
+    assert all(fates[name] > 0 for name in ("heard", "lost", "receiver_dead", "blackout", "partitioned"))
+    assert fates["heard"] > sum(fates[name] for name in ("receiver_dead", "blackout", "partitioned"))
+    assert [(event.do, event.ended) for event in result.events] == [
+        ("blackout", False),
+        ("kill", False),
+        ("blackout", True),
+        ("kill", False),
+        ("kill", True),
+        ("partition", False),
+        ("partition", True),
+        ("revive", False),
+    ]
+
+
+def fell_apart_and_rejoined(arena: ArenaResult) -> bool:
+    apart_s = arena.metrics["rejoin_median"].final
+    return (
+        final(arena, "fragmentations") >= 1
+        and apart_s is not None
+        and np.isfinite(apart_s)
+        and (final(arena, "unrejoined"), final(arena, "components")) == (0, 1)
+    )
+
+
+def test_the_flock_of_split_falls_apart_and_rejoins():
+    """All ten seeds did when this was written."""
+    arenas = shipped("split", seeds=range(1, 11)).arenas
+    assert fell_apart_and_rejoined(arenas[0]), arenas[0].metrics
+    assert sum(map(fell_apart_and_rejoined, arenas)) >= 8
+
+
+def test_split_is_the_rocks_doing():
+    """Where the signal passes through the rock the same flock never falls apart."""
+    assert final(shipped("split", ["radio.line_of_sight=false"]), "fragmentations") == 0
+
+
+def test_two_of_forty_die_and_the_others_end_no_worse_ordered_than_a_flock_unharmed():
+    result = shipped("five-percent")
+    (kill,) = result.events
+    assert (kill.do, len(kill.robots[0]), result.robots) == ("kill", 2, 40)
+    assert final(result, "order") >= UNHARMED_LOW
+
+
+def final_orders(*overrides: str) -> FloatArray:
+    return np.array([final(arena, "order") for arena in shipped("five-percent", overrides, SEEDS).arenas])
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_over_twenty_seeds_survivors_end_in_the_range_of_flocks_unharmed_and_the_mute_do_not():
+    """One in ten of the unharmed lies outside of it as well: of twenty, more than five with p = 0.011."""
+    low, high = np.quantile(final_orders("events=[]"), [0.05, 0.95])
+    assert low == pytest.approx(UNHARMED_LOW, abs=1e-3)
+    survivors, mute = final_orders(), final_orders(*EVERYBODY_MUTE)
+    assert low <= np.median(survivors) <= high
+    assert np.sum((survivors < low) | (survivors > high)) <= 5
+    assert np.median(mute) < low, "or the criterion could not tell"
