@@ -17,7 +17,7 @@ from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.lockstep import Lockstep, Refused
 from tests.agent.hosts import GIVES, assignment, group, heard_from, plain, senses
 
-GROUPS = ("flock", "scouts", "lone")
+GROUPS = {"flock", "scouts", "lone"}
 FLOCK, SCOUTS = [0, 1, 4, 5], [2, 6]  # rows of the two groups; robot 3 and 7 are a third
 
 

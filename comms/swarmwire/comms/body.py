@@ -6,6 +6,7 @@ A sheet with `like = "epuck"` starts from that body's sheet, table by table, and
 import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from functools import cached_property
 from importlib.resources import files
 from math import isfinite
 from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
@@ -39,22 +40,22 @@ class Body:
     drive: DifferentialDrive = parameter(help="how it moves")
     senses: dict[str, Sheet] = field(default_factory=dict[str, Sheet])
 
-    @property
+    @cached_property
     def proximity(self) -> Proximity | None:
         """The proximity sensor's sheet."""
         return self._sheet(Proximity)
 
-    @property
+    @cached_property
     def compass(self) -> Compass | None:
         """The compass's sheet."""
         return self._sheet(Compass)
 
-    @property
+    @cached_property
     def odometry(self) -> Odometry | None:
         """The wheel encoders' sheet."""
         return self._sheet(Odometry)
 
-    @property
+    @cached_property
     def light(self) -> Light | None:
         """The photocells' sheet."""
         return self._sheet(Light)

@@ -1,6 +1,6 @@
 """What a tick carries across the wire: senses and heard packets to a runner, actions back; checked on arrival."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping, Set
 
 import numpy as np
 
@@ -29,7 +29,7 @@ def encode_tick(tick: int, senses: Senses, heard: Heard) -> bytes:
     return frames.encode("tick", tick, arrays)
 
 
-def decode_tick(frame: Frame, gives: tuple[str, ...], known: Collection[str]) -> tuple[Senses, Heard]:
+def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[Senses, Heard]:
     """Senses and heard packets of a `tick` frame; BadFrame if it holds none, or some of groups that are not known."""
     groups: dict[str, dict[str, AnyArray]] = {}
     try:
@@ -38,7 +38,7 @@ def decode_tick(frame: Frame, gives: tuple[str, ...], known: Collection[str]) ->
                 _, name, sense = key.split("/", 2)
                 groups.setdefault(name, {})[sense] = array
         senses = {name: GroupSenses(fields.pop("rows"), fields) for name, fields in groups.items()}
-        if not senses or any(name not in known for name in senses):
+        if not senses or not senses.keys() <= known:
             raise BadFrame("malformed", "sense: expected groups of this runner")
         return senses, _heard(frame.arrays, gives)
     except (KeyError, ValueError) as error:
