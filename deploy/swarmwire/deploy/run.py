@@ -106,9 +106,9 @@ class Execution:
         with Interrupt() as interrupt, self._crew(interrupt) as crew:
             loop = Loop(self.world, self.air(), crew, watching, self.scenario.events)
             crew.start()
-            started_ns = self._clock.now_ns()
             for observer in watching:
                 observer.begin(self.world.static)
+            started_ns = self._clock.now_ns()
             try:
                 loop.run(self.ticks, stopped=lambda: interrupt.asked)
             except Interrupted:
