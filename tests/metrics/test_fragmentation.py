@@ -3,8 +3,7 @@ import pytest
 
 from swarmwire.metrics.fragmentations import Fragmentations
 from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.rejoin_median import RejoinMedian
-from swarmwire.metrics.rejoin_worst import RejoinWorst
+from swarmwire.metrics.rejoin import RejoinMedian, RejoinWorst
 from swarmwire.metrics.unrejoined import Unrejoined
 from tests.metrics.truths import edges, static, truth
 

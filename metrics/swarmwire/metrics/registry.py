@@ -11,8 +11,7 @@ from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.min_gap import MinGap
 from swarmwire.metrics.order import Order
 from swarmwire.metrics.order_velocity import OrderVelocity
-from swarmwire.metrics.rejoin_median import RejoinMedian
-from swarmwire.metrics.rejoin_worst import RejoinWorst
+from swarmwire.metrics.rejoin import RejoinMedian, RejoinWorst
 from swarmwire.metrics.target_best import TargetBest
 from swarmwire.metrics.target_mean import TargetMean
 from swarmwire.metrics.unrejoined import Unrejoined
