@@ -404,7 +404,7 @@ def test_whoever_takes_over_gets_the_open_tick_unless_it_was_answered(answered: 
         lockstep.answer("b", encode_actions(0, actions([4, 5, 6, 7])))
     lockstep.gone("b", "its link is gone")
     lockstep.lose_silent("no answer")  # nobody is there to be silent
-    assert (lockstep.waiting, lockstep.vacant, len(lockstep.losses)) == (1, True, 1)
+    assert (lockstep.waiting, lockstep.missing[0], len(lockstep.losses)) == (1, "that did not join", 1)
     joined(lockstep, "c")
     again = lockstep.answer("c", frames.encode("ready", -1, {}))
     assert again == ([] if answered else [("c", out["b"])])

@@ -65,7 +65,7 @@ def _load_file(path: Path) -> Any:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except BaseException:
+    except BaseException:  # also an exit or Ctrl-C: a half-imported module must not be found the next time
         del sys.modules[name]
         raise
     return module

@@ -83,11 +83,6 @@ class Roster(ABC, Generic[S]):
         return sum(slot.state not in ("ready", "dead") for slot in self._slots)
 
     @property
-    def vacant(self) -> bool:
-        """Whether robots wait for a runner to join."""
-        return any(slot.state == "free" for slot in self._slots)
-
-    @property
     def bears_losses(self) -> bool:
         """Whether the run goes on without a runner that is lost now."""
         return self._on_loss != "stop" and self._tick >= 0
