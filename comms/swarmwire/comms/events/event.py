@@ -37,7 +37,7 @@ class Event(ABC):
 
     def end(self, serial: int, conditions: Conditions) -> BoolArray:
         """Undo what `begin` did; only called if the event lasts for a time. Which robots that changed, (rows,)."""
-        raise NotImplementedError
+        raise TypeError(f"{self.do} lasts for ever: there is nothing to undo")
 
 
 @dataclass(frozen=True, kw_only=True)
