@@ -1,0 +1,1 @@
+"""The commands of `swarmwire`, one a file; `cli` lists them."""

@@ -1,0 +1,5 @@
+"""What the command line's exit codes mean."""
+
+FAILED = 1  # the run failed: an agent's error, a runner lost
+BAD_INPUT = 2
+INTERRUPTED = 130  # Ctrl-C, with a summary

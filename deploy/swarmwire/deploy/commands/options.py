@@ -1,0 +1,16 @@
+"""Arguments that several commands take."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ScenarioFile = Annotated[Path, typer.Argument(help="The scenario, a TOML file.", metavar="SCENARIO")]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="Set a value by its path, e.g. robots.flock.params.separation_m=0.3. Repeatable.",
+        metavar="PATH=VALUE",
+    ),
+]

@@ -1,0 +1,84 @@
+"""`swarmwire run`."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.commands.exit_codes import INTERRUPTED
+from swarmwire.deploy.commands.options import Overrides, ScenarioFile
+from swarmwire.deploy.folder import default_folder, make_folder
+from swarmwire.deploy.report import print_result
+from swarmwire.deploy.result import Result
+
+MOST_SEEDS = 10_000
+
+
+def run_command(
+    scenario: ScenarioFile,
+    runners: Annotated[
+        str, typer.Option(help='Processes that run the agents: "none" (all in this one), a number, or "per-robot".')
+    ] = "none",
+    out: Annotated[
+        Path | None, typer.Option(help="The run folder, new or empty. Default: runs/<scenario>-s<seed>-<UTC>.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed instead of the scenario's.")] = None,
+    seeds: Annotated[str | None, typer.Option(help="One arena per seed, side by side: 1:9 (1 to 8) or 1,5,7.")] = None,
+    overrides: Overrides = None,
+    socket: Annotated[
+        Path | None, typer.Option(help="Unix socket at which runners meet the world. Default: a private temporary one.")
+    ] = None,
+    realtime: Annotated[
+        str | None,
+        typer.Option(
+            help="Keep to the wall clock, FACTOR (1 if left out) simulated seconds per second; wait for no runner.",
+            metavar="[FACTOR]",
+        ),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Run a scenario, print what came of it, and write summary.json and run.rrd into the run folder.
+
+    Without --realtime the same scenario and seed give the same run bit for bit, whatever --runners says.
+    """
+    # Imported here: numba and zenoh take a second, which --help and typing errors should not.
+    from swarmwire.deploy.progress import ProgressLine
+    from swarmwire.deploy.run import Execution, choose_seeds
+    from swarmwire.world.scenario_file import load_scenario
+
+    console = Console(quiet=quiet, highlight=False)
+    checked = load_scenario(scenario, overrides or [])
+    chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
+    execution = Execution(checked, chosen, runners, socket=socket, realtime=realtime)
+    folder = execution.folder = make_folder(out or default_folder(scenario.stem, chosen))
+    result = execution.run([ProgressLine(execution.ticks, WallClock(), console)])
+    print_result(result, console)
+    _say_where(result, folder, console)
+    if result.ended == "interrupted":
+        raise typer.Exit(INTERRUPTED)
+
+
+def _seed_list(text: str) -> list[int]:
+    first, colon, last = text.partition(":")
+    try:
+        found = range(int(first), int(last)) if colon else [int(item) for item in text.split(",")]
+    except ValueError:
+        found = []
+    if not 0 < len(found) <= MOST_SEEDS:
+        expected = f"expected FIRST:END (END left out) or a list such as 1,5,7, {MOST_SEEDS} at most; got {text!r}"
+        raise BadInput("--seeds", "", expected)
+    return list(found)
+
+
+def _say_where(result: Result, folder: Path, console: Console) -> None:
+    recorded = f" of seed {result.arenas[0].seed}" if len(result.arenas) > 1 else ""
+    console.print(f"written: {folder}/summary.json and the recording{recorded} {folder}/run.rrd", soft_wrap=True)
+    viewer = Path(sys.executable).with_name("rerun")
+    if viewer.is_relative_to(Path.cwd()):
+        viewer = viewer.relative_to(Path.cwd())
+    console.print(f"look at it: {viewer} {folder}/run.rrd", soft_wrap=True)
+    console.print(f"  without a screen: {viewer} --serve-web --bind 127.0.0.1 {folder}/run.rrd", soft_wrap=True)

@@ -1,0 +1,18 @@
+"""`swarmwire screenshot`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def screenshot_command(
+    recording: Annotated[Path, typer.Argument(help="A run folder, or its run.rrd.", metavar="RUN")],
+    to: Annotated[Path, typer.Option(help="The PNG to write.")],
+    tick: Annotated[int | None, typer.Option(help="The tick to show. Default: the last.")] = None,
+) -> None:
+    """Draw a recording as rerun's viewer shows it, without a screen. Needs a Vulkan driver; Mesa's will do."""
+    from swarmwire.metrics.picture import render_png
+
+    render_png(recording / "run.rrd" if recording.is_dir() else recording, to, tick)
+    typer.echo(f"written: {to}")
