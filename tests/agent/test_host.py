@@ -336,3 +336,29 @@ def test_a_group_that_is_split_does_what_it_does_as_a_whole() -> None:
             expected
         )
         sent = expected.sent
+
+
+def test_the_last_state_that_a_robot_names_in_a_tick_counts() -> None:
+    class Rows(VectorAgent):
+        def step(self, robots: Robots, state: State) -> None:
+            robots.note("search")
+            robots.note("wait", rows=np.array([False, True, False]))
+
+    class One(Agent):
+        def step(self, robot: Robot) -> None:
+            if robot.time_s == 0.0:
+                robot.note(state="search")
+
+    notes = once(Rows, [1, 4, 6]).notes
+    assert [notes.names[code] for code in notes.code] == ["search", "wait", "search"]
+    host = host_of(One, [2, 5])
+    assert [len(step(host, tick, [2, 5]).notes) for tick in (0, 1)] == [2, 0]
+
+
+@pytest.mark.parametrize("state", ["", "x" * 65, 3, None], ids=repr)
+def test_a_state_is_a_short_text(state: object) -> None:
+    class Wrong(Agent):
+        def step(self, robot: Robot) -> None:
+            robot.note(state)
+
+    assert "expected a text of 1 to 64 characters" in failure(Wrong).traceback

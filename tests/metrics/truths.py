@@ -41,6 +41,9 @@ def truth(of: Static, tick: int = 0, **given: Any) -> Truth:
         "pose": np.zeros((rows, 3)),
         "velocity": np.zeros((rows, 3)),
         "command": np.zeros((rows, 2)),
+        "state": np.zeros(rows, np.int64),
+        "states": ("",),
+        "senses": {},
         "contact_onsets": np.zeros((of.arenas, 2), np.int64),
         "edges": None,
         "tally": None,
@@ -74,7 +77,7 @@ def finished(
 ) -> Finished:
     sent, final = np.array(sent_at_ns, np.int64), np.array(final_at_ns, np.int64)
     zero = np.zeros(len(sent), np.int64)
-    return Finished(zero + arena, zero, zero + 1, zero, sent, sent, final, zero + fate, zero, zero)
+    return Finished(zero + arena, zero, zero + 1, zero + 1, zero, sent, sent, final, zero + fate, zero, zero)
 
 
 def measured(name: str, of: Static, seen: Truth) -> list[float]:

@@ -71,6 +71,10 @@ class Robot(Handle):
         self._turn.linear_mps[self._row] = linear_mps
         self._turn.angular_radps[self._row] = angular_radps
 
+    def note(self, state: str) -> None:
+        """Name what the robot is at ("search", "wait"), for recordings and pictures; it holds until the next call."""
+        self._turn.note(np.array([self._row]), state)
+
 
 class RadioPort:
     """The robot's radio: an unreliable medium."""

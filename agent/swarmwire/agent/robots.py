@@ -77,6 +77,10 @@ class Robots(Handle):
         np.copyto(turn.linear_mps, linear_mps, where=moved)
         np.copyto(turn.angular_radps, angular_radps, where=moved)
 
+    def note(self, state: str, rows: BoolArray | None = None) -> None:
+        """Name what the robots of the mask `rows`, or all, are at; for recordings and pictures, until the next call."""
+        self._turn.note(slice(None) if rows is None else rows, state)
+
 
 class RadioRows:
     """The radios of n robots: an unreliable medium."""

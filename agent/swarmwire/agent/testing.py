@@ -136,8 +136,15 @@ def _assert_same(first: Actions, second: Actions, text: str) -> None:
         one, other = getattr(first, name), getattr(second, name)
         if not np.array_equal(one, other, equal_nan=name not in ("rows", "drive")):
             raise AssertionError(f"{text}: {name}\n{one}\n{other}")
+    if _states(first) != _states(second):
+        raise AssertionError(f"{text}: states\n{_states(first)}\n{_states(second)}")
     if _packets(first.sent) != _packets(second.sent):
         raise AssertionError(f"{text}: packets\n{_packets(first.sent)}\n{_packets(second.sent)}")
+
+
+def _states(actions: Actions) -> dict[int, str]:
+    notes = actions.notes
+    return {int(row): notes.names[code] for row, code in zip(notes.rows, notes.code, strict=True)}
 
 
 def _packets(sent: Sent) -> list[tuple[int, int, bytes]]:

@@ -5,9 +5,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from swarmwire.agent.packet import NotDeclared, Packets
-from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
 from swarmwire.comms.messages import Message, decode_alike, decode_rows
+from swarmwire.comms.notes import Notes, checked_state
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
 
@@ -36,6 +37,8 @@ class Turn:
         self.linear_mps, self.angular_radps = np.zeros((2, self.n))
         self._sent_before = sent_before  # (n,) packets that each robot has sent up to now; written to
         self._outbox: list[Sent] = []
+        self._states: dict[str, int] = {}  # that were named in this tick, by code
+        self._state: IntArray | None = None  # (n,) codes; -1: none named
         self._packets: dict[type[Message], Packets[Any]] = {}
 
     def field(self, sense: str, name: str) -> FloatArray:
@@ -78,6 +81,19 @@ class Turn:
         self._sent_before[place] += 1
         return ids
 
+    def note(self, rows: IntArray | BoolArray | slice, state: str) -> None:
+        """Name a state for some of the robots; the last one named in a tick counts."""
+        if self._state is None:
+            self._state = np.full(self.n, -1)
+        self._state[rows] = self._states.setdefault(checked_state(state), len(self._states))
+
     def actions(self) -> Actions:
         """What the robots did."""
-        return Actions(self.senses.rows, self.drive, self.linear_mps, self.angular_radps, Sent.joined(self._outbox))
+        sent = Sent.joined(self._outbox)
+        return Actions(self.senses.rows, self.drive, self.linear_mps, self.angular_radps, sent, self._notes())
+
+    def _notes(self) -> Notes:
+        if self._state is None:
+            return Notes.none()
+        noted = np.flatnonzero(self._state >= 0)
+        return Notes(self.senses.rows[noted], self._state[noted], tuple(self._states))

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.notes import Notes
 from swarmwire.comms.packets import Sent
 
 
@@ -28,6 +29,7 @@ class Actions:
     linear_mps: FloatArray  # (n,) forward speed asked for
     angular_radps: FloatArray  # (n,) turn rate asked for, positive to the left
     sent: Sent = field(default_factory=Sent.none)
+    notes: Notes = field(default_factory=Notes.none)
 
     @classmethod
     def joined(cls, parts: "list[Actions]") -> "Actions":
@@ -43,4 +45,5 @@ class Actions:
             np.concatenate([part.linear_mps for part in parts]),
             np.concatenate([part.angular_radps for part in parts]),
             Sent.joined([part.sent for part in parts]),
+            Notes.joined([part.notes for part in parts]),
         )

@@ -6,6 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.body import Body
+from swarmwire.comms.senses import Senses
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +87,14 @@ class Static:
 class Finished:
     """Links whose fate became final since the last tick: a row per (packet, receiver it might have reached).
 
-    Receivers out of range or behind a sender-side fate are counted in the tally alone, never listed.
+    A packet that never went on air (queue full, too large, sender dead, its radio off) has one row with receiver -1.
+    Receivers out of range are counted in the tally alone, never listed.
     """
 
     arena: IntArray  # (k,)
     sender: IntArray  # (k,) index in the arena
-    receiver: IntArray  # (k,) index in the arena
+    receiver: IntArray  # (k,) index in the arena; -1: all that the packet was meant for
+    receivers: IntArray  # (k,) how many intended receivers the row stands for: 1, or all of them
     sequence: IntArray  # (k,)
     sent_at_ns: IntArray  # (k,)
     on_air_at_ns: IntArray  # (k,)
@@ -99,6 +102,7 @@ class Finished:
     fate: IntArray  # (k,) a Fate
     size_bytes: IntArray  # (k,) payload with its tag
     tag: IntArray  # (k,) topic
+    rssi_dbm: FloatArray | None = None  # (k,) strength at the receiver; None: this radio knows no strength
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +145,9 @@ class Truth:
     pose: FloatArray  # (rows, 3) x, y in m, heading in rad, arena frame
     velocity: FloatArray  # (rows, 3) m/s, m/s, rad/s, arena frame
     command: FloatArray  # (rows, 2) applied: forward m/s, left turn rad/s
+    state: IntArray  # (rows,) what the agent says it is at, a place in `states`; 0: it has said nothing
+    states: tuple[str, ...]  # named so far, in that order; the first is empty
+    senses: Senses  # by group, of the robots that act in this tick: what they sensed at its start
     contact_onsets: IntArray  # (arenas, 2) that began in this tick: robot with robot, robot with wall or obstacle
     edges: IntArray | None  # (e, 2) robot rows joined in the radio graph at the tick's start; None without a radio
     tally: Tally | None  # None without a radio

@@ -50,6 +50,10 @@ class Run:
         """A column of all links that became final, in order."""
         return np.concatenate([getattr(one.finished, name) for one in self.news])
 
+    def on_air(self, name: str) -> IntArray:
+        """The same of the links of packets that went on air."""
+        return self.finished(name)[self.finished("receiver") >= 0]
+
 
 def make_air(
     radio: Radio, robots: int, seeds: Sequence[int] = (1,), obstacles: Sequence[Sequence[Obstacle]] | None = None

@@ -55,10 +55,10 @@ def test_tally_agrees_with_what_is_listed(radio: Radio, arenas: int, robots: int
     """Heard packets, listed links and the tally tell the same story, in every tick."""
     for one in random_run(radio, arenas, robots, seed, 2).news:
         listed = np.zeros_like(one.tally.fates)
-        np.add.at(listed, (one.finished.arena, one.finished.fate), 1)
-        of_links = [Fate.HEARD, Fate.BLOCKED, Fate.LOST]
-        np.testing.assert_array_equal(listed[:, of_links], one.tally.fates[:, of_links])
-        assert listed.sum() == listed[:, of_links].sum()
+        np.add.at(listed, (one.finished.arena, one.finished.fate), one.finished.receivers)
+        but_far = [fate for fate in Fate if fate != Fate.OUT_OF_RANGE]
+        np.testing.assert_array_equal(listed[:, but_far], one.tally.fates[:, but_far])
+        assert not listed[:, Fate.OUT_OF_RANGE].any()
         assert len(one.heard) == listed[:, Fate.HEARD].sum()
         in_range = listed[:, Fate.HEARD] + listed[:, Fate.LOST]
         assert (one.tally.in_range >= in_range).all()

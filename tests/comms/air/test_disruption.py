@@ -50,7 +50,7 @@ def test_a_queue_ends_with_its_sender_and_is_empty_when_it_is_revived():
     sent = {0: packets([0] * 4), 3: packets([0])}
     told = ran(make_air(slow(), 3), THREE, sent, {1: disrupted(3, dead=[0]), 3: disrupted(3)}, 6)
     assert told.fates() == {"HEARD": 6, "SENDER_DEAD": 4}
-    assert sorted(set(told.finished("on_air_at_ns").tolist())) == [0, 80_000_000, 300_000_000]
+    assert sorted(set(told.on_air("on_air_at_ns").tolist())) == [0, 80_000_000, 300_000_000]
     assert told.news[1].tally.fates.sum() == 6, "the queue is settled when its sender dies"
     assert told.tally.in_range.tolist() == [10]
 
@@ -91,7 +91,7 @@ def test_a_radio_that_is_off_neither_sends_nor_receives_and_loses_what_it_was_to
     now = {1: disrupted(3, off=[0]), 3: disrupted(3)}
     told = ran(make_air(slow(), 3), THREE, {0: packets([0] * 5), 1: packets([1], 0)}, now, 7)
     assert told.fates() == {"HEARD": 6, "BLACKOUT": 5}
-    assert sorted(set(told.finished("on_air_at_ns").tolist())) == [0, 80_000_000, 100_000_000, 320_000_000]
+    assert sorted(set(told.on_air("on_air_at_ns").tolist())) == [0, 80_000_000, 100_000_000, 320_000_000]
     assert told.tally.in_range.tolist() == [11]
 
 

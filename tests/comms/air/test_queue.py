@@ -16,12 +16,10 @@ def test_packets_of_one_sender_follow_each_other_without_gap():
     told = run(make_air(SLOW, 3), TRIO, lambda _: packets([0, 0, 1, 0], size=[10, 5, 10, 10]), 1)
     times = {
         (int(s), int(n)): int(t)
-        for s, n, t in zip(
-            told.finished("sender"), told.finished("sequence"), told.finished("on_air_at_ns"), strict=True
-        )
+        for s, n, t in zip(told.on_air("sender"), told.on_air("sequence"), told.on_air("on_air_at_ns"), strict=True)
     }
     assert times == {(0, 0): 0, (0, 1): 20_000_000, (0, 2): 30_000_000, (1, 0): 0}
-    assert (told.finished("sent_at_ns") == 0).all()
+    assert (told.on_air("sent_at_ns") == 0).all()
 
 
 @pytest.mark.parametrize("limit", [0, 1, 3])
@@ -29,7 +27,7 @@ def test_a_full_queue_refuses_for_every_intended_receiver(limit: int):
     """One packet is on air and `limit` wait; the refused count as in range where they would have been heard."""
     radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=limit)
     told = run(make_air(radio, 3), TRIO, lambda _: packets([0] * 5), 1, 3)
-    assert told.finished("sequence").tolist() == list(range(limit + 1))
+    assert told.on_air("sequence").tolist() == list(range(limit + 1))
     assert told.fates() == {"HEARD": limit + 1, "OUT_OF_RANGE": limit + 1, "QUEUE_FULL": 2 * (4 - limit)}
     assert told.tally.in_range.tolist() == [5]
 
@@ -38,25 +36,25 @@ def test_the_queue_empties_as_time_passes():
     """Packets of 60 ms, two per tick of 100 ms, and room for one: with every other tick one more is refused."""
     radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=1)
     told = run(make_air(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=30), 6, 3)
-    on_air_ms = (told.finished("on_air_at_ns") // 10**6).tolist()
+    on_air_ms = (told.on_air("on_air_at_ns") // 10**6).tolist()
     assert on_air_ms == [0, 60, 120, 200, 260, 320, 400, 460, 520]
     assert told.fates() == {"HEARD": 9, "QUEUE_FULL": 3}
-    assert (np.diff(told.finished("sequence")) > 0).all()
+    assert (np.diff(told.on_air("sequence")) > 0).all()
 
 
 def test_what_earlier_ticks_left_waiting_counts_against_the_limit():
     """Packets of 60 ms and room for three: 120 and 180 ms still wait at 100 ms, 240 ms at 200 ms."""
     radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=3)
     told = run(make_air(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0] * 5, size=30), 3, 6)
-    assert told.finished("sequence").tolist() == [0, 1, 2, 3, 5, 10, 11]
-    assert told.finished("on_air_at_ns")[-3:].tolist() == [240_000_000, 300_000_000, 360_000_000]
+    assert told.on_air("sequence").tolist() == [0, 1, 2, 3, 5, 10, 11]
+    assert told.on_air("on_air_at_ns")[-3:].tolist() == [240_000_000, 300_000_000, 360_000_000]
 
 
 def test_refused_packets_are_numbered_too():
     """And a packet too large takes no time on air: the next goes out at once."""
     told = run(make_air(SLOW, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=[101, 100]), 1, 3)
     assert told.heard("sequence").tolist() == [1]
-    assert told.finished("on_air_at_ns").tolist() == [0]
+    assert told.on_air("on_air_at_ns").tolist() == [0]
 
 
 def test_a_payload_above_the_maximum_is_too_large_for_every_intended_receiver():

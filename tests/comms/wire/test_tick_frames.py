@@ -11,6 +11,7 @@ from hypothesis.extra import numpy as npst
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.notes import Notes
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.wire import frames
@@ -166,3 +167,33 @@ def test_packets_without_any_sender_are_none() -> None:
     empty = {"sent": np.empty((2, 0), np.int64), "sent/offset": np.zeros(1, np.int64)}
     arrays = {**frame.arrays, **empty, "sent/data": np.empty(0, np.uint8)}
     assert len(decode_actions(replace(frame, arrays=arrays), ROWS).sent) == 0
+
+
+def noting(rows: list[int], code: list[int], names: tuple[str, ...]) -> bytes:
+    return encode_actions(0, replace(sound(), notes=Notes(np.array(rows), np.array(code), names)))
+
+
+def test_named_states_come_over_whole() -> None:
+    notes = decode_actions(frames.decode(noting([9, 4], [1, 0], ("search", "wait"))), ROWS).notes
+    assert (notes.rows.tolist(), notes.code.tolist(), notes.names) == ([9, 4], [1, 0], ("search", "wait"))
+
+
+@pytest.mark.parametrize(
+    ("rows", "code", "names"),
+    [
+        ([5], [0], ("search",)),  # another's robot
+        ([4, 4], [0, 0], ("search",)),
+        ([4], [1], ("search",)),
+        ([4], [-1], ("search",)),
+        ([4], [0], ()),
+        ([4], [0], ("",)),
+        ([4], [0], ("x" * 65,)),
+        ([4], [0], (7,)),
+        ([4], [0], tuple(map(str, range(257)))),
+    ],
+    ids=repr,
+)
+def test_states_that_contradict_themselves_are_refused(rows: list[int], code: list[int], names: tuple[str]) -> None:
+    with pytest.raises(BadFrame) as caught:
+        decode_actions(frames.decode(noting(rows, code, names)), ROWS)
+    assert caught.value.fault == "malformed"

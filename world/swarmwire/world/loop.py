@@ -44,7 +44,8 @@ class Loop:
         news = self.air.advance(start_ns) if self.air else None
         heard = news.heard if news else Heard.none()
         self._open = news.tally if news else None
-        actions = self.crew.act(tick, world.sense(tick), self._mailbox.hand_over(tick, heard, world.alive))
+        senses = world.sense(tick)
+        actions = self.crew.act(tick, senses, self._mailbox.hand_over(tick, heard, world.alive))
 
         pose, velocity, alive = world.pose, world.velocity, world.alive.copy()
         if self.air:
@@ -58,7 +59,22 @@ class Loop:
         edges = self.air.edges(pose, alive) if self.air else None
         tally, finished = (news.tally, news.finished) if news else (None, None)
         self._open = None
-        truth = Truth(tick, start_ns, alive, pose, velocity, command, onsets, edges, tally, finished, events)
+        truth = Truth(
+            tick=tick,
+            time_ns=start_ns,
+            alive=alive,
+            pose=pose,
+            velocity=velocity,
+            command=command,
+            state=world.states.code,
+            states=world.states.names,
+            senses=senses,
+            contact_onsets=onsets,
+            edges=edges,
+            tally=tally,
+            finished=finished,
+            events=events,
+        )
         for observer in self.observers:
             observer.see(truth)
         self.ticks_done += 1

@@ -24,6 +24,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.notes import Notes
 from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire.frames import Frame
@@ -68,6 +69,7 @@ class RealTime(Roster[_Slot]):
         self._stopped = np.zeros(rows, np.bool_)
         self._drive, self._command = np.zeros(rows, np.bool_), np.zeros((2, rows))
         self._sent: list[Sent] = []
+        self._notes: list[Notes] = []
         self.late, self.watchdog_stops = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
         self.frames_dropped = self.packets_dropped = 0
 
@@ -100,8 +102,10 @@ class RealTime(Roster[_Slot]):
         self._stop(np.flatnonzero(overdue))
         rows = np.arange(len(self._drive))
         linear_mps, angular_radps = self._command
-        actions = Actions(rows, self._drive, linear_mps, angular_radps, Sent.joined(self._sent))
-        self._drive, self._command, self._sent = np.zeros_like(self._drive), np.zeros_like(self._command), []
+        sent, notes = Sent.joined(self._sent), self._latest_notes()
+        actions = Actions(rows, self._drive, linear_mps, angular_radps, sent, notes)
+        self._drive, self._command = np.zeros_like(self._drive), np.zeros_like(self._command)
+        self._sent, self._notes = [], []
         return actions
 
     def _acted(self, slot: _Slot, frame: Frame) -> None:
@@ -119,6 +123,7 @@ class RealTime(Roster[_Slot]):
         command: FloatArray = np.array((actions.linear_mps, actions.angular_radps))
         self._command[:, given] = command[:, actions.drive]
         self._sent.append(actions.sent)
+        self._notes.append(actions.notes)
 
     def _catch_up(self, slot: _Slot) -> Sequence[bytes]:
         return ()  # the next tick is soon
@@ -129,6 +134,13 @@ class RealTime(Roster[_Slot]):
             self._drop(slot.asked.popleft())
         if slot.state == "dead":
             self._stop(slot.all_rows)
+
+    def _latest_notes(self) -> Notes:
+        """Of a robot that answered more than once since the last take, what it named last."""
+        notes = Notes.joined(self._notes)
+        _, back = np.unique(notes.rows[::-1], return_index=True)
+        last = len(notes) - 1 - back
+        return Notes(notes.rows[last], notes.code[last], notes.names)
 
     def _drop(self, asked: _Asked) -> None:
         self.frames_dropped += 1

@@ -18,6 +18,7 @@ from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.sensors import SENSORS, Accumulating, Scene, Sensor
+from swarmwire.world.states import States
 
 
 class World:
@@ -32,6 +33,7 @@ class World:
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
         command: (rows, 2) applied, within the wheels' limits: forward m/s, left turn rad/s.
         alive: (rows,).
+        states: what each robot is at, as its agent named it.
     """
 
     def __init__(self, scenario: Scenario, seeds: Sequence[int], needs: Mapping[str, Sequence[str]]) -> None:
@@ -63,11 +65,13 @@ class World:
         rows = self.static.arenas * self.static.robots
         self.alive: BoolArray = np.ones(rows, np.bool_)
         self.command: FloatArray = np.zeros((rows, 2))
+        self.states = States(rows)
         self._clipped = self._not_finite = 0
         self._show()
 
     def live(self, alive: BoolArray) -> None:
         """These robots (rows,) are alive from now on; the others brake, and resist whatever pushes them."""
+        self.states.forget(alive & ~self.alive)  # a robot that is revived starts afresh
         self.alive, self.command = alive.copy(), self.command.copy()
         self.command[~alive] = 0.0
         self._physics.braked = ~alive.reshape(self.static.arenas, self.static.robots)
@@ -108,13 +112,15 @@ class World:
         self._clipped += int(np.count_nonzero(clipped))
         self.command = self.command.copy()
         self.command[rows] = within
+        self.states.take(actions.notes, self.alive)
         onsets = self._physics.tick(self.command.reshape(self.static.arenas, self.static.robots, 2))
         self._show()
         return onsets
 
     def counts(self) -> dict[str, int]:
-        """Commands since the start that the wheels could not follow, and that were not finite and so dropped."""
-        return {"clipped_commands": self._clipped, "nan_commands": self._not_finite}
+        """Commands since the start that the wheels could not follow, or not finite and so dropped; states too many."""
+        states = {"states_over_limit": self.states.dropped} if self.states.dropped else {}
+        return {"clipped_commands": self._clipped, "nan_commands": self._not_finite, **states}
 
     def _show(self) -> None:
         state = self._physics.state.reshape(-1, 6)

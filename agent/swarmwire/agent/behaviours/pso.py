@@ -88,6 +88,8 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
         bounded = np.minimum(1.0, furthest / np.maximum(np.hypot(x, y), 1e-9))
         state.velocity_x[now] = state.target_x[now] = (x * bounded)[now]
         state.velocity_y[now] = state.target_y[now] = (y * bounded)[now]
+        robots.note("to its own best", now & ~brighter)
+        robots.note("to the neighbours' best", now & brighter)
 
     def _velocity(
         self,

@@ -6,6 +6,7 @@ from swarmwire.comms.air.links import HEARD, THE_REST, Links
 from swarmwire.comms.air.order import by_receiver
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.truth import Finished
 
@@ -30,13 +31,15 @@ def heard(ended: Links, packets: Transmissions, gives: tuple[str, ...], robots: 
 
 
 def finished(ended: Links, packets: Transmissions, robots: int) -> Finished:
-    """The links whose fate is final, without those that are only counted."""
-    index = np.flatnonzero(ended.receiver != THE_REST)
+    """The links whose fate is final, and packets that never went on air; not receivers out of range."""
+    the_rest = ended.receiver == THE_REST
+    index = np.flatnonzero(~the_rest | (ended.fate != Fate.OUT_OF_RANGE))
     packet, sender = ended.packet[index], ended.sender[index]
     return Finished(
         arena=sender // robots,
         sender=sender % robots,
-        receiver=ended.receiver[index] % robots,
+        receiver=np.where(the_rest[index], THE_REST, ended.receiver[index] % robots),
+        receivers=ended.receivers[index],
         sequence=ended.sequence[index],
         sent_at_ns=packets.sent_at_ns[packet],
         on_air_at_ns=packets.on_air_at_ns[packet],

@@ -1,11 +1,13 @@
 """What a tick carries across the wire: senses and heard packets to a runner, actions back; checked on arrival."""
 
 from collections.abc import Mapping, Set
+from typing import Any, cast
 
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.notes import MOST_STATES, Notes, checked_state
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.wire import frames
@@ -64,7 +66,11 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
         arrays["sent"] = np.array((actions.sent.sender, actions.sent.to))
         arrays["sent/data"] = actions.sent.payloads.data
         arrays["sent/offset"] = actions.sent.payloads.offset
-    return frames.encode("actions", tick, arrays, {"dropped": dropped} if dropped else None)
+    values: dict[str, Any] = {"dropped": dropped} if dropped else {}
+    if len(actions.notes):
+        arrays["notes"] = np.array((actions.notes.rows, actions.notes.code))
+        values["states"] = actions.notes.names
+    return frames.encode("actions", tick, arrays, values)
 
 
 def decode_actions(frame: Frame, rows: IntArray) -> Actions:
@@ -74,7 +80,8 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
         raise BadFrame("malformed", "rows: expected the runner's own robots")
     drive, linear_mps, angular_radps = _checked(frame, "command", "<f8", (3, n))
     sent = _sent(frame, rows) if "sent" in frame.arrays else Sent.none()
-    return Actions(rows, drive != 0.0, linear_mps, angular_radps, sent)
+    notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
+    return Actions(rows, drive != 0.0, linear_mps, angular_radps, sent, notes)
 
 
 def _sent(frame: Frame, rows: IntArray) -> Sent:
@@ -83,12 +90,33 @@ def _sent(frame: Frame, rows: IntArray) -> Sent:
     data = _checked(frame, "sent/data", "|u1", (None,))
     if offset[0] != 0 or offset[-1] != len(data) or (offset[1:] < offset[:-1]).any():
         raise BadFrame("malformed", "sent/offset: expected rising offsets into sent/data")
-    known = np.sort(rows)
-    if len(sender) and not len(known):
-        raise BadFrame("malformed", "sent: expected no packets of no robots")
-    if (known[np.searchsorted(known[:-1], sender)] != sender).any() or (to < BROADCAST).any():
+    if not _own(sender, rows) or (to < BROADCAST).any():
         raise BadFrame("malformed", "sent: expected packets of the runner's own robots")
     return Sent(sender, to, Payloads(data, offset))
+
+
+def _notes(frame: Frame, rows: IntArray) -> Notes:
+    noted, code = _checked(frame, "notes", "<i8", (2, None))
+    names: object = frame.values.get("states")
+    if type(names) is not list or not 0 < len(cast("list[object]", names)) <= MOST_STATES:
+        raise BadFrame("malformed", f"states: expected a list of 1 to {MOST_STATES} texts")
+    try:
+        states = tuple(checked_state(name) for name in cast("list[object]", names))
+    except ValueError as error:
+        raise BadFrame("malformed", str(error)) from error
+    if not _own(noted, rows) or len(np.unique(noted)) < len(noted):
+        raise BadFrame("malformed", "notes: expected the runner's own robots, each once")
+    if ((code < 0) | (code >= len(states))).any():
+        raise BadFrame("malformed", "notes: expected places in states")
+    return Notes(noted, code, states)
+
+
+def _own(some: IntArray, rows: IntArray) -> bool:
+    """Whether all of these are among the rows."""
+    if not len(some) or not len(rows):
+        return not len(some)
+    known = np.sort(rows)
+    return bool((known[np.searchsorted(known[:-1], some)] == some).all())
 
 
 def _checked(frame: Frame, name: str, code: str, shape: tuple[int | None, ...]) -> AnyArray:
