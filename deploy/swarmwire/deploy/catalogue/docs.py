@@ -5,6 +5,7 @@ import inspect
 import io
 import textwrap
 import tokenize
+from typing import Any
 
 
 def paragraphs(docstring: str | None) -> str:
@@ -18,9 +19,9 @@ def first_line(docstring: str | None) -> str:
     return paragraphs(docstring).partition("\n\n")[0].strip().removesuffix(".")
 
 
-def texts_of(kind: type, bases: tuple[type, ...]) -> str:
-    """The docstrings of a class and of what it inherits from, up to but without `bases`."""
-    of = [base for base in kind.__mro__ if base not in bases and issubclass(base, bases)]
+def texts_of(kind: type, bases: tuple[Any, ...]) -> str:
+    """The docstrings of a class and of what it inherits from, without those of `bases`."""
+    of = [base for base in kind.__mro__ if base not in bases]
     return "\n\n".join(paragraphs(base.__dict__["__doc__"]) for base in of if base.__dict__.get("__doc__"))
 
 

@@ -1,5 +1,6 @@
 """Metrics: what is measured of every run."""
 
+from abc import ABC
 from math import isinf
 
 from swarmwire.deploy.catalogue.docs import texts_of
@@ -29,7 +30,7 @@ def _metric(kind: type[Metric]) -> Entry:
             ("bounds", _bounds(*kind.bounds)),
         ),
         tables=(ParameterTable("parameters", parameters),) if parameters else (),
-        text=texts_of(kind, (Metric,)),
+        text=texts_of(kind, (Metric, ABC, object)),
     )
 
 
