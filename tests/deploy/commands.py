@@ -26,7 +26,8 @@ def called(
     monkeypatch.setattr(sys, "argv", ["swarmwire", *map(str, arguments)])
     with pytest.raises(SystemExit) as ended:
         main()
-    return (ended.value.code, *capsys.readouterr())
+    out, errors = capsys.readouterr()
+    return ended.value.code, out, errors
 
 
 def started(*arguments: str | Path) -> subprocess.Popen[str]:

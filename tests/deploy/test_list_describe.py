@@ -22,7 +22,7 @@ from swarmwire.deploy.catalogue.entry import Entry
 from swarmwire.deploy.catalogue.find import find
 from swarmwire.deploy.catalogue.kinds import KINDS
 from swarmwire.deploy.catalogue.units import unit_of
-from swarmwire.deploy.catalogue_text import print_entry, print_kinds, print_list
+from swarmwire.deploy.catalogue_text import print_entry, print_list
 from swarmwire.metrics.order import Order
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.scenario_file import scenario_schema
@@ -136,6 +136,7 @@ def test_a_body_tells_its_figures_units_senses_and_source(name):
             value = getattr(sheet, of.name)
             figure = "" if is_dataclass(value) else json.dumps(value)
             assert_tells(section, [(of.name, limits_of(of).unit, figure, limits_of(of).help)])
+    assert body.proximity is not None
     assert_tells(text, [("response.reach_m", f"{body.proximity.response.reach_m}")])
     assert f"{body.radius_m}" in text
     assert f"{body.max_linear_mps:.4g} m/s" in text
@@ -265,13 +266,14 @@ def test_a_metric_of_ones_own_is_there_once_it_is_registered(monkeypatch):
     assert find("mine").help == "order, as I see it"
 
 
-def test_lists_are_plain_lines_where_they_are_piped():
-    for show in (print_kinds, *(lambda console, kind=kind: print_list(kind, console) for kind in KINDS)):
-        out = StringIO()
-        show(Console(file=out))
-        lines = out.getvalue().splitlines()
-        assert all(line == line.rstrip() and line.isprintable() and "─" not in line for line in lines)
-    assert len(lines) == 1 + len(KINDS[-1].entries())
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_a_list_is_a_plain_line_for_each_thing_where_it_is_piped(kind):
+    out = StringIO()
+    print_list(kind, Console(file=out))
+    heading, *lines = out.getvalue().splitlines()
+    assert heading.startswith(kind.one)
+    assert [line.split("  ")[0] for line in lines] == [entry.name for entry in kind.entries()]
+    assert all(line == line.rstrip() and line.isprintable() for line in lines)
 
 
 def test_the_list_command_names_kinds_and_things(monkeypatch, capsys):

@@ -36,8 +36,9 @@ def behaviour(spec: str, beside: Path | None = None) -> Entry:
 
 
 def _entry(kind: AgentClass, spec: str) -> Entry:
-    comments = comments_of(kind)
-    parameters = tuple(_parameter(of, comments.get(of.name, "")) for of in parameters_of(kind).values())
+    declared = parameters_of(kind)
+    comments = comments_of(kind, declared)
+    parameters = tuple(_parameter(of, comments.get(name, "")) for name, of in declared.items())
     text = texts_of(kind, BASES)
     vector = issubclass(kind, VectorAgent)
     return Entry(

@@ -7,7 +7,7 @@ from swarmwire.deploy.catalogue.entry import Entry
 
 def fates() -> list[Entry]:
     """All fates, in the order of the tally's columns."""
-    comments = comments_of(Fate)
+    comments = comments_of(Fate, Fate.__members__)
     return [
         Entry(
             kind="fate",
