@@ -207,6 +207,23 @@ def test_a_key_tells_unit_default_and_bounds():
 
 
 @pytest.mark.parametrize(
+    ("name", "place"),
+    [
+        ("seed", "seed, before the first table"),
+        ("radio", "the table [radio]"),
+        ("radio.gives.range.noise_m", "noise_m in [radio.gives.range]"),
+        ("robots.*", "the table [robots.GROUP]"),
+        ("robots.*.place.radius_m", "radius_m in [robots.GROUP.place]"),
+        ("arena.lights", "the tables [[arena.lights]]"),
+        ("events.*.at_s", "at_s in [[events]]"),
+        ("events.*.robots.share", "share in [events.robots]"),
+    ],
+)
+def test_a_key_tells_where_the_file_has_it(name, place):
+    assert dict(find(name).facts)["in a scenario"] == place
+
+
+@pytest.mark.parametrize(
     ("asked", "name"),
     [
         ("ORDER", "order"),

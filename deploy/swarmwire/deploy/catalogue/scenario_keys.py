@@ -42,8 +42,18 @@ def _key(key: Parameter, kind: str) -> Entry:
 
 
 def _place(key: Parameter, is_table: bool) -> str:
-    table, _, name = key.name.rpartition(".")
-    star = "; * is a group's name or a place in a list" if "*" in key.name else ""
+    """Where the file has it, as TOML writes that."""
     if is_table:
-        return f"the table {key.name}{star}"
-    return (f"{name} in [{table}]" if table else f"{name}, before the first table") + star
+        in_list = key.expected.startswith("a list")
+        return f"the tables {_header(f'{key.name}.*')}" if in_list else f"the table {_header(key.name)}"
+    table, _, name = key.name.rpartition(".")
+    return f"{name} in {_header(table)}" if table else f"{name}, before the first table"
+
+
+def _header(path: str) -> str:
+    """The header of a table: "[robots.GROUP]", or "[[events]]" for one of a list."""
+    lists = {of.name for of in all_keys() if of.expected.startswith("a list")}
+    parts = path.split(".")
+    places = [part == "*" and ".".join(parts[:depth]) in lists for depth, part in enumerate(parts)]
+    shown = ".".join("GROUP" if part == "*" else part for part, place in zip(parts, places, strict=True) if not place)
+    return f"[[{shown}]]" if places[-1] else f"[{shown}]"
