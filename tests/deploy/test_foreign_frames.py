@@ -10,7 +10,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.deploy import run
-from swarmwire.deploy.run import finished
+from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
 from tests.deploy.commands import LOSSY
 

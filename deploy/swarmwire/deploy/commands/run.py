@@ -48,7 +48,7 @@ def run_command(
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.arguments import choose_seeds
     from swarmwire.deploy.progress import ProgressLine
-    from swarmwire.deploy.run import finished
+    from swarmwire.deploy.running import finished
     from swarmwire.deploy.simulation import Simulation
     from swarmwire.world.scenario_file import load_scenario
 
