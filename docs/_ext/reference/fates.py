@@ -1,0 +1,10 @@
+"""What may become of a packet."""
+
+from swarmwire.comms.fates import Fate
+
+from reference.markdown import code, sentence, table
+
+
+def fate_table() -> str:
+    """Every fate and its meaning."""
+    return table(("fate", "meaning"), [(code(fate.name.lower()), sentence(fate.meaning)) for fate in Fate])

@@ -1,0 +1,34 @@
+"""The comments behind fields, `heading_rad: float  # of its compass`: what the code says of a field, for the reference."""
+
+import re
+from importlib.util import find_spec
+from inspect import getsource
+from pathlib import Path
+from typing import Any
+
+from sphinx.application import Sphinx
+from sphinx.pycode import ModuleAnalyzer
+
+PARTS = ("comms", "agent", "world", "metrics", "deploy")
+FIELD = re.compile(r"^(    (\w+): [^#\n]*  )# (.*)$", re.MULTILINE)
+
+
+def comments_of(kind: type[Any]) -> dict[str, str]:
+    """The comments behind the fields of a class and its bases in swarmwire, by name."""
+    ours = [base for base in kind.__mro__ if base.__module__.startswith("swarmwire.")]
+    return {name: text for base in reversed(ours) for _, name, text in FIELD.findall(getsource(base))}
+
+
+def teach_autodoc(app: Sphinx) -> None:
+    """Let autodoc, which knows `#:` alone, take these comments for the fields' documentation."""
+    for part in PARTS:
+        spec = find_spec(f"swarmwire.{part}")
+        for folder in (spec.submodule_search_locations or []) if spec else []:
+            for path in Path(folder).rglob("*.py"):
+                _teach(path, Path(folder).parents[1])
+
+
+def _teach(path: Path, root: Path) -> None:
+    module = ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__")
+    source = FIELD.sub(r"\1#: \3", path.read_text(encoding="utf-8"))
+    ModuleAnalyzer.cache["module", module] = ModuleAnalyzer.for_string(source, module, str(path))
