@@ -7,7 +7,7 @@ sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 
 project = "swarmwire"
 author = copyright = "the swarmwire authors"  # noqa: A001 - the name that Sphinx reads
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "reference"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "reference"]
 exclude_patterns = ["_build", "_ext"]
 
 html_theme = "furo"
@@ -23,8 +23,9 @@ autodoc_class_signature = "separated"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "exclude-members": "__init__, __new__"}
 autodoc_preserve_defaults = True
-napoleon_numpy_docstring = False
 
 nitpicky = True
-# Other projects' names are not looked up: a build should not need the network.
-nitpick_ignore_regex = [("py:.*", r"(?!swarmwire\b).*")]
+nitpick_ignore_regex = [
+    ("py:.*", r"(?!swarmwire\b).*"),  # other projects' names are not looked up: a build should not need the network
+    ("py:class", r"swarmwire\..*\.[A-Z]"),  # type variables
+]

@@ -11,7 +11,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.typing import ExtensionMetadata
 
-from reference import field_comments
+from reference import array_names, docstrings, field_comments
 from reference.behaviours import behaviour_table
 from reference.bodies import body_sources, body_table
 from reference.commands import command_tables
@@ -52,7 +52,10 @@ class Reference(SphinxDirective):
 
 
 def setup(app: Sphinx) -> ExtensionMetadata:
-    """Known to Sphinx as the directive `reference`; comments behind fields become their documentation."""
+    """Add the directive `reference`, and let autodoc read docstrings and comments as this project writes them."""
+    app.setup_extension("sphinx.ext.autodoc")
     app.add_directive("reference", Reference)
     app.connect("builder-inited", field_comments.teach_autodoc)
+    app.connect("autodoc-process-docstring", docstrings.prepare)
+    array_names.shorten(app)
     return {"version": "1", "parallel_read_safe": True}
