@@ -1,4 +1,4 @@
-"""How Sphinx builds the site: `make docs`. Nothing generated is kept; the reference comes from the code at each build."""
+"""How Sphinx builds the site: `make docs`. The reference is made from the code at each build; none of it is kept."""
 
 import sys
 from pathlib import Path

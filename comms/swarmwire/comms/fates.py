@@ -10,6 +10,7 @@ class Fate(IntEnum):
     meaning: str
 
     def __new__(cls, value: int, meaning: str) -> Self:
+        """The fate of this number."""
         fate = int.__new__(cls, value)
         fate._value_ = value
         fate.meaning = meaning

@@ -5,7 +5,8 @@ from typing import Any
 
 from sphinx.addnodes import desc_signature
 from sphinx.application import Sphinx
-from sphinx.domains.python import PyAttribute, PyFunction, PyMethod, PyObject, PyProperty
+from sphinx.domains.python import PyAttribute, PyFunction, PyMethod, PyProperty
+from sphinx.domains.python._object import PyObject
 
 NAMES = {"float64": "FloatArray", "int64": "IntArray", "bool": "BoolArray", "uint64": "KeyArray", "uint8": "ByteArray"}
 ARRAY = re.compile(r"~?numpy\.ndarray\[tuple\[~?typing\.Any, \.\.\.\], ~?numpy\.dtype\[~?numpy\.(\w+)\]\]")

@@ -2,13 +2,12 @@
 
 from typing import Any
 
-from swarmwire.agent import behaviours
-from swarmwire.agent.declared import REQUIRED, parameters_of
-from swarmwire.agent.vector_agent import VectorAgent
-
 from reference.docstrings import told_of
 from reference.field_comments import comments_of
 from reference.markdown import code, table, toml_code
+from swarmwire.agent import behaviours
+from swarmwire.agent.declared import REQUIRED, parameters_of
+from swarmwire.agent.vector_agent import VectorAgent
 
 HEAD = ("parameter", "default", "meaning")
 
@@ -19,7 +18,9 @@ def behaviour_table() -> str:
     for name in behaviours.__all__:
         kind: Any = getattr(behaviours, name)
         needs = ", ".join(code(need) for need in kind.needs) or "nothing"
-        parts.append(f"### {code(f'swarmwire.agent.behaviours:{name}')}\n\n{told_of(kind, VectorAgent)}\n\nNeeds {needs}.\n")
+        parts.append(
+            f"### {code(f'swarmwire.agent.behaviours:{name}')}\n\n{told_of(kind, VectorAgent)}\n\nNeeds {needs}.\n"
+        )
         meant = comments_of(kind)
         declared = parameters_of(kind).items()
         rows = [(code(key), _default(of.default), meant.get(key, "")) for key, of in declared]

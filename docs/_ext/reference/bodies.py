@@ -5,10 +5,9 @@ from dataclasses import fields, is_dataclass
 from itertools import pairwise
 from typing import Any, cast
 
+from reference.markdown import NOTHING, code, number, table
 from swarmwire.comms.body import Body, body_names, load_body
 from swarmwire.comms.parameters import limits_of
-
-from reference.markdown import NOTHING, code, number, table
 
 Figure = tuple[str, str, object]  # path within the sheet, unit, value
 

@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from swarmwire.deploy.cli import app
 from typer.main import get_command
 
 from reference.markdown import NOTHING, code, sentence, table, toml_code
+from swarmwire.deploy.cli import app
 
 
 def command_tables() -> str:

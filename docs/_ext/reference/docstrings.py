@@ -4,7 +4,7 @@ from inspect import cleandoc
 from typing import Any
 
 from sphinx.application import Sphinx
-from sphinx.ext.napoleon import GoogleDocstring
+from sphinx.ext.napoleon.docstring import GoogleDocstring
 
 from reference.field_comments import SILENT, help_of
 
@@ -15,7 +15,7 @@ def told_of(kind: type[Any], below: type[Any]) -> str:
     return "\n\n".join(cleandoc(base.__doc__) for base in reversed(ours) if base.__doc__)
 
 
-def prepare(app: Sphinx, what: str, name: str, of: Any, options: Any, lines: list[str]) -> None:
+def prepare(_app: Sphinx, what: str, name: str, _of: Any, _options: Any, lines: list[str]) -> None:
     """Make reStructuredText of a docstring, in place.
 
     A module's is for its maintainers: the page says what it is about. Napoleon as it stands would take "value: what it

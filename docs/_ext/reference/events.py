@@ -2,10 +2,9 @@
 
 from inspect import getdoc
 
-from swarmwire.comms.events.registry import ACTIONS
-
 from reference.keys import schema, tables_of
 from reference.markdown import code, sentence
+from swarmwire.comms.events.registry import ACTIONS
 
 
 def event_tables() -> str:

@@ -1,8 +1,7 @@
 """What may become of a packet."""
 
-from swarmwire.comms.fates import Fate
-
 from reference.markdown import code, sentence, table
+from swarmwire.comms.fates import Fate
 
 
 def fate_table() -> str:

@@ -1,4 +1,4 @@
-"""The comments behind fields, `heading_rad: float  # of its compass`: what the code says of a field, for the reference."""
+"""The comments behind fields, such as `heading_rad: float  # of its compass`, for the reference."""
 
 import re
 import sys
@@ -10,6 +10,7 @@ from typing import Any
 
 from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
+
 from swarmwire.comms.parameters import limits_of
 
 PARTS = ("comms", "agent", "world", "metrics", "deploy")
@@ -34,7 +35,7 @@ def help_of(path: str) -> str:
     return "".join(f"{of.help}, in {of.unit}" if of.unit else of.help for of in limits)
 
 
-def teach_autodoc(app: Sphinx) -> None:
+def teach_autodoc(_app: Sphinx) -> None:
     """Let autodoc, which knows `#:` alone, take these comments for the fields' documentation.
 
     A field without one is `SILENT`: it speaks for itself, but it is listed.

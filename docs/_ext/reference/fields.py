@@ -3,15 +3,17 @@
 from typing import Any, get_args
 
 import numpy as np
-from swarmwire import agent
 
 from reference.markdown import code, table
+from swarmwire import agent
 
 
 def field_table() -> str:
     """Every type that `swarmwire.agent` has for the fields of a message: size and range."""
     hints = {name: get_args(getattr(agent, name)) for name in agent.__all__}
-    found = {name: hint[-1] for name, hint in hints.items() if hint and isinstance(hint[-1], np.dtype)}
+    found: dict[str, np.dtype[Any]] = {
+        name: hint[-1] for name, hint in hints.items() if hint and isinstance(hint[-1], np.dtype)
+    }
     rows = [(code(name), str(of.itemsize), _range(of)) for name, of in found.items()]
     return table(("type", "bytes on air", "holds"), rows)
 

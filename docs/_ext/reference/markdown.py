@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any, cast
 
 NOTHING = "–"
 
@@ -26,7 +27,7 @@ def number(value: float) -> str:
     return f"{whole // 10**zeros}e{zeros}" if zeros >= 6 else str(whole)
 
 
-def toml(value: object) -> str:
+def toml(value: Any) -> str:
     """A value as a scenario would give it; a dash for none."""
     if value is None or value in ([], {}):
         return NOTHING
@@ -35,9 +36,9 @@ def toml(value: object) -> str:
     if isinstance(value, int | float):
         return number(value)
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {toml(item)}" for key, item in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {toml(item)}" for key, item in cast("dict[str, Any]", value).items()) + " }"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(toml(item) for item in value)}]"
+        return f"[{', '.join(toml(item) for item in cast('list[Any]', value))}]"
     return f'"{value}"'
 
 

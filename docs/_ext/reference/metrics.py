@@ -2,12 +2,11 @@
 
 from math import isfinite
 
-from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.registry import METRICS
-
 from reference.docstrings import told_of
 from reference.markdown import NOTHING, code, number, sentence, table
 from reference.parameters import HEAD, parameter_rows
+from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.registry import METRICS
 
 
 def metric_table() -> str:

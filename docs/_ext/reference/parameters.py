@@ -3,9 +3,8 @@
 from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any, get_type_hints
 
-from swarmwire.comms.parameters import Limits, limits_of
-
 from reference.markdown import NOTHING, code, number, sentence, toml_code
+from swarmwire.comms.parameters import Limits, limits_of
 
 HEAD = ("key", "unit", "allowed", "default", "meaning")
 

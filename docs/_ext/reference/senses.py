@@ -2,10 +2,9 @@
 
 from inspect import getdoc
 
-from swarmwire.comms.sheets import SHEETS
-
 from reference.markdown import code, sentence, table
 from reference.parameters import HEAD, parameter_rows
+from swarmwire.comms.sheets import SHEETS
 
 
 def sense_tables() -> str:
