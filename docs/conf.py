@@ -16,7 +16,8 @@ html_show_sphinx = False
 html_copy_source = False
 
 myst_heading_anchors = 3
-myst_enable_extensions = ["colon_fence"]
+myst_disable_syntax = ["html_inline"]  # help texts say <seed> and mean it
+smartquotes = False  # --set and "none" stay as they are typed
 
 default_role = "code"  # docstrings write `name`, as Markdown does
 autodoc_class_signature = "separated"

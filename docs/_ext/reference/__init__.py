@@ -1,7 +1,8 @@
 """A Sphinx extension: the reference's tables, made from the registries each time the site is built.
 
-A page asks for one by name, ```` ```{reference} fates ````, some with what it is about: ```` ```{reference} keys radio ````.
-`TABLES` lists them. Each is a function that returns Markdown, so that a page reads as if the table stood in it.
+A page asks for one by name, ```` ```{reference} fates ````, and for keys of a scenario with the path of their table,
+```` ```{reference} keys radio ````. `TABLES` lists them. Each is a function that returns Markdown, so that a page reads
+as if the table stood in it.
 """
 
 from collections.abc import Callable

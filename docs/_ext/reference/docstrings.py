@@ -1,5 +1,6 @@
 """Docstrings for the reference: those of a class and its bases as one text, and Google's sections for autodoc."""
 
+import re
 from inspect import cleandoc
 from typing import Any
 
@@ -7,6 +8,8 @@ from sphinx.application import Sphinx
 from sphinx.ext.napoleon.docstring import GoogleDocstring
 
 from reference.field_comments import SILENT, help_of
+
+MARKUP = re.compile(r"[|*]|(?<=\w)_(?!\w)")  # |a|, *args, name_
 
 
 def told_of(kind: type[Any], below: type[Any]) -> str:
@@ -24,6 +27,12 @@ def prepare(_app: Sphinx, what: str, name: str, _of: Any, _options: Any, lines: 
     if what == "module":
         lines.clear()
     elif lines and lines[0] == SILENT:
-        lines[0] = help_of(name) or SILENT
+        lines[0] = _escaped(help_of(name)) or SILENT
     elif lines:
-        lines[:] = GoogleDocstring(lines, what="method").lines()
+        lines[:] = GoogleDocstring([_escaped(line) for line in lines], what="method").lines()
+
+
+def _escaped(line: str) -> str:
+    """The line with what Markdown takes for text, and reStructuredText for markup, kept as text; code is left alone."""
+    parts = line.split("`")
+    return "`".join(MARKUP.sub(r"\\\g<0>", part) if i % 2 == 0 else part for i, part in enumerate(parts))

@@ -14,7 +14,7 @@ from sphinx.pycode import ModuleAnalyzer
 from swarmwire.comms.parameters import limits_of
 
 PARTS = ("comms", "agent", "world", "metrics", "deploy")
-FIELD = re.compile(r"^(    (\w+): [^#\n]*  )# (.*)$", re.MULTILINE)
+FIELD = re.compile(r"^(    (\w+): [^#\n]*  )# (?!noqa|pyright:)(.*)$", re.MULTILINE)
 BARE = re.compile(r"^(    [a-z]\w*: [^#\n]*[^#\n,({\[])$(?!\n    \"\"\")", re.MULTILINE)  # with no comment, on one line
 SPREAD = re.compile(r"^(    [a-z]\w*: [^#\n]* = parameter\(\n(?:        .*\n)+    \))$", re.MULTILINE)
 SILENT = "–"

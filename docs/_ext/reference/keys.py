@@ -24,7 +24,7 @@ def key_tables(path: str = "") -> str:
 def tables_of(path: str, definition: str, tag: str, seen: set[str]) -> list[str]:
     """The tables of one variant, which its key `tag` tells, and of what it holds; those `seen` already are left out."""
     variant = schema()["$defs"][definition]
-    return _tables(path, {**variant, "required": [*variant["required"], tag]}, seen)
+    return _tables(path, {**variant, "required": [*variant.get("required", []), tag]}, seen)
 
 
 def _at(path: str) -> dict[str, Any]:
@@ -44,7 +44,9 @@ def _tables(path: str, of: dict[str, Any], seen: set[str]) -> list[str]:
                 continue
             seen.add(inner["title"])
             inner_path = ".".join(part for part in (path, key) if part)
-            found.append(f"{code(inner_path)}{f', {code(tag)}' if tag else ''}: {sentence(inner['description'])}\n")
+            found.append(
+                f"{code(inner_path)}{f', {code(tag)}' if tag else ''}: {sentence(inner.get('description', ''))}\n"
+            )
             if inner.get("properties"):
                 found += _tables(inner_path, inner, seen)
     return found
@@ -53,7 +55,7 @@ def _tables(path: str, of: dict[str, Any], seen: set[str]) -> list[str]:
 def _row(key: str, value: dict[str, Any], required: bool) -> tuple[str, str, str, str]:
     inner = _within(value)
     default = "required" if required else NOTHING if inner else toml_code(value.get("default"))
-    means = value.get("description") or (inner[0][1]["description"] if inner else "")
+    means = value.get("description") or (inner[0][1].get("description", "") if inner else "")
     return code(key), words_of(without_null(value)), default, sentence(means)
 
 

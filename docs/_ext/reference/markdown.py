@@ -51,7 +51,7 @@ def toml_code(value: object) -> str:
 def sentence(text: str) -> str:
     """The text without line breaks, from a capital letter to a full stop."""
     flat = " ".join(text.split())
-    return flat[:1].upper() + flat[1:] + ("" if flat.endswith((".", "?", "!")) else ".")
+    return flat[:1].upper() + flat[1:] + ("" if not flat or flat.endswith((".", "?", "!")) else ".")
 
 
 def _cell(text: str) -> str:

@@ -10,9 +10,8 @@ Variant = tuple[str, str, str]  # the key that tells, its value, the definition'
 def without_null(value: dict[str, Any]) -> dict[str, Any]:
     """The schema of what may stand there if the key is given at all."""
     given = [item for item in value.get("anyOf", []) if item.get("type") != "null"]
-    if len(given) != 1 or "anyOf" not in value:
-        return value
-    return {**{key: item for key, item in value.items() if key != "anyOf"}, **given[0]}
+    rest = {key: item for key, item in value.items() if key != "anyOf"}
+    return {**rest, **given[0]} if len(given) == 1 else {**rest, "anyOf": given} if given else value
 
 
 def variants_of(value: dict[str, Any]) -> list[Variant]:
@@ -22,6 +21,8 @@ def variants_of(value: dict[str, Any]) -> list[Variant]:
     if "discriminator" in value:
         tag = value["discriminator"]["propertyName"]
         return [(tag, name, _name(ref)) for name, ref in value["discriminator"]["mapping"].items()]
+    if "anyOf" in value:
+        return [variant for item in value["anyOf"] for variant in variants_of(item)]
     for key in ("items", "additionalProperties"):
         if isinstance(value.get(key), dict):
             return variants_of(value[key])
@@ -31,12 +32,12 @@ def variants_of(value: dict[str, Any]) -> list[Variant]:
 
 def words_of(value: dict[str, Any]) -> str:
     """Kind, unit and bounds, such as "number in m, above 0"; choices as code."""
+    if "anyOf" in value:
+        return " or ".join(words_of(item) for item in value["anyOf"])
     if variants_of(value):
         return "tables" if value.get("type") == "array" else "table"
     if "const" in value or "enum" in value:
         return " or ".join(code(toml(choice)) for choice in value.get("enum", [value.get("const")]))
-    if "anyOf" in value:
-        return " or ".join(words_of(item) for item in value["anyOf"])
     kind: str = value.get("type", "any")
     if kind == "array":
         return _list(value)
@@ -47,8 +48,8 @@ def words_of(value: dict[str, Any]) -> str:
 
 def _list(value: dict[str, Any]) -> str:
     if "prefixItems" not in value:
-        inner = words_of(value.get("items", {}))
-        return f"list of {inner.replace('list of', 'lists of', 1)}" if inner.startswith("list") else f"list: {inner}"
+        kind, *rest = words_of(value.get("items", {})).split(" ", maxsplit=1)
+        return " ".join([f"list of {kind}s", *rest])
     items = [words_of(item) for item in value["prefixItems"]]
     return "list of " + "; ".join(f"{items.count(item)} x {item}" for item in dict.fromkeys(items))
 
