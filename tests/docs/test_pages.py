@@ -71,12 +71,13 @@ def test_what_is_shown_must_be_printed_in_its_order():
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if page.startswith("docs")])
-def test_code_is_in_a_file_that_something_on_the_page_uses(page):
+def test_code_is_in_a_file_that_the_page_names_and_uses(page):
     files = files_of(page)
     assert all(block.file for block in blocks_of(page, "python"))
     for name in files:
         users = [command.line for command in commands_of(page)] + [files[other] for other in files if other != name]
         assert any(name in user for user in users), name
+        assert f"`{name}`" in (ROOT / page).read_text(), name
 
 
 @pytest.mark.parametrize("page", PAGES)
