@@ -1,0 +1,94 @@
+"""One arena of a run as it moved: what pictures and films of a run folder are drawn from."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.truth import Static
+
+if TYPE_CHECKING:
+    import polars as pl
+
+NO_STATE = -1
+
+
+class Recorded(Protocol):
+    """What a film needs of a run folder."""
+
+    @property
+    def static(self) -> Static:
+        """What did not change."""
+        ...
+
+    def ticks(self, arena: int | None = None) -> "pl.DataFrame":
+        """A row per tick of an arena, as far as it was written."""
+        ...
+
+
+@dataclass(frozen=True)
+class Film:
+    """An arena of a run, tick by tick, for T ticks and n robots."""
+
+    static: Static
+    arena: int
+    time_s: FloatArray  # (T,) rising
+    pose: AnyArray  # (T, n, 3) x, y in m, heading in rad, arena frame
+    alive: BoolArray  # (T, n)
+    metrics: dict[str, FloatArray]  # (T,) each, NaN where undefined
+    state: IntArray | None = None  # (T, n) places in `state_names`, NO_STATE for none; None if no robot has any
+    state_names: tuple[str, ...] = ()
+
+    def index_at(self, time_s: float) -> int:
+        """The last tick that had begun by then; the first if none had."""
+        return max(0, int(np.searchsorted(self.time_s, time_s + 1e-9, side="right")) - 1)
+
+
+def film_of(recorded: Recorded, arena: int, where: str) -> Film:
+    """The film of one arena; BadInput names `where` if there is no such arena, or no tick of it yet."""
+    static = recorded.static
+    if not 0 <= arena < static.arenas:
+        raise BadInput(where, "arena", f"expected 0 to {static.arenas - 1}, got {arena}")
+    frame = recorded.ticks(arena).sort("tick")
+    if frame.is_empty():
+        raise BadInput(where, "", "holds no tick yet")
+    pose = np.stack([frame[name].to_numpy() for name in ("x_m", "y_m", "heading_rad")], axis=-1)
+    names, state = states(frame)
+    return Film(
+        static=static,
+        arena=arena,
+        time_s=frame["time_s"].to_numpy(),
+        pose=pose,
+        alive=frame["alive"].to_numpy(),
+        metrics=_metrics(frame),
+        state=state,
+        state_names=names,
+    )
+
+
+def states(frame: "pl.DataFrame") -> tuple[tuple[str, ...], IntArray | None]:
+    """The names of the states that robots noted, in order of their first tick, and who was in which.
+
+    Texts and whole numbers are both names; null and the empty text are none. Second: (T, n) places in the names or
+    NO_STATE, or None if no robot ever noted a state.
+    """
+    if "state" not in frame.columns:
+        return (), None
+    rows: list[list[Any]] = frame["state"].to_list()
+    place: dict[str, int] = {}
+    index = np.full((len(rows), len(rows[0])), NO_STATE, np.int64)
+    for row, found in zip(index, rows, strict=True):
+        for robot, value in enumerate(found):
+            if value is not None and value != "":
+                row[robot] = place.setdefault(str(value), len(place))
+    return tuple(place), index if place else None
+
+
+def _metrics(frame: "pl.DataFrame") -> dict[str, FloatArray]:
+    """The columns that hold one number a tick."""
+    import polars as pl
+
+    names = [name for name, kind in frame.schema.items() if kind == pl.Float64 and name != "time_s"]
+    return {name: frame[name].fill_null(np.nan).to_numpy() for name in names}
