@@ -1,7 +1,7 @@
 """One arena of a run as it moved: what pictures and films of a run folder are drawn from."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -71,19 +71,21 @@ def film_of(recorded: Recorded, arena: int, where: str) -> Film:
 def states(frame: "pl.DataFrame") -> tuple[tuple[str, ...], IntArray | None]:
     """The names of the states that robots noted, in order of their first tick, and who was in which.
 
-    Texts and whole numbers are both names; null and the empty text are none. Second: (T, n) places in the names or
-    NO_STATE, or None if no robot ever noted a state.
+    Null, the empty text and the number 0 are no state; other numbers are their own names. Second: (T, n) places in the
+    names or NO_STATE, or None if no robot ever noted a state.
     """
+    import polars as pl
+
     if "state" not in frame.columns:
         return (), None
-    rows: list[list[Any]] = frame["state"].to_list()
-    place: dict[str, int] = {}
-    index = np.full((len(rows), len(rows[0])), NO_STATE, np.int64)
-    for row, found in zip(index, rows, strict=True):
-        for robot, value in enumerate(found):
-            if value is not None and value != "":
-                row[robot] = place.setdefault(str(value), len(place))
-    return tuple(place), index if place else None
+    noted = frame["state"].explode()
+    unnoted = "0" if noted.dtype.is_integer() else ""
+    texts = noted.cast(pl.String)
+    names = [name for name in texts.unique(maintain_order=True).to_list() if name is not None and name != unnoted]
+    if not names:
+        return (), None
+    place = texts.cast(pl.Enum(names), strict=False).to_physical().cast(pl.Int64).fill_null(NO_STATE)
+    return tuple(names), place.to_numpy().reshape(frame.height, -1)
 
 
 def _metrics(frame: "pl.DataFrame") -> dict[str, FloatArray]:

@@ -1,11 +1,12 @@
 """Figures without pyplot: made, turned into pixels, and saved."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from swarmwire.comms.arrays import ByteArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.drawing.looks import LONG_SIDE_IN, PAPER
+from swarmwire.metrics.drawing.whole_file import check_path, whole_file
 from swarmwire.metrics.report_extra import need_report_extra
 
 SUFFIXES = (".png", ".svg", ".pdf")
@@ -24,7 +25,8 @@ def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
     if not LEAST_SIZE_PX <= size_px <= GREATEST_SIZE_PX:
         raise BadInput("--size", "", f"expected {LEAST_SIZE_PX} to {GREATEST_SIZE_PX} pixels, got {size_px}")
     dpi = size_px / LONG_SIDE_IN
-    even = [2 * round(side * dpi / 2) / dpi for side in (width_in, height_in)]
+    # A hundredth more, since the canvas cuts off what is after the point.
+    even = [(2 * round(side * dpi / 2) + 0.01) / dpi for side in (width_in, height_in)]
     figure = Figure(figsize=(even[0], even[1]), dpi=dpi, facecolor=PAPER)
     FigureCanvasAgg(figure)
     return figure
@@ -41,16 +43,10 @@ def save(figure: Any, to: Path) -> None:
     """Write a picture; its kind is that of the file's name. BadInput for another kind, or a path that cannot be."""
     import matplotlib as mpl
 
+    fixed = cast("Any", mpl).rc_context
+
     check_path(to, SUFFIXES)
     # Equal pictures are equal bytes: no date, and names within an SVG that do not change.
     undated = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[to.suffix.lower()]
-    with mpl.rc_context({"svg.hashsalt": "swarmwire"}):
-        figure.savefig(to, dpi=figure.dpi, metadata=undated)
-
-
-def check_path(to: Path, suffixes: tuple[str, ...]) -> None:
-    """Return if a file of one of these kinds can be written there; else BadInput."""
-    if to.suffix.lower() not in suffixes:
-        raise BadInput(str(to), "", f"expected a file name that ends in {' or '.join(suffixes)}")
-    if not to.parent.is_dir() or to.is_dir():
-        raise BadInput(str(to), "", "expected a path in a folder that exists")
+    with whole_file(to) as part, fixed({"svg.hashsalt": "swarmwire"}):
+        figure.savefig(part, dpi=figure.dpi, metadata=undated)

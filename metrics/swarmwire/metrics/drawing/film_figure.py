@@ -114,7 +114,7 @@ def _frequent(film: Film) -> tuple[str, ...]:
     """The states that get a colour: all, or the most frequent, in the order in which they came up."""
     assert film.state is not None
     counts = np.bincount(film.state[film.state >= 0], minlength=len(film.state_names))
-    most = sorted(np.argsort(-counts, kind="stable")[: len(STATE_COLORS)])
+    most: list[int] = sorted(np.argsort(-counts, kind="stable")[: len(STATE_COLORS)].tolist())
     return tuple(film.state_names[i] for i in most)
 
 

@@ -24,9 +24,7 @@ def write_gif(to: Path, frames: Iterable[ByteArray], samples: Sequence[ByteArray
     rest = _indexed(frames, palette)
     first = next(rest)
     duration_ms = max(2 * _MS_STEP, _MS_STEP * round(1000.0 / frames_per_s / _MS_STEP))
-    first.save(
-        to, "GIF", save_all=True, append_images=rest, duration=duration_ms, loop=0, disposal=1, optimize=True
-    )
+    first.save(to, "GIF", save_all=True, append_images=rest, duration=duration_ms, loop=0, disposal=1, optimize=True)
 
 
 def _palette(samples: Sequence[ByteArray]) -> Any:

@@ -52,9 +52,7 @@ def lay_out(size_m: tuple[float, float], panel_in: float, legend_rows: int, axes
     beside_in = _GAP_IN + _PANEL_BESIDE_IN if beside else 0.0
     below_in = 0.0 if beside or not panel_in else _GAP_IN + panel_in
     low_in = _FOOT_IN + axes_in / 2 + below_in
-    in_per_m = min(
-        (LONG_SIDE_IN - left_in - _EDGE_IN - beside_in) / across_m, (LONG_SIDE_IN - head_in - low_in) / up_m
-    )
+    in_per_m = min((LONG_SIDE_IN - left_in - _EDGE_IN - beside_in) / across_m, (LONG_SIDE_IN - head_in - low_in) / up_m)
     arena_in = across_m * in_per_m, up_m * in_per_m
     width_in = max(left_in + arena_in[0] + beside_in + _EDGE_IN, _LEAST_WIDTH_IN)
     height_in = head_in + arena_in[1] + low_in

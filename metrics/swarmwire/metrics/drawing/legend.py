@@ -13,6 +13,7 @@ from swarmwire.metrics.drawing.looks import (
     PAPER,
     STATE_COLORS,
     TEXT_PT,
+    Look,
     rgb,
     shade,
 )
@@ -48,7 +49,7 @@ def light_entry() -> Any:
     """The entry of lights."""
     from matplotlib.lines import Line2D
 
-    look = {"markerfacecolor": LIGHT, "markeredgecolor": LIGHT_EDGE, "markersize": 4.5}
+    look: Look = {"markerfacecolor": LIGHT, "markeredgecolor": LIGHT_EDGE, "markersize": 4.5}
     return Line2D([], [], linestyle="none", marker="o", label="light", **look)
 
 
@@ -92,5 +93,5 @@ def _disc(label: str, fill: Color | None, rim: Color) -> Any:
     from matplotlib.lines import Line2D
 
     face = PAPER if fill is None else rgb(fill)
-    look = {"markerfacecolor": face, "markeredgecolor": shade(rim), "markeredgewidth": 1.0, "markersize": 6.0}
+    look: Look = {"markerfacecolor": face, "markeredgecolor": shade(rim), "markeredgewidth": 1.0, "markersize": 6.0}
     return Line2D([], [], linestyle="none", marker="o", label=label, **look)

@@ -1,6 +1,10 @@
 """What every picture shares: its colours, sizes of letters, and the length that all of them are laid out for."""
 
+from typing import Any
+
 from swarmwire.metrics.palette import Color
+
+Look = dict[str, Any]  # arguments of matplotlib that say how a thing looks
 
 LONG_SIDE_IN = 6.4  # pictures are laid out in inches for this long side; pixels only scale them
 TITLE_PT, TEXT_PT, SMALL_PT = 9.5, 7.5, 6.5

@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.drawing.layout import Layout
-from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT
+from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Look
 from swarmwire.metrics.registry import METRICS
 
 MOST_PLOTS = 4
@@ -80,10 +80,10 @@ class _Plot:
         axes.plot(time_s[::every], value[::every], color=FAINT, lw=1.0, zorder=2)
         [self._past] = axes.plot([], [], color=CURVE, lw=1.4, zorder=3)
         [self._cursor] = axes.plot([], [], color=SOFT, lw=0.7, alpha=0.7, zorder=2.5)
-        look = {"markersize": 4.5, "markeredgecolor": "white", "markeredgewidth": 0.8, "clip_on": False}
+        look: Look = {"markersize": 4.5, "markeredgecolor": "white", "markeredgewidth": 0.8, "clip_on": False}
         [self._dot] = axes.plot([], [], "o", color=CURVE, zorder=4, **look)
-        where = {"xy": (1.0, 1.0), "xycoords": "axes fraction", "xytext": (0, 4), "textcoords": "offset points"}
-        bold = {"fontsize": TEXT_PT, "fontweight": "bold", "color": INK, "ha": "right", "va": "baseline"}
+        where: Look = {"xy": (1.0, 1.0), "xycoords": "axes fraction", "xytext": (0, 4), "textcoords": "offset points"}
+        bold: Look = {"fontsize": TEXT_PT, "fontweight": "bold", "color": INK, "ha": "right", "va": "baseline"}
         self._number = axes.annotate("", **where, **bold)
         self._low, self._high = axes.get_ylim()
 

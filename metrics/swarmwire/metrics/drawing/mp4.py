@@ -22,10 +22,10 @@ def write_mp4(to: Path, frames: Iterable[ByteArray], frames_per_s: float) -> Non
         for frame in frames:
             if ffmpeg is None:
                 height, width = frame.shape[:2]
-                options = ["-crf", _QUALITY, "-movflags", "+faststart"]
-                kind = {"codec": "libx264", "pix_fmt_in": "rgb24", "pix_fmt_out": "yuv420p"}
-                size = {"size": (width, height), "macro_block_size": 2, "fps": frames_per_s, "quality": None}
-                ffmpeg = cast("Any", imageio_ffmpeg).write_frames(str(to), **kind, **size, output_params=options)
+                kind: dict[str, Any] = {"codec": "libx264", "pix_fmt_in": "rgb24", "pix_fmt_out": "yuv420p"}
+                form: dict[str, Any] = {"size": (width, height), "macro_block_size": 2, "fps": frames_per_s}
+                how: dict[str, Any] = {"quality": None, "output_params": ["-crf", _QUALITY, "-movflags", "+faststart"]}
+                ffmpeg = cast("Any", imageio_ffmpeg).write_frames(str(to), **kind, **form, **how)
                 ffmpeg.send(None)
             ffmpeg.send(np.ascontiguousarray(frame))
     finally:

@@ -1,6 +1,9 @@
 """Who is in whose radio range, from positions alone."""
 
+from typing import Any, cast
+
 import numpy as np
+from scipy.spatial import KDTree
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, IntArray
 
@@ -10,8 +13,7 @@ def in_range(position_m: AnyArray, alive: BoolArray, range_m: float) -> IntArray
 
     Walls in the line of sight, partitions and failed radios are not regarded: a run folder holds no links.
     """
-    from scipy.spatial import cKDTree
-
     living = np.flatnonzero(alive)
-    pairs = cKDTree(position_m[living]).query_pairs(range_m, output_type="ndarray")
-    return living[pairs].astype(np.int64)
+    tree = cast(Any, KDTree)(position_m[living])  # its stub types the answers in part only
+    pairs: IntArray = tree.query_pairs(range_m, output_type="ndarray")
+    return living[pairs]

@@ -10,7 +10,7 @@ from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import new_figure, save
 from swarmwire.metrics.drawing.layout import Layout, add_arena_axes, lay_out
 from swarmwire.metrics.drawing.legend import add_legend, group_entries, light_entry
-from swarmwire.metrics.drawing.looks import FAINT, INK, LINK, PAPER, SMALL_PT, SOFT, TEXT_PT, TITLE_PT
+from swarmwire.metrics.drawing.looks import FAINT, INK, LINK, PAPER, SMALL_PT, SOFT, TITLE_PT, Look
 from swarmwire.metrics.drawing.panel_text import add_facts
 from swarmwire.metrics.drawing.scenery import draw_scenery
 from swarmwire.metrics.drawing.swarm import Swarm
@@ -37,9 +37,7 @@ def draw_scenario(static: Static, pose: FloatArray, duration_s: float, to: Path,
         entries.append(light_entry())
     if static.range_m is not None:
         entries.append(_draw_reach(axes, pose, static.range_m, static.arena_size_m))
-    figure.text(
-        layout.left, layout.below_top(0.22), static.name, fontsize=TITLE_PT, fontweight="bold", color=INK
-    )
+    figure.text(layout.left, layout.below_top(0.22), static.name, fontsize=TITLE_PT, fontweight="bold", color=INK)
     _fill_panel(figure, layout, entries, _facts(static, duration_s, swarm.enlarged))
     save(figure, to)
 
@@ -63,9 +61,9 @@ def _draw_reach(axes: Any, pose: FloatArray, range_m: float, size_m: tuple[float
 
     position = pose[:, :2]
     middle = position[np.argmin(np.linalg.norm(position - np.median(position, axis=0), axis=1))]
-    look = {"edgecolor": LINK, "linestyle": (0, (4, 3)), "linewidth": 1.1}
+    look: Look = {"edgecolor": LINK, "linestyle": (0, (4, 3)), "linewidth": 1.1}
     within = Rectangle((-size_m[0] / 2, -size_m[1] / 2), *size_m, transform=axes.transData)
-    area = {"facecolor": LINK, "alpha": 0.08, "zorder": 1.5}
+    area: Look = {"facecolor": LINK, "alpha": 0.08, "zorder": 1.5}
     for circle in (Circle(middle, range_m, **area), Circle(middle, range_m, fill=False, zorder=1.6, **look)):
         axes.add_patch(circle)
         circle.set_clip_path(within)

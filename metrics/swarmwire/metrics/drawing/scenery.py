@@ -3,7 +3,18 @@
 from typing import Any
 
 from swarmwire.comms.truth import Obstacle, Static
-from swarmwire.metrics.drawing.looks import FLOOR, INK, LIGHT, LIGHT_EDGE, OBSTACLE, OBSTACLE_EDGE, SMALL_PT, SOFT, WALL
+from swarmwire.metrics.drawing.looks import (
+    FLOOR,
+    INK,
+    LIGHT,
+    LIGHT_EDGE,
+    OBSTACLE,
+    OBSTACLE_EDGE,
+    SMALL_PT,
+    SOFT,
+    WALL,
+    Look,
+)
 
 _BAR_BELOW_IN = 0.1
 _GLOW = ((0.045, 0.10), (0.03, 0.16), (0.018, 0.3))  # radius as a share of the arena's longer side, and opacity
@@ -15,14 +26,15 @@ def draw_scenery(axes: Any, static: Static, arena: int) -> None:
     from matplotlib.patches import Rectangle
 
     width, height = static.arena_size_m
-    line = {"linewidth": 1.3, "edgecolor": WALL} if static.walled else {"linewidth": 0.8, "edgecolor": OBSTACLE_EDGE}
-    dashes = "-" if static.walled else (0, (4, 3))
-    floor = Rectangle((-width / 2, -height / 2), width, height, facecolor=FLOOR, linestyle=dashes, zorder=0, **line)
+    wall: Look = {"linewidth": 1.3, "edgecolor": WALL}
+    edge: Look = {"linewidth": 0.8, "edgecolor": OBSTACLE_EDGE, "linestyle": (0, (4, 3))}
+    look = wall if static.walled else edge
+    floor = Rectangle((-width / 2, -height / 2), width, height, facecolor=FLOOR, zorder=0, **look)
     axes.add_patch(floor)
     shapes = [_shape(obstacle) for obstacle in static.obstacles[arena]]
     if shapes:
-        look = {"facecolor": OBSTACLE, "edgecolor": OBSTACLE_EDGE, "linewidth": 0.8, "zorder": 1}
-        axes.add_collection(PatchCollection(shapes, **look), autolim=False)
+        solid: Look = {"facecolor": OBSTACLE, "edgecolor": OBSTACLE_EDGE, "linewidth": 0.8, "zorder": 1}
+        axes.add_collection(PatchCollection(shapes, **solid), autolim=False)
     for light in static.lights[arena] if static.lights else ():
         _draw_light(axes, light.x_m, light.y_m, max(width, height))
 
@@ -33,7 +45,7 @@ def draw_scale_bar(axes: Any, size_m: tuple[float, float], note: str) -> None:
 
     length_m = round_length_m(0.24 * size_m[0])
     below = ScaledTranslation(0.0, -_BAR_BELOW_IN, axes.figure.dpi_scale_trans)
-    line = {"transform": blended_transform_factory(axes.transData, axes.transAxes) + below, "clip_on": False}
+    line: Look = {"transform": blended_transform_factory(axes.transData, axes.transAxes) + below, "clip_on": False}
     left = -size_m[0] / 2
     axes.plot([left, left + length_m], [0.0, 0.0], color=INK, lw=1.6, solid_capstyle="butt", **line)
     text = f"{length_m:g} m" + (f"    {note}" if note else "")

@@ -1,12 +1,13 @@
 """The robots of one arena: discs, headings, trails and links as four collections whose arrays each frame replaces."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.drawing.looks import DEAD, LINK, OTHER_STATE, STATE_COLORS, rgb, shade
+from swarmwire.metrics.drawing.looks import DEAD, LINK, OTHER_STATE, STATE_COLORS, Look, rgb, shade
 from swarmwire.metrics.palette import group_color
 
 _LEAST, _CROWDED = 0.0105, 0.2  # least radius of a disc by the arena's longer side; and that times sqrt(robots)
@@ -36,12 +37,12 @@ class Swarm:
         fading = _FADING[-1:] if self._crowd else _FADING
         self._fading = np.array(fading)
         thin = 0.6 if self._crowd else 1.0
-        self._links = LineCollection(_NOBODY, colors=LINK, linewidths=0.6, zorder=2)
-        self._trails = LineCollection(_NOBODY, linewidths=1.3 * thin, zorder=3, capstyle="butt")
-        self._headings = LineCollection(_NOBODY, linewidths=1.5 * thin, zorder=4, capstyle="round")
+        self._links: Any = LineCollection([], colors=LINK, linewidths=0.6, zorder=2)
+        self._trails: Any = LineCollection([], linewidths=1.3 * thin, zorder=3, capstyle="butt")
+        self._headings: Any = LineCollection([], linewidths=1.5 * thin, zorder=4, capstyle="round")
         across = 2.0 * self._radius_m
-        on_axes = {"units": "xy", "offset_transform": axes.transData, "zorder": 5}
-        self._discs = EllipseCollection(across, across, np.zeros(len(across)), linewidths=0.9 * thin, **on_axes)
+        on_axes: Look = {"units": "xy", "offset_transform": axes.transData, "zorder": 5}
+        self._discs: Any = EllipseCollection(across, across, np.zeros(len(across)), linewidths=0.9 * thin, **on_axes)
         self._shown: tuple[bytes, bytes] | None = None
         for artist in self.artists:
             axes.add_collection(artist, autolim=False)
@@ -91,7 +92,7 @@ class Swarm:
         kept = trail[np.round(np.linspace(0, len(trail) - 1, points)).astype(int)]
         cuts = np.round(np.linspace(0, points - 1, len(self._fading) + 1)).astype(int)
         parts: list[AnyArray] = []
-        for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+        for first, last in pairwise(cuts):
             parts.extend(kept[first : last + 1].swapaxes(0, 1))
         self._trails.set_segments(parts)
 

@@ -8,7 +8,18 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.body import Body
 from swarmwire.comms.sheets import Bumper, Light, Proximity
-from swarmwire.metrics.drawing.looks import CURVE, INK, LIGHT, LIGHT_EDGE, OBSTACLE_EDGE, SMALL_PT, SOFT, rgb, shade
+from swarmwire.metrics.drawing.looks import (
+    CURVE,
+    INK,
+    LIGHT,
+    LIGHT_EDGE,
+    OBSTACLE_EDGE,
+    SMALL_PT,
+    SOFT,
+    Look,
+    rgb,
+    shade,
+)
 from swarmwire.metrics.drawing.scenery import round_length_m
 from swarmwire.metrics.palette import group_color
 
@@ -20,7 +31,10 @@ _LEAST_RADII = 2.0  # seen in each direction at least, in radii of the body
 
 
 def draw_from_above(axes: Any, body: Body) -> None:
-    """Draw it into axes of equal sides. The sheet knows no size of wheels: theirs is for show, their distance is not."""
+    """Draw it into axes of equal sides.
+
+    A data sheet has no size of the wheels: theirs is for show, the distance between them is not.
+    """
     reach_m = body.radius_m + (body.proximity.range_m if body.proximity else 0.0)
     half_m = _ROOM * max(reach_m, _LEAST_RADII * body.radius_m)
     axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal")
@@ -33,7 +47,7 @@ def draw_from_above(axes: Any, body: Body) -> None:
                 _draw_rays(axes, body.radius_m, sheet)
             case Light():
                 x, y = _around(sheet.angle_rad, 0.86 * body.radius_m)
-                look = {"markerfacecolor": LIGHT, "markeredgecolor": LIGHT_EDGE, "markeredgewidth": 0.7}
+                look: Look = {"markerfacecolor": LIGHT, "markeredgecolor": LIGHT_EDGE, "markeredgewidth": 0.7}
                 axes.plot(x, y, "s", markersize=3.6, zorder=6, label="photocell", **look)
             case Bumper():
                 _draw_bumper(axes, body.radius_m)
@@ -42,14 +56,22 @@ def draw_from_above(axes: Any, body: Body) -> None:
     _draw_heading(axes, body.radius_m)
     _draw_bar(axes, half_m)
     if axes.get_legend_handles_labels()[0]:
-        plain = {"frameon": False, "fontsize": SMALL_PT, "labelcolor": SOFT, "borderaxespad": 0.0, "borderpad": 0.0}
-        axes.legend(ncols=3, loc="center right", bbox_to_anchor=(1.0, _BELOW), handlelength=1.3, columnspacing=1.2, **plain)
+        plain: Look = {
+            "frameon": False,
+            "fontsize": SMALL_PT,
+            "labelcolor": SOFT,
+            "borderaxespad": 0.0,
+            "borderpad": 0.0,
+        }
+        axes.legend(
+            ncols=3, loc="center right", bbox_to_anchor=(1.0, _BELOW), handlelength=1.3, columnspacing=1.2, **plain
+        )
 
 
 def _draw_disc(axes: Any, body: Body) -> None:
     from matplotlib.patches import Circle
 
-    look = {"facecolor": (*rgb(_COLOR), 0.35), "edgecolor": shade(_COLOR), "linewidth": 1.4, "zorder": 3}
+    look: Look = {"facecolor": (*rgb(_COLOR), 0.35), "edgecolor": shade(_COLOR), "linewidth": 1.4, "zorder": 3}
     axes.add_patch(Circle((0.0, 0.0), body.radius_m, **look))
 
 
@@ -61,7 +83,7 @@ def _draw_wheels(axes: Any, body: Body) -> None:
     for x in (-half_m, half_m):
         style = f"round,pad=0,rounding_size={0.4 * wide_m}"
         corner = x - wide_m / 2, -long_m / 2
-        look = {"facecolor": INK, "edgecolor": INK, "linewidth": 0.5, "zorder": 5}
+        look: Look = {"facecolor": INK, "edgecolor": INK, "linewidth": 0.5, "zorder": 5}
         axes.add_patch(FancyBboxPatch(corner, wide_m, long_m, boxstyle=style, **look))
 
 
@@ -85,7 +107,7 @@ def _draw_bumper(axes: Any, radius_m: float) -> None:
 
 
 def _draw_heading(axes: Any, radius_m: float) -> None:
-    look = {"arrowstyle": "-|>", "color": CURVE, "lw": 1.8, "mutation_scale": 11, "shrinkA": 0, "shrinkB": 0}
+    look: Look = {"arrowstyle": "-|>", "color": CURVE, "lw": 1.8, "mutation_scale": 11, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", xy=(0.0, 0.7 * radius_m), xytext=(0.0, 0.0), arrowprops=look, zorder=7)
 
 
