@@ -50,7 +50,7 @@ def footage(
     chosen = speed or _speed(end - start, wanted)
     shown = frames_per_s or min(wanted, rate_hz * chosen)
     step_s = chosen / shown
-    frames = int((end - start) / step_s + 1e-6) + 1
+    frames = _frames(end - start, step_s)
     if frames > MOST_FRAMES:
         raise BadInput("--speed", "", f"expected no more than {MOST_FRAMES} frames; {chosen:g} x makes {frames}")
     at_s = start + step_s * np.arange(frames)
@@ -59,11 +59,16 @@ def footage(
 
 
 def _speed(duration_s: float, frames_per_s: float) -> float:
-    """The slowest round speed at which a duration is no more than the frames that there are by default."""
-    needed = duration_s * frames_per_s / MOST_BY_DEFAULT
+    """The slowest round speed at which a duration needs no more frames than a film has by default."""
     power = 1.0
     while True:
         for factor in _SPEEDS:
-            if factor * power >= needed:
-                return factor * power
+            speed = factor * power
+            if _frames(duration_s, speed / frames_per_s) <= MOST_BY_DEFAULT:
+                return speed
         power *= 10.0
+
+
+def _frames(duration_s: float, step_s: float) -> int:
+    """How many there are, the first and what fits after it."""
+    return int(duration_s / step_s + 1e-6) + 1

@@ -11,6 +11,7 @@ from swarmwire.metrics.drawing.looks import FLOOR, PAPER
 from swarmwire.metrics.report_extra import need_report_extra
 
 COLORS = 64
+_SAME = 6  # colours of a palette that differ by no more from a ground are left out for it
 _MS_STEP = 10  # a GIF counts time in hundredths of a second
 
 
@@ -32,11 +33,13 @@ def _palette(samples: Sequence[ByteArray]) -> Any:
     from matplotlib.colors import to_rgb
     from PIL import Image
 
-    grounds = [round(255 * share) for color in (PAPER, FLOOR) for share in to_rgb(color)]
+    grounds = np.array([[round(255 * share) for share in to_rgb(color)] for color in (PAPER, FLOOR)])
     sampled = Image.fromarray(np.concatenate(list(samples)))
-    found = sampled.quantize(COLORS - 2, Image.Quantize.MEDIANCUT).getpalette() or []
+    found = np.array(sampled.quantize(COLORS - len(grounds)).getpalette() or []).reshape(-1, 3)
+    # Pillow looks colours up to within four steps, and might take what is almost a ground for it.
+    apart = np.abs(found[:, None] - grounds).max(axis=2).min(axis=1) > _SAME
     palette = Image.new("P", (1, 1))
-    palette.putpalette(grounds + found)
+    palette.putpalette(np.concatenate([grounds, found[apart]]).ravel().tolist())
     return palette
 
 

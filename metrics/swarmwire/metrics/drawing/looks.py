@@ -10,7 +10,7 @@ LONG_SIDE_IN = 6.4  # pictures are laid out in inches for this long side; pixels
 TITLE_PT, TEXT_PT, SMALL_PT = 9.5, 7.5, 6.5
 
 INK, SOFT, FAINT, GRID = "#20242b", "#69707d", "#b9bfc9", "#e6e9ee"
-PAPER, FLOOR = "#ffffff", "#f8f9fb"
+PAPER, FLOOR = "#ffffff", "#f4f6f9"  # so far apart that a GIF's palette keeps both
 WALL, OBSTACLE, OBSTACLE_EDGE = "#5c6370", "#d3d8df", "#8f97a3"
 LIGHT, LIGHT_EDGE = "#ffd23f", "#c98f00"
 LINK = "#7d8aa5"
