@@ -74,7 +74,7 @@ def test_a_picture_may_be_of_lines(here):
         (["epuck", "--to", "absent/a.png"], "absent/a.png: expected a path in a folder that exists"),
         ([LOSSY, "--size", "9"], "--size: expected 100 to 8000 pixels, got 9"),
         ([LOSSY, "--seed", "-1"], "seeds: expected different whole numbers of at least 0, got [-1]"),
-        (["thin.toml"], "thin.toml: radius_m: expected a number above 0 (m), got -1.0"),
+        (["thin.toml"], "thin.toml: radius_m: expected more than 0 m, got -1.0"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(here, arguments, told):

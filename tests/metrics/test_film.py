@@ -55,6 +55,7 @@ def test_a_run_without_a_tick_yet_is_refused():
 def test_states_are_numbered_in_the_order_in_which_they_came_up(noted, names, places):
     found, place = states(ticks_frame(film(ticks=2), states=noted))
     assert found == names
+    assert place is not None
     assert place.tolist() == places
     assert NO_STATE == -1
 

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import ByteArray
-from swarmwire.metrics.drawing.looks import FLOOR, PAPER
+from swarmwire.comms.arrays import ByteArray, IntArray
 from swarmwire.metrics.report_extra import need_report_extra
 
 COLORS = 64
-_SAME = 6  # colours of a palette that differ by no more from a ground are left out for it
+EVEN_COLORS = 24  # of these, of areas
+_SAME = 6  # steps of a colour that make no difference
 _MS_STEP = 10  # a GIF counts time in hundredths of a second
 
 
@@ -29,18 +29,32 @@ def write_gif(to: Path, frames: Iterable[ByteArray], samples: Sequence[ByteArray
 
 
 def _palette(samples: Sequence[ByteArray]) -> Any:
-    """The grounds as they are, which all else lies on, and the colours into which the samples fall."""
-    from matplotlib.colors import to_rgb
+    """The colours of even areas as they are, which are the most frequent, and means of those at their edges."""
     from PIL import Image
 
-    grounds = np.array([[round(255 * share) for share in to_rgb(color)] for color in (PAPER, FLOOR)])
-    sampled = Image.fromarray(np.concatenate(list(samples)))
-    found = np.array(sampled.quantize(COLORS - len(grounds)).getpalette() or []).reshape(-1, 3)
-    # Pillow looks colours up to within four steps, and might take what is almost a ground for it.
-    apart = np.abs(found[:, None] - grounds).max(axis=2).min(axis=1) > _SAME
+    parts = np.concatenate([sample.reshape(-1, 3) for sample in samples]).astype(np.int64)
+    packed, counts = np.unique(parts @ (1 << 16, 1 << 8, 1), return_counts=True)
+    frequent = packed[np.argsort(-counts, kind="stable")]
+    color = np.stack([frequent >> 16, frequent >> 8 & 255, frequent & 255], axis=1)
+    means = Image.fromarray(color[None].astype(np.uint8)).quantize(COLORS - EVEN_COLORS).getpalette() or []
+    chosen = _apart(np.empty((0, 3), np.int64), color, EVEN_COLORS)
+    chosen = _apart(chosen, np.array(means, np.int64).reshape(-1, 3), COLORS)
     palette = Image.new("P", (1, 1))
-    palette.putpalette(np.concatenate([grounds, found[apart]]).ravel().tolist())
+    palette.putpalette(chosen.ravel().tolist())
     return palette
+
+
+def _apart(chosen: IntArray, candidates: IntArray, most: int) -> IntArray:
+    """The chosen colours, and as many candidates as there is room for that are none of them nor almost one.
+
+    Pillow looks colours up to within four steps, and might take what is almost a colour for it.
+    """
+    for candidate in candidates:
+        if len(chosen) == most:
+            break
+        if not len(chosen) or np.abs(chosen - candidate).max(axis=1).min() > _SAME:
+            chosen = np.concatenate([chosen, candidate[None]])
+    return chosen
 
 
 def _indexed(frames: Iterable[ByteArray], palette: Any) -> Iterator[Any]:
