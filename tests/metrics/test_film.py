@@ -67,3 +67,21 @@ def test_there_are_no_states_where_no_robot_noted_any():
 def test_the_tick_of_a_time_is_the_last_that_had_begun():
     of = film()
     assert [of.index_at(time_s) for time_s in (0.0, 0.05, 0.1, 0.3, 2.99, 99.0)] == [0, 0, 1, 3, 29, 30]
+
+
+def test_delivery_is_what_was_heard_of_what_was_in_range_within_the_last_second():
+    ticks = 31
+    heard, in_range = np.full(ticks, 3), np.full(ticks, 4)
+    heard[:15], in_range[0] = 0, 0
+    counts = {"heard": pl.Series(heard), "in_range": pl.Series(in_range)}
+    frame = ticks_frame(film(ticks)).with_columns(**counts)
+    found = film_of(SimpleNamespace(static=two_groups(), ticks=lambda _: frame), 0, "run").metrics["delivery"]
+    assert np.isnan(found[0])
+    np.testing.assert_allclose(found[[14, 15, 19, 24, 30]], [0.0, 0.075, 0.375, 0.75, 0.75])
+
+
+def test_without_a_radio_there_is_no_delivery():
+    none = pl.Series([None] * 31, dtype=pl.Int64)
+    frame = ticks_frame(film()).with_columns(heard=none, in_range=none)
+    found = film_of(SimpleNamespace(static=two_groups(), ticks=lambda _: frame), 0, "run").metrics["delivery"]
+    assert np.isnan(found).all()

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 NO_STATE = -1
+DELIVERY = "delivery"  # over the last second
 
 
 class Recorded(Protocol):
@@ -62,7 +63,7 @@ def film_of(recorded: Recorded, arena: int, where: str) -> Film:
         time_s=frame["time_s"].to_numpy(),
         pose=pose,
         alive=frame["alive"].to_numpy(),
-        metrics=_metrics(frame),
+        metrics=_metrics(frame, static.rate_hz),
         state=state,
         state_names=names,
     )
@@ -88,9 +89,16 @@ def states(frame: "pl.DataFrame") -> tuple[tuple[str, ...], IntArray | None]:
     return tuple(names), place.to_numpy().reshape(frame.height, -1)
 
 
-def _metrics(frame: "pl.DataFrame") -> dict[str, FloatArray]:
-    """The columns that hold one number a tick."""
+def _metrics(frame: "pl.DataFrame", rate_hz: int) -> dict[str, FloatArray]:
+    """The columns that hold one number a tick, and `delivery`: receivers that heard, of those in range."""
     import polars as pl
 
     names = [name for name, kind in frame.schema.items() if kind == pl.Float64 and name != "time_s"]
-    return {name: frame[name].fill_null(np.nan).to_numpy() for name in names}
+    found: dict[str, FloatArray] = {name: frame[name].fill_null(np.nan).to_numpy() for name in names}
+    if DELIVERY not in found and {"heard", "in_range"} <= set(frame.columns):
+        heard, in_range = (
+            frame[name].cast(pl.Float64).rolling_sum(rate_hz, min_samples=1).fill_null(np.nan).to_numpy()
+            for name in ("heard", "in_range")
+        )
+        found[DELIVERY] = np.divide(heard, in_range, out=np.full(len(heard), np.nan), where=in_range > 0)
+    return found

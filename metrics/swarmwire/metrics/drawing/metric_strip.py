@@ -9,10 +9,11 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.drawing.layout import Layout
 from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Look
+from swarmwire.metrics.film import DELIVERY
 from swarmwire.metrics.registry import METRICS
 
 MOST_PLOTS = 4
-PREFERRED = ("target_best", "target_mean", "order", "largest_component", "delivery", "min_gap", "collisions")
+PREFERRED = ("target_best", "target_mean", "order", "largest_component", DELIVERY, "min_gap", "collisions")
 USUAL_PLOTS = 3
 _MOST_POINTS = 1500  # of a curve: more than a plot has pixels
 _HEAD_IN, _FOOT_IN, _NUMBERS_IN, _APART_IN = 0.2, 0.18, 0.3, 0.16
@@ -109,7 +110,7 @@ def _is_count(name: str) -> bool:
 
 def _limits(name: str, value: FloatArray) -> tuple[float, float]:
     """0 to 1 for shares, else from 0 or the least value to the greatest, with some air."""
-    if name == "delivery" or (name in METRICS and METRICS[name].bounds == (0.0, 1.0)):
+    if name == DELIVERY or (name in METRICS and METRICS[name].bounds == (0.0, 1.0)):
         return -0.03, 1.05
     known = value[np.isfinite(value)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
