@@ -47,13 +47,11 @@ def draw_command(
 
 
 def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path, size_px: int) -> None:
-    from swarmwire.deploy.run import Execution, choose_seeds
+    from swarmwire.deploy.simulation import Simulation
     from swarmwire.metrics.drawing.scenario_sheet import draw_scenario
-    from swarmwire.world.scenario_file import load_scenario
 
-    checked = load_scenario(path, overrides)
-    world = Execution(checked, choose_seeds(checked, seed, None)).world
-    draw_scenario(world.static, world.pose, checked.duration_s, to, size_px)
+    simulation = Simulation(path, seed=seed, overrides=overrides)
+    draw_scenario(simulation.static, simulation.world.pose, simulation.scenario.duration_s, to, size_px)
 
 
 def _draw_named_body(name: str, to: Path, size_px: int) -> None:
