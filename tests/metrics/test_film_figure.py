@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.body import load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Group
+from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.metrics.drawing.film_figure import FilmFigure
 from swarmwire.metrics.drawing.looks import DEAD, OTHER_STATE, STATE_COLORS
 from swarmwire.metrics.film import NO_STATE, Film
@@ -80,14 +80,20 @@ def test_obstacles_of_every_shape_and_lights_stand_where_they_are():
     assert seen == [OBSTACLE, OBSTACLE, OBSTACLE, (0xFF, 0xD2, 0x3F), FLOOR]
 
 
-def test_links_join_robots_in_range_that_are_alive():
-    between = (-2.25, -1.0)
-    assert shown(film(), 0, between) != [FLOOR]
-    alive = np.ones((31, 3), np.bool_)
-    alive[:, 0] = False
-    assert shown(film(alive=alive), 0, between) == [FLOOR]
-    assert shown(film(static=replace(two_groups(), range_m=1.4)), 0, between) == [FLOOR]
-    assert shown(film(static=replace(two_groups(), range_m=None)), 0, between) == [FLOOR]
+@pytest.mark.parametrize(
+    ("given", "joined"),
+    [
+        ({}, True),
+        ({"alive": np.tile([False, True, True], (31, 1))}, False),
+        ({"static": replace(two_groups(), range_m=1.4)}, False),
+        ({"static": replace(two_groups(), range_m=None)}, False),
+        ({"static": replace(two_groups(), obstacles=((Obstacle("cylinder", -2.6, -1.0, radius_m=0.1),),))}, False),
+    ],
+)
+def test_links_join_robots_alive_in_range_and_sight(given, joined):
+    pixel_m = 0.02
+    across = [(-2.25, -1.0 + up * pixel_m) for up in (-1, 0, 1)]  # half way between two robots
+    assert (shown(film(**given), 0, *across) != [FLOOR] * 3) == joined
 
 
 def test_a_trail_follows_a_robot_that_moved_and_fades():

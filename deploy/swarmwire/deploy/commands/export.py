@@ -69,7 +69,7 @@ def export_command(
 ) -> None:
     """Draw a run as a picture or a film, without a screen: the arena, and metrics beside it.
 
-    Lines join robots that are within radio range of one another, whatever stands between them.
+    Lines join robots in radio range and sight of one another, whatever partitions and failed radios part them.
     """
     from swarmwire.metrics.drawing.film_figure import FilmFigure
     from swarmwire.metrics.drawing.whole_file import check_path

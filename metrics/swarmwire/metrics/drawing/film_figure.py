@@ -85,8 +85,9 @@ class FilmFigure:
     def _show(self, index: int) -> None:
         film = self._film
         pose, alive = film.pose[index], film.alive[index]
-        range_m = film.static.range_m
-        edges: IntArray | None = None if range_m is None else in_range(pose[:, :2], alive, range_m)
+        edges: IntArray | None = None
+        if film.static.range_m is not None:
+            edges = in_range(pose[:, :2], alive, film.static.range_m, film.static.obstacles[film.arena])
         state = None if self._state is None else self._state[index]
         self._swarm.show(pose, alive, edges, _trail(film, index), state)
         self._time.set_text(f"t = {film.time_s[index]:.1f} s")

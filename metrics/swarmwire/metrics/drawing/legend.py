@@ -1,5 +1,6 @@
 """The legend of an arena: groups, states, the dead, links and whatever else a picture shows."""
 
+from itertools import pairwise
 from typing import Any
 
 from swarmwire.comms.truth import Group, Static
@@ -42,7 +43,7 @@ def link_entry(range_m: float) -> Any:
     """The entry of lines between robots."""
     from matplotlib.lines import Line2D
 
-    return Line2D([], [], color=LINK, lw=1.0, alpha=0.8, label=f"within {range_m:g} m (radio)")
+    return Line2D([], [], color=LINK, lw=1.0, alpha=0.8, label=f"in sight within {range_m:g} m (radio)")
 
 
 def light_entry() -> Any:
@@ -54,9 +55,15 @@ def light_entry() -> Any:
 
 
 def columns_in(entries: list[Any], width_in: float) -> int:
-    """How many entries stand side by side in this width."""
-    longest = max((len(entry.get_label()) for entry in entries), default=0)
-    return max(1, min(len(entries), int(width_in / (_HANDLE_IN + _LETTER_IN * longest))))
+    """How many columns of entries, which fill one column after the other, stand side by side in this width."""
+    letters = [len(entry.get_label()) for entry in entries]
+    for columns in range(len(letters), 1, -1):
+        full, rest = divmod(len(letters), columns)
+        starts = [column * full + min(column, rest) for column in range(columns + 1)]
+        widest = [max(letters[first:after]) for first, after in pairwise(starts)]
+        if sum(_HANDLE_IN + _LETTER_IN * most for most in widest) <= width_in:
+            return columns
+    return 1
 
 
 def add_legend(figure: Any, entries: list[Any], left: float, top: float, columns: int) -> None:
