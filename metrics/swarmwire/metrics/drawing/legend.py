@@ -25,7 +25,10 @@ _LETTER_IN, _HANDLE_IN = 0.062, 0.4  # widths, roughly: of a letter of a legend,
 
 def group_entries(static: Static, filled: bool = True, bodies: bool = False) -> list[Any]:
     """An entry per group, with the count and if wanted the name of its robots; not filled: its rim alone."""
-    return [_disc(_named(g, bodies), group_color(i) if filled else None, group_color(i)) for i, g in _groups(static)]
+    return [
+        _disc(_named(g, bodies), group_color(i) if filled else None, group_color(i))
+        for i, g in enumerate(static.groups)
+    ]
 
 
 def state_entries(names: tuple[str, ...], others: bool) -> list[Any]:
@@ -85,10 +88,6 @@ def add_legend(figure: Any, entries: list[Any], left: float, top: float, columns
         handletextpad=0.5,
         columnspacing=1.3,
     )
-
-
-def _groups(static: Static) -> list[tuple[int, Group]]:
-    return list(enumerate(static.groups))
 
 
 def _named(group: Group, body: bool) -> str:
