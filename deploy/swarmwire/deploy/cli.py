@@ -10,6 +10,7 @@ from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
+from swarmwire.deploy.commands.verify import verify_command
 
 app = typer.Typer(
     help="A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own.",
@@ -22,6 +23,7 @@ app.command("run")(run_command)
 app.command("check")(check_command)
 app.command("screenshot")(screenshot_command)
 app.command("schema")(schema_command)
+app.command("verify")(verify_command)
 
 
 def main() -> None:
