@@ -50,7 +50,10 @@ class TickColumns:
         self._static, self._metrics = static, metrics
         self._tick: AnyArray = np.empty(ticks, np.int64)
         self._time_s: AnyArray = np.empty(ticks, np.float64)
-        self._motion: AnyArray = np.empty((len(MOTION), *of_robots), np.float32)
+        # As the truth has them, which copies fastest; the thread that writes puts them in columns.
+        self._pose: AnyArray = np.empty((*of_robots, len(POSE)), np.float32)
+        self._velocity: AnyArray = np.empty((*of_robots, len(VELOCITY)), np.float32)
+        self._command: AnyArray = np.empty((*of_robots, len(COMMAND)), np.float32)
         self._alive: AnyArray = np.empty(of_robots, np.bool_)
         self._state: AnyArray = np.empty(of_robots, np.uint16)
         self._states: tuple[str, ...] = ("",)
@@ -60,15 +63,13 @@ class TickColumns:
 
     def add(self, truth: Truth, latest: dict[str, FloatArray]) -> None:
         """Copy a tick, with what the metrics say of it (arenas,) each."""
-        at, shape = self.ticks, (self._static.arenas, self._static.robots, -1)
+        at, shape = self.ticks, (self._static.arenas, self._static.robots)
         self._tick[at], self._time_s[at] = truth.tick, to_s(truth.time_ns)
-        motion, row = self._motion[:, at], 0
-        for source in (truth.pose, truth.velocity, truth.command):
-            columns = np.moveaxis(source.reshape(shape), 2, 0)
-            motion[row : row + len(columns)] = columns
-            row += len(columns)
-        self._alive[at] = truth.alive.reshape(shape[:2])
-        self._state[at] = truth.state.reshape(shape[:2])
+        self._pose[at] = truth.pose.reshape(*shape, -1)
+        self._velocity[at] = truth.velocity.reshape(*shape, -1)
+        self._command[at] = truth.command.reshape(*shape, -1)
+        self._alive[at] = truth.alive.reshape(shape)
+        self._state[at] = truth.state.reshape(shape)
         self._states = truth.states  # it only grows
         for place, name in enumerate(self._metrics):
             self._measured[place, at] = latest[name]
@@ -89,7 +90,9 @@ class TickColumns:
             "arena": np.tile(np.arange(arenas, dtype=np.int32), ticks),
             "seed": np.tile(np.array(self._static.seeds, np.int64), ticks),
         }
-        columns |= {name: self._motion[row, :ticks].reshape(per_robot) for row, name in enumerate(MOTION)}
+        for names, values in ((POSE, self._pose), (VELOCITY, self._velocity), (COMMAND, self._command)):
+            for place, name in enumerate(names):
+                columns[name] = np.ascontiguousarray(values[:ticks, ..., place]).reshape(per_robot)
         columns["alive"] = self._alive[:ticks].reshape(per_robot)
         columns["state"] = pl.Series(self._states).gather(self._state[:ticks].reshape(-1)).reshape(per_robot)
         measured = {name: self._measured[row, :ticks].reshape(-1) for row, name in enumerate(self._metrics)}
