@@ -21,14 +21,13 @@ def one_run(scenario: Scenario, folder: Path | None) -> tuple[float, Result]:
 
 
 def compared(scenario: Scenario, repeats: int) -> tuple[list[float], list[float], dict[str, float], Result]:
-    """Seconds of each run without and with recording, sizes of the tables in MB, and one of the results."""
-    without: list[float] = []
-    recorded: list[float] = []
+    """Seconds of each run without and with recording, sizes of the tables in MB, and the first result."""
+    without: list[tuple[float, Result]] = []
+    recorded: list[tuple[float, Result]] = []
     sizes_mb: dict[str, float] = {}
     for _ in range(repeats):
-        plain_s, result = one_run(scenario, None)
-        without.append(plain_s)
+        without.append(one_run(scenario, None))
         with TemporaryDirectory() as folder:
-            recorded.append(one_run(scenario, Path(folder))[0])
+            recorded.append(one_run(scenario, Path(folder)))
             sizes_mb = {file.stem: round(file.stat().st_size / 1e6, 3) for file in Path(folder).glob("*.parquet")}
-    return without, recorded, sizes_mb, result
+    return [spent_s for spent_s, _ in without], [spent_s for spent_s, _ in recorded], sizes_mb, without[0][1]
