@@ -46,7 +46,9 @@ def fill(folder, **given):
     of = static(3, arenas=ARENAS)
     recorded = record(folder, of, seen_ticks(of), packets=given.pop("share", 1.0))
     summarise(folder, of, given.pop("record", recorded), **given)
-    RunLog(folder).say("begins")
+    log = RunLog(folder)
+    log.say("begins")
+    log.close()
 
 
 def states(folder):

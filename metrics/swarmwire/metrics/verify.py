@@ -95,7 +95,8 @@ def _log(folder: RunFolder) -> Finding:
     path = folder.path / run_log.NAME
     if not path.exists():
         return Finding(run_log.NAME, State.MISSING, "what was said during the run")
-    lines = sum(1 for _ in path.open("rb"))
+    with path.open("rb") as file:
+        lines = sum(1 for _ in file)
     return Finding(run_log.NAME, State.WHOLE if lines else State.DAMAGED, f"{lines} lines")
 
 
