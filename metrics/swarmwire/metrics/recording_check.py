@@ -14,13 +14,11 @@ FRAME_HEADER_BYTES = 16  # kind, and the payload's length in the last 8, little-
 
 def check_recording(path: Path) -> tuple[State, str]:
     """Read a .rrd to its end; without rerun-sdk only that it is there."""
-    size = path.stat().st_size
-    megabytes = f"{size / 1e6:.1f} MB"
+    megabytes = f"{path.stat().st_size / 1e6:.1f} MB"
     if find_spec("rerun") is None or find_spec("rerun_bindings") is None:
         return State.WHOLE, f"{megabytes}, not read: that needs rerun-sdk (swarmwire-metrics[view])"
-    whole = _whole_frames_bytes(path)
     try:
-        last, closed = _read(path) if whole == size else _read_start(path, whole)
+        last, closed = _read_all(path)
     except Exception as error:  # noqa: BLE001 - rerun promises no type; whatever it is, the file is unreadable
         return State.DAMAGED, str(error).splitlines()[0]
     reach = "no tick in it" if last is None else f"up to tick {last}"
@@ -29,26 +27,31 @@ def check_recording(path: Path) -> tuple[State, str]:
     return State.WHOLE if last is not None else State.PARTIAL, f"{megabytes}, {reach}"
 
 
+def _read_all(path: Path) -> tuple[int | None, bool]:
+    """As `_read`; where rerun's reader refuses a file whose last frame is cut off, up to that frame."""
+    try:
+        return _read(path)
+    except Exception as refused:
+        with TemporaryDirectory() as folder, path.open("rb") as whole:
+            start = Path(folder) / path.name
+            start.write_bytes(whole.read(_whole_frames_bytes(path)))
+            try:
+                return _read(start)[0], False
+            except Exception:  # noqa: BLE001 - rerun promises no type; what it said of the file itself counts
+                raise refused from None
+
+
 def _whole_frames_bytes(path: Path) -> int:
-    """Where a frame that the file cuts off begins; its size if there is none. A killed run may leave one."""
+    """Where the frame begins that the file cuts off, as the end of a run that was killed may."""
     size, at = path.stat().st_size, FILE_HEADER_BYTES
     with path.open("rb") as file:
         while at + FRAME_HEADER_BYTES <= size:
             file.seek(at + 8)
             end = at + FRAME_HEADER_BYTES + int.from_bytes(file.read(8), "little")
             if end > size:
-                return at
+                break
             at = end
-    return min(at, size)
-
-
-def _read_start(path: Path, length: int) -> tuple[int | None, bool]:
-    """As `_read`, of the first bytes: rerun's reader refuses a file whose last frame is cut off."""
-    with TemporaryDirectory() as folder:
-        start = Path(folder) / path.name
-        with path.open("rb") as whole:
-            start.write_bytes(whole.read(length))
-        return _read(start)
+    return at
 
 
 def _read(path: Path) -> tuple[int | None, bool]:
