@@ -11,11 +11,11 @@ from swarmwire.metrics.verify import verify
 from tests.deploy.commands import swarmwire
 from tests.deploy.recorded import record_run, started
 
-DURATION = "duration_s=40"
-TICKS = 400
+DURATION = "duration_s=20"
+TICKS = 200
 KILL = 'events=[{at_s=1.0, do="kill", robots={group="flock", share=0.2}}]'
 # At random moments (fixed seed), and while the parts are joined.
-MOMENTS = [*np.random.default_rng(17).integers(0, TICKS, 4).tolist(), "ends"]
+MOMENTS = [*np.random.default_rng(17).integers(0, TICKS, 3).tolist(), "ends"]
 
 
 @pytest.fixture(scope="module")

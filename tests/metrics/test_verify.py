@@ -139,6 +139,14 @@ def test_a_run_killed_before_its_first_part_left_nothing(tmp_path, monkeypatch):
     assert text_of(tmp_path, "ticks") == "nothing was on disk yet"
 
 
+def test_parts_left_beside_the_whole_table_are_no_fault(tmp_path):
+    fill(tmp_path)
+    (tmp_path / "ticks").mkdir()
+    shutil.copy(tmp_path / "ticks.parquet", tmp_path / "ticks" / "part-000001.parquet")
+    assert states(tmp_path) == {}
+    assert text_of(tmp_path, "ticks").endswith("its parts were not cleared away")
+
+
 def test_a_part_that_is_damaged_or_gone_is_named(tmp_path, monkeypatch):
     killed(tmp_path, monkeypatch)
     broken = tmp_path / "ticks" / "part-000001.parquet"

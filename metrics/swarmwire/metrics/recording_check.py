@@ -31,14 +31,14 @@ def _read_all(path: Path) -> tuple[int | None, bool]:
     """As `_read`; where rerun's reader refuses a file whose last frame is cut off, up to that frame."""
     try:
         return _read(path)
-    except Exception as refused:
+    except RuntimeError as refused:
         with TemporaryDirectory() as folder, path.open("rb") as whole:
             start = Path(folder) / path.name
             start.write_bytes(whole.read(_whole_frames_bytes(path)))
             try:
                 return _read(start)[0], False
-            except Exception:  # noqa: BLE001 - rerun promises no type; what it said of the file itself counts
-                raise refused from None
+            except RuntimeError:
+                raise refused from None  # what it said of the file itself counts
 
 
 def _whole_frames_bytes(path: Path) -> int:

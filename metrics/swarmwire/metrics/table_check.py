@@ -22,7 +22,8 @@ def check_table(folder: Path, name: str) -> TableCheck:
     if whole.exists():
         fault = _fault(whole)
         if fault is None:
-            return TableCheck(State.WHOLE, [whole], "")
+            # A run killed between the two leaves both; whoever reads takes the whole.
+            return TableCheck(State.WHOLE, [whole], "its parts were not cleared away" if parts else "")
         return TableCheck(State.DAMAGED, [], f"{whole.name}: {fault}")
     if not (folder / name).is_dir():
         return TableCheck(State.MISSING, [], f"there is neither {whole.name} nor a folder of its parts")

@@ -21,7 +21,7 @@ class PacketRecorder:
 
     Receivers out of range are counted in `ticks` and the summary alone, and what is in flight at the end has no row.
     A share below 1 keeps whole packets, chosen by arena seed, sender and sequence number: the same in every layout.
-    Summary part: `record_packets`: rows written, rows dropped (in real time only), and the share.
+    Summary part: `record_packets`: rows written, rows dropped (in real time only; all, not the share), and the share.
     """
 
     def __init__(

@@ -18,7 +18,7 @@ WAITING_CHUNKS = 4  # at most, beside the one that is being written
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """Rows of a table: how many, and how the thread makes a frame of them (None: none is worth keeping)."""
+    """Rows of a table: how many, and how the thread makes a frame of them, or of those worth keeping."""
 
     rows: int
     frame: "Callable[[], pl.DataFrame]"
