@@ -105,6 +105,17 @@ def test_what_is_not_there_is_named(tmp_path):
         _ = RunFolder(tmp_path).static
 
 
+def test_of_a_killed_run_in_which_nothing_had_happened_the_events_are_none(tmp_path):
+    of = static(2)
+    (tmp_path / "ended").mkdir()
+    record(tmp_path / "ended", of, wandering(of, 2), packets=1.0)
+    for name in ("packets", "events"):
+        (tmp_path / name).mkdir()
+        left, ended = getattr(RunFolder(tmp_path), name)(), getattr(RunFolder(tmp_path / "ended"), name)()
+        assert len(left) == 0
+        assert left.schema == ended.schema
+
+
 def test_a_damaged_table_and_an_arena_that_is_not_there_are_named(recorded):
     folder, _, _ = recorded
     with pytest.raises(BadInput, match=r"arena: expected 0 to 1, got 2"):

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
+from swarmwire.metrics.record.event_recorder import event_schema
+from swarmwire.metrics.record.packet_columns import packet_schema
 from swarmwire.metrics.record.part_files import parts_of, table_file
 from swarmwire.metrics.record.static_file import NAME, read_static
 from swarmwire.metrics.record.tick_columns import ROBOT_COLUMNS
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 SUMMARY = "summary.json"
+SCHEMAS = {"packets": packet_schema, "events": event_schema}  # which may well have no rows
 CHANGES_UNDERFOOT = 3  # times that the files of a running run may be joined while they are read
 
 
@@ -119,6 +122,8 @@ class RunFolder:
             except pl.exceptions.PolarsError as error:
                 where = str(self.path / name)
                 raise BadInput(where, "", f"expected whole Parquet files ({error}); see swarmwire verify") from error
+        if name in SCHEMAS and (self.path / name).is_dir():  # a run that was killed before anything happened
+            return pl.DataFrame(schema=SCHEMAS[name]())
         raise BadInput(str(self.path), name, "expected this table; the folder holds nothing of it")
 
 
