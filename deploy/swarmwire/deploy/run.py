@@ -1,8 +1,9 @@
 """One execution of a scenario: wires the parts together, runs the loop, and gives back what came of it."""
 
 import sys
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.deploy import machine
 from swarmwire.deploy.agents import agent_specs, check_agents
+from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.endpoint import local_endpoint, new_run_id
 from swarmwire.deploy.folder import make_folder
 from swarmwire.deploy.guarded import Guarded
@@ -31,7 +33,8 @@ from swarmwire.world.pace import Pace
 from swarmwire.world.realtime_crew import PacedCrew, RealTimeCrew, RealTimeReport
 from swarmwire.world.remote_crew import RemoteCrew
 from swarmwire.world.roster import Loss
-from swarmwire.world.runner_crew import Surroundings
+from swarmwire.world.runner_crew import RunnerCrew, Surroundings
+from swarmwire.world.runner_health import RunnerHealth
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.world import World
@@ -84,13 +87,17 @@ class Execution:
         realtime: float | str | None = None,
     ) -> None:
         self.scenario, self.seeds = scenario, seeds
-        self._factor = None if realtime is None else _factor(realtime)
         self._losses: list[Loss] = []
         self.folder: Path | None = None  # where summary and recording go, if anywhere
         self.ticks = _ticks(scenario)
         self.run_id = new_run_id()
         self._socket, self._clock = socket, WallClock()
         self._called_ns = self._clock.now_ns()
+        rate_hz = scenario.time.rate_hz
+        self._pace = None if realtime is None else Pace(self._clock, rate_hz, _factor(realtime), _say)
+        self.controls = Controls(self._clock, rate_hz, self._pace)
+        self.metrics = Metrics()
+        self._runner_crew: RunnerCrew[Any] | None = None
         self._specs = agent_specs(scenario)
         needs = {name: kind.needs for name, kind in check_agents(scenario, self._specs).items()}
         self.world = World(scenario, seeds, needs)
@@ -98,19 +105,19 @@ class Execution:
 
     def run(self, observers: Sequence[Observer] = ()) -> Result:
         """Run to the end of the scenario, or until an interrupt."""
-        metrics = Metrics()
-        recorders: list[Observer] = [RerunRecording(self.folder / "run.rrd", metrics)] if self.folder else []
+        recorders: list[Observer] = [RerunRecording(self.folder / "run.rrd", self.metrics)] if self.folder else []
         guarded = [Guarded(observer) for observer in (*recorders, *observers)]
-        watching: list[Observer] = [metrics, RadioTally(), EventLog(), *guarded]
+        watching: list[Observer] = [self.metrics, RadioTally(), EventLog(), *guarded]
         parts: dict[str, Any] = {}
-        with Interrupt() as interrupt, self._crew(interrupt) as crew:
+        with Interrupt() as interrupt, self._crew(partial(self._stopped, interrupt)) as crew:
             loop = Loop(self.world, self.air(), crew, watching, self.scenario.events)
             crew.start()
             for observer in watching:
                 observer.begin(self.world.static)
             started_ns = self._clock.now_ns()
             try:
-                loop.run(self.ticks, stopped=lambda: interrupt.asked)
+                stopped = partial(self._stopped, interrupt)
+                loop.run(self.ticks, stopped, lambda tick: self.controls.hold(tick, stopped))
             except Interrupted:
                 pass  # the summary says how far it came
             finally:  # also of a run that failed: a recording is worth most then
@@ -125,6 +132,13 @@ class Execution:
             result.write(self.folder / "summary.json")
         return result
 
+    def health(self) -> RunnerHealth | None:
+        """How the runners are doing; None if all agents are in this process."""
+        return self._runner_crew.health() if self._runner_crew else None
+
+    def _stopped(self, interrupt: Interrupt) -> bool:
+        return interrupt.asked or self.controls.quit_asked
+
     def air(self) -> Air | None:
         """The air of the scenario's radio, if it has one."""
         static, radio = self.world.static, self.scenario.radio
@@ -135,11 +149,11 @@ class Execution:
         return Air(radio, self.world.keys, static.robots, size_m, obstacles, static.rate_hz, every)
 
     @contextmanager
-    def _crew(self, interrupt: Interrupt) -> Generator[Crew]:
+    def _crew(self, stopped: Callable[[], bool]) -> Generator[Crew]:
         whole = assignments.whole(self.scenario, self.world.static, self._specs)
         if not self.runners:
             with closing(LocalCrew(whole)) as local:
-                yield local if self._factor is None else PacedCrew(local, self._pace(self._factor))
+                yield PacedCrew(local, self._pace) if self._pace else local
             return
         parts = assignments.split(whole, self.runners)
         names = [f"r{i}" for i in range(len(parts))]
@@ -149,8 +163,8 @@ class Execution:
             return processes[0].trouble() if processes else None
 
         with local_endpoint(self._socket) as endpoint:
-            around = Surroundings(trouble, lambda: interrupt.asked, lambda loss: self._survive(loss, endpoint))
-            crew = self._remote_crew(endpoint, parts, around)
+            around = Surroundings(trouble, stopped, lambda loss: self._survive(loss, endpoint))
+            crew = self._runner_crew = self._remote_crew(endpoint, parts, around)
             try:
                 crew.open()
                 processes.append(RunnerProcesses(endpoint, self.run_id, sorted(set(self._specs.values())), names))
@@ -163,12 +177,7 @@ class Execution:
     def _remote_crew(self, endpoint: str, parts: list[Assignment], around: Surroundings) -> RemoteCrew | RealTimeCrew:
         table = self.scenario.run
         common = endpoint, self.run_id, parts, table.runner_timeout_s, self._clock, around, table.on_runner_loss
-        if self._factor is None:
-            return RemoteCrew(*common)
-        return RealTimeCrew(*common, self._pace(self._factor), table.watchdog_s)
-
-    def _pace(self, factor: float) -> Pace:
-        return Pace(self._clock, self.scenario.time.rate_hz, factor, _say)
+        return RealTimeCrew(*common, self._pace, table.watchdog_s) if self._pace else RemoteCrew(*common)
 
     def _survive(self, loss: Loss, endpoint: str) -> None:
         """Tell people of a runner that was lost, and of what they can do."""

@@ -46,7 +46,8 @@ def run_command(
     Without --realtime the same scenario and seed give the same run bit for bit, whatever --runners says.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.deploy.progress import ProgressLine
+    from swarmwire.deploy.panel import Panel
+    from swarmwire.deploy.progress import ProgressLines
     from swarmwire.deploy.run import Execution, choose_seeds
     from swarmwire.world.scenario_file import load_scenario
 
@@ -55,7 +56,12 @@ def run_command(
     chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
     execution = Execution(checked, chosen, runners, socket=socket, realtime=realtime)
     folder = execution.folder = make_folder(out or default_folder(scenario.stem, chosen))
-    result = execution.run([ProgressLine(execution.ticks, WallClock(), console)])
+    clock, metrics = WallClock(), execution.metrics
+    if console.is_terminal and not console.is_dumb_terminal and not quiet:
+        shown = Panel(execution.ticks, metrics, execution.controls, execution.health, clock, console)
+    else:
+        shown = ProgressLines(execution.ticks, metrics, clock, console)
+    result = execution.run([shown])
     print_result(result, console)
     _say_where(result, folder, console)
     if result.ended == "interrupted":
