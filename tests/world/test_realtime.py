@@ -14,6 +14,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import encode_actions
 from swarmwire.world.realtime import RealTime
 from swarmwire.world.roster import OnLoss
+from swarmwire.world.runner_health import RunnerHealth
 from tests.agent.hosts import GIVES, assignment, group, heard_from, one_group
 
 ROWS = [0, 1, 2, 3]
@@ -224,3 +225,16 @@ def test_a_runner_that_is_silent_for_too_long_is_lost() -> None:
         runners.answer("b", said("b", tick, 1.0))
         assert len(runners.losses) == (tick > 10)  # asked at 0.0 s
     assert runners.losses[0].reason == "no answer for 1 s"
+
+
+def test_health_counts_runners_and_what_they_missed() -> None:
+    runners = playing("dead")
+    assert runners.health() == RunnerHealth(ready=2, lost=0)
+    for tick in range(7):
+        opened(runners, tick)
+        runners.answer("a", said("a", tick, 1.0))
+        taken(runners)
+    runners.answer("b", said("b", 5, 1.0))
+    assert runners.health() == RunnerHealth(2, 0, late_answers=2, frames_dropped=5, watchdog_stops=2)
+    runners.gone("a", "its link is gone")
+    assert (runners.health().ready, runners.health().lost) == (1, 1)

@@ -19,10 +19,10 @@ class Binding(NamedTuple):
 BINDINGS = (
     Binding(" ", "space", "pause", "pause, or go on", Controls.toggle_pause),
     Binding("s.", "s", "step", "one tick, then pause again", Controls.step),
-    Binding("+=", "+", "faster", "a higher speed, in the end as fast as possible", Controls.faster),
-    Binding("-_", "-", "slower", "a lower speed", Controls.slower),
-    Binding("qQ", "q", "quit", "end after this tick, with a summary", Controls.quit),
-    Binding("?h", "?", "help", "this, or no longer", Controls.toggle_help),
+    Binding("+=", "+", "faster", "faster, at last without a limit", Controls.faster),
+    Binding("-_", "-", "slower", "slower: limit the speed", Controls.slower),
+    Binding("qQ", "q", "quit", "end after this tick", Controls.quit),
+    Binding("?h", "?", "help", "show this, or no longer", Controls.toggle_help),
 )
 
 

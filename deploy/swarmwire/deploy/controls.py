@@ -138,5 +138,5 @@ class Controls:
 
     def _set_speed(self, speed: float | None) -> None:
         self.speed, self._asked = speed, True
-        self._next_ns = 0
+        self._next_ns = self._clock.now_ns()
         self._since = None  # measured anew from the next tick on

@@ -5,7 +5,7 @@ from collections import deque
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.fates import FATE_NAMES, Fate
 from swarmwire.comms.truth import Happened, Static, Truth
@@ -83,7 +83,7 @@ class Figures:
 
     def level(self, name: str) -> float:
         """A metric in the last tick; NaN where it has no value."""
-        return _mean(self._metrics.latest[name])
+        return _mean(self._metrics.latest[name].tolist())
 
     def history(self, name: str, per_value_s: int) -> list[float]:
         """A metric over the last minute, a mean per so many seconds; what is averaged together stays so."""
@@ -92,7 +92,7 @@ class Figures:
         parts: dict[int, list[float]] = {}
         for second, values in enumerate(self._history, first):
             parts.setdefault(second // per_value_s, []).append(values[column])
-        return [_mean(np.array(values)) for values in parts.values()]
+        return [_mean(values) for values in parts.values()]
 
     def speed(self, over_s: float) -> float:
         """Simulated s per s of wall time, over so many seconds of wall time up to now; NaN at the very start."""
@@ -117,9 +117,9 @@ def _words(event: Happened, time_ns: int, static: Static) -> str:
     return f"{to_s(time_ns):.1f} s  {event.do}{' ended' if event.ended else ''}: {who}"
 
 
-def _mean(values: FloatArray) -> float:
-    known = values[~np.isnan(values)]
-    return float(known.mean()) if known.size else math.nan
+def _mean(values: list[float]) -> float:
+    known = [value for value in values if not math.isnan(value)]
+    return sum(known) / len(known) if known else math.nan
 
 
 def _share(part: int, whole: int) -> float:

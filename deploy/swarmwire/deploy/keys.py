@@ -83,7 +83,7 @@ class Keys:
     def _take(self) -> None:
         if self._before is None and _in_foreground():
             self._before = termios.tcgetattr(0)
-            tty.setcbreak(0, termios.TCSADRAIN)
+            tty.setcbreak(0, termios.TCSAFLUSH)  # what was typed before was not meant for the run
             os.write(1, HIDE_CURSOR)
 
     def _give_back(self) -> None:

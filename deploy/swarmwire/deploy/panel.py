@@ -17,8 +17,8 @@ from swarmwire.deploy.panel_view import panel_view
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.world.runner_health import RunnerHealth
 
-REDRAW_NS = to_ns(0.1)  # wall time between two pictures, at least
-COST = 125  # a picture that took so long is followed by so many times as long without one: below 1 % of a run
+REDRAW_NS, SELDOM_NS = to_ns(0.1), to_ns(0.5)  # wall time between two pictures, at least and at most
+COST = 150  # a picture that took so long is followed by so many times as long without one: below 1 % of a run
 
 
 class Panel:
@@ -38,7 +38,7 @@ class Panel:
         self.figures = Figures(ticks, metrics, clock)
         self._keys = Keys(partial(press, controls))
         self._live = Live(self, console=console, auto_refresh=False, transient=True, vertical_overflow="crop")
-        self._next_ns = 0
+        self._next_ns = 0  # no picture before
         self._broken: OSError | None = None
 
     def begin(self, static: Static) -> None:
@@ -55,13 +55,16 @@ class Panel:
         if self._broken is not None:
             raise self._broken
         if self._clock.now_ns() >= self._next_ns:
-            self._draw()
+            cost_ns = self._draw()
+            self._next_ns += min(max(COST * cost_ns, REDRAW_NS), SELDOM_NS) - REDRAW_NS
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """Take it away."""
         self._controls.on_wait = lambda: None
-        self._keys.stop()
-        self._live.stop()
+        try:
+            self._live.stop()
+        finally:
+            self._keys.stop()
         return {}
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
@@ -78,8 +81,9 @@ class Panel:
             except OSError as error:  # nothing catches it here; the next tick reports it as any observer's
                 self._broken = error
 
-    def _draw(self) -> None:
+    def _draw(self) -> int:
+        """Returns how long it took, in ns."""
         before_ns = self._clock.now_ns()
         self._live.refresh()
-        after_ns = self._clock.now_ns()
-        self._next_ns = before_ns + max(REDRAW_NS, COST * (after_ns - before_ns))
+        self._next_ns = before_ns + REDRAW_NS
+        return self._clock.now_ns() - before_ns
