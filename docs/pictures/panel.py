@@ -1,6 +1,6 @@
 """Draws docs/panel.svg: the panel of a terminal of 100 x 30 in the middle of a run.
 
-    uv run python docs/pictures/panel.py
+uv run python docs/pictures/panel.py
 """
 
 import io
@@ -40,9 +40,7 @@ class Picture:
         self._figures.see(truth)
         if truth.tick == AT_TICK:
             execution = self._execution
-            self._console.print(
-                panel_view(self._figures, execution.controls, execution.health(), WIDTH, keys=True)
-            )
+            self._console.print(panel_view(self._figures, execution.controls, execution.health(), WIDTH, keys=True))
             execution.controls.quit()
 
     def end(self, last: Tally | None) -> dict[str, Any]:

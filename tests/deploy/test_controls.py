@@ -1,6 +1,7 @@
 """What people ask of a run holds it up or ends it, at once, and never changes what it does."""
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import pytest
 
@@ -104,7 +105,7 @@ def test_a_limit_is_kept_and_lifted() -> None:
         controls.hold(tick, never)
         began_ns.append(clock.time_ns)
         clock.time_ns += 7 * MS
-    gaps = [after - before for before, after in zip(began_ns, began_ns[1:], strict=False)]
+    gaps = [after - before for before, after in pairwise(began_ns)]
     assert gaps == [TICK_NS // 2] * 9
     controls.faster()  # 5 is more than the run ever did
     assert controls.speed is None
@@ -197,7 +198,14 @@ def free() -> Result:
 def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, runners: int | None) -> None:
     execution = Execution(load_scenario(LOSSY, SHORT), (1,), runners)
     controls = execution.controls
-    plan = [controls.toggle_pause, controls.step, controls.step, controls.toggle_pause, controls.slower, controls.slower]
+    plan = [
+        controls.toggle_pause,
+        controls.step,
+        controls.step,
+        controls.toggle_pause,
+        controls.slower,
+        controls.slower,
+    ]
     plan += [controls.toggle_pause, controls.step, controls.toggle_pause, *[controls.faster] * 20]
     asker = Asker(plan)
     controls.on_wait = asker.ask
