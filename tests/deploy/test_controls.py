@@ -49,8 +49,10 @@ def never() -> bool:
 
 def test_a_run_of_which_nothing_is_asked_is_not_held() -> None:
     clock, controls, _, _ = controlled()
-    for tick in range(5):
-        controls.hold(tick, never)
+    controls.hold(0, never)
+    clock.now_ns = lambda: pytest.fail("it reads the clock, in every tick")
+    for tick in range(1, 5):
+        controls.hold(tick, lambda: pytest.fail("it asks, in every tick"))
     assert not clock.slept_until
 
 

@@ -29,6 +29,8 @@ class Keys:
         self._before: list[Any] | None = None  # the terminal's attributes, while they are changed
         self._wake: tuple[int, int] | None = None  # a pipe that ends the thread
         self._handlers: dict[signal.Signals, Any] = {}
+        self._suspended = False
+        self._lock = threading.RLock()  # of the attributes; a signal's handler may interrupt who holds it
 
     @property
     def active(self) -> bool:
@@ -39,7 +41,7 @@ class Keys:
         """Take the terminal, if there is one."""
         if self.active or not (os.isatty(0) and os.isatty(1) and _in_foreground()):
             return
-        self._wake = os.pipe()
+        self._wake, self._suspended = os.pipe(), False
         atexit.register(self.stop)
         if threading.current_thread() is threading.main_thread():
             for number, handler in ((signal.SIGTSTP, self._suspend), (signal.SIGCONT, self._continue)):
@@ -66,6 +68,7 @@ class Keys:
         """Until the pipe is closed. In the background a read would stop the whole run, so there is none."""
         while True:
             foreground = _in_foreground()
+            self._take()  # again, if the run comes back from the background
             ready, _, _ = select.select([wake, 0] if foreground else [wake], [], [], LOOK_S)
             if wake in ready:
                 return
@@ -81,15 +84,17 @@ class Keys:
                         self._press(key)
 
     def _take(self) -> None:
-        if self._before is None and _in_foreground():
-            self._before = termios.tcgetattr(0)
-            tty.setcbreak(0, termios.TCSAFLUSH)  # what was typed before was not meant for the run
-            os.write(1, HIDE_CURSOR)
+        with self._lock, suppress(termios.error, OSError):  # a terminal that is gone gives no keys
+            if self._before is None and not self._suspended and _in_foreground():
+                self._before = termios.tcgetattr(0)
+                tty.setcbreak(0, termios.TCSAFLUSH)  # what was typed before was not meant for the run
+                os.write(1, HIDE_CURSOR)
 
     def _give_back(self) -> None:
-        before, self._before = self._before, None
-        if before is not None and _in_foreground():
-            with suppress(termios.error, OSError):  # the terminal is gone, and its attributes with it
+        with self._lock, suppress(termios.error, OSError):  # or it is gone, and its attributes with it
+            self._suspended = True
+            before, self._before = self._before, None
+            if before is not None and _in_foreground():
                 termios.tcsetattr(0, termios.TCSADRAIN, before)
                 os.write(1, SHOW_CURSOR)
 
@@ -102,6 +107,7 @@ class Keys:
 
     def _continue(self, number: int, frame: FrameType | None) -> None:
         signal.signal(signal.SIGTSTP, self._suspend)
+        self._suspended = False
         self._take()
 
 

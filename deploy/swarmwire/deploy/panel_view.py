@@ -46,7 +46,7 @@ def panel_view(figures: Figures, controls: Controls, health: RunnerHealth | None
         line.truncate(inner, overflow="ellipsis")
     seeds = figures.static.seeds
     which = f"seed {seeds[0]}" if len(seeds) == 1 else f"{len(seeds)} seeds, {seeds[0]} to {seeds[-1]}: means"
-    title = Text.assemble((f" {figures.static.name} ", "bold"), (f"{which} ", "dim"))
+    title = Text.assemble((f"{figures.static.name}  ", "bold"), (which, "dim"))
     title.truncate(inner - 2, overflow="ellipsis")
     border = "yellow" if controls.paused else "cyan"
     footer = _keys() if keys else None
@@ -164,7 +164,7 @@ def _help() -> list[Text]:
 
 def _keys() -> Text:
     pairs = [Text.assemble((binding.shown, "bold"), f" {binding.name}") for binding in BINDINGS]
-    return Text(" ").append_text(Text("  ").join(pairs)).append(" ")
+    return Text("  ").join(pairs)
 
 
 def _row(label: str, value: str) -> Text:

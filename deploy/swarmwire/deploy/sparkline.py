@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-BARS = "▁▂▃▄▅▆▇█"
+BARS = "▁▂▃▄▅▆▇"  # not the full block: curves in lines below one another would touch
 NOTHING = " "
 
 
@@ -11,7 +11,7 @@ def sparkline(values: Sequence[float], least: float, largest: float) -> str:
     """A character per value, from the least to the largest; a gap for NaN.
 
     >>> sparkline([0.0, 0.5, 1.0, math.nan], 0.0, 1.0)
-    '▁▅█ '
+    '▁▄▇ '
     """
     span = largest - least
     return "".join(
