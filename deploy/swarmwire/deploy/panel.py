@@ -18,7 +18,7 @@ from swarmwire.metrics.metrics import Metrics
 from swarmwire.world.runner_health import RunnerHealth
 
 REDRAW_NS, SELDOM_NS = to_ns(0.1), to_ns(0.5)  # wall time between two pictures, at least and at most
-COST = 200  # a picture that took so long is followed by so many times as long without one: below 1 % of a run
+COST = 250  # a picture that took so long is followed by so many times as long without one: below 1 % of a run
 
 
 class Panel:
