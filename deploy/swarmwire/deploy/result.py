@@ -85,6 +85,7 @@ class Result:
     lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
     realtime: RealTimeReport | None = None
     error: str | None = None  # why it failed
+    record: dict[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]], compare=False)  # tables
     out: Path | None = field(default=None, compare=False)  # the run folder
 
     @property
@@ -136,6 +137,7 @@ class Result:
             "counts": self.counts,
             "lost_runners": list(self.lost_runners),
             "realtime": asdict(self.realtime) if self.realtime else None,
+            "record": self.record,
             "cpu": self.cpu,
             "versions": self.versions,
         }

@@ -47,9 +47,13 @@ class RunFolder:
             raise BadInput(str(path), "", f"expected JSON: {error}") from error
 
     @cached_property
+    def _static(self) -> Static:
+        return read_static(self.path / NAME)
+
+    @property
     def static(self) -> Static:
         """Arena, bodies, groups and names."""
-        return read_static(self.path / NAME)
+        return self._static
 
     def ticks(self, arena: int | None = None) -> "pl.DataFrame":
         """A row per tick and arena, of one arena or of all; lists with an item per robot in its order.
