@@ -7,6 +7,7 @@ import typer
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.commands.check import check_command
 from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
+from swarmwire.deploy.commands.repeat import repeat_command
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
@@ -19,6 +20,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 app.command("run")(run_command)
+app.command("repeat")(repeat_command)
 app.command("check")(check_command)
 app.command("screenshot")(screenshot_command)
 app.command("schema")(schema_command)

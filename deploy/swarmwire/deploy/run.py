@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Generator, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,13 @@ from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.endpoint import local_endpoint, new_run_id
 from swarmwire.deploy.folder import make_folder
 from swarmwire.deploy.guarded import Guarded
+from swarmwire.deploy.inputs import RecordedCrew, RecordedInputs, ReplayedCrew
 from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.modules import module_digests
+from swarmwire.deploy.origin import Origin
 from swarmwire.deploy.result import EventResult, Result, arena_result
 from swarmwire.deploy.runner_processes import RunnerProcesses
+from swarmwire.deploy.scenario_copy import CopiedFile, copy_scenario
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.radio_tally import RadioTally
@@ -87,24 +92,29 @@ class Execution:
         self._factor = None if realtime is None else _factor(realtime)
         self._losses: list[Loss] = []
         self.folder: Path | None = None  # where summary and recording go, if anywhere
+        self.inputs: RecordedInputs | None = None  # of a run that is repeated
+        self.recording: dict[str, Any] = {}  # options that change what is recorded, never what happens
         self.ticks = _ticks(scenario)
         self.run_id = new_run_id()
         self._socket, self._clock = socket, WallClock()
         self._called_ns = self._clock.now_ns()
-        self._specs = agent_specs(scenario)
-        needs = {name: kind.needs for name, kind in check_agents(scenario, self._specs).items()}
+        self.specs = agent_specs(scenario)
+        needs = {name: kind.needs for name, kind in check_agents(scenario, self.specs).items()}
         self.world = World(scenario, seeds, needs)
         self.runners = _runner_count(runners, self.world.static.arenas * self.world.static.robots)
 
     def run(self, observers: Sequence[Observer] = ()) -> Result:
         """Run to the end of the scenario, or until an interrupt."""
+        modules = module_digests(self.specs.values())
+        files = self._keep(modules)
         metrics = Metrics()
         recorders: list[Observer] = [RerunRecording(self.folder / "run.rrd", metrics)] if self.folder else []
         guarded = [Guarded(observer) for observer in (*recorders, *observers)]
         watching: list[Observer] = [metrics, RadioTally(), EventLog(), *guarded]
         parts: dict[str, Any] = {}
         with Interrupt() as interrupt, self._crew(interrupt) as crew:
-            loop = Loop(self.world, self.air(), crew, watching, self.scenario.events)
+            recorded = RecordedCrew(crew, self.folder, self._outside) if self.folder else None
+            loop = Loop(self.world, self.air(), recorded or crew, watching, self.scenario.events)
             crew.start()
             for observer in watching:
                 observer.begin(self.world.static)
@@ -121,9 +131,34 @@ class Execution:
             report = crew.report() if isinstance(crew, PacedCrew | RealTimeCrew) else None
         failed = {f"observer_failed_{observer.name}": 1 for observer in guarded if observer.failed}
         result = self._result(loop, parts, {**loop.counts(), **failed}, started_ns, ended_ns, report)
+        result = replace(result, modules=modules, files=files, inputs=recorded.record() if recorded else None)
         if self.folder:
             result.write(self.folder / "summary.json")
         return result
+
+    def _keep(self, modules: dict[str, str]) -> tuple[CopiedFile, ...]:
+        """Put into the run folder, before anything happens, what the run needs to be repeated."""
+        if self.folder is None:
+            return ()
+        files = copy_scenario(self.scenario, self.seeds, self.folder)
+        Origin(
+            seeds=self.seeds,
+            ticks=self.ticks,
+            runners=self.runners,
+            realtime=self._factor,
+            recording=self.recording,
+            files=files,
+            modules=modules,
+            cpu=machine.cpu(),
+            versions=machine.versions(),
+        ).write(self.folder)
+        return files
+
+    def _outside(self, tick: int) -> bool:
+        """Whether the actions of this tick need not follow from scenario and seed."""
+        if self.inputs is not None:
+            return tick >= self.inputs.first_tick
+        return bool(self._losses) or (self._factor is not None and self.runners > 0)
 
     def air(self) -> Air | None:
         """The air of the scenario's radio, if it has one."""
@@ -136,10 +171,13 @@ class Execution:
 
     @contextmanager
     def _crew(self, interrupt: Interrupt) -> Generator[Crew]:
-        whole = assignments.whole(self.scenario, self.world.static, self._specs)
+        whole = assignments.whole(self.scenario, self.world.static, self.specs)
         if not self.runners:
             with closing(LocalCrew(whole)) as local:
-                yield local if self._factor is None else PacedCrew(local, self._pace(self._factor))
+                if self.inputs is not None:
+                    yield ReplayedCrew(local, self.inputs)
+                else:
+                    yield local if self._factor is None else PacedCrew(local, self._pace(self._factor))
             return
         parts = assignments.split(whole, self.runners)
         names = [f"r{i}" for i in range(len(parts))]
@@ -153,7 +191,7 @@ class Execution:
             crew = self._remote_crew(endpoint, parts, around)
             try:
                 crew.open()
-                processes.append(RunnerProcesses(endpoint, self.run_id, sorted(set(self._specs.values())), names))
+                processes.append(RunnerProcesses(endpoint, self.run_id, sorted(set(self.specs.values())), names))
                 yield crew
             finally:
                 crew.close()
@@ -176,7 +214,7 @@ class Execution:
         if self.scenario.run.on_runner_loss == "dead":
             _say(f"lost runner {loss}; its robots stand still")
             return
-        agents = ",".join(sorted(set(self._specs.values())))
+        agents = ",".join(sorted(set(self.specs.values())))
         takeover = f"python -m swarmwire.agent.nursery {endpoint} {self.run_id} {agents} NAME"
         _say(f"lost runner {loss}; waiting for another, such as: {takeover}")
 
@@ -209,6 +247,7 @@ class Execution:
             counts=counts,
             cpu=machine.cpu(),
             versions=machine.versions(),
+            modules={},
             lost_runners=tuple(str(loss) for loss in self._losses),
             realtime=report,
             out=self.folder,

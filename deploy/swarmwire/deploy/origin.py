@@ -1,0 +1,87 @@
+"""What a run needs to be repeated: `run.json`, written into the run folder before the first tick.
+
+A run that is killed leaves no summary; what stands here is enough to run it again.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy import machine
+from swarmwire.deploy.folder import write_whole
+from swarmwire.deploy.modules import changed_modules, module_digests
+from swarmwire.deploy.scenario_copy import CopiedFile, changed_files
+
+RUN_FORMAT = 1
+RUN_JSON = "run.json"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """From what a run was made. Paths are within the run folder."""
+
+    seeds: tuple[int, ...]  # of the arenas, in order
+    ticks: int  # that the run was to have
+    runners: int  # 0: all agents in the world's process
+    realtime: float | None  # simulated s per s of wall time; None: lockstep, as fast as may be
+    recording: Mapping[str, Any]  # options that change what is recorded, never what happens
+    files: tuple[CopiedFile, ...]
+    modules: Mapping[str, str]  # sha256 of the installed code, by module
+    cpu: str
+    versions: Mapping[str, str]
+
+    def write(self, folder: Path) -> None:
+        """Write `run.json`."""
+        write_whole(folder / RUN_JSON, json.dumps({"format": RUN_FORMAT, **asdict(self)}, indent=2) + "\n")
+
+    def changes(self, folder: Path, specs: Mapping[str, str]) -> list[str]:
+        """What is not as it was when the run of this folder began, a line each; `specs` are its agents."""
+        versions = machine.versions()
+        changed = [name for name in self.versions if self.versions[name] != versions.get(name)]
+        return [
+            *changed_files(self.files, folder),
+            *changed_modules(self.modules, module_digests(specs.values())),
+            *(f"{name} is {versions.get(name, 'not there')}; it was {self.versions[name]}" for name in changed),
+            *([f"the CPU is {machine.cpu()}; it was {self.cpu}"] if machine.cpu() != self.cpu else []),
+        ]
+
+
+def read_origin(folder: Path) -> Origin:
+    """The origin of the run of this folder; BadInput if there is none."""
+    path = folder / RUN_JSON
+    if not folder.is_dir():
+        raise BadInput(str(folder), "", "expected a run folder: there is none")
+    try:
+        found: object = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadInput(str(path), "", f"expected a run folder with its {RUN_JSON}: {error.strerror}") from None
+    except ValueError:  # no JSON, or no UTF-8
+        found = None
+    match found:
+        case {
+            "format": 1,
+            "seeds": [int(), *_] as seeds,
+            "ticks": int(ticks),
+            "runners": int(runners),
+            "realtime": int() | float() | None as realtime,
+            "recording": dict(recording),
+            "files": list(files),
+            "modules": dict(modules),
+            "cpu": str(cpu),
+            "versions": dict(versions),
+        } if ticks > 0 and all(_is_file(file) for file in files):
+            copied = tuple(CopiedFile(**file) for file in files)
+            return Origin(tuple(seeds), ticks, runners, realtime, recording, copied, modules, cpu, versions)
+        case _:
+            raise BadInput(str(path), "", f"expected what swarmwire writes at the start of a run, format {RUN_FORMAT}")
+
+
+def _is_file(item: object) -> bool:
+    match item:
+        case {"path": str(), "sha256": str(), "what": str(), **rest} if not rest:
+            return True
+        case _:
+            return False
