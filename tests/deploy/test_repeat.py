@@ -174,7 +174,7 @@ def test_the_command_says_same_or_different_and_names_what_changed(tmp_path, min
 @pytest.mark.parametrize(
     ("spoil", "expected"),
     [
-        (lambda run: shutil.rmtree(run), "there is none"),
+        (shutil.rmtree, "there is none"),
         (lambda run: (run / "run.json").unlink(), "run.json"),
         (lambda run: (run / "run.json").write_text("{}"), "at the start of a run"),
         (lambda run: (run / "summary.json").write_text("{"), "the summary of a run"),

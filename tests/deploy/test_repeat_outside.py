@@ -1,4 +1,4 @@
-"""What came into a run from outside (late answers, lost runners, Ctrl-C) is recorded, and the repetition gets the same."""
+"""What came into a run from outside (late answers, lost runners, Ctrl-C) is recorded; the repetition gets the same."""
 
 import signal
 import struct
@@ -11,7 +11,7 @@ from swarmwire.deploy import run
 from swarmwire.deploy.inputs import INPUTS
 from swarmwire.deploy.repetition import repeat
 from tests.deploy.commands import LOSSY
-from tests.deploy.test_realtime import Watcher, runners_here
+from tests.deploy.test_realtime import Watcher, runners_here, still
 
 TALKER = """
 from swarmwire.agent import Agent, Message, Robot, f4
@@ -23,9 +23,10 @@ class Talker(Agent):
     needs = ("compass",)
 
     def step(self, robot: Robot) -> None:
-        robot.note(state="turning" if robot.heard else "waiting")
-        robot.send(Word(heading_rad=robot.compass.heading_rad))
-        robot.drive(0.03, 0.4 * len(robot.heard) - 0.2)
+        words = robot.radio.heard(Word)
+        robot.note(state="turning" if words else "waiting")
+        robot.radio.send(Word(heading_rad=robot.compass.heading_rad))
+        robot.drive(0.03, 0.1 * len(words) - 0.2)
 """
 
 
@@ -70,7 +71,7 @@ def test_a_run_in_real_time_with_late_answers_is_the_same_again(tmp_path, talker
     setting = [*talkers, "duration_s=500", "run.watchdog_s=0.2"]
     result = run(LOSSY, overrides=setting, runners=3, realtime=5, out=tmp_path / "run", observers=[watcher])
     assert result.realtime is not None
-    assert result.realtime.late_answers
+    assert result.realtime.late_answers or result.realtime.frames_dropped  # of the runner that was frozen
     assert result.inputs is not None
     assert (result.inputs.first_tick, result.inputs.ticks) == (0, result.ticks)
     repetition = repeat(tmp_path / "run", out=tmp_path / "again")
@@ -84,11 +85,13 @@ def test_a_run_in_real_time_with_late_answers_is_the_same_again(tmp_path, talker
 
 @pytest.mark.parametrize("realtime", [None, 10])
 def test_a_run_that_lost_a_runner_is_the_same_again(tmp_path, talkers, realtime):
+    def kill() -> None:
+        runners_here()[0].kill()
+
     watcher = Watcher(
-        (lambda truth: truth.tick >= 5, lambda: runners_here()[0].kill()),
-        (lambda truth: (~truth.command.any(axis=1)).sum() >= 5, lambda: None),
-        *[(lambda truth: True, lambda: None)] * 10,
-        (lambda truth: True, interrupt),
+        (lambda truth: truth.tick >= 5, kill),
+        *[(lambda truth: still(truth) == 5, lambda: None)] * 10,
+        (lambda truth: still(truth) == 5, interrupt),
     )
     setting = [*talkers, "duration_s=500", "run.on_runner_loss=dead", "run.watchdog_s=1000"]
     result = run(LOSSY, overrides=setting, runners=4, realtime=realtime, out=tmp_path / "run", observers=[watcher])

@@ -55,33 +55,29 @@ def read_origin(folder: Path) -> Origin:
     if not folder.is_dir():
         raise BadInput(str(folder), "", "expected a run folder: there is none")
     try:
-        found: object = json.loads(path.read_text(encoding="utf-8"))
+        found: Any = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise BadInput(str(path), "", f"expected a run folder with its {RUN_JSON}: {error.strerror}") from None
     except ValueError:  # no JSON, or no UTF-8
         found = None
-    match found:
-        case {
-            "format": 1,
-            "seeds": [int(), *_] as seeds,
-            "ticks": int(ticks),
-            "runners": int(runners),
-            "realtime": int() | float() | None as realtime,
-            "recording": dict(recording),
-            "files": list(files),
-            "modules": dict(modules),
-            "cpu": str(cpu),
-            "versions": dict(versions),
-        } if ticks > 0 and all(_is_file(file) for file in files):
-            copied = tuple(CopiedFile(**file) for file in files)
-            return Origin(tuple(seeds), ticks, runners, realtime, recording, copied, modules, cpu, versions)
-        case _:
-            raise BadInput(str(path), "", f"expected what swarmwire writes at the start of a run, format {RUN_FORMAT}")
+    try:
+        if found["format"] != RUN_FORMAT:
+            raise KeyError
+        return _origin(found)
+    except (KeyError, TypeError, ValueError):
+        expected = f"expected what swarmwire writes at the start of a run, format {RUN_FORMAT}"
+        raise BadInput(str(path), "", expected) from None
 
 
-def _is_file(item: object) -> bool:
-    match item:
-        case {"path": str(), "sha256": str(), "what": str(), **rest} if not rest:
-            return True
-        case _:
-            return False
+def _origin(found: dict[str, Any]) -> Origin:
+    return Origin(
+        seeds=tuple(int(seed) for seed in found["seeds"]),
+        ticks=int(found["ticks"]),
+        runners=int(found["runners"]),
+        realtime=None if found["realtime"] is None else float(found["realtime"]),
+        recording=dict(found["recording"]),
+        files=tuple(CopiedFile(**file) for file in found["files"]),
+        modules=dict(found["modules"]),
+        cpu=str(found["cpu"]),
+        versions=dict(found["versions"]),
+    )

@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.protocols import Observer
@@ -36,7 +37,7 @@ class Repetition:
     @property
     def same(self) -> bool | None:
         """Whether every arena came out the same, bit for bit; None if there is nothing to compare with."""
-        return None if self.before is None else not self.differing
+        return None if self.before is None else self.before == tuple(self.result.trajectory_sha256)
 
 
 def repeat(
@@ -103,7 +104,7 @@ def _read_summary(folder: Path) -> _Summary | None:
     if not path.exists():
         return None
     try:
-        found: object = json.loads(path.read_text(encoding="utf-8"))
+        found: Any = json.loads(path.read_text(encoding="utf-8"))
     except ValueError:
         found = None
     match found:
@@ -119,7 +120,6 @@ def _inputs(folder: Path, origin: Origin, summary: _Summary | None) -> RecordedI
     inputs = recorded_inputs(folder)
     from_outside = (origin.realtime is not None and origin.runners > 0) or bool(summary and summary.inputs_sha256)
     if inputs is None and from_outside:
-        raise BadInput(
-            str(folder / INPUTS), "", "expected the recorded inputs, without which this run is no function of its seed"
-        )
+        expected = "expected the record of what came from outside, on which this run depends"
+        raise BadInput(str(folder / INPUTS), "", expected)
     return inputs

@@ -1,7 +1,7 @@
 """A scenario as the mapping that describes it: the way back from `scenario_from`, for whoever writes it to a file."""
 
 from copy import deepcopy
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from typing import Any, cast
 
 from pydantic import BaseModel
@@ -10,10 +10,11 @@ from swarmwire.world.scenario import Scenario
 
 
 def mapping_of(scenario: Scenario) -> dict[str, Any]:
-    """The mapping that gives an equal scenario: texts, numbers, lists and tables only, without what was left out.
+    """The mapping that gives an equal scenario: texts, numbers, lists and tables only.
 
     It is the mapping that the scenario was read from, as long as it still describes it; a scenario that was made or
-    changed in Python is taken apart instead. The mapping is the caller's own.
+    changed in Python is taken apart instead, and then says defaults of radio and events, too. The mapping is the
+    caller's own.
     """
     given = scenario.given
     if given is not None and same_content(Scenario.model_validate(given), scenario):
@@ -32,10 +33,7 @@ def _plain(value: object) -> object:
             {name: getattr(value, name) for name in type(value).model_fields if name in value.model_fields_set}
         )
     if is_dataclass(value) and not isinstance(value, type):
-        said = {of.name: getattr(value, of.name) for of in fields(value)}
-        return _table(
-            {of.name: said[of.name] for of in fields(value) if of.default is MISSING or said[of.name] != of.default}
-        )
+        return _table({of.name: getattr(value, of.name) for of in fields(value)})
     if isinstance(value, dict):
         return _table(cast("dict[str, object]", value))
     if isinstance(value, list | tuple):
