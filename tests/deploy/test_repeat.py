@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.comms.errors import BadInput
-from swarmwire.deploy import run
-from swarmwire.deploy.repetition import RepeatedRun, repeat
+from swarmwire.comms.errors import AgentFailed, BadInput
+from swarmwire.deploy import Simulation, repeat, run
+from swarmwire.deploy.repetition import RepeatedRun
+from swarmwire.deploy.trajectory_log import DIGESTS
 from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.scenario_mapping import same_content
 from tests.deploy.commands import LOSSY, ROOT, started, swarmwire
@@ -119,7 +120,7 @@ def test_an_agent_file_that_was_edited_since_is_named_and_its_run_is_another(tmp
     path.write_text(path.read_text().replace("0.5)", "0.6)"))  # of the same size, maybe within the same second
     repetition = repeat(tmp_path / "run")
     assert repetition.same is False
-    assert repetition.differing == [4]
+    assert repetition.first_difference == 0
     assert repetition.changes == ("files/mine.py is not as the run left it: its sha256 differs",)
     path.unlink()
     with pytest.raises(BadInput, match="there is no file"):
@@ -166,7 +167,7 @@ def test_the_command_says_same_or_different_and_names_what_changed(tmp_path, min
     path.write_text(path.read_text().replace("0.5)", "0.6)"))
     other = swarmwire("repeat", folder)
     assert (other.returncode, other.stderr) == (1, "")
-    assert "a different run" in other.stdout
+    assert "a different run from tick 0 on" in other.stdout
     assert "files/mine.py is not as the run left it" in other.stdout
     assert swarmwire("repeat", folder, "--quiet").stdout == ""
 
@@ -194,12 +195,47 @@ def test_the_command_refuses_what_is_no_run_folder(tmp_path):
     assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1)
 
 
-def test_a_run_that_was_killed_is_repeated_in_full_though_there_is_nothing_to_compare_with(tmp_path):
-    process = started(LOSSY, "--set", "duration_s=20", "--out", tmp_path / "run")
+@pytest.mark.parametrize("logged", [True, False])
+def test_a_run_that_was_killed_is_repeated_in_full_and_compared_as_far_as_it_came(tmp_path, mine, logged):
+    """As SIGKILL leaves it: the folder of a run that was stepped, before it could write its summary."""
+    with Simulation(mine, out=tmp_path / "run") as simulation:
+        simulation.run(7)
+        shutil.copytree(tmp_path / "run", tmp_path / "killed")
+    if not logged:
+        (tmp_path / "killed" / DIGESTS).unlink()
+    repetition = repeat(tmp_path / "killed")
+    assert repetition.result.ticks == 20
+    assert repetition.before is None
+    assert repetition.compared == (7 if logged else 0)
+    assert repetition.same is (True if logged else None)
+    assert repetition.why_not_all == "the run left no summary.json: it was killed"
+
+
+def test_the_command_repeats_a_killed_run(tmp_path, mine):
+    process = started(mine, "--set", "duration_s=100", "--out", tmp_path / "run")
     process.kill()
     process.communicate()
     assert not (tmp_path / "run" / "summary.json").exists()
     ended = swarmwire("repeat", tmp_path / "run", "--out", tmp_path / "again")
-    assert (ended.returncode, ended.stderr) == (1, "")
-    assert "nothing to compare with: the run left no summary.json" in ended.stdout
-    assert json.loads((tmp_path / "again" / "summary.json").read_text())["ticks"] == 200
+    assert ended.stderr == ""
+    assert "the run left no summary.json" in ended.stdout
+    assert json.loads((tmp_path / "again" / "summary.json").read_text())["ticks"] == 1000
+
+
+def test_a_run_that_an_agent_ended_is_repeated_up_to_there(tmp_path, mine):
+    path = mine.parent / "mine.py"
+    failing = "        if robots.time_s > 0.45:\n            raise ValueError('enough')\n        robots.drive"
+    path.write_text(FILE_AGENT.replace("        robots.drive", failing))
+    with pytest.raises(AgentFailed):
+        run(mine, out=tmp_path / "run")
+    repetition = repeat(tmp_path / "run")
+    assert repetition.same
+    assert repetition.result.ticks == 5
+
+
+def test_the_first_tick_that_came_out_differently_is_named(tmp_path, mine):
+    run(mine, out=tmp_path / "run")
+    path = tmp_path / "run" / "files" / "mine.py"
+    path.write_text(FILE_AGENT.replace("0.5)", "0.5 if robots.time_s < 0.95 else 0.6)"))
+    repetition = repeat(tmp_path / "run")
+    assert (repetition.same, repetition.first_difference) == (False, 10)

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy import run
+from swarmwire.deploy import repeat, run
 from swarmwire.deploy.inputs import INPUTS
-from swarmwire.deploy.repetition import repeat
 from tests.deploy.commands import LOSSY
 from tests.deploy.test_realtime import Watcher, runners_here, still
 
@@ -120,8 +119,8 @@ def test_a_record_that_is_cut_off_is_repeated_as_far_as_it_is_whole(in_real_time
     data = (in_real_time / INPUTS).read_bytes()
     (in_real_time / INPUTS).write_bytes(data[:-10])
     repetition = repeat(in_real_time)
-    assert repetition.same is None
-    assert repetition.why_not == "this is 9 of the run's 10 ticks"
+    assert (repetition.before, repetition.compared, repetition.same) == (None, 9, True)
+    assert repetition.why_not_all == "this is 9 of the run's 10 ticks"
     assert repetition.changes == (f"{INPUTS} is not as the run left it: its sha256 differs",)
     (in_real_time / "summary.json").unlink()
     assert repeat(in_real_time).result.ticks == 9

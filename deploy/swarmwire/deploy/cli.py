@@ -6,7 +6,10 @@ import typer
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.commands.check import check_command
+from swarmwire.deploy.commands.describe import describe_command
 from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
+from swarmwire.deploy.commands.list_kinds import list_command
+from swarmwire.deploy.commands.new import new_command
 from swarmwire.deploy.commands.repeat import repeat_command
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
@@ -24,6 +27,9 @@ app.command("repeat")(repeat_command)
 app.command("check")(check_command)
 app.command("screenshot")(screenshot_command)
 app.command("schema")(schema_command)
+app.command("list")(list_command)
+app.command("describe")(describe_command)
+app.command("new")(new_command)
 
 
 def main() -> None:

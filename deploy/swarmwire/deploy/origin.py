@@ -13,7 +13,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import machine
 from swarmwire.deploy.folder import write_whole
 from swarmwire.deploy.modules import changed_modules, module_digests
-from swarmwire.deploy.scenario_copy import CopiedFile, changed_files
+from swarmwire.deploy.scenario_copy import CopiedFile, changed_files, copy_scenario
+from swarmwire.world.scenario import Scenario
 
 RUN_FORMAT = 1
 RUN_JSON = "run.json"
@@ -27,26 +28,47 @@ class Origin:
     ticks: int  # that the run was to have
     runners: int  # 0: all agents in the world's process
     realtime: float | None  # simulated s per s of wall time; None: lockstep, as fast as may be
-    recording: Mapping[str, Any]  # options that change what is recorded, never what happens
     files: tuple[CopiedFile, ...]
     modules: Mapping[str, str]  # sha256 of the installed code, by module
     cpu: str
     versions: Mapping[str, str]
 
-    def write(self, folder: Path) -> None:
-        """Write `run.json`."""
-        write_whole(folder / RUN_JSON, json.dumps({"format": RUN_FORMAT, **asdict(self)}, indent=2) + "\n")
-
-    def changes(self, folder: Path, specs: Mapping[str, str]) -> list[str]:
-        """What is not as it was when the run of this folder began, a line each; `specs` are its agents."""
+    def changes(self, folder: Path, agents: Mapping[str, str]) -> list[str]:
+        """What is not as it was when the run of this folder began, a line each; `agents` are their specs by group."""
         versions = machine.versions()
         changed = [name for name in self.versions if self.versions[name] != versions.get(name)]
         return [
             *changed_files(self.files, folder),
-            *changed_modules(self.modules, module_digests(specs.values())),
+            *changed_modules(self.modules, module_digests(agents.values())),
             *(f"{name} is {versions.get(name, 'not there')}; it was {self.versions[name]}" for name in changed),
             *([f"the CPU is {machine.cpu()}; it was {self.cpu}"] if machine.cpu() != self.cpu else []),
         ]
+
+
+def origin_of(
+    scenario: Scenario,
+    agents: Mapping[str, str],
+    *,
+    seeds: tuple[int, ...],
+    ticks: int,
+    runners: int,
+    realtime: float | None,
+    folder: Path | None,
+) -> Origin:
+    """The origin of a run that is about to begin; put into its run folder, if it has one, with the copied files."""
+    origin = Origin(
+        seeds=seeds,
+        ticks=ticks,
+        runners=runners,
+        realtime=realtime,
+        files=copy_scenario(scenario, seeds, folder) if folder else (),
+        modules=module_digests(agents.values()),
+        cpu=machine.cpu(),
+        versions=machine.versions(),
+    )
+    if folder:
+        write_whole(folder / RUN_JSON, json.dumps({"format": RUN_FORMAT, **asdict(origin)}, indent=2) + "\n")
+    return origin
 
 
 def read_origin(folder: Path) -> Origin:
@@ -75,7 +97,6 @@ def _origin(found: dict[str, Any]) -> Origin:
         ticks=int(found["ticks"]),
         runners=int(found["runners"]),
         realtime=None if found["realtime"] is None else float(found["realtime"]),
-        recording=dict(found["recording"]),
         files=tuple(CopiedFile(**file) for file in found["files"]),
         modules=dict(found["modules"]),
         cpu=str(found["cpu"]),

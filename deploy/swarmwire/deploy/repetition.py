@@ -8,13 +8,14 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.protocols import Observer
-from swarmwire.deploy.folder import make_folder
+from swarmwire.deploy.arguments import Runners
 from swarmwire.deploy.inputs import INPUTS, RecordedInputs, recorded_inputs
 from swarmwire.deploy.origin import Origin, read_origin
 from swarmwire.deploy.result import Result
-from swarmwire.deploy.run import Execution, Runners
+from swarmwire.deploy.running import finished
 from swarmwire.deploy.scenario_copy import SCENARIO
-from swarmwire.world.scenario_file import load_scenario
+from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.trajectory_log import TrajectoryCheck
 
 SUMMARY = "summary.json"
 
@@ -24,20 +25,18 @@ class Repetition:
     """A run that was run again."""
 
     result: Result  # of the repetition
-    before: tuple[str, ...] | None  # trajectory hash of each arena of the run; None: there is nothing to compare with
-    why_not: str  # why there is nothing to compare with, or ""
+    before: tuple[str, ...] | None  # trajectory hash of each arena of the run; None: it left none, or not of this end
+    compared: int  # ticks, from the first, that could be compared
+    first_difference: int | None  # the first tick that came out differently
+    why_not_all: str  # why it is not the whole run that was compared, or ""
     changes: tuple[str, ...]  # what is not as it was when the run began: files, modules, versions, CPU; a line each
 
     @property
-    def differing(self) -> list[int]:
-        """Seeds of the arenas that came out differently."""
-        pairs = zip(self.result.arenas, self.before or (), strict=False)
-        return [arena.seed for arena, before in pairs if arena.trajectory_sha256 != before]
-
-    @property
     def same(self) -> bool | None:
-        """Whether every arena came out the same, bit for bit; None if there is nothing to compare with."""
-        return None if self.before is None else self.before == tuple(self.result.trajectory_sha256)
+        """Whether it came out the same, bit for bit, as far as can be told; None if there is nothing to compare with."""
+        if self.before is not None:
+            return self.before == tuple(self.result.trajectory_sha256)
+        return self.first_difference is None if self.compared else None
 
 
 def repeat(
@@ -45,47 +44,69 @@ def repeat(
 ) -> Repetition:
     """Run the run of this folder again, and compare the trajectory hashes.
 
-    It has as many ticks as the run had, also if that was interrupted. `runners` are as for `run`; a run into which
+    It has as many ticks as the run had, also if that was interrupted or failed; all that it was to have, if it was
+    killed. `runners` are as for `run`; a run into which
     something came from outside takes none, since its record plays their part. `out`, a new or empty folder, becomes the
     repetition's own run folder.
 
     Raises BadInput if this is no run folder or it cannot be run any more, and what `run` raises.
     """
-    repeated = RepeatedRun(Path(folder), runners)
-    if out is not None:
-        repeated.execution.folder = make_folder(Path(out))
-    return repeated.run(observers)
+    return RepeatedRun(folder, runners=runners, out=out, observers=observers).run()
 
 
 class RepeatedRun:
-    """A run on its way to its repetition; `execution` may still be told where and what to record."""
+    """A run on its way to its repetition, with the arguments of `repeat`.
 
-    def __init__(self, folder: Path, runners: Runners = None) -> None:
-        self.folder, self.origin = folder, read_origin(folder)
+    Attributes:
+        simulation: what will run.
+        origin: from what the run was made.
+    """
+
+    def __init__(
+        self,
+        folder: Path | str,
+        *,
+        runners: Runners = None,
+        out: Path | str | None = None,
+        observers: Sequence[Observer] = (),
+    ) -> None:
+        self._folder = folder = Path(folder)
+        self.origin = read_origin(folder)
         self._summary = _read_summary(folder)
         self._inputs = _inputs(folder, self.origin, self._summary)
         if self._inputs is not None and runners not in (None, "none"):
             raise BadInput("--runners", "", f'expected "none": {INPUTS} says what the runners did; got {runners!r}')
-        execution = self.execution = Execution(load_scenario(folder / SCENARIO), self.origin.seeds, runners)
-        execution.inputs, execution.ticks = self._inputs, self._ticks()
+        self.simulation = Simulation(
+            folder / SCENARIO, seeds=self.origin.seeds, runners=runners, out=out, observers=observers
+        )
+        self.simulation.inputs, self.simulation.ticks = self._inputs, self._ticks()
+        self._check = TrajectoryCheck(folder, self.simulation.hashes)
+        self.simulation.watch(self._check)
 
-    def run(self, observers: Sequence[Observer] = ()) -> Repetition:
+    def run(self) -> Repetition:
         """Run it, and compare."""
-        changes = self.origin.changes(self.folder, self.execution.specs)
+        changes = self.origin.changes(self._folder, self.simulation.agents)
         summary, inputs = self._summary, self._inputs
         if summary and summary.inputs_sha256 and inputs and inputs.sha256 != summary.inputs_sha256:
             changes.append(f"{INPUTS} is not as the run left it: its sha256 differs")
-        result = self.execution.run(observers)
-        why_not = self._why_not(result)
-        return Repetition(result, None if why_not or not summary else summary.hashes, why_not, tuple(changes))
+        result = finished(self.simulation)
+        why_not_all = self._why_not_all(result)
+        return Repetition(
+            result=result,
+            before=summary.hashes if summary and not why_not_all else None,
+            compared=self._check.compared,
+            first_difference=self._check.first_difference,
+            why_not_all=why_not_all,
+            changes=tuple(changes),
+        )
 
     def _ticks(self) -> int:
         wanted = self._summary.ticks if self._summary else self.origin.ticks
         return min(wanted, self._inputs.end_tick) if self._inputs else wanted
 
-    def _why_not(self, result: Result) -> str:
+    def _why_not_all(self, result: Result) -> str:
         if self._summary is None:
-            return f"the run left no {SUMMARY}: it was killed or it failed"
+            return f"the run left no {SUMMARY}: it was killed"
         if result.ticks < self._summary.ticks:
             return f"this is {result.ticks} of the run's {self._summary.ticks} ticks"
         return ""

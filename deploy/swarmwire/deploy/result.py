@@ -74,7 +74,7 @@ class Result:
     robots: int  # in each arena
     runners: int  # 0: all agents in the world's process
     mode: str  # "local" | "lockstep" | "realtime"
-    ended: str  # "duration" | "interrupted"
+    ended: str  # "duration" | "interrupted" | "left" (by whoever stepped it) | "failed"
     ticks: int
     sim_time_s: float
     wall_time_s: float  # of the loop
@@ -90,6 +90,7 @@ class Result:
     inputs: InputsRecord | None = None  # what came from outside, if anything did
     lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
     realtime: RealTimeReport | None = None
+    error: str | None = None  # why it failed
     out: Path | None = field(default=None, compare=False)  # the run folder
 
     @property
@@ -127,6 +128,7 @@ class Result:
             "runners": self.runners,
             "mode": self.mode,
             "ended": self.ended,
+            "error": self.error,
             "ticks": self.ticks,
             "sim_time_s": self.sim_time_s,
             "wall_time_s": self.wall_time_s,

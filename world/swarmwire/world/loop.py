@@ -36,7 +36,7 @@ class Loop:
         while self.ticks_done < ticks and not stopped():
             self.step()
 
-    def step(self) -> None:
+    def step(self) -> Truth:
         """One tick, in the order of the design: events, air, senses, crew, air, physics, observers."""
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
@@ -78,6 +78,7 @@ class Loop:
         for observer in self.observers:
             observer.see(truth)
         self.ticks_done += 1
+        return truth
 
     def end(self) -> Tally | None:
         """End the air: what was in flight, and what no observer has seen of a tick that was broken off."""

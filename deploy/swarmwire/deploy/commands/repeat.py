@@ -8,7 +8,6 @@ from rich.console import Console
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.deploy.commands.exit_codes import DIFFERENT, INTERRUPTED
-from swarmwire.deploy.folder import make_folder
 
 if TYPE_CHECKING:
     from swarmwire.deploy.repetition import Repetition
@@ -26,19 +25,17 @@ def repeat_command(
 ) -> None:
     """Run a run again from its folder alone, and tell whether it came out the same, bit for bit.
 
-    Exit code 0: the same; 1: different, or there is nothing to compare with; 2: the folder holds no run that can be
-    repeated.
+    Exit code 0: the same, as far as can be compared; 1: different, or there is nothing to compare with; 2: the folder
+    holds no run that can be repeated.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.progress import ProgressLine
     from swarmwire.deploy.repetition import RepeatedRun
 
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
-    repeated = RepeatedRun(folder, runners)
-    if out is not None:
-        repeated.execution.folder = make_folder(out)
-    ticks = repeated.execution.ticks
-    repetition = repeated.run([ProgressLine(ticks, WallClock(), console)])
+    repeated = RepeatedRun(folder, runners=runners, out=out)
+    repeated.simulation.watch(ProgressLine(repeated.simulation.ticks, WallClock(), console))
+    repetition = repeated.run()
     _print(repetition, console)
     if out is not None:
         console.print(f"written: {out}")
@@ -49,19 +46,24 @@ def repeat_command(
 
 
 def _print(repetition: "Repetition", console: Console) -> None:
-    for arena, before in zip(repetition.result.arenas, repetition.before or (), strict=False):
-        now = arena.trajectory_sha256
-        verdict = "the same" if now == before else f"different, it was {before[:16]}…"
-        console.print(f"seed {arena.seed}: trajectory {now[:16]}…: {verdict}")
-    if repetition.same is None:
-        console.print(f"nothing to compare with: {repetition.why_not}")
-    elif repetition.same:
-        console.print(f"the same run, bit for bit: {repetition.result.ticks} ticks")
-    else:
-        console.print("a different run")
+    for arena in repetition.result.arenas:
+        console.print(f"seed {arena.seed}: trajectory {arena.trajectory_sha256[:16]}…")
+    console.print(_verdict(repetition))
     if repetition.changes:
         console.print("changed since the run:")
     elif repetition.same is False:
         console.print("files, modules, versions and CPU are the same: does an agent draw or read the time by itself?")
     for change in repetition.changes:
         console.print(f"  {change}", markup=False)
+
+
+def _verdict(repetition: "Repetition") -> str:
+    why_not_all = repetition.why_not_all
+    if repetition.same is None:
+        return f"nothing to compare with: {why_not_all}"
+    if not repetition.same:
+        at = repetition.first_difference
+        return "a different run" + ("" if at is None else f" from tick {at} on")
+    if why_not_all:
+        return f"the same, bit for bit, in the {repetition.compared} ticks that can be compared: {why_not_all}"
+    return f"the same run, bit for bit: {repetition.result.ticks} ticks"

@@ -11,7 +11,7 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
 from swarmwire.deploy.commands.options import Overrides, ScenarioFile
-from swarmwire.deploy.folder import default_folder, make_folder
+from swarmwire.deploy.folder import default_folder
 from swarmwire.deploy.report import print_result
 from swarmwire.deploy.result import Result
 
@@ -46,16 +46,19 @@ def run_command(
     Without --realtime the same scenario and seed give the same run bit for bit, whatever --runners says.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
+    from swarmwire.deploy.arguments import choose_seeds
     from swarmwire.deploy.progress import ProgressLine
-    from swarmwire.deploy.run import Execution, choose_seeds
+    from swarmwire.deploy.running import finished
+    from swarmwire.deploy.simulation import Simulation
     from swarmwire.world.scenario_file import load_scenario
 
     console = Console(quiet=quiet, highlight=False)
     checked = load_scenario(scenario, overrides or [])
     chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
-    execution = Execution(checked, chosen, runners, socket=socket, realtime=realtime)
-    folder = execution.folder = make_folder(out or default_folder(scenario.stem, chosen))
-    result = execution.run([ProgressLine(execution.ticks, WallClock(), console)])
+    folder = out or default_folder(scenario.stem, chosen)
+    simulation = Simulation(checked, seeds=chosen, runners=runners, out=folder, socket=socket, realtime=realtime)
+    simulation.watch(ProgressLine(simulation.ticks, WallClock(), console))
+    result = finished(simulation)
     print_result(result, console)
     _say_where(result, folder, console)
     if result.ended == "interrupted":
