@@ -5,14 +5,17 @@ import shutil
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner, Result
 
 from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.deploy import Simulation, repeat, run
+from swarmwire.deploy.cli import app
+from swarmwire.deploy.modules import PARTS, module_digests
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.deploy.trajectory_log import DIGESTS
 from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.scenario_mapping import same_content
-from tests.deploy.commands import LOSSY, ROOT, started, swarmwire
+from tests.deploy.commands import LOSSY, ROOT, started
 
 SHORT = ["duration_s=2"]
 FILE_AGENT = """
@@ -142,6 +145,17 @@ def test_a_changed_installed_module_is_named(tmp_path, mine, monkeypatch):
     assert repetition.changes == ("module circling_agents has changed since",)
 
 
+def test_parts_of_swarmwire_are_named_once_and_a_lone_module_is_its_file(tmp_path, monkeypatch):
+    (tmp_path / "lone_circler.py").write_text(FILE_AGENT)
+    monkeypatch.syspath_prepend(tmp_path)
+    digests = module_digests(["swarmwire.agent.behaviours:Flocking", "lone_circler:Circler", "/some/where.py:Mine"])
+    assert set(digests) == {*PARTS, "lone_circler"}
+    (tmp_path / "beside.py").write_text("")
+    assert module_digests(["lone_circler:Circler"])["lone_circler"] == digests["lone_circler"]
+    (tmp_path / "lone_circler.py").write_text(FILE_AGENT + "#")
+    assert module_digests(["lone_circler:Circler"])["lone_circler"] != digests["lone_circler"]
+
+
 def test_what_the_run_ran_on_is_compared(tmp_path):
     run(LOSSY, overrides=SHORT, out=tmp_path / "run")
     path = tmp_path / "run" / "run.json"
@@ -156,20 +170,34 @@ def test_what_the_run_ran_on_is_compared(tmp_path):
     assert changes[2].endswith("; it was Z80")
 
 
+def called(*arguments: str | Path) -> Result:
+    """The command in this process, which has long imported all that it needs."""
+    return CliRunner().invoke(app, ["repeat", *map(str, arguments)])
+
+
 def test_the_command_says_same_or_different_and_names_what_changed(tmp_path, mine):
     folder = tmp_path / "run"
     run(mine, out=folder)
-    same = swarmwire("repeat", folder, "--out", tmp_path / "again")
-    assert (same.returncode, same.stderr) == (0, "")
+    same = called(folder, "--out", tmp_path / "again")
+    assert same.exit_code == 0
     assert "the same run, bit for bit: 20 ticks" in same.stdout
     assert (tmp_path / "again" / "summary.json").exists()
+    assert called(folder, "--quiet").stdout == ""
     path = folder / "files" / "mine.py"
     path.write_text(path.read_text().replace("0.5)", "0.6)"))
-    other = swarmwire("repeat", folder)
-    assert (other.returncode, other.stderr) == (1, "")
+    other = called(folder)
+    assert other.exit_code == 1
     assert "a different run from tick 0 on" in other.stdout
     assert "files/mine.py is not as the run left it" in other.stdout
-    assert swarmwire("repeat", folder, "--quiet").stdout == ""
+
+
+def test_an_agent_that_draws_by_itself_is_suspected(tmp_path, mine):
+    path = mine.parent / "mine.py"
+    path.write_text("import random\n" + FILE_AGENT.replace("0.5)", "random.random())"))
+    run(mine, out=tmp_path / "run")
+    other = called(tmp_path / "run")
+    assert other.exit_code == 1
+    assert "does an agent draw or read the time by itself?" in other.stdout
 
 
 @pytest.mark.parametrize(
@@ -190,11 +218,6 @@ def test_what_is_no_run_folder_is_refused_in_one_line(tmp_path, mine, spoil, exp
     assert "\n" not in str(caught.value)
 
 
-def test_the_command_refuses_what_is_no_run_folder(tmp_path):
-    ended = swarmwire("repeat", tmp_path)
-    assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1)
-
-
 @pytest.mark.parametrize("logged", [True, False])
 def test_a_run_that_was_killed_is_repeated_in_full_and_compared_as_far_as_it_came(tmp_path, mine, logged):
     """As SIGKILL leaves it: the folder of a run that was stepped, before it could write its summary."""
@@ -211,15 +234,14 @@ def test_a_run_that_was_killed_is_repeated_in_full_and_compared_as_far_as_it_cam
     assert repetition.why_not_all == "the run left no summary.json: it was killed"
 
 
-def test_the_command_repeats_a_killed_run(tmp_path, mine):
+def test_a_process_that_was_killed_leaves_enough_to_repeat_its_run(tmp_path, mine):
     process = started(mine, "--set", "duration_s=100", "--out", tmp_path / "run")
     process.kill()
     process.communicate()
     assert not (tmp_path / "run" / "summary.json").exists()
-    ended = swarmwire("repeat", tmp_path / "run", "--out", tmp_path / "again")
-    assert ended.stderr == ""
-    assert "the run left no summary.json" in ended.stdout
-    assert json.loads((tmp_path / "again" / "summary.json").read_text())["ticks"] == 1000
+    ended = called(tmp_path / "run")
+    assert "the run left no summary.json: it was killed" in ended.stdout
+    assert "1000 ticks at 10 Hz" in ended.stdout
 
 
 def test_a_run_that_an_agent_ended_is_repeated_up_to_there(tmp_path, mine):

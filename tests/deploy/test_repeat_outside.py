@@ -2,13 +2,19 @@
 
 import signal
 import struct
+import subprocess
+import sys
 from pathlib import Path
 
+import numpy as np
+import psutil
 import pytest
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.senses import Actions, Senses
 from swarmwire.deploy import repeat, run
-from swarmwire.deploy.inputs import INPUTS
+from swarmwire.deploy.inputs import INPUTS, RecordedCrew
 from tests.deploy.commands import LOSSY
 from tests.deploy.test_realtime import Watcher, runners_here, still
 
@@ -37,6 +43,10 @@ def talkers(tmp_path) -> list[str]:
 
 def interrupt() -> None:
     signal.raise_signal(signal.SIGINT)
+
+
+def killed(runner: psutil.Process) -> None:
+    runner.kill()
 
 
 def recorded_ticks(folder: Path) -> int:
@@ -84,11 +94,8 @@ def test_a_run_in_real_time_with_late_answers_is_the_same_again(tmp_path, talker
 
 @pytest.mark.parametrize("realtime", [None, 10])
 def test_a_run_that_lost_a_runner_is_the_same_again(tmp_path, talkers, realtime):
-    def kill() -> None:
-        runners_here()[0].kill()
-
     watcher = Watcher(
-        (lambda truth: truth.tick >= 5, kill),
+        (lambda truth: truth.tick >= 5, lambda: killed(runners_here()[0])),
         *[(lambda truth: still(truth) == 5, lambda: None)] * 10,
         (lambda truth: still(truth) == 5, interrupt),
     )
@@ -101,6 +108,25 @@ def test_a_run_that_lost_a_runner_is_the_same_again(tmp_path, talkers, realtime)
     repetition = repeat(tmp_path / "run")
     assert repetition.same
     assert repetition.result.ticks == result.ticks
+
+
+def test_a_run_whose_lost_runner_was_replaced_by_a_fresh_one_is_the_same_again(tmp_path, talkers, monkeypatch):
+    takeovers: list[subprocess.Popen[bytes]] = []
+
+    def take_over(text: str) -> None:
+        command = text.partition("such as: python ")[2].replace("NAME", "fresh").split()
+        takeovers.append(subprocess.Popen([sys.executable, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE))
+
+    monkeypatch.setattr("swarmwire.deploy.simulation._say", take_over)
+    setting = [*talkers, "duration_s=1.5", "run.on_runner_loss=wait"]
+    watcher = Watcher((lambda truth: truth.tick >= 5, lambda: killed(runners_here()[0])))
+    try:
+        result = run(LOSSY, overrides=setting, runners=2, out=tmp_path / "run", observers=[watcher])
+    finally:
+        for process in takeovers:
+            process.communicate()
+    assert (len(takeovers), len(result.lost_runners), result.ended) == (1, 1, "duration")
+    assert repeat(tmp_path / "run").same
 
 
 def test_a_lockstep_run_that_may_lose_runners_but_lost_none_needs_no_record(tmp_path, talkers):
@@ -132,6 +158,12 @@ def test_a_record_that_is_missing_or_damaged_is_refused(in_real_time):
     (in_real_time / INPUTS).write_bytes(data)
     with pytest.raises(BadInput, match="expected the actions of a tick"):
         repeat(in_real_time)
+    scenario = in_real_time / "scenario.toml"
+    data[10] ^= 0xFF
+    (in_real_time / INPUTS).write_bytes(data)
+    scenario.write_text(scenario.read_text().replace("count = 20", "count = 19"))
+    with pytest.raises(BadInput, match="rows: expected robots of 19"):
+        repeat(in_real_time)
     (in_real_time / INPUTS).unlink()
     with pytest.raises(BadInput, match="what came from outside"):
         repeat(in_real_time)
@@ -139,3 +171,27 @@ def test_a_record_that_is_missing_or_damaged_is_refused(in_real_time):
 
 def test_the_record_of_a_run_in_real_time_has_each_tick(in_real_time):
     assert recorded_ticks(in_real_time) == 10
+
+
+class Standing:
+    """A crew whose robot stands."""
+
+    def start(self) -> None: ...
+
+    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+        return Actions(np.zeros(1, np.int64), np.ones(1, np.bool_), np.zeros(1), np.zeros(1))
+
+    def counts(self) -> dict[str, int]:
+        return {}
+
+    def close(self) -> None: ...
+
+
+def test_a_record_that_cannot_be_written_does_not_end_the_run_and_is_counted(tmp_path):
+    (tmp_path / "inputs").write_text("in the way")
+    crew = RecordedCrew(Standing(), tmp_path, lambda tick: tick >= 2)
+    for tick in range(5):
+        crew.act(tick, {}, Heard.none())
+    record = crew.record()
+    assert record is not None
+    assert (record.first_tick, record.ticks, record.ticks_not_recorded) == (2, 0, 3)

@@ -1,4 +1,4 @@
-"""Where things run: `run` a scenario from Python, step a `Simulation`, `repeat` a run; the command line does the same."""
+"""Where things run: `run` a scenario from Python, step a `Simulation`, or `repeat` a run; so does the command line."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

@@ -107,13 +107,16 @@ class RecordedInputs:
         """The first tick after those recorded."""
         return self.first_tick + self.ticks
 
-    def actions(self, tick: int) -> Actions:
-        """What the robots did in a recorded tick; BadInput if the file does not say."""
+    def actions(self, tick: int, robots: int) -> Actions:
+        """What the robots, so many in all arenas, did in a recorded tick; BadInput if the file does not say."""
         frame = self._frame(tick - self.first_tick)
         try:
             if frame.kind != "actions" or frame.tick != tick or "rows" not in frame.arrays:
                 raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
-            return decode_actions(frame, frame.arrays["rows"])
+            rows = frame.arrays["rows"]
+            if ((rows < 0) | (rows >= robots)).any():
+                raise BadFrame("malformed", f"rows: expected robots of {robots}")
+            return decode_actions(frame, rows)
         except BadFrame as fault:
             raise self._damaged(tick, fault) from None
 
@@ -131,15 +134,16 @@ class RecordedInputs:
 class ReplayedCrew:
     """A crew whose agents act until the first recorded tick; from there on the record does."""
 
-    def __init__(self, agents: Crew, inputs: RecordedInputs) -> None:
-        self._agents, self._inputs = agents, inputs
+    def __init__(self, agents: Crew, inputs: RecordedInputs, robots: int) -> None:
+        """`robots` in all arenas."""
+        self._agents, self._inputs, self._robots = agents, inputs, robots
         self.start, self.counts, self.close = agents.start, agents.counts, agents.close
 
     def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
         """What every robot does in this tick, or did."""
         if tick < self._inputs.first_tick:
             return self._agents.act(tick, senses, heard)
-        return self._inputs.actions(tick)
+        return self._inputs.actions(tick, self._robots)
 
 
 def recorded_inputs(folder: Path) -> RecordedInputs | None:

@@ -33,7 +33,7 @@ class Repetition:
 
     @property
     def same(self) -> bool | None:
-        """Whether it came out the same, bit for bit, as far as can be told; None if there is nothing to compare with."""
+        """Whether it came out the same, bit for bit, as far as can be told; None: there is nothing to compare."""
         if self.before is not None:
             return self.before == tuple(self.result.trajectory_sha256)
         return self.first_difference is None if self.compared else None

@@ -204,7 +204,8 @@ class Simulation:
 
     def _acting(self) -> Crew:
         """The crew as the loop has it: replayed as far as there are inputs, and recorded as far as need be."""
-        crew = self._crew if self.inputs is None else ReplayedCrew(self._crew, self.inputs)
+        rows = self.static.arenas * self.static.robots
+        crew = self._crew if self.inputs is None else ReplayedCrew(self._crew, self.inputs, rows)
         if self.folder is None:
             return crew
         self._recorded = RecordedCrew(crew, self.folder, self._from_outside)

@@ -1,6 +1,6 @@
 """How a run went, tick by tick, in 8 bytes each: `trajectory.digests`, by which two runs are told apart at the tick.
 
-Each is the start of a SHA-256 over the trajectory hashes of all arenas so far. A run that is killed has them for all the
+Each is the start of a SHA-256 over the trajectory hashes of all arenas so far. A run that is killed leaves them for all
 ticks that it did.
 """
 
