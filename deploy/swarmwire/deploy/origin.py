@@ -79,7 +79,7 @@ def read_origin(folder: Path) -> Origin:
     try:
         found: Any = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise BadInput(str(path), "", f"expected a run folder with its {RUN_JSON}: {error.strerror}") from None
+        raise BadInput(str(folder), "", f"expected a run folder, with its {RUN_JSON}: {error.strerror}") from None
     except ValueError:  # no JSON, or no UTF-8
         found = None
     try:

@@ -106,7 +106,7 @@ class RepeatedRun:
 
     def _why_not_all(self, result: Result) -> str:
         if self._summary is None:
-            return f"the run left no {SUMMARY}: it was killed"
+            return f"the run left no {SUMMARY}: it was killed, or still goes on"
         if result.ticks < self._summary.ticks:
             return f"this is {result.ticks} of the run's {self._summary.ticks} ticks"
         return ""
