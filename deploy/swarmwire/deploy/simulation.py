@@ -39,7 +39,7 @@ GLOBAL_SENSES = ("compass", "positioning")
 
 
 class Simulation:
-    """A scenario, checked and ready; entered, it has its agents and can be stepped; left, it has a result.
+    """A scenario, checked and ready; entered, it has its agents and can be stepped; left, it has a result::
 
         with Simulation("scenario.toml", seed=3) as simulation:
             while simulation.tick < 100:
@@ -141,7 +141,7 @@ class Simulation:
         with ExitStack() as stack:
             self._crew: Crew = stack.enter_context(self._crews.crew())
             self._watching: list[Observer] = [self.metrics, RadioTally(), EventLog(), *self._observers]
-            self._loop = Loop(self.world, self.air(), self._acting(), self._watching, self.scenario.events)
+            self._loop = Loop(self.world, self._air(), self._acting(), self._watching, self.scenario.events)
             self._crew.start()
             for observer in self._watching:
                 observer.begin(self.static)
@@ -176,7 +176,7 @@ class Simulation:
         if self.folder:
             self._result.write(self.folder / "summary.json")
 
-    def air(self) -> Air | None:
+    def _air(self) -> Air | None:
         """A new air of the scenario's radio, if it has one."""
         static, radio = self.static, self.scenario.radio
         if radio is None:
