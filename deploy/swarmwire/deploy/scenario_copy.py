@@ -12,7 +12,6 @@ import hashlib
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import tomli_w
 
@@ -87,7 +86,7 @@ class _Copies:
 
 
 def _header(scenario: Scenario) -> str:
-    source: Any = Path(scenario.source).name or "a Scenario made in Python"
+    source = Path(scenario.source).name or "a Scenario made in Python"
     return f"# As run by swarmwire {version('swarmwire-deploy')}, from {source}, with overrides and seed as run.\n"
 
 
