@@ -39,7 +39,9 @@ GLOBAL_SENSES = ("compass", "positioning")
 
 
 class Simulation:
-    """A scenario, checked and ready; entered, it has its agents and can be stepped; left, it has a result::
+    """A scenario, checked and ready; entered, it has its agents and can be stepped; left, it has a result.
+
+    So::
 
         with Simulation("scenario.toml", seed=3) as simulation:
             while simulation.tick < 100:
