@@ -16,6 +16,7 @@ from swarmwire.deploy.commands.repeat import repeat_command
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
+from swarmwire.deploy.commands.verify import verify_command
 
 app = typer.Typer(
     help="A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own.",
@@ -34,6 +35,7 @@ app.command("schema")(schema_command)
 app.command("list")(list_command)
 app.command("describe")(describe_command)
 app.command("new")(new_command)
+app.command("verify")(verify_command)
 
 
 def main() -> None:
