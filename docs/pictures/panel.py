@@ -14,7 +14,8 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy.figures import Figures
 from swarmwire.deploy.panel_view import panel_view
-from swarmwire.deploy.run import Execution, choose_seeds
+from swarmwire.deploy.running import finished
+from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.scenario_file import load_scenario
 
 DOCS = Path(__file__).parents[1]
@@ -27,9 +28,9 @@ RUNNERS = 4
 class Picture:
     """Observer that draws the panel of one tick and ends the run."""
 
-    def __init__(self, execution: Execution, console: Console) -> None:
-        self._execution, self._console = execution, console
-        self._figures = Figures(execution.ticks, execution.metrics, WallClock())
+    def __init__(self, simulation: Simulation, console: Console) -> None:
+        self._simulation, self._console = simulation, console
+        self._figures = Figures(simulation.ticks, simulation.metrics, WallClock())
 
     def begin(self, static: Static) -> None:
         """Look on from here."""
@@ -39,9 +40,9 @@ class Picture:
         """Draw, if it is the tick."""
         self._figures.see(truth)
         if truth.tick == AT_TICK:
-            execution = self._execution
-            self._console.print(panel_view(self._figures, execution.controls, execution.health(), WIDTH, keys=True))
-            execution.controls.quit()
+            simulation = self._simulation
+            self._console.print(panel_view(self._figures, simulation.controls, simulation.health(), WIDTH, keys=True))
+            simulation.controls.quit()
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """Nothing is left to draw."""
@@ -54,8 +55,9 @@ def main() -> None:
         record=True, width=WIDTH, height=HEIGHT, file=io.StringIO(), force_terminal=True, color_system="truecolor"
     )
     scenario = load_scenario(DOCS.parent / SCENARIO)
-    execution = Execution(scenario, choose_seeds(scenario, None, None), RUNNERS)
-    execution.run([Picture(execution, console)])
+    simulation = Simulation(scenario, runners=RUNNERS)
+    simulation.watch(Picture(simulation, console))
+    finished(simulation)
     svg = console.export_svg(title=f"swarmwire run {SCENARIO} --runners {RUNNERS}", unique_id="panel")
     # The font would be fetched from the network by whoever looks at the picture.
     (DOCS / "panel.svg").write_text(re.sub(r"\s*@font-face \{.*?\}", "", svg, flags=re.DOTALL), encoding="utf-8")

@@ -10,9 +10,9 @@ from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.bindings import BINDINGS, press
 from swarmwire.deploy.controls import LOOK_NS, Controls
-from swarmwire.deploy.run import Execution
+from swarmwire.deploy.running import finished
+from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.pace import Pace
-from swarmwire.world.scenario_file import load_scenario
 from tests.deploy.commands import LOSSY
 from tests.world.test_pace import MS, FakeClock
 
@@ -198,8 +198,8 @@ def free() -> Result:
 
 @pytest.mark.parametrize("runners", [None, 3])
 def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, runners: int | None) -> None:
-    execution = Execution(load_scenario(LOSSY, SHORT), (1,), runners)
-    controls = execution.controls
+    simulation = Simulation(LOSSY, overrides=SHORT, runners=runners)
+    controls = simulation.controls
     plan = [
         controls.toggle_pause,
         controls.step,
@@ -211,7 +211,8 @@ def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, runners: i
     plan += [controls.toggle_pause, controls.step, controls.toggle_pause, *[controls.faster] * 20]
     asker = Asker(plan)
     controls.on_wait = asker.ask
-    result = execution.run([asker])
+    simulation.watch(asker)
+    result = finished(simulation)
     assert not plan
     assert controls.paused_ns > 0
     assert (result.ended, result.ticks) == ("duration", free.ticks)

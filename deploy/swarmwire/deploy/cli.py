@@ -12,6 +12,7 @@ from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.commands.export import ExportCommand, export_command
 from swarmwire.deploy.commands.list_kinds import list_command
 from swarmwire.deploy.commands.new import new_command
+from swarmwire.deploy.commands.repeat import repeat_command
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
@@ -25,6 +26,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 app.command("run")(run_command)
+app.command("repeat")(repeat_command)
 app.command("check")(check_command)
 app.command("draw")(draw_command)
 app.command("export", cls=ExportCommand)(export_command)

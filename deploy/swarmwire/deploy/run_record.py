@@ -1,17 +1,22 @@
-"""What a run leaves behind: its folder, from the first line of the log to the summary."""
+"""What a run leaves behind: its folder, from the scenario and the first line of the log to the summary."""
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.protocols import Observer
 from swarmwire.deploy.folder import make_folder
+from swarmwire.deploy.origin import Origin, origin_of
 from swarmwire.deploy.recording import Recording
 from swarmwire.deploy.result import Result
+from swarmwire.deploy.trajectory_log import TrajectoryLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.run_log import RunLog
+from swarmwire.world.scenario import Scenario
+
+SUMMARY = "summary.json"
 
 
 class RunRecord:
@@ -19,16 +24,40 @@ class RunRecord:
 
     Attributes:
         folder: the run folder, if any.
-        observers: those that fill it.
     """
 
-    def __init__(self, out: Path | None, what: Recording, metrics: Metrics, clock: WallClock, may_drop: bool) -> None:
+    def __init__(self, out: Path | None, clock: WallClock) -> None:
         """Make the folder; BadInput unless it is new or empty, or can be made."""
         self.folder = None if out is None else make_folder(out)
+        self._clock = clock
         self._log = RunLog(self.folder, clock) if self.folder else None
-        self.observers: Sequence[Observer] = (
-            what.observers(self.folder, metrics, clock, may_drop) if self.folder else ()
+
+    def observers(
+        self, what: Recording, metrics: Metrics, hashes: Callable[[], list[str]], *, may_drop: bool
+    ) -> Sequence[Observer]:
+        """Those that fill the folder."""
+        if self.folder is None:
+            return ()
+        recorders = what.observers(self.folder, metrics, self._clock, may_drop)
+        return (*recorders, TrajectoryLog(self.folder, hashes))
+
+    def begin(
+        self,
+        scenario: Scenario,
+        agents: Mapping[str, str],
+        *,
+        seeds: tuple[int, ...],
+        ticks: int,
+        runners: int,
+        realtime: float | None,
+    ) -> Origin:
+        """Put into the folder all that the run is made from; what that is."""
+        origin = origin_of(
+            scenario, agents, seeds=seeds, ticks=ticks, runners=runners, realtime=realtime, folder=self.folder
         )
+        version = origin.versions.get("swarmwire", "")
+        self.note(f"swarmwire {version}: {scenario.name}, seeds {list(seeds)}, {ticks} ticks, {runners} runners")
+        return origin
 
     def say(self, text: str) -> None:
         """Tell people at once, and keep it in the log."""
@@ -46,7 +75,7 @@ class RunRecord:
         if self._log:
             self._log.close()
         if self.folder:
-            result.write(self.folder / "summary.json")
+            result.write(self.folder / SUMMARY)
 
 
 def dropped_rows(record: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:

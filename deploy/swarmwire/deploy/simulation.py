@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, cast
+from typing import Any, Self
 
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.clock import WallClock, tick_start_ns, to_ns, to_s
@@ -12,14 +12,15 @@ from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.comms.truth import Static, Truth
-from swarmwire.deploy import machine
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.arguments import Runners, choose_seeds, real_time_factor, runner_count
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.crews import Crews
 from swarmwire.deploy.endpoint import new_run_id
 from swarmwire.deploy.guarded import Guarded
+from swarmwire.deploy.inputs import RecordedCrew, RecordedInputs, ReplayedCrew
 from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.origin import Origin
 from swarmwire.deploy.recording import Recording
 from swarmwire.deploy.result import EventResult, Result, arena_result
 from swarmwire.deploy.run_record import RunRecord, dropped_rows
@@ -30,8 +31,8 @@ from swarmwire.metrics.record.recorders import record_summary
 from swarmwire.world.loop import Loop
 from swarmwire.world.pace import Pace
 from swarmwire.world.realtime_crew import PacedCrew, RealTimeCrew, RealTimeReport
+from swarmwire.world.remote_crew import RemoteCrew
 from swarmwire.world.roster import Loss
-from swarmwire.world.runner_crew import RunnerCrew
 from swarmwire.world.runner_health import RunnerHealth
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
@@ -58,6 +59,8 @@ class Simulation:
         metrics: what was measured up to the last tick, in `metrics.latest`.
         ticks: of the whole run.
         runners: processes that run the agents; 0: none, they are in this one.
+        agents: the spec of each group's agent.
+        inputs: of a run that is repeated, what came into it from outside.
         interrupt: entered, SIGINT ends `run` after the tick under way.
         controls: pause, step, speed and end of `run`, for other threads.
     """
@@ -82,8 +85,8 @@ class Simulation:
             raise BadInput("overrides", "", "expected a path of a scenario; a Scenario is complete as it is")
         self.scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
         factor, rate_hz = real_time_factor(realtime), self.scenario.time.rate_hz
-        specs = agent_specs(self.scenario)
-        needs = {name: kind.needs for name, kind in check_agents(self.scenario, specs).items()}
+        self.agents = agent_specs(self.scenario)
+        needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
         self.world = World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
         self.ticks = _ticks(self.scenario)
         self.runners = runner_count(runners, self.static.arenas * self.static.robots)
@@ -91,29 +94,39 @@ class Simulation:
         self.interrupt = Interrupt()
         self.metrics = Metrics()
         place = None if out is None else Path(out)
-        self._record = RunRecord(place, record or Recording(), self.metrics, self._clock, may_drop=factor is not None)
-        pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
-        self.controls = Controls(self._clock, rate_hz, pace)
+        self._record = RunRecord(place, self._clock)
+        self._pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
+        self.controls = Controls(self._clock, rate_hz, self._pace)
+        recorders = self._record.observers(
+            record or Recording(), self.metrics, self.hashes, may_drop=factor is not None
+        )
         self._observers: list[Guarded] = []
-        for observer in (*self._record.observers, *observers):
+        for observer in (*recorders, *observers):
             self.watch(observer)
         self._losses: list[Loss] = []
         self._crews = Crews(
             scenario=self.scenario,
             static=self.static,
-            agents=specs,
+            agents=self.agents,
             runners=self.runners,
             run_id=self.run_id,
             clock=self._clock,
-            pace=pace,
+            pace=self._pace,
             socket=socket,
             stopped=self._stopped,
             lost=self._losses.append,
             say=self._record.say,
         )
+        self.inputs: RecordedInputs | None = None
         self._crew: Crew | None = None
+        self._recorded: RecordedCrew | None = None
         self._loop: Loop | None = None
         self._result: Result | None = None
+
+    @property
+    def folder(self) -> Path | None:
+        """The run folder, if any."""
+        return self._record.folder
 
     @property
     def static(self) -> Static:
@@ -132,6 +145,10 @@ class Simulation:
             raise RuntimeError("the run is not over yet: leave the `with` block first")
         return self._result
 
+    def hashes(self) -> list[str]:
+        """The trajectory hash of each arena, up to the last tick."""
+        return self._loop.hexdigests() if self._loop else []
+
     def watch(self, observer: Observer) -> None:
         """Add an observer, before the run begins; if it fails, it is counted and left out."""
         self._observers.append(Guarded(observer, self._record.say))
@@ -140,10 +157,11 @@ class Simulation:
         """Start the agents; AgentFailed or RunnerLost if that fails."""
         if self._loop is not None:
             raise RuntimeError("a simulation runs once; make another one")
+        self._origin = self._keep()
         with ExitStack() as stack:
             crew = self._crew = stack.enter_context(self._crews.crew())
             self._watching: list[Observer] = [self.metrics, RadioTally(), EventLog(), *self._observers]
-            self._loop = Loop(self.world, self._air(), crew, self._watching, self.scenario.events)
+            self._loop = Loop(self.world, self._air(), self._acting(crew), self._watching, self.scenario.events)
             crew.start()
             for observer in self._watching:
                 observer.begin(self.static)
@@ -189,7 +207,34 @@ class Simulation:
 
     def health(self) -> RunnerHealth | None:
         """How the runners are doing; None if there are none."""
-        return cast("RunnerCrew[Any]", self._crew).health() if isinstance(self._crew, RunnerCrew) else None
+        return self._crew.health() if isinstance(self._crew, RemoteCrew | RealTimeCrew) else None
+
+    def _keep(self) -> Origin:
+        """From what this run is made, put into its folder before anything happens."""
+        realtime = self._pace.factor if self._pace else None
+        return self._record.begin(
+            self.scenario,
+            self.agents,
+            seeds=self.static.seeds,
+            ticks=self.ticks,
+            runners=self.runners,
+            realtime=realtime,
+        )
+
+    def _acting(self, crew: Crew) -> Crew:
+        """The crew as the loop has it: replayed as far as there are inputs, and recorded as far as need be."""
+        if self.inputs is not None:
+            crew = ReplayedCrew(crew, self.inputs, self.static.arenas * self.static.robots)
+        if self.folder is None:
+            return crew
+        self._recorded = RecordedCrew(crew, self.folder, self._from_outside)
+        return self._recorded
+
+    def _from_outside(self, tick: int) -> bool:
+        """Whether the actions of this tick need not follow from scenario and seed."""
+        if self.inputs is not None:
+            return tick >= self.inputs.first_tick
+        return bool(self._losses) or (self._pace is not None and self.runners > 0)
 
     def _stopped(self) -> bool:
         return self.interrupt.asked or self.controls.quit_asked
@@ -237,12 +282,15 @@ class Simulation:
             events=tuple(EventResult(**event) for event in parts["events"]),
             global_senses={body: found for body, found in senses.items() if found},
             counts=counts,
-            cpu=machine.cpu(),
-            versions=machine.versions(),
+            cpu=self._origin.cpu,
+            versions=dict(self._origin.versions),
+            modules=dict(self._origin.modules),
+            files=self._origin.files,
+            inputs=self._recorded.record() if self._recorded else None,
             lost_runners=tuple(str(loss) for loss in self._losses),
             realtime=report,
             record=record_summary(parts),
-            out=self._record.folder,
+            out=self.folder,
         )
 
 

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
-from swarmwire.deploy.commands.options import Overrides, ScenarioFile
+from swarmwire.deploy.commands.options import Overrides, Packets, ScenarioFile
 from swarmwire.deploy.folder import default_folder
 from swarmwire.deploy.report import print_result
 from swarmwire.deploy.result import Result
@@ -38,13 +38,7 @@ def run_command(
             metavar="[FACTOR]",
         ),
     ] = None,
-    packets: Annotated[
-        str,
-        typer.Option(
-            help='Packets to record in packets.parquet: "off", "all", or a share of them, such as 0.1.',
-            metavar="off|all|SHARE",
-        ),
-    ] = "off",
+    packets: Packets = "off",
     rrd: Annotated[bool, typer.Option(help="Record run.rrd, for rerun's viewer.")] = True,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
