@@ -8,6 +8,8 @@ import json
 import statistics
 import sys
 from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import psutil
@@ -16,6 +18,8 @@ from benchmarks import scenes
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.machine import cpu
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.rerun_recording import RerunRecording
 from swarmwire.world.scenario_file import scenario_from
 
 REPEATS = 3
@@ -73,6 +77,29 @@ def processes(name: str, *, robots: int, ticks: int) -> None:
     report(f"{name}-uss", statistics.median(memory.uss_mb), "MB", results[0], {**config, **spread(memory.uss_mb)})
 
 
+def view_cost(name: str, *, robots: int, ticks: int) -> None:
+    """How much longer a run takes when it is recorded for the viewer, in percent, and the size of the recording.
+
+    Runs with and without a recording take turns, so that what else the machine does falls on both.
+    """
+    scenario = scenario_from(scenes.diffusion(robots, 5, ticks / 10, radio=True), name)
+    run(scenario.model_copy(update={"duration_s": 2.0}))
+    costs: list[float] = []
+    with TemporaryDirectory() as folder:
+        rrd = Path(folder, "run.rrd")
+        for _ in range(REPEATS):
+            measured = Metrics()  # of its own in both, as the recording plots what it measured
+            plain = run(scenario, observers=[measured])
+            result = run(scenario, observers=[measured, RerunRecording(rrd, measured)])
+            if result.counts.get("observer_failed_RerunRecording"):
+                raise RuntimeError("the recording failed: its cost says nothing")
+            costs.append(100.0 * (result.wall_time_s / plain.wall_time_s - 1.0))
+        size_mb = rrd.stat().st_size / 1e6
+    config = {"body": "footbot", "rays": 24, "physics_steps": 5, "density_per_m2": scenes.DENSITY_PER_M2}
+    report(name, statistics.median(costs), "% of the run without", result, {**config, **spread(costs)})
+    report(f"{name}-size", size_mb, "MB", result, config)
+
+
 def report(name: str, value: float, unit: str, result: Result, config: dict[str, Any]) -> None:
     """Print one line."""
     radio = result.radio
@@ -102,6 +129,7 @@ BENCHMARKS: dict[str, Callable[[str], None]] = {
     "inprocess-1000-d1-10steps": lambda name: in_process(name, robots=1000, steps=10, ticks=200, radio=False),
     "inprocess-1000-d1-radio": lambda name: in_process(name, robots=1000, steps=5, ticks=200, radio=True),
     "wire-1000x2": lambda name: in_process(name, robots=1000, steps=5, ticks=200, radio=True, runners=2),
+    "view-cost": lambda name: view_cost(name, robots=1000, ticks=600),
     "processes-100": lambda name: processes(name, robots=100, ticks=300),
 }
 

@@ -9,9 +9,11 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.metrics.event_log import names
 from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.rerun_about import about
 from swarmwire.metrics.rerun_arena import RerunArena
 from swarmwire.metrics.rerun_layout import layout
 from swarmwire.metrics.rerun_plots import RerunPlots
+from swarmwire.metrics.rerun_selected import default_selected
 from swarmwire.metrics.view_extra import need_view_extra
 
 
@@ -24,28 +26,35 @@ class RerunRecording:
     bytes: rerun numbers its chunks at random and cuts them as they come.
     """
 
-    def __init__(self, path: Path, metrics: Metrics, arena: int = 0) -> None:
-        """Record to this file, which is replaced; BadInput without the extra [view]."""
+    def __init__(self, path: Path, metrics: Metrics, arena: int = 0, selected: str | None = None) -> None:
+        """Record to this file, which is replaced; BadInput without the extra [view].
+
+        `selected` names the robot that is shown in detail: its rays, its ring, its radio's range. None: the first robot
+        of the first group that has rays or photocells.
+        """
         need_view_extra(f"recording {path.name}")
-        self._path, self._metrics, self._arena = path, metrics, arena
+        self._path, self._metrics, self._arena, self._selected = path, metrics, arena, selected
 
     def begin(self, static: Static) -> None:
-        """Open the file and log what does not change; BadInput if there is no such arena."""
+        """Open the file and log what does not change; BadInput if there is no such arena or selected robot."""
         import rerun as rr
 
         if not 0 <= self._arena < static.arenas:
             raise BadInput(f"recording {self._path.name}", "arena", f"expected 0 to {static.arenas - 1}")
         self._static, seed = static, static.seeds[self._arena]
-        self._arena_view = RerunArena(static, self._arena)
+        selected = default_selected(static) if self._selected is None else self._selected
+        self._arena_view = RerunArena(static, self._arena, selected)
         self._plots = RerunPlots(static, self._metrics.metrics, self._arena)
         self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
         self._rec.set_log_time_enabled(False)
         self._rec.set_log_tick_enabled(False)
-        self._rec.save(self._path, default_blueprint=layout(static))
+        self._rec.save(self._path, default_blueprint=layout(static, selected))
         self._rec.send_recording_name(f"{static.name}, seed {seed}")
         links_every = self._arena_view.links_every_ticks
         run = rr.AnyValues(scenario=static.name, seed=seed, robots=static.robots, links_every_ticks=links_every)
         self._rec.send_property("run", run)
+        text = about(static, self._arena, selected, links_every)
+        self._rec.log("about", rr.TextDocument(text, media_type="text/markdown"), static=True)
         self._arena_view.begin(self._rec)
         self._plots.begin(self._rec)
 
@@ -59,7 +68,7 @@ class RerunRecording:
         for event in truth.events:
             robots = ", ".join(names(event, self._static)[self._arena])
             self._rec.log("events", rr.TextLog(f"{event.do}{' ended' if event.ended else ''}: {robots or 'no robot'}"))
-        self._plots.log(self._rec, self._metrics.latest, truth.tally)
+        self._plots.log(self._rec, self._metrics.latest, truth)
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """Close the file; a recording adds nothing to the summary."""

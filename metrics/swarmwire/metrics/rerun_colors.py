@@ -1,0 +1,50 @@
+"""What is drawn in which colour, red, green and blue of 255, on a dark ground; and texts that the viewer has letters for."""
+
+from swarmwire.comms.fates import Fate
+
+Color = tuple[int, int, int]
+
+DEAD = (95, 95, 100)
+WALL = (150, 155, 170)
+LIGHT = (255, 220, 60)
+MARK = (235, 235, 240)
+
+CLASSES: tuple[Color, ...] = (  # of robots, in the order in which their groups and states appear
+    (86, 180, 233),
+    (240, 160, 50),
+    (0, 200, 140),
+    (230, 110, 180),
+    (160, 140, 250),
+    (150, 210, 60),
+    (235, 125, 100),
+    (90, 210, 220),
+    (200, 165, 125),
+    (240, 185, 225),
+)
+SERIES: tuple[Color, ...] = (
+    (86, 180, 233),
+    (240, 228, 66),
+    (0, 200, 140),
+    (230, 120, 40),
+    (204, 121, 167),
+    (180, 180, 190),
+)
+FATES: dict[Fate, Color] = {
+    Fate.HEARD: (86, 180, 233),
+    Fate.BLOCKED: (240, 180, 60),
+    Fate.LOST: (235, 85, 75),
+    Fate.QUEUE_FULL: (160, 140, 250),
+    Fate.TOO_LARGE: (205, 205, 110),
+    Fate.IN_FLIGHT: (0, 200, 140),
+    Fate.SENDER_DEAD: (125, 125, 135),
+    Fate.RECEIVER_DEAD: (175, 175, 185),
+    Fate.BLACKOUT: (190, 95, 235),
+    Fate.PARTITIONED: (255, 130, 195),
+}  # out of range is no colour: such receivers are counted, never listed
+
+_LAST_LETTER = "\u024f"  # of Latin with its extensions
+
+
+def shown(text: str) -> str:
+    """The text with `?` for letters that the viewer's only font may lack: drawing without a screen, it ends at one."""
+    return "".join(letter if " " <= letter <= _LAST_LETTER else "?" for letter in text)

@@ -1,0 +1,137 @@
+"""One robot of a recording looked at closely: a ring around it, its radio's range, and what its sensors tell it."""
+
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.sheets import Light, Proximity
+from swarmwire.comms.truth import Group, Static, Truth
+from swarmwire.metrics.rerun_colors import LIGHT, MARK
+
+_FRAME = "world/selected"  # moves with the robot, axes as the arena's
+EYE = f"{_FRAME}/eye"  # what looks on from there sees y point up
+_NOTHING, _THING, _ROBOT = (120, 125, 145, 150), (*MARK, 255), (255, 95, 170, 255)
+_LIGHT_BAR = (*LIGHT, 200)
+_RANGE = (*MARK, 45)
+_RING = (*MARK, 170)
+_LIGHT_RADII = 2.0  # length of a photocell's bar at full light, in body radii
+_ORDER = 5.0
+_CIRCLE = np.linspace(0.0, 2.0 * np.pi, 65)
+
+
+def default_selected(static: Static) -> str:
+    """The first robot of the first group whose body has proximity sensors or photocells, else the first of all."""
+    for group in static.groups:
+        if group.body.proximity or group.body.light:
+            return static.robot_names[group.start]
+    return static.robot_names[0]
+
+
+def close_up_m(static: Static, selected: str) -> float:
+    """Half the width of what a close look at a robot should show."""
+    body = _group(static, static.robot_names.index(selected)).body
+    return 3.0 * (body.radius_m + (body.proximity.range_m if body.proximity else 2.0 * body.radius_m))
+
+
+class RerunSelected:
+    """The selected robot of one arena. Its rays end where the reading says that something is, noise and all.
+
+    Red rays meet a robot, white ones a wall or obstacle, faint ones nothing, or nothing that noise alone could not be.
+    Bars outwards from the rim tell how much light each photocell sees. Between a robot's turns these are what it
+    sensed last; senses that its agent does not use are not there.
+    """
+
+    def __init__(self, static: Static, arena: int, selected: str, ring_m: FloatArray) -> None:
+        """Follow this robot; ring_m (robots,) is the radius of the ring around each. BadInput if there is no such one."""
+        if selected not in static.robot_names:
+            raise BadInput("recording", "selected", f"expected a robot such as {static.robot_names[0]}; got {selected!r}")
+        self._static, self._arena = static, arena
+        self._index = static.robot_names.index(selected)
+        self._row = arena * static.robots + self._index
+        self._group, self._ring_m = _group(static, self._index), float(ring_m[self._index])
+        self._radius_m = self._robot_radii()
+        self._sensed: dict[str, FloatArray] = {}
+
+    def begin(self, rec: Any) -> None:
+        """Log what moves with the robot but never changes."""
+        import rerun as rr
+
+        around = np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1)
+        circles, colors = [self._ring_m * around], [_RING]
+        if self._static.range_m is not None:
+            circles.append(self._static.range_m * around)
+            colors.append(_RANGE)
+        thin = rr.Radius.ui_points(0.7)
+        marks = rr.LineStrips2D(circles, radii=thin, colors=colors, draw_order=_ORDER)
+        rec.log(f"{_FRAME}/marks", marks, static=True)
+        rec.log(EYE, rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
+        rays = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(0.8), draw_order=_ORDER)
+        rec.log(f"{_FRAME}/rays", rays, static=True)
+
+    def log(self, rec: Any, truth: Truth) -> None:
+        """Log a tick."""
+        import rerun as rr
+
+        x_m, y_m, heading_rad = truth.pose[self._row].tolist()
+        rec.log(_FRAME, rr.Transform3D.from_fields(translation=[x_m, y_m, 0.0]))
+        self._remember(truth)
+        strips, colors = [np.empty((0, 2, 2))], [np.empty((0, 4), np.uint8)]
+        body = self._group.body
+        if body.proximity and "proximity.value" in self._sensed:
+            near = self._rays(body.proximity, self._sensed["proximity.value"], heading_rad)
+            strips.append(near)
+            colors.append(self._hits(truth, body.proximity, near))
+        if body.light and "light.value" in self._sensed:
+            length_m = _LIGHT_RADII * body.radius_m * self._sensed["light.value"]
+            strips.append(self._bars(body.light, length_m, heading_rad))
+            colors.append(np.tile(np.array(_LIGHT_BAR, np.uint8), (len(length_m), 1)))
+        if self._sensed or truth.tick == 0 or not truth.alive[self._row]:
+            lines = np.concatenate(strips).astype(np.float32)
+            rec.log(f"{_FRAME}/rays", rr.LineStrips2D.from_fields(strips=lines, colors=np.concatenate(colors)))
+
+    def _remember(self, truth: Truth) -> None:
+        """Keep what it senses in this tick; the dead sense nothing."""
+        senses = truth.senses.get(self._group.name)
+        if not truth.alive[self._row]:
+            self._sensed = {}
+        elif senses is not None:
+            at = int(np.searchsorted(senses.rows, self._row))
+            if at < len(senses.rows) and senses.rows[at] == self._row:
+                self._sensed = {name: values[at] for name, values in senses.fields.items()}
+
+    def _rays(self, sheet: Proximity, value: FloatArray, heading_rad: float) -> FloatArray:
+        return self._bars(sheet, sheet.response.distance_m(value), heading_rad)
+
+    def _bars(self, sheet: Proximity | Light, length_m: FloatArray, heading_rad: float) -> FloatArray:
+        """Lines of these lengths outwards from the rim, (sensors, 2, 2) from the robot's centre."""
+        angle = sheet.angle_rad + heading_rad
+        outwards = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        rim_m = self._group.body.radius_m
+        return np.stack([rim_m * outwards, (rim_m + length_m)[:, None] * outwards], axis=1)
+
+    def _hits(self, truth: Truth, sheet: Proximity, rays: FloatArray) -> FloatArray:
+        """The colour of each ray, (rays, 4), by what it meets."""
+        first = self._arena * self._static.robots
+        centre = truth.pose[first : first + self._static.robots, :2] - truth.pose[self._row, :2]
+        others = np.flatnonzero(np.hypot(centre[:, 0], centre[:, 1]) < 2.0 * (sheet.range_m + self._radius_m.max()))
+        others = others[others != self._index]
+        seen = self._sensed["proximity.value"] > sheet.noise
+        outwards = rays[:, 0] / self._group.body.radius_m
+        along = outwards @ centre[others].T  # (rays, others)
+        beside = np.abs(outwards[:, :1] * centre[others, 1] - outwards[:, 1:] * centre[others, 0])
+        reach_m = self._group.body.radius_m + sheet.range_m + self._radius_m[others]
+        robot = ((along > 0.0) & (along < reach_m) & (beside < self._radius_m[others])).any(axis=1)
+        kinds = np.array([_NOTHING, _THING, _ROBOT], np.uint8)
+        return kinds[np.where(seen, np.where(robot, 2, 1), 0)]
+
+    def _robot_radii(self) -> FloatArray:
+        radius_m = np.zeros(self._static.robots)
+        for group in self._static.groups:
+            radius_m[group.start : group.stop] = group.body.radius_m
+        return radius_m
+
+
+def _group(static: Static, index: int) -> Group:
+    return next(group for group in static.groups if group.start <= index < group.stop)
