@@ -13,14 +13,14 @@ def about(static: Static, arena: int, selected: str, links_every_ticks: int) -> 
         "",
         f"{groups} in {size} m, {static.rate_hz} ticks per second",
         "",
-        f"The ring marks {selected}. Its rays: red meets a robot, white a wall or an obstacle, faint nothing; yellow bars: "
-        "light.",
+        f"The ring marks {selected}. Its rays: red meets a robot, white a wall or an obstacle, faint nothing; "
+        "yellow bars: light.",
     ]
     if static.range_m is not None:
         often = "" if links_every_ticks == 1 else f" (every {links_every_ticks} ticks)"
         lines += [
             "",
-            f"The radio reaches {static.range_m:g} m: the large circle. Grey lines join robots in reach; coloured ones are "
-            f"packets that ended unheard{often}, in the colour of their fate in the plot of packets.",
+            f"The radio reaches {static.range_m:g} m: the large circle. Grey lines join robots in reach; coloured ones "
+            f"are packets that ended unheard{often}, in the colour of their fate in the plot of packets.",
         ]
     return "\n".join(shown(line) for line in lines)

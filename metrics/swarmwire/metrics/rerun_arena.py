@@ -16,7 +16,6 @@ THINNED_LINKS_EVERY_TICKS = 10
 
 _LINK_COLOR = (130, 145, 180, 50)
 _LIGHTS, _LINKS = 0.5, 1.0  # drawn in this order, below all that moves
-_RING_HEADINGS = 0.9  # radius of the ring around the selected robot, in lengths of its heading's arrow
 
 
 class RerunArena:
@@ -26,11 +25,11 @@ class RerunArena:
     """
 
     def __init__(self, static: Static, arena: int, selected: str) -> None:
-        """Draw this arena of the run, and this robot in detail; BadInput if there is no such robot."""
+        """Draw this arena of the run, and this robot in detail."""
         self._static, self._arena = static, arena
         self._rows = slice(arena * static.robots, (arena + 1) * static.robots)
         self._robots = RerunRobots(static)
-        self._selected = RerunSelected(static, arena, selected, _RING_HEADINGS * self._robots.heading_m)
+        self._selected = RerunSelected(static, arena, selected, self._robots.radius_m, self._robots.heading_m)
         self.links_every_ticks = 1 if static.robots <= LINKS_EVERY_TICK_UP_TO else THINNED_LINKS_EVERY_TICKS
 
     def begin(self, rec: Any) -> None:

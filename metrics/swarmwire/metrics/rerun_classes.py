@@ -9,7 +9,7 @@ from swarmwire.comms.truth import Static
 from swarmwire.metrics.rerun_colors import CLASSES, DEAD, shown
 
 DEAD_CLASS = 0
-LEGEND_LINES = 8  # as many as the layout has room for
+LEGEND_LINES = 6  # as many as the layout has room for
 _LONGEST_LINE = 28  # characters
 _LABELLED = 1.0  # radius in ui points of the dot that a line of the legend hangs on
 

@@ -1,10 +1,10 @@
-"""What is drawn in which colour, red, green and blue of 255, on a dark ground; and texts that the viewer has letters for."""
+"""What is drawn in which colour (red, green and blue of 255), and texts that the viewer has letters for."""
 
 from swarmwire.comms.fates import Fate
 
 Color = tuple[int, int, int]
 
-DEAD = (95, 95, 100)
+DEAD = (118, 118, 124)
 WALL = (150, 155, 170)
 LIGHT = (255, 220, 60)
 MARK = (235, 235, 240)
@@ -43,6 +43,12 @@ FATES: dict[Fate, Color] = {
 }  # out of range is no colour: such receivers are counted, never listed
 
 _LAST_LETTER = "\u024f"  # of Latin with its extensions
+
+
+def packed(color: Color, alpha: int) -> int:
+    """A colour and its opacity of 255 as the number 0xRRGGBBAA, which rerun takes fastest."""
+    red, green, blue = color
+    return red << 24 | green << 16 | blue << 8 | alpha
 
 
 def shown(text: str) -> str:

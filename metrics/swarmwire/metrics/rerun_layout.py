@@ -5,7 +5,7 @@ from typing import Any, Literal
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.rerun_classes import LEGEND_LINES
-from swarmwire.metrics.rerun_selected import EYE, close_up_m, default_selected
+from swarmwire.metrics.rerun_selected import EYE, close_up_m
 
 TRAIL_S = 5.0
 _MARGIN = 1.03  # of the arena's half width, so that its walls are seen
@@ -13,25 +13,28 @@ _TICK, _TIME = "tick", "sim_time"
 _GROUND = [16, 18, 24]
 _ARENA_SHARE = 0.44  # of the window's width, for an arena as wide as it is high; a narrow one leaves more to the plots
 _LEAST_ARENA_SHARE, _SIDE_SHARE = 0.24, 0.19
+_NARROW = 0.6  # width over height below which an arena gets the window's whole height
+_ROWS = [4.2, 1.0]  # of what is looked at, and of the events below it
 
 
-def layout(
-    static: Static, selected: str | None = None, play_state: Literal["playing", "following", "paused"] = "playing"
-) -> Any:
-    """The blueprint for recordings of this run, with a close look at the selected robot (None: the usual one).
+def layout(static: Static, selected: str, play_state: Literal["playing", "following", "paused"] = "playing") -> Any:
+    """The blueprint for recordings of this run, with a close look at the selected robot.
 
     `play_state` is "following" for what is still being recorded. Without a radio there is no plot of packets.
     """
     import rerun.blueprint as rrb
 
-    selected = default_selected(static) if selected is None else selected
     wide = static.arena_size_m[0] / static.arena_size_m[1]
     arena_share = _ARENA_SHARE * min(max(wide, _LEAST_ARENA_SHARE / _ARENA_SHARE), 1.0)
-    side = rrb.Vertical(_legend(), _close_up(static, selected), _about(), row_shares=[0.85, 1.1, 1.15])
-    middle = rrb.Vertical(_arena(static), _events(), row_shares=[4.2, 1.0])
+    side = rrb.Vertical(_legend(), _close_up(static, selected), _about(), row_shares=[0.65, 1.1, 1.25])
+    plots = rrb.Vertical(*_plots(static))
+    if wide < _NARROW:
+        middle, right = _arena(static), rrb.Vertical(plots, _events(), row_shares=_ROWS)
+    else:
+        middle, right = rrb.Vertical(_arena(static), _events(), row_shares=_ROWS), plots
     shares = [_SIDE_SHARE, arena_share, 1.0 - _SIDE_SHARE - arena_share]
     return rrb.Blueprint(
-        rrb.Horizontal(side, middle, rrb.Vertical(*_plots(static)), column_shares=shares),
+        rrb.Horizontal(side, middle, right, column_shares=shares),
         rrb.TopPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=_TIME, play_state=play_state),
         rrb.BlueprintPanel(state="collapsed"),

@@ -7,15 +7,15 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.truth import Finished
-from swarmwire.metrics.rerun_colors import FATES
+from swarmwire.metrics.rerun_colors import FATES, packed
 
 _ALPHA = 110
 _LOST_ALPHA = 40  # loss is everywhere, a third of all packets or so: it must not drown the robots, nor the rarer fates
 _ORDER = 1.5  # above the links, below the robots
 
-_COLORS = np.zeros((len(Fate), 4), np.uint8)
+_COLORS = np.zeros(len(Fate), np.uint32)
 for _fate, _color in FATES.items():
-    _COLORS[_fate] = (*_color, _LOST_ALPHA if _fate is Fate.LOST else _ALPHA)
+    _COLORS[_fate] = packed(_color, _LOST_ALPHA if _fate is Fate.LOST else _ALPHA)
 
 
 def begin_lost(rec: Any) -> None:
@@ -27,10 +27,10 @@ def begin_lost(rec: Any) -> None:
 
 
 def log_lost(rec: Any, finished: Finished, arena: int, position_m: FloatArray) -> None:
-    """Log the packets of an arena that ended unheard since the last tick, between where its robots are now, (robots, 2).
+    """Log the packets of an arena that ended unheard since the last tick, as lines between its robots' positions.
 
-    Where they were when the packet went on air may be a few ticks back. A packet that never went on air has no
-    receiver, and so no line.
+    position_m (robots, 2) is where they are now, which is not quite where they were when the packet went on air. A
+    packet that never did has no receiver, and so no line.
     """
     import rerun as rr
 

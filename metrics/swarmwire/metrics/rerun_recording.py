@@ -13,7 +13,7 @@ from swarmwire.metrics.rerun_about import about
 from swarmwire.metrics.rerun_arena import RerunArena
 from swarmwire.metrics.rerun_layout import layout
 from swarmwire.metrics.rerun_plots import RerunPlots
-from swarmwire.metrics.rerun_selected import default_selected
+from swarmwire.metrics.rerun_selected import selected_robot
 from swarmwire.metrics.view_extra import need_view_extra
 
 
@@ -42,7 +42,7 @@ class RerunRecording:
         if not 0 <= self._arena < static.arenas:
             raise BadInput(f"recording {self._path.name}", "arena", f"expected 0 to {static.arenas - 1}")
         self._static, seed = static, static.seeds[self._arena]
-        selected = default_selected(static) if self._selected is None else self._selected
+        selected = selected_robot(static, self._selected, f"recording {self._path.name}")
         self._arena_view = RerunArena(static, self._arena, selected)
         self._plots = RerunPlots(static, self._metrics.metrics, self._arena)
         self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
@@ -57,6 +57,7 @@ class RerunRecording:
         self._rec.log("about", rr.TextDocument(text, media_type="text/markdown"), static=True)
         self._arena_view.begin(self._rec)
         self._plots.begin(self._rec)
+        self._begun = False
 
     def see(self, truth: Truth) -> None:
         """Record one tick."""
@@ -65,6 +66,9 @@ class RerunRecording:
         self._rec.set_time("tick", sequence=truth.tick)
         self._rec.set_time("sim_time", duration=np.timedelta64(truth.time_ns, "ns"))
         self._arena_view.log(self._rec, truth)
+        if not self._begun:
+            self._rec.log("events", rr.TextLog(f"the run begins: {self._static.robots} robots"))
+            self._begun = True
         for event in truth.events:
             robots = ", ".join(names(event, self._static)[self._arena])
             self._rec.log("events", rr.TextLog(f"{event.do}{' ended' if event.ended else ''}: {robots or 'no robot'}"))

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.metrics.rerun_classes import RerunClasses
 from swarmwire.metrics.rerun_colors import CLASSES, shown
@@ -23,11 +23,10 @@ class RerunRobots:
     def __init__(self, static: Static) -> None:
         """Draw the robots of any arena of this run."""
         self._static, self._classes = static, RerunClasses(static)
-        self._radius_m = np.zeros(static.robots)
-        for group in static.groups:
-            self._radius_m[group.start : group.stop] = group.body.radius_m
+        radii = [np.full(group.stop - group.start, group.body.radius_m) for group in static.groups]
+        self.radius_m = np.concatenate(radii)  # (robots,)
         least = min(_LEAST_HEADING, _CROWDED / math.sqrt(static.robots))
-        self.heading_m = np.maximum(_HEADING_RADII * self._radius_m, least * max(static.arena_size_m))  # (robots,)
+        self.heading_m = np.maximum(_HEADING_RADII * self.radius_m, least * max(static.arena_size_m))  # (robots,)
         self._was: tuple[BoolArray, IntArray] | None = None  # who was alive and at what when the colours were logged
 
     def begin(self, rec: Any) -> None:
@@ -35,7 +34,7 @@ class RerunRobots:
         import rerun as rr
 
         names = [shown(name) for name in self._static.robot_names]
-        robots = rr.Points2D.from_fields(radii=self._radius_m, labels=names, show_labels=False, draw_order=_ROBOTS)
+        robots = rr.Points2D.from_fields(radii=self.radius_m, labels=names, show_labels=False, draw_order=_ROBOTS)
         rec.log("world/robots", robots, static=True)
         faint = np.zeros((self._static.robots, 4), np.uint8)
         for i, group in enumerate(self._static.groups):

@@ -3,26 +3,37 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sheets import Light, Proximity
 from swarmwire.comms.truth import Group, Static, Truth
-from swarmwire.metrics.rerun_colors import LIGHT, MARK
+from swarmwire.metrics.rerun_colors import LIGHT, MARK, packed
 
 _FRAME = "world/selected"  # moves with the robot, axes as the arena's
 EYE = f"{_FRAME}/eye"  # what looks on from there sees y point up
-_NOTHING, _THING, _ROBOT = (120, 125, 145, 150), (*MARK, 255), (255, 95, 170, 255)
-_LIGHT_BAR = (*LIGHT, 200)
-_RANGE = (*MARK, 45)
-_RING = (*MARK, 170)
+_HITS: NDArray[np.uint32] = np.array(
+    [packed((120, 125, 145), 150), packed(MARK, 255), packed((255, 60, 50), 255)], np.uint32
+)
+_NOTHING, _THING, _ROBOT = range(3)  # what a ray meets
+_LIGHT_BAR = packed(LIGHT, 200)
+_RANGE_ALPHA, _RING_ALPHA = 45, 170
 _LIGHT_RADII = 2.0  # length of a photocell's bar at full light, in body radii
+_RING_HEADINGS = 0.9  # radius of the ring in lengths of the heading's arrow
 _ORDER = 5.0
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 65)
 
 
-def default_selected(static: Static) -> str:
-    """The first robot of the first group whose body has proximity sensors or photocells, else the first of all."""
+def selected_robot(static: Static, name: str | None, where: str) -> str:
+    """This robot; None: the first of the first group whose body has proximity sensors or photocells, else of all.
+
+    BadInput, naming `where`, if there is no such robot.
+    """
+    if name in static.robot_names:
+        return name
+    if name is not None:
+        raise BadInput(where, "selected", f"expected a robot such as {static.robot_names[0]}; got {name!r}")
     for group in static.groups:
         if group.body.proximity or group.body.light:
             return static.robot_names[group.start]
@@ -43,26 +54,25 @@ class RerunSelected:
     sensed last; senses that its agent does not use are not there.
     """
 
-    def __init__(self, static: Static, arena: int, selected: str, ring_m: FloatArray) -> None:
-        """Follow this robot; ring_m (robots,) is the radius of the ring around each. BadInput if there is no such one."""
-        if selected not in static.robot_names:
-            raise BadInput("recording", "selected", f"expected a robot such as {static.robot_names[0]}; got {selected!r}")
+    def __init__(self, static: Static, arena: int, selected: str, radius_m: FloatArray, heading_m: FloatArray) -> None:
+        """Follow this robot; radius_m and heading_m (robots,) are how large robots are drawn, and their arrows."""
         self._static, self._arena = static, arena
         self._index = static.robot_names.index(selected)
         self._row = arena * static.robots + self._index
-        self._group, self._ring_m = _group(static, self._index), float(ring_m[self._index])
-        self._radius_m = self._robot_radii()
+        self._group, self._ring_m = _group(static, self._index), _RING_HEADINGS * float(heading_m[self._index])
+        self._radius_m = radius_m
         self._sensed: dict[str, FloatArray] = {}
+        self._drawn = False  # whether there are rays to be seen
 
     def begin(self, rec: Any) -> None:
         """Log what moves with the robot but never changes."""
         import rerun as rr
 
         around = np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1)
-        circles, colors = [self._ring_m * around], [_RING]
+        circles, colors = [self._ring_m * around], [packed(MARK, _RING_ALPHA)]
         if self._static.range_m is not None:
             circles.append(self._static.range_m * around)
-            colors.append(_RANGE)
+            colors.append(packed(MARK, _RANGE_ALPHA))
         thin = rr.Radius.ui_points(0.7)
         marks = rr.LineStrips2D(circles, radii=thin, colors=colors, draw_order=_ORDER)
         rec.log(f"{_FRAME}/marks", marks, static=True)
@@ -77,19 +87,21 @@ class RerunSelected:
         x_m, y_m, heading_rad = truth.pose[self._row].tolist()
         rec.log(_FRAME, rr.Transform3D.from_fields(translation=[x_m, y_m, 0.0]))
         self._remember(truth)
-        strips, colors = [np.empty((0, 2, 2))], [np.empty((0, 4), np.uint8)]
+        strips, colors = [np.empty((0, 2, 2))], [_HITS[:0]]
         body = self._group.body
         if body.proximity and "proximity.value" in self._sensed:
-            near = self._rays(body.proximity, self._sensed["proximity.value"], heading_rad)
+            distance_m = body.proximity.response.distance_m(self._sensed["proximity.value"])
+            near = self._bars(body.proximity, distance_m, heading_rad)
             strips.append(near)
             colors.append(self._hits(truth, body.proximity, near))
         if body.light and "light.value" in self._sensed:
             length_m = _LIGHT_RADII * body.radius_m * self._sensed["light.value"]
             strips.append(self._bars(body.light, length_m, heading_rad))
-            colors.append(np.tile(np.array(_LIGHT_BAR, np.uint8), (len(length_m), 1)))
-        if self._sensed or truth.tick == 0 or not truth.alive[self._row]:
-            lines = np.concatenate(strips).astype(np.float32)
+            colors.append(np.full(len(length_m), _LIGHT_BAR, np.uint32))
+        lines = np.concatenate(strips).astype(np.float32)
+        if len(lines) or self._drawn:
             rec.log(f"{_FRAME}/rays", rr.LineStrips2D.from_fields(strips=lines, colors=np.concatenate(colors)))
+        self._drawn = len(lines) > 0
 
     def _remember(self, truth: Truth) -> None:
         """Keep what it senses in this tick; the dead sense nothing."""
@@ -101,9 +113,6 @@ class RerunSelected:
             if at < len(senses.rows) and senses.rows[at] == self._row:
                 self._sensed = {name: values[at] for name, values in senses.fields.items()}
 
-    def _rays(self, sheet: Proximity, value: FloatArray, heading_rad: float) -> FloatArray:
-        return self._bars(sheet, sheet.response.distance_m(value), heading_rad)
-
     def _bars(self, sheet: Proximity | Light, length_m: FloatArray, heading_rad: float) -> FloatArray:
         """Lines of these lengths outwards from the rim, (sensors, 2, 2) from the robot's centre."""
         angle = sheet.angle_rad + heading_rad
@@ -111,26 +120,21 @@ class RerunSelected:
         rim_m = self._group.body.radius_m
         return np.stack([rim_m * outwards, (rim_m + length_m)[:, None] * outwards], axis=1)
 
-    def _hits(self, truth: Truth, sheet: Proximity, rays: FloatArray) -> FloatArray:
-        """The colour of each ray, (rays, 4), by what it meets."""
+    def _hits(self, truth: Truth, sheet: Proximity, rays: FloatArray) -> NDArray[np.uint32]:
+        """The colour of each ray, (rays,), by what it meets."""
+        seen = self._sensed["proximity.value"] > sheet.noise
+        if not seen.any():
+            return np.full(len(rays), _HITS[_NOTHING])
         first = self._arena * self._static.robots
         centre = truth.pose[first : first + self._static.robots, :2] - truth.pose[self._row, :2]
         others = np.flatnonzero(np.hypot(centre[:, 0], centre[:, 1]) < 2.0 * (sheet.range_m + self._radius_m.max()))
         others = others[others != self._index]
-        seen = self._sensed["proximity.value"] > sheet.noise
         outwards = rays[:, 0] / self._group.body.radius_m
         along = outwards @ centre[others].T  # (rays, others)
         beside = np.abs(outwards[:, :1] * centre[others, 1] - outwards[:, 1:] * centre[others, 0])
         reach_m = self._group.body.radius_m + sheet.range_m + self._radius_m[others]
         robot = ((along > 0.0) & (along < reach_m) & (beside < self._radius_m[others])).any(axis=1)
-        kinds = np.array([_NOTHING, _THING, _ROBOT], np.uint8)
-        return kinds[np.where(seen, np.where(robot, 2, 1), 0)]
-
-    def _robot_radii(self) -> FloatArray:
-        radius_m = np.zeros(self._static.robots)
-        for group in self._static.groups:
-            radius_m[group.start : group.stop] = group.body.radius_m
-        return radius_m
+        return _HITS[np.where(seen, np.where(robot, _ROBOT, _THING), _NOTHING)]
 
 
 def _group(static: Static, index: int) -> Group:
