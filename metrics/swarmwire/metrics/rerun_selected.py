@@ -49,7 +49,7 @@ def close_up_m(static: Static, selected: str) -> float:
 class RerunSelected:
     """The selected robot of one arena. Its rays end where the reading says that something is, noise and all.
 
-    Red rays meet a robot, white ones a wall or obstacle, faint ones nothing, or nothing that noise alone could not be.
+    Of the rays that see more than noise could feign, those on which a robot stands are red, the others white.
     Bars outwards from the rim tell how much light each photocell sees. Between a robot's turns these are what it
     sensed last; senses that its agent does not use are not there.
     """
@@ -111,7 +111,7 @@ class RerunSelected:
         elif senses is not None:
             at = int(np.searchsorted(senses.rows, self._row))
             if at < len(senses.rows) and senses.rows[at] == self._row:
-                self._sensed = {name: values[at] for name, values in senses.fields.items()}
+                self._sensed = {name: np.array(values[at]) for name, values in senses.fields.items()}
 
     def _bars(self, sheet: Proximity | Light, length_m: FloatArray, heading_rad: float) -> FloatArray:
         """Lines of these lengths outwards from the rim, (sensors, 2, 2) from the robot's centre."""
