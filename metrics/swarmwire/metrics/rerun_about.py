@@ -6,7 +6,7 @@ from swarmwire.metrics.rerun_colors import shown
 
 def about(static: Static, arena: int, selected: str, links_every_ticks: int) -> str:
     """Markdown: the run, and how to read the picture."""
-    size = " × ".join(f"{side:g}" for side in static.arena_size_m)
+    size = " × ".join(f"{side:.3g}" for side in static.arena_size_m)
     groups = ", ".join(f"{group.stop - group.start} × {group.body.name} ({group.name})" for group in static.groups)
     lines = [
         f"**{static.name}**, seed {static.seeds[arena]}",
@@ -20,7 +20,7 @@ def about(static: Static, arena: int, selected: str, links_every_ticks: int) -> 
         often = "" if links_every_ticks == 1 else f" (every {links_every_ticks} ticks)"
         lines += [
             "",
-            f"The radio reaches {static.range_m:g} m: the large circle. Grey lines join robots in reach; coloured ones "
-            f"are packets that ended unheard{often}, in the colour of their fate in the plot of packets.",
+            f"The radio reaches {static.range_m:.3g} m: the large circle. Grey lines join robots in reach; "
+            f"coloured ones are packets that ended unheard{often}, in the colour of their fate in the plot of packets.",
         ]
     return "\n".join(shown(line) for line in lines)

@@ -14,6 +14,7 @@ from swarmwire.metrics.rerun_colors import FATES, MARK, Color
 from swarmwire.metrics.rerun_series import RerunSeries
 
 _EVENT_MARK = 1.04  # where the mark of an event stands among the shares: above them all
+_FATES = {fate: FATE_NAMES[fate].replace("_", " ") for fate in FATES}
 _PLOTS = {"m": "distances", "s": "times"}  # by a metric's unit; the others are shares or numbers
 
 
@@ -30,9 +31,11 @@ class RerunPlots:
         self._arena, self._rate_hz, self._radio = arena, static.rate_hz, static.range_m is not None
         self._names = {"shares": [m.name for m in metrics if _plot(m) == "shares"]}
         self._names |= {plot: [m.name for m in metrics if _plot(m) == plot] for plot in (*_PLOTS.values(), "numbers")}
-        fates: dict[str, Color] = {FATE_NAMES[fate].replace("_", " "): color for fate, color in FATES.items()}
+        fates: dict[str, Color] = {_FATES[fate]: color for fate, color in FATES.items()}
         self._series = {plot: RerunSeries(f"plots/{plot}") for plot in self._names}
-        self._packets = RerunSeries("plots/packets", fates)
+        self._series["packets"] = RerunSeries("plots/packets", fates)
+        self._occurred: set[str] = set()  # fates
+        self._sent_second = 0
         self._second: deque[IntArray] = deque(maxlen=static.rate_hz)  # per tick: (fates,), in range
 
     def begin(self, rec: Any) -> None:
@@ -43,19 +46,26 @@ class RerunPlots:
         rec.log("plots/shares/event", look, static=True)
 
     def log(self, rec: Any, latest: Mapping[str, FloatArray], truth: Truth) -> None:
-        """Log the numbers of a tick."""
+        """Log the numbers of a tick; they are sent once a second of the run, and at its end."""
         import rerun as rr
 
         numbers = {plot: {name: latest[name][self._arena] for name in names} for plot, names in self._names.items()}
         if self._radio:
             per_second, in_range = self._per_second(truth)
             numbers["shares"]["delivery"] = per_second[Fate.HEARD] / in_range if in_range > 0 else np.nan
-            occurred = {name: rate if rate > 0 else np.nan for name, rate in _by_name(per_second).items()}
-            self._packets.log(rec, occurred, missing=0.0)
-        for plot, series in self._series.items():
-            series.log(rec, numbers[plot])
+            numbers["packets"] = self._by_name(per_second)
+        for plot, value in numbers.items():
+            self._series[plot].add(rec, truth.tick, truth.time_ns, value)
         if truth.events:
             rec.log("plots/shares/event", rr.Scalars(_EVENT_MARK))
+        if truth.tick // self._rate_hz != self._sent_second:
+            self._sent_second = truth.tick // self._rate_hz
+            self.flush(rec)
+
+    def flush(self, rec: Any) -> None:
+        """Send the numbers that were not yet."""
+        for series in self._series.values():
+            series.flush(rec)
 
     def _per_second(self, truth: Truth) -> tuple[FloatArray, float]:
         """Receivers per second over the last one: by fate, (fates,), and in range."""
@@ -66,10 +76,12 @@ class RerunPlots:
         rates = np.sum(self._second, axis=0) * (self._rate_hz / len(self._second))
         return rates[:-1], float(rates[-1])
 
+    def _by_name(self, per_second: FloatArray) -> dict[str, float]:
+        """Receivers per second of each fate, NaN until it first occurs."""
+        rates = {name: float(per_second[fate]) for fate, name in _FATES.items()}
+        self._occurred |= {name for name, rate in rates.items() if rate > 0}
+        return {name: rate if name in self._occurred else np.nan for name, rate in rates.items()}
+
 
 def _plot(metric: Metric) -> str:
     return "shares" if metric.bounds == (0.0, 1.0) else _PLOTS.get(metric.unit, "numbers")
-
-
-def _by_name(per_second: FloatArray) -> dict[str, float]:
-    return {FATE_NAMES[fate].replace("_", " "): float(per_second[fate]) for fate in FATES}

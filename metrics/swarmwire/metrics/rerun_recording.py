@@ -76,6 +76,7 @@ class RerunRecording:
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """Close the file; a recording adds nothing to the summary."""
+        self._plots.flush(self._rec)
         self._rec.flush()
         self._rec.disconnect()
         return {}
