@@ -15,6 +15,7 @@ from typing import Any
 import psutil
 
 from benchmarks import scenes
+from swarmwire.comms.clock import WallClock
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.machine import cpu
@@ -23,7 +24,6 @@ from swarmwire.metrics.rerun_recording import RerunRecording
 from swarmwire.world.scenario_file import scenario_from
 
 REPEATS = 3
-VIEW_REPEATS = 7  # pairs of runs: their difference is a tenth of what each takes
 
 
 class OwnMemory:
@@ -78,28 +78,61 @@ def processes(name: str, *, robots: int, ticks: int) -> None:
     report(f"{name}-uss", statistics.median(memory.uss_mb), "MB", results[0], {**config, **spread(memory.uss_mb)})
 
 
-def view_cost(name: str, *, robots: int, ticks: int) -> None:
-    """How much longer a run takes when it is recorded for the viewer, in percent, and the size of the recording.
+class Timed:
+    """Observer that records for the viewer, and notes how long that takes in each tick."""
 
-    Runs with and without a recording take turns, so that what else the machine does falls on both.
+    def __init__(self, rrd: Path) -> None:
+        self._clock, self._metrics = WallClock(), Metrics()  # of its own, as observers are not told the run's
+        self._recording = RerunRecording(rrd, self._metrics)
+        self.at_ns, self.spent_ns, self.own_ns = list[int](), list[int](), list[int]()
+
+    def begin(self, static: Static) -> None:
+        """Open the recording."""
+        self._metrics.begin(static)
+        self._recording.begin(static)
+
+    def see(self, truth: Truth) -> None:
+        """Record a tick."""
+        start_ns = self._clock.now_ns()
+        self._metrics.see(truth)
+        measured_ns = self._clock.now_ns()
+        self._recording.see(truth)
+        self.at_ns.append(start_ns)
+        self.own_ns.append(measured_ns - start_ns)
+        self.spent_ns.append(self._clock.now_ns() - measured_ns)
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """Close the recording."""
+        return self._recording.end(last)
+
+    def costs_percent(self) -> list[float]:
+        """The recording's share of the rest of the run, for each second of it but the first."""
+        seconds = range(10, len(self.at_ns) - 10, 10)
+        spent_ns = [sum(self.spent_ns[at : at + 10]) for at in seconds]
+        own_ns = [sum(self.own_ns[at : at + 10]) for at in seconds]
+        whole_ns = [self.at_ns[at + 10] - self.at_ns[at] for at in seconds]
+        return [100.0 * s / (w - o - s) for s, o, w in zip(spent_ns, own_ns, whole_ns, strict=True)]
+
+
+def view_cost(name: str, *, robots: int, ticks: int) -> None:
+    """What recording for the viewer adds to a run, in percent, and the size of the recording.
+
+    Both parts are timed in the same runs, second by second, so that what else the machine does falls on both; rerun's
+    own threads, which compress and write, are not in it while there is a core for them.
     """
     scenario = scenario_from(scenes.diffusion(robots, 5, ticks / 10, radio=True), name)
     run(scenario.model_copy(update={"duration_s": 2.0}))
-    pairs: list[tuple[Result, Result]] = []
     with TemporaryDirectory() as folder:
         rrd = Path(folder, "run.rrd")
-        for _ in range(VIEW_REPEATS):
-            measured = Metrics()  # of its own in both, as the recording plots what it measured
-            plain = run(scenario, observers=[measured])
-            recorded = run(scenario, observers=[measured, RerunRecording(rrd, measured)])
-            if recorded.counts.get("observer_failed_RerunRecording"):
-                raise RuntimeError("the recording failed: its cost says nothing")
-            pairs.append((plain, recorded))
+        timed = [Timed(rrd) for _ in range(REPEATS)]
+        results = [run(scenario, observers=[observer]) for observer in timed]
         size_mb = rrd.stat().st_size / 1e6
-    costs = [100.0 * (recorded.wall_time_s / plain.wall_time_s - 1.0) for plain, recorded in pairs]
+    if any(result.counts.get("observer_failed_Timed") for result in results):
+        raise RuntimeError("the recording failed: its cost says nothing")
+    costs = [statistics.median(observer.costs_percent()) for observer in timed]
     config = {"body": "footbot", "rays": 24, "physics_steps": 5, "density_per_m2": scenes.DENSITY_PER_M2}
-    report(name, statistics.median(costs), "% of the run without", pairs[0][1], {**config, **spread(costs)})
-    report(f"{name}-size", size_mb, "MB", pairs[0][1], config)
+    report(name, statistics.median(costs), "% of the run without", results[0], {**config, **spread(costs)})
+    report(f"{name}-size", size_mb, "MB", results[0], config)
 
 
 def report(name: str, value: float, unit: str, result: Result, config: dict[str, Any]) -> None:

@@ -13,6 +13,7 @@ from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.rerun_colors import FATES, MARK, Color
 from swarmwire.metrics.rerun_series import RerunSeries
 
+SEND_EVERY_S = 5.0  # of the run; each time costs half a kilobyte and more per entity, whatever it holds
 _EVENT_MARK = 1.04  # where the mark of an event stands among the shares: above them all
 _FATES = {fate: FATE_NAMES[fate].replace("_", " ") for fate in FATES}
 _PLOTS = {"m": "distances", "s": "times"}  # by a metric's unit; the others are shares or numbers
@@ -35,7 +36,8 @@ class RerunPlots:
         self._series = {plot: RerunSeries(f"plots/{plot}") for plot in self._names}
         self._series["packets"] = RerunSeries("plots/packets", fates)
         self._occurred: set[str] = set()  # fates
-        self._sent_second = 0
+        self.send_every_ticks = round(SEND_EVERY_S * static.rate_hz)
+        self._send_at_tick = 0
         self._second: deque[IntArray] = deque(maxlen=static.rate_hz)  # per tick: (fates,), in range
 
     def begin(self, rec: Any) -> None:
@@ -46,7 +48,7 @@ class RerunPlots:
         rec.log("plots/shares/event", look, static=True)
 
     def log(self, rec: Any, latest: Mapping[str, FloatArray], truth: Truth) -> None:
-        """Log the numbers of a tick; they are sent once a second of the run, and at its end."""
+        """Log the numbers of a tick; they are sent every few ticks, and by `flush`."""
         import rerun as rr
 
         numbers = {plot: {name: latest[name][self._arena] for name in names} for plot, names in self._names.items()}
@@ -58,8 +60,8 @@ class RerunPlots:
             self._series[plot].add(rec, truth.tick, truth.time_ns, value)
         if truth.events:
             rec.log("plots/shares/event", rr.Scalars(_EVENT_MARK))
-        if truth.tick // self._rate_hz != self._sent_second:
-            self._sent_second = truth.tick // self._rate_hz
+        if truth.tick >= self._send_at_tick:
+            self._send_at_tick = truth.tick + self.send_every_ticks
             self.flush(rec)
 
     def flush(self, rec: Any) -> None:
