@@ -27,6 +27,7 @@ class RerunRobots:
         self.radius_m = np.concatenate(radii)  # (robots,)
         least = min(_LEAST_HEADING, _CROWDED / math.sqrt(static.robots))
         self.heading_m = np.maximum(_HEADING_RADII * self.radius_m, least * max(static.arena_size_m))  # (robots,)
+        self._arrow_m = self.heading_m[:, None].astype(np.float32)
         self._was: tuple[BoolArray, IntArray] | None = None  # who was alive and at what when the colours were logged
 
     def begin(self, rec: Any) -> None:
@@ -50,13 +51,13 @@ class RerunRobots:
         import rerun as rr
 
         pose, alive, state = truth.pose[rows], truth.alive[rows], truth.state[rows]
-        position_m, heading_rad = pose[:, :2].astype(np.float32), pose[:, 2]
+        position_m, heading_rad = pose[:, :2].astype(np.float32), pose[:, 2].astype(np.float32)
         points = rr.Points2D.from_fields(positions=position_m)
         rec.log("world/robots", points)
         if trails:
             rec.log("world/trails", points)
-        ahead = np.stack([np.cos(heading_rad), np.sin(heading_rad)], axis=1) * self.heading_m[:, None]
-        rec.log("world/headings", rr.Arrows2D.from_fields(origins=position_m, vectors=ahead.astype(np.float32)))
+        ahead = np.stack([np.cos(heading_rad), np.sin(heading_rad)], axis=1) * self._arrow_m
+        rec.log("world/headings", rr.Arrows2D.from_fields(origins=position_m, vectors=ahead))
         now = alive, state
         if self._was is None or not all(map(np.array_equal, now, self._was)):
             class_id = self._classes.of(rec, alive, state, truth.states)

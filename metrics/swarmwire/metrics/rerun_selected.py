@@ -115,10 +115,12 @@ class RerunSelected:
 
     def _bars(self, sheet: Proximity | Light, length_m: FloatArray, heading_rad: float) -> FloatArray:
         """Lines of these lengths outwards from the rim, (sensors, 2, 2) from the robot's centre."""
-        angle = sheet.angle_rad + heading_rad
-        outwards = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        rim_m = self._group.body.radius_m
-        return np.stack([rim_m * outwards, (rim_m + length_m)[:, None] * outwards], axis=1)
+        angle, rim_m = sheet.angle_rad + heading_rad, self._group.body.radius_m
+        lines = np.empty((len(angle), 2, 2))
+        lines[:, :, 0], lines[:, :, 1] = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        lines[:, 0] *= rim_m
+        lines[:, 1] *= (rim_m + length_m)[:, None]
+        return lines
 
     def _hits(self, truth: Truth, sheet: Proximity, rays: FloatArray) -> NDArray[np.uint32]:
         """The colour of each ray, (rays,), by what it meets."""
