@@ -86,6 +86,17 @@ def test_between_its_turns_it_keeps_what_it_sensed_and_the_dead_sense_nothing(tm
     np.testing.assert_allclose(drawn[1][0], drawn[0][0] @ turn, atol=1e-6)
 
 
+@pytest.mark.parametrize(("robots", "expected"), [(200, list(range(12))), (201, [0, 4, 5, 10])])
+def test_in_large_swarms_rays_that_see_nothing_are_thinned_as_links_are(tmp_path, robots, expected):
+    of = static(robots)
+    ticks = [
+        truth(of, tick, senses=sensed([0], proximity_value=np.full((1, 8), 0.5 if tick == 4 else 0.0)))
+        for tick in range(12)
+    ]
+    record(tmp_path / "run.rrd", of, ticks)
+    assert list(rays(tmp_path / "run.rrd")) == expected
+
+
 def test_photocells_are_bars_as_long_as_what_they_see(tmp_path):
     of, value = static(1), np.linspace(0.0, 1.0, 8)[None]
     record(tmp_path / "run.rrd", of, [truth(of, senses=sensed([0], light_value=value))])

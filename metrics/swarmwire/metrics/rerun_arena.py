@@ -48,7 +48,7 @@ class RerunArena:
         """Log one tick."""
         full = truth.tick % self.links_every_ticks == 0
         self._robots.log(rec, truth, self._rows, trails=full)
-        self._selected.log(rec, truth)
+        self._selected.log(rec, truth, full=full)
         if full:
             self._log_radio(rec, truth, truth.pose[self._rows, :2])
 

@@ -20,6 +20,7 @@ _NOTHING, _THING, _ROBOT = range(3)  # what a ray meets
 _LIGHT_BAR = packed(LIGHT, 200)
 _RANGE_ALPHA, _RING_ALPHA = 45, 170
 _LIGHT_RADII = 2.0  # length of a photocell's bar at full light, in body radii
+_DRAWN = ("proximity.value", "light.value")  # senses
 _RING_HEADINGS = 0.9  # radius of the ring in lengths of the heading's arrow
 _ORDER = 5.0
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 65)
@@ -62,6 +63,7 @@ class RerunSelected:
         self._group, self._ring_m = _group(static, self._index), _RING_HEADINGS * float(heading_m[self._index])
         self._radius_m = radius_m
         self._sensed: dict[str, FloatArray] = {}
+        self._sees = False  # whether any sensor answers
         self._drawn = False  # whether there are rays to be seen
 
     def begin(self, rec: Any) -> None:
@@ -80,13 +82,16 @@ class RerunSelected:
         rays = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(0.8), draw_order=_ORDER)
         rec.log(f"{_FRAME}/rays", rays, static=True)
 
-    def log(self, rec: Any, truth: Truth) -> None:
-        """Log a tick."""
+    def log(self, rec: Any, truth: Truth, *, full: bool) -> None:
+        """Log a tick; if it is not to be logged in full, rays that see nothing stay as they are."""
         import rerun as rr
 
         x_m, y_m, heading_rad = truth.pose[self._row].tolist()
         rec.log(_FRAME, rr.Transform3D.from_fields(translation=[x_m, y_m, 0.0]))
         self._remember(truth)
+        saw, self._sees = self._sees, any(bool(value.any()) for value in self._sensed.values())
+        if not (full or saw or self._sees or not truth.alive[self._row]):
+            return
         strips, colors = [np.empty((0, 2, 2))], [_HITS[:0]]
         body = self._group.body
         if body.proximity and "proximity.value" in self._sensed:
@@ -111,7 +116,7 @@ class RerunSelected:
         elif senses is not None:
             at = int(np.searchsorted(senses.rows, self._row))
             if at < len(senses.rows) and senses.rows[at] == self._row:
-                self._sensed = {name: np.array(values[at]) for name, values in senses.fields.items()}
+                self._sensed = {name: senses.fields[name][at].copy() for name in _DRAWN if name in senses.fields}
 
     def _bars(self, sheet: Proximity | Light, length_m: FloatArray, heading_rad: float) -> FloatArray:
         """Lines of these lengths outwards from the rim, (sensors, 2, 2) from the robot's centre."""
