@@ -20,11 +20,10 @@ from swarmwire.metrics.view_extra import need_view_extra
 class RerunRecording:
     """Observer that writes one arena of a run to a file for `rerun`, with timelines `tick` and `sim_time`.
 
-    Every tick is written in full, but in swarms of more than 200 robots links, lost packets, trails, and rays that
-    see nothing only every tenth tick. Of
-    several arenas it records one, the first if none is named. It plots what `metrics` measured, so that must see each
-    tick before it. Two runs that are equal give equal contents (there is no wall-clock time in it), but not equal
-    bytes: rerun numbers its chunks at random and cuts them as they come.
+    Every tick is written in full, but in swarms of more than 200 robots links, lost packets, trails, and rays that see
+    nothing only every tenth tick. Of several arenas it records one, the first if none is named. It plots what `metrics`
+    measured, so that must see each tick before it. Two runs that are equal give equal contents (there is no wall-clock
+    time in it), but not equal bytes: rerun numbers its chunks at random and cuts them as they come.
     """
 
     def __init__(self, path: Path, metrics: Metrics, arena: int = 0, selected: str | None = None) -> None:
