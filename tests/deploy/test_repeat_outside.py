@@ -15,6 +15,7 @@ from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.inputs import INPUTS, RecordedCrew
+from swarmwire.deploy.run_record import RunRecord
 from tests.deploy.commands import LOSSY
 from tests.deploy.test_realtime import Watcher, runners_here, still
 
@@ -113,11 +114,11 @@ def test_a_run_that_lost_a_runner_is_the_same_again(tmp_path, talkers, realtime)
 def test_a_run_whose_lost_runner_was_replaced_by_a_fresh_one_is_the_same_again(tmp_path, talkers, monkeypatch):
     takeovers: list[subprocess.Popen[bytes]] = []
 
-    def take_over(text: str) -> None:
+    def take_over(_: RunRecord, text: str) -> None:
         command = text.partition("such as: python ")[2].replace("NAME", "fresh").split()
         takeovers.append(subprocess.Popen([sys.executable, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE))
 
-    monkeypatch.setattr("swarmwire.deploy.simulation._say", take_over)
+    monkeypatch.setattr(RunRecord, "say", take_over)
     setting = [*talkers, "duration_s=1.5", "run.on_runner_loss=wait"]
     watcher = Watcher((lambda truth: truth.tick >= 5, lambda: killed(runners_here()[0])))
     try:

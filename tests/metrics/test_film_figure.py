@@ -11,7 +11,7 @@ from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.metrics.drawing.film_figure import FilmFigure
 from swarmwire.metrics.drawing.looks import DEAD, OTHER_STATE, STATE_COLORS
 from swarmwire.metrics.film import NO_STATE, Film
-from swarmwire.metrics.palette import group_color
+from swarmwire.metrics.palette import robot_color
 from tests.metrics.films import LIGHT, OBSTACLES, film, two_groups
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
@@ -37,7 +37,7 @@ def robots_shown(of: Film, index: int) -> list[tuple[int, ...]]:
 
 @pytest.mark.parametrize("index", [0, 30])
 def test_robots_have_the_colour_of_their_group_where_they_are(index):
-    assert robots_shown(film(), index) == [group_color(0), group_color(0), group_color(1)]
+    assert robots_shown(film(), index) == [robot_color(0), robot_color(0), robot_color(1)]
 
 
 def test_a_frame_shows_only_its_own_tick():
@@ -53,8 +53,8 @@ def test_the_dead_are_grey_from_the_tick_in_which_they_die():
     alive = np.ones((31, 3), np.bool_)
     alive[15:, 1] = False
     of = film(alive=alive)
-    assert robots_shown(of, 14)[1] == group_color(0)
-    assert robots_shown(of, 15) == [group_color(0), DEAD, group_color(1)]
+    assert robots_shown(of, 14)[1] == robot_color(0)
+    assert robots_shown(of, 15) == [robot_color(0), DEAD, robot_color(1)]
 
 
 def test_states_colour_the_robots_that_are_in_them():
@@ -155,7 +155,7 @@ def test_a_crowd_is_drawn():
     )
     pose = np.random.default_rng(1).uniform(-2.5, 2.5, (ticks, robots, 3))
     of = film(static=static, pose=pose, alive=np.ones((ticks, robots), np.bool_), time_s=np.arange(ticks) / 10)
-    assert robots_shown(replace(of, metrics={}), ticks - 1)[-1] == group_color(0)
+    assert robots_shown(replace(of, metrics={}), ticks - 1)[-1] == robot_color(0)
 
 
 @pytest.mark.parametrize(

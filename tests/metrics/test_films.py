@@ -12,7 +12,7 @@ from swarmwire.comms.truth import Group
 from swarmwire.metrics.drawing.film_figure import FilmFigure
 from swarmwire.metrics.drawing.gif import write_gif
 from swarmwire.metrics.drawing.mp4 import write_mp4
-from swarmwire.metrics.palette import group_color
+from swarmwire.metrics.palette import robot_color
 from tests.metrics.films import film, two_groups
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
@@ -46,7 +46,7 @@ def test_a_gif_has_a_frame_per_tick_in_the_colours_of_the_picture(figure, tmp_pa
             gif.seek(place)
             assert gif.info["duration"] == 80
             shown = np.asarray(gif.convert("RGB"))
-            assert off(shown[robot_at(figure, tick)], group_color(1)) < NEAR
+            assert off(shown[robot_at(figure, tick)], robot_color(1)) < NEAR
             assert tuple(shown[1, 1]) == (255, 255, 255)
 
 
@@ -69,7 +69,7 @@ def test_an_mp4_decodes_to_a_frame_per_tick_in_the_colours_of_the_picture(figure
     frames = np.frombuffer(decoded.stdout, np.uint8).reshape(-1, *figure.frame(0).shape)
     assert len(frames) == len(TICKS)
     for shown, tick in zip(frames, TICKS, strict=True):
-        assert off(shown[robot_at(figure, tick)], group_color(1)) < NEAR
+        assert off(shown[robot_at(figure, tick)], robot_color(1)) < NEAR
 
 
 def test_twenty_robots_for_a_minute_make_a_small_gif(tmp_path):

@@ -18,7 +18,7 @@ from swarmwire.metrics.drawing.looks import (
     rgb,
     shade,
 )
-from swarmwire.metrics.palette import Color, group_color
+from swarmwire.metrics.palette import Color, robot_color
 
 _LETTER_IN, _HANDLE_IN = 0.062, 0.4  # widths, roughly: of a letter of a legend, and of what stands before a text
 
@@ -26,7 +26,7 @@ _LETTER_IN, _HANDLE_IN = 0.062, 0.4  # widths, roughly: of a letter of a legend,
 def group_entries(static: Static, filled: bool = True, bodies: bool = False) -> list[Any]:
     """An entry per group, with the count and if wanted the name of its robots; not filled: its rim alone."""
     return [
-        _disc(_named(g, bodies), group_color(i) if filled else None, group_color(i))
+        _disc(_named(g, bodies), robot_color(i) if filled else None, robot_color(i))
         for i, g in enumerate(static.groups)
     ]
 

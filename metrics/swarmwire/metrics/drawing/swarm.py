@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.looks import DEAD, LINK, OTHER_STATE, STATE_COLORS, Look, rgb, shade
-from swarmwire.metrics.palette import group_color
+from swarmwire.metrics.palette import robot_color
 
 _LEAST, _CROWDED = 0.0105, 0.2  # least radius of a disc by the arena's longer side; and that times sqrt(robots)
 _HEADING_RADII = 2.0  # length of a heading in radii of its disc, from the centre
@@ -28,7 +28,7 @@ class Swarm:
         """Add the collections, empty, to axes in m."""
         from matplotlib.collections import EllipseCollection, LineCollection
 
-        by_group = [(group_color(i), group) for i, group in enumerate(static.groups)]
+        by_group = [(robot_color(i), group) for i, group in enumerate(static.groups)]
         radius_m = np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for _, group in by_group])
         self._fill = np.array([rgb(color) for color, group in by_group for _ in range(group.start, group.stop)])
         self._rim = np.array([shade(color) for color, group in by_group for _ in range(group.start, group.stop)])

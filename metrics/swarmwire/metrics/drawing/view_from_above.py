@@ -21,10 +21,10 @@ from swarmwire.metrics.drawing.looks import (
     shade,
 )
 from swarmwire.metrics.drawing.scenery import round_length_m
-from swarmwire.metrics.palette import group_color
+from swarmwire.metrics.palette import robot_color
 
 _RAY = "#d1495b"
-_COLOR = group_color(0)
+_COLOR = robot_color(0)
 _ROOM = 1.16  # of what is seen by what is drawn, so that numbers at the rays' ends fit
 _BELOW = -0.035  # where legend and bar are, as a share of the view's height
 _LEAST_RADII = 2.0  # seen in each direction at least, in radii of the body
