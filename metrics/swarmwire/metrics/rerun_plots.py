@@ -9,7 +9,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.truth import Static, Tally
-from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.plotted import Plotted
 
 _COLORS = (
     (86, 180, 233),
@@ -30,7 +30,7 @@ class RerunPlots:
     not.
     """
 
-    def __init__(self, static: Static, metrics: Sequence[Metric], arena: int) -> None:
+    def __init__(self, static: Static, metrics: Sequence[Plotted], arena: int) -> None:
         """Plots of one arena."""
         self._arena, self._rate_hz, self._radio = arena, static.rate_hz, static.range_m is not None
         self._shares = [metric.name for metric in metrics if metric.bounds == (0.0, 1.0)]
