@@ -10,6 +10,7 @@ from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
+from swarmwire.deploy.commands.view import view_command
 
 app = typer.Typer(
     help="A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own.",
@@ -20,6 +21,7 @@ app = typer.Typer(
 )
 app.command("run")(run_command)
 app.command("check")(check_command)
+app.command("view")(view_command)
 app.command("screenshot")(screenshot_command)
 app.command("schema")(schema_command)
 

@@ -4,25 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.glimpse import Series
+from swarmwire.metrics.metric import Metric
 
-
-class Plotted(Protocol):
-    """A metric, as far as a plot needs to know it."""
-
-    @property
-    def name(self) -> str:
-        """In the plot's legend."""
-        ...
-
-    @property
-    def unit(self) -> str:
-        """Of its values."""
-        ...
-
-    @property
-    def bounds(self) -> tuple[float, float | None]:
-        """Least and largest value of a tick; None: no largest."""
-        ...
+Plotted = Metric | Series  # a name, a unit and bounds
 
 
 class Measured(Protocol):
