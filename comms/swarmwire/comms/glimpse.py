@@ -12,7 +12,7 @@ class Series:
 
     name: str
     unit: str
-    bounds: tuple[float, float | None]  # least and largest value of a tick; None: no largest
+    bounds: tuple[float | None, float | None]  # least and largest value of a tick; None: there is none
 
 
 @dataclass(frozen=True, slots=True)

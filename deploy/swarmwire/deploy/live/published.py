@@ -7,6 +7,7 @@ import os
 import queue
 import threading
 from contextlib import ExitStack, suppress
+from math import isinf
 from pathlib import Path
 from typing import Any
 
@@ -98,8 +99,9 @@ class Published:
         return status.matching
 
     def _scene(self, static: Static) -> Scene:
-        series = [Series(metric.name, metric.unit, metric.bounds) for metric in self._metrics.metrics]
-        return Scene(static_of(static, self._arena), tuple(series))
+        metrics = self._metrics.metrics
+        series = tuple(Series(metric.name, metric.unit, _finite(*metric.bounds)) for metric in metrics)
+        return Scene(static_of(static, self._arena), series)
 
     def _declare(self, session: zenoh.Session, scene: bytes) -> None:
         keys = ObserverKeys(self._run_id)
@@ -127,3 +129,8 @@ class Published:
         with suppress(queue.Full):  # it has failed, or is still busy: the closed session ends it
             self._frames.put(None, timeout=LEAVE_S)
         self._sender.join(LEAVE_S)
+
+
+def _finite(*bounds: float | None) -> tuple[float | None, float | None]:
+    least, largest = (None if bound is None or isinf(bound) else bound for bound in bounds)
+    return least, largest
