@@ -10,6 +10,7 @@ from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.deploy.live.evened import Evened
 from swarmwire.deploy.live.following import Following, following
 from swarmwire.deploy.live.live_file import Live
+from swarmwire.deploy.live.recording import whole
 from swarmwire.deploy.live.viewer_program import Viewer, viewer
 from swarmwire.metrics.rerun_live import RerunLive
 
@@ -36,8 +37,8 @@ class Way:
 
 
 def show_recording(recording: Path, way: Way) -> None:
-    """Show a recording until the viewer is closed or `way.stopped()`."""
-    with way.viewer(recording) as shown:
+    """Show a recording, also of a run that was killed, until the viewer is closed or `way.stopped()`."""
+    with whole(recording) as complete, way.viewer(complete) as shown:
         _say_where(shown, way)
         while shown.alive and not way.stopped():
             way.pause()
