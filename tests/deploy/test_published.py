@@ -16,6 +16,7 @@ from swarmwire.comms.fates import Fate
 from swarmwire.comms.senses import GroupSenses
 from swarmwire.comms.truth import Happened
 from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpoint
+from swarmwire.comms.wire.truth_frames import encode_truth
 from swarmwire.deploy import run
 from swarmwire.deploy.live import published
 from swarmwire.deploy.live.following import RunGone, following
@@ -56,6 +57,13 @@ def publish(folder, of, clock=None, arena=0):
     metrics.begin(of)
     observer.begin(of)
     return metrics, observer
+
+
+def live(folder):
+    """The run that goes on in this folder."""
+    found = read_live(folder)
+    assert found is not None
+    return found
 
 
 def next_of(run):
@@ -129,8 +137,7 @@ def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tm
 
 def test_ticks_that_find_the_sender_busy_are_left_out_and_counted(tmp_path, monkeypatch, every_tick):
     of, go = static(2), threading.Event()
-    encode = published.encode_truth
-    monkeypatch.setattr(published, "encode_truth", lambda glimpse: go.wait() and encode(glimpse))
+    monkeypatch.setattr(published, "encode_truth", lambda glimpse: go.wait() and encode_truth(glimpse))
     metrics, observer = publish(tmp_path, of)
     try:
         with following(read_live(tmp_path)) as seen:
@@ -173,11 +180,10 @@ def test_a_run_is_the_same_beside_an_observer_that_is_frozen_or_killed(
     tmp_path, monkeypatch, every_tick, number, stays
 ):
     puts, clock = [], WallClock()
-    encode = published.encode_truth
 
     def timed(glimpse):
         puts.append(clock.now_ns())  # the put before this one is over
-        return encode(glimpse)
+        return encode_truth(glimpse)
 
     alone = run(LOSSY, overrides=MANY)
     monkeypatch.setattr(published, "encode_truth", timed)
@@ -209,7 +215,7 @@ def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path):
         def listen():
             sides = {
                 "runners": open_runner(unix_endpoint(str(socket))),
-                "observers": open_observer(read_live(tmp_path).endpoint),
+                "observers": open_observer(live(tmp_path).endpoint),
             }
             for side, session in sides.items():
                 held.enter_context(session)
@@ -230,7 +236,7 @@ def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path):
 def test_a_published_run_listens_on_no_network(tmp_path):
     _, observer = publish(tmp_path, static(2))
     try:
-        assert read_live(tmp_path).endpoint.startswith("unixsock-stream/")
+        assert live(tmp_path).endpoint.startswith("unixsock-stream/")
         listening = [c for c in psutil.Process().net_connections("inet") if c.status == psutil.CONN_LISTEN]
         assert listening == []
     finally:
@@ -257,8 +263,8 @@ def test_large_swarms_show_fewer_links_the_senses_of_one_and_no_flood_of_packets
         shown[0].senses["flock"].rows.tolist() == shown[0].senses["flock"].fields["compass.heading_rad"].tolist() == [7]
     )
     assert shown[0].finished is None
-    small = replace(full, finished=finished([0] * 2000, [1] * 2000))
-    assert len(sampling.glimpse(small, 1, values, 0).truth.finished.fate) == 2000
+    few = finished([0] * 2000, [1] * 2000)
+    assert sampling.glimpse(replace(full, finished=few), 1, values, 0).truth.finished == few
 
 
 def test_ticks_are_taken_once():

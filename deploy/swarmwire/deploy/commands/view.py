@@ -1,5 +1,6 @@
 """`swarmwire view`."""
 
+import os
 import select
 import sys
 from pathlib import Path
@@ -36,6 +37,7 @@ def view_command(
     from swarmwire.metrics.view_extra import need_view_extra
 
     need_view_extra("view")
+    os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
     live = read_live(run) if run.is_dir() else None
     recording = run / RECORDING if run.is_dir() else run
     with Interrupt() as interrupt:
