@@ -41,9 +41,18 @@ class Published:
     Summary part: `published`: `frames` sent, and `left_out`: due while the one before was not yet sent.
     """
 
-    def __init__(self, folder: Path, run_id: str, metrics: Measured, clock: Clock, arena: int = 0) -> None:
-        """Publish the run whose folder this is."""
-        self._folder, self._run_id, self._metrics, self._clock, self._arena = folder, run_id, metrics, clock, arena
+    def __init__(
+        self,
+        folder: Path,
+        run_id: str,
+        metrics: Measured,
+        clock: Clock,
+        arena: int = 0,
+        selected: int | None = None,
+    ) -> None:
+        """Publish the run whose folder this is; `selected` is the index of the robot that is shown in detail."""
+        self._folder, self._run_id, self._metrics, self._clock = folder, run_id, metrics, clock
+        self._arena, self._selected = arena, selected
         self._open = ExitStack()
         self.frames = self.left_out = 0
 
@@ -51,7 +60,8 @@ class Published:
         """Open the endpoint and tell where it is; BadInput if there is no such arena."""
         if not 0 <= self._arena < static.arenas:
             raise BadInput("live view", "arena", f"expected 0 to {static.arenas - 1}")
-        self._sampling, self._since, self._rate = Sampling(static, self._arena), Since(), Rate(FRAMES_PER_S)
+        self._sampling = Sampling(static, self._arena, self._selected)
+        self._since, self._rate = Since(), Rate(FRAMES_PER_S)
         self._watched = False
         self._fault: Exception | None = None
         self._frames: queue.Queue[Glimpse | None] = queue.Queue(maxsize=1)

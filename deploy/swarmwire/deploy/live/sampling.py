@@ -63,12 +63,16 @@ class Since:
 class Sampling:
     """Glimpses of one arena, out of the ticks of all."""
 
-    def __init__(self, static: Static, arena: int) -> None:
-        """Show this arena."""
+    def __init__(self, static: Static, arena: int, selected: int | None = None) -> None:
+        """Show this arena, and of a large swarm the senses of the robot `selected`.
+
+        None: the first robot of the first group that has rays or photocells.
+        """
         self._static, self._arena = static, arena
         self._serial = 0
         self._links = Rate(LINKS_PER_S)
-        self.selected = 0  # the robot of the arena whose senses are shown in a large swarm
+        seeing = [group.start for group in static.groups if group.body.proximity or group.body.light]
+        self._selected = selected if selected is not None else [*seeing, 0][0]
 
     def glimpse(self, truth: Truth, ticks: int, values: FloatArray, now_ns: int) -> Glimpse:
         """What is shown of a tick; `values` (series, arenas) were measured in it."""
@@ -78,6 +82,6 @@ class Sampling:
         few = shown.finished is not None and len(shown.finished.fate) <= MOST_FINISHED
         shown = replace(shown, edges=shown.edges if links else None, finished=shown.finished if few else None)
         if static.robots > SMALL:
-            shown = replace(shown, senses=senses_within(shown.senses, slice(self.selected, self.selected + 1)))
+            shown = replace(shown, senses=senses_within(shown.senses, slice(self._selected, self._selected + 1)))
         self._serial += 1
         return Glimpse(shown, self._serial - 1, ticks, values[:, self._arena : self._arena + 1])
