@@ -13,6 +13,7 @@ from typing import Any
 import psutil
 
 from benchmarks import scenes
+from benchmarks.record_cost import compared
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.machine import cpu
@@ -73,6 +74,17 @@ def processes(name: str, *, robots: int, ticks: int) -> None:
     report(f"{name}-uss", statistics.median(memory.uss_mb), "MB", results[0], {**config, **spread(memory.uss_mb)})
 
 
+def record_cost(name: str, *, robots: int, ticks: int) -> None:
+    """Time of a run that is recorded over that of one that is not, its tables joined; and their size."""
+    scenario = scenario_from(scenes.diffusion(robots, 5, ticks / 10, radio=False), name)
+    compared(scenario.model_copy(update={"duration_s": 2.0}), 1)
+    without, recorded, sizes_mb, result = compared(scenario, REPEATS)
+    ratios = [with_s / plain_s for plain_s, with_s in zip(without, recorded, strict=True)]
+    config = {"body": "footbot", "physics_steps": 5, "density_per_m2": scenes.DENSITY_PER_M2}
+    report(name, statistics.median(ratios), "x the run without", result, {**config, **spread(ratios)})
+    report(f"{name}-size", sum(sizes_mb.values()), "MB", result, {**config, "tables_mb": sizes_mb})
+
+
 def report(name: str, value: float, unit: str, result: Result, config: dict[str, Any]) -> None:
     """Print one line."""
     radio = result.radio
@@ -102,6 +114,7 @@ BENCHMARKS: dict[str, Callable[[str], None]] = {
     "inprocess-1000-d1-10steps": lambda name: in_process(name, robots=1000, steps=10, ticks=200, radio=False),
     "inprocess-1000-d1-radio": lambda name: in_process(name, robots=1000, steps=5, ticks=200, radio=True),
     "wire-1000x2": lambda name: in_process(name, robots=1000, steps=5, ticks=200, radio=True, runners=2),
+    "record-cost": lambda name: record_cost(name, robots=1000, ticks=600),
     "processes-100": lambda name: processes(name, robots=100, ticks=300),
 }
 

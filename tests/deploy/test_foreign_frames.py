@@ -10,8 +10,8 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.deploy import run
-from swarmwire.deploy.run import Execution
-from swarmwire.world.scenario_file import load_scenario
+from swarmwire.deploy.running import finished
+from swarmwire.deploy.simulation import Simulation
 from tests.deploy.commands import LOSSY
 
 
@@ -54,10 +54,11 @@ class Vandal:
 
 def test_a_stranger_cannot_stop_or_change_a_run(tmp_path):
     path = tmp_path / "s"
-    execution = Execution(load_scenario(LOSSY, ["duration_s=2"]), (1,), 3, path)
+    simulation = Simulation(LOSSY, overrides=["duration_s=2"], runners=3, socket=path)
     vandal = Vandal(str(path))
-    vandal.keys = Keys(execution.run_id)
-    result = execution.run([vandal])
+    vandal.keys = Keys(simulation.run_id)
+    simulation.watch(vandal)
+    result = finished(simulation)
     assert result.ticks == 20
     assert result.trajectory_sha256 == run(LOSSY, overrides=["duration_s=2"]).trajectory_sha256
     counts = result.counts

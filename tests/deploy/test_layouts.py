@@ -6,12 +6,11 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.agents import agent_specs
 from swarmwire.deploy.endpoint import local_endpoint, new_run_id
-from swarmwire.deploy.run import Execution
 from swarmwire.deploy.runner_processes import RunnerProcesses
+from swarmwire.deploy.simulation import Simulation
 from swarmwire.world import assignments
 from swarmwire.world.loop import Loop
 from swarmwire.world.remote_crew import RemoteCrew
-from swarmwire.world.scenario_file import load_scenario
 from tests.deploy.commands import LOSSY, ROOT
 
 SHORT = ["duration_s=3"]
@@ -56,9 +55,9 @@ def test_an_arena_is_the_same_alone_and_as_one_of_eight(local, runners):
 
 def test_which_runner_plays_which_robots_does_not_matter(local):
     """Runners get robots in the order in which they come: handing them out backwards is the other order of starting."""
-    execution = Execution(load_scenario(LOSSY, SHORT), (1,))
-    specs = agent_specs(execution.scenario)
-    parts = assignments.split(assignments.whole(execution.scenario, execution.world.static, specs), 3)
+    simulation = Simulation(LOSSY, overrides=SHORT)
+    specs = agent_specs(simulation.scenario)
+    parts = assignments.split(assignments.whole(simulation.scenario, simulation.world.static, specs), 3)
     run_id = new_run_id()
     with local_endpoint(None) as endpoint:
         crew = RemoteCrew(endpoint, run_id, parts[::-1], 30.0, WallClock())
@@ -66,8 +65,8 @@ def test_which_runner_plays_which_robots_does_not_matter(local):
         processes = RunnerProcesses(endpoint, run_id, sorted(specs.values()), ["c", "b", "a"])
         try:
             crew.start()
-            loop = Loop(execution.world, execution.air(), crew, [])
-            loop.run(execution.ticks)
+            loop = Loop(simulation.world, simulation._air(), crew, [])
+            loop.run(simulation.ticks)
         finally:
             crew.close()
             processes.stop()

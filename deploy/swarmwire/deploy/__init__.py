@@ -1,6 +1,24 @@
-"""Where things run: `run` a scenario from Python; the command line does the same."""
+"""Where things run: `run` a scenario from Python, or step a `Simulation`; the command line does the same."""
 
-from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
-from swarmwire.deploy.run import run
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["ArenaResult", "Percentiles", "RadioResult", "Result", "Statistics", "run"]
+if TYPE_CHECKING:
+    from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
+    from swarmwire.deploy.running import run
+    from swarmwire.deploy.simulation import Simulation
+
+__all__ = ["ArenaResult", "Percentiles", "RadioResult", "Result", "Simulation", "Statistics", "run"]
+
+_PLACES = {"run": "running", "Simulation": "simulation"}  # all else is part of a result
+
+
+def __getattr__(name: str) -> Any:
+    """Imports on first use: `swarmwire --help` must not wait for compilers, physics and zenoh."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_PLACES.get(name, 'result')}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

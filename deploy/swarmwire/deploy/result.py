@@ -71,7 +71,7 @@ class Result:
     robots: int  # in each arena
     runners: int  # 0: all agents in the world's process
     mode: str  # "local" | "lockstep" | "realtime"
-    ended: str  # "duration" | "interrupted"
+    ended: str  # "duration" | "interrupted" | "left" (by whoever stepped it) | "failed"
     ticks: int
     sim_time_s: float
     wall_time_s: float  # of the loop
@@ -84,6 +84,8 @@ class Result:
     versions: dict[str, str]
     lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
     realtime: RealTimeReport | None = None
+    error: str | None = None  # why it failed
+    record: dict[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]], compare=False)  # tables
     out: Path | None = field(default=None, compare=False)  # the run folder
 
     @property
@@ -121,6 +123,7 @@ class Result:
             "runners": self.runners,
             "mode": self.mode,
             "ended": self.ended,
+            "error": self.error,
             "ticks": self.ticks,
             "sim_time_s": self.sim_time_s,
             "wall_time_s": self.wall_time_s,
@@ -134,6 +137,7 @@ class Result:
             "counts": self.counts,
             "lost_runners": list(self.lost_runners),
             "realtime": asdict(self.realtime) if self.realtime else None,
+            "record": self.record,
             "cpu": self.cpu,
             "versions": self.versions,
         }

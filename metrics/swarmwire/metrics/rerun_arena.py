@@ -7,11 +7,11 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Obstacle, Static, Truth
+from swarmwire.metrics.palette import group_color
 
 LINKS_EVERY_TICK_UP_TO = 200  # robots; links are most of a recording's bytes and time
 THINNED_LINKS_EVERY_TICKS = 10
 
-_GROUP_COLORS = ((86, 180, 233), (240, 160, 50), (0, 200, 140), (230, 110, 180), (240, 228, 66), (160, 140, 250))
 _DEAD_COLOR = (95, 95, 100)
 _WALL_COLOR = (150, 155, 170)
 _LIGHT_COLOR = (255, 220, 60)
@@ -107,7 +107,7 @@ def _by_group(static: Static) -> tuple[Any, FloatArray]:
     color = np.zeros((static.robots, 3), np.uint8)
     radius_m = np.zeros(static.robots)
     for i, group in enumerate(static.groups):
-        color[group.start : group.stop] = _GROUP_COLORS[i % len(_GROUP_COLORS)]
+        color[group.start : group.stop] = group_color(i)
         radius_m[group.start : group.stop] = group.body.radius_m
     return color, radius_m
 

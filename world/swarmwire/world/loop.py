@@ -31,12 +31,20 @@ class Loop:
         self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
 
-    def run(self, ticks: int, stopped: Callable[[], bool] = lambda: False) -> None:
-        """Run up to tick `ticks`, or until `stopped()`; the crew must have been started."""
-        while self.ticks_done < ticks and not stopped():
+    def run(
+        self, ticks: int, stopped: Callable[[], bool] = lambda: False, hold: Callable[[int], None] = lambda _: None
+    ) -> None:
+        """Run up to tick `ticks`, or until `stopped()`; the crew must have been started.
+
+        `hold` returns when the tick that it is given may begin; it changes when a tick begins, never what is in it.
+        """
+        while self.ticks_done < ticks:
+            hold(self.ticks_done)
+            if stopped():
+                return
             self.step()
 
-    def step(self) -> None:
+    def step(self) -> Truth:
         """One tick, in the order of the design: events, air, senses, crew, air, physics, observers."""
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
@@ -78,6 +86,7 @@ class Loop:
         for observer in self.observers:
             observer.see(truth)
         self.ticks_done += 1
+        return truth
 
     def end(self) -> Tally | None:
         """End the air: what was in flight, and what no observer has seen of a tick that was broken off."""

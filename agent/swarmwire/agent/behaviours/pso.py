@@ -45,10 +45,10 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
 
     update_every_ticks: int = 100  # steps between two updates of the velocity
     tell_before_ticks: int = 10  # the own best is broadcast so many steps before an update
-    inertia: float = 0.7298  # w, a and b: Clerc and Kennedy's constriction for phi = 4.1
-    own_weight: float = 1.4962
-    neighbour_weight: float = 1.4962
-    speed_mps: float = 0.1
+    inertia: float = 0.7298  # w; w, a and b are Clerc and Kennedy's constriction for phi = 4.1
+    own_weight: float = 1.4962  # a: pull of the own best
+    neighbour_weight: float = 1.4962  # b: pull of the neighbours' best
+    speed_mps: float = 0.1  # straight ahead
     arrived_m: float = 0.05  # nearer than this to the target the robot waits
     avoidance: float = 2.0  # weight of the rays against the way to the target
     turn_gain_per_s: float = 3.0  # turn rate per angle to the wanted direction

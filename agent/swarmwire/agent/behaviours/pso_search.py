@@ -27,10 +27,10 @@ class WheeledParticle(Particle):
 
 
 class PsoSearch(ParticleSwarm[WheeledParticle]):
-    """Neighbours are those whose broadcast is heard; a best comes as a vector from its sender.
+    """Particle swarm search by what a robot itself senses: wheels, compass, and a radio that tells range and bearing.
 
-    The receiver adds where it hears the sender. Places are kept by dead reckoning: the mean way of both wheels, along
-    the compass' heading.
+    Neighbours are those whose broadcast is heard; a best comes as a vector from its sender, and the receiver adds where
+    it hears the sender. Places are kept by dead reckoning: the mean way of both wheels, along the compass' heading.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("light", "proximity", "compass", "odometry", "radio.range", "radio.bearing")

@@ -27,7 +27,10 @@ class PositionedParticle(Particle):
 
 
 class PsoSearchPositioned(ParticleSwarm[PositionedParticle]):
-    """A best comes as a place; with a radio that reaches all, the neighbourhood is global."""
+    """Particle swarm search by global positions.
+
+    A best comes as a place; with a radio that reaches all, the neighbourhood is global.
+    """
 
     needs: ClassVar[tuple[str, ...]] = ("light", "proximity", "compass", "positioning")
 

@@ -14,3 +14,4 @@ Overrides = Annotated[
         metavar="PATH=VALUE",
     ),
 ]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]

@@ -7,11 +7,10 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
 from swarmwire.deploy.commands.options import Overrides, ScenarioFile
-from swarmwire.deploy.folder import default_folder, make_folder
+from swarmwire.deploy.folder import default_folder
 from swarmwire.deploy.report import print_result
 from swarmwire.deploy.result import Result
 
@@ -39,23 +38,43 @@ def run_command(
             metavar="[FACTOR]",
         ),
     ] = None,
+    packets: Annotated[
+        str,
+        typer.Option(
+            help='Packets to record in packets.parquet: "off", "all", or a share of them, such as 0.1.',
+            metavar="off|all|SHARE",
+        ),
+    ] = "off",
+    rrd: Annotated[bool, typer.Option(help="Record run.rrd, for rerun's viewer.")] = True,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Run a scenario, print what came of it, and write summary.json and run.rrd into the run folder.
+    """Run a scenario, show how it goes, and leave a run folder: summary, tables, recording, log.
 
     Without --realtime the same scenario and seed give the same run bit for bit, whatever --runners says.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.deploy.progress import ProgressLine
-    from swarmwire.deploy.run import Execution, choose_seeds
+    from swarmwire.deploy.arguments import choose_seeds
+    from swarmwire.deploy.recording import Recording, packet_share
+    from swarmwire.deploy.running import finished
+    from swarmwire.deploy.shown import progress
+    from swarmwire.deploy.simulation import Simulation
     from swarmwire.world.scenario_file import load_scenario
 
     console = Console(quiet=quiet, highlight=False)
     checked = load_scenario(scenario, overrides or [])
     chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
-    execution = Execution(checked, chosen, runners, socket=socket, realtime=realtime)
-    folder = execution.folder = make_folder(out or default_folder(scenario.stem, chosen))
-    result = execution.run([ProgressLine(execution.ticks, WallClock(), console)])
+    folder = out or default_folder(scenario.stem, chosen)
+    simulation = Simulation(
+        checked,
+        seeds=chosen,
+        runners=runners,
+        out=folder,
+        socket=socket,
+        realtime=realtime,
+        record=Recording(packets=packet_share(packets), rrd=rrd),
+    )
+    simulation.watch(progress(simulation, console))
+    result = finished(simulation)
     print_result(result, console)
     _say_where(result, folder, console)
     if result.ended == "interrupted":

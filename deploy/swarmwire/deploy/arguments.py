@@ -1,0 +1,45 @@
+"""What people ask of an execution, checked at the door: seeds, runners, the pace of real time."""
+
+from collections.abc import Sequence
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.world.scenario import Scenario
+
+FASTEST = 1e6  # factor in real time
+Runners = int | str | None  # how many, "per-robot", or None for a local crew
+
+
+def choose_seeds(scenario: Scenario, seed: int | None, seeds: Sequence[int] | None) -> tuple[int, ...]:
+    """The seed of each arena: those asked for, or the scenario's own; BadInput if they are no good."""
+    if seed is not None and seeds is not None:
+        raise BadInput("", "seeds", "expected either one seed or several seeds")
+    chosen = tuple(seeds) if seeds is not None else (scenario.seed if seed is None else seed,)
+    if not chosen or len(set(chosen)) != len(chosen) or min(chosen) < 0:
+        raise BadInput("", "seeds", f"expected different whole numbers of at least 0, got {list(chosen)}")
+    return chosen
+
+
+def runner_count(runners: Runners, robots: int) -> int:
+    """How many runners there will be, 0 for a local crew; BadInput if there are not so many robots."""
+    if runners is None or runners == "none":
+        return 0
+    if runners == "per-robot":
+        return robots
+    if isinstance(runners, str) and runners.isdecimal():
+        runners = int(runners)
+    if isinstance(runners, str | bool) or not 1 <= runners <= robots:
+        raise BadInput("--runners", "", f'expected "none", "per-robot" or 1 to {robots} (the robots), got {runners!r}')
+    return runners
+
+
+def real_time_factor(realtime: float | str | None) -> float | None:
+    """Simulated seconds per second of wall time, None for as fast as possible; BadInput if it is no such number."""
+    if realtime is None:
+        return None
+    try:
+        factor = float(realtime)
+    except ValueError:
+        factor = 0.0
+    if not 0 < factor <= FASTEST:
+        raise BadInput("--realtime", "", f"expected a factor above 0 and at most {FASTEST:g}, got {realtime!r}")
+    return factor

@@ -1,0 +1,65 @@
+"""From a name to the one thing that has it."""
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.catalogue.behaviours import behaviour
+from swarmwire.deploy.catalogue.entry import Entry
+from swarmwire.deploy.catalogue.kinds import KINDS, Kind
+
+
+def kind_named(name: str) -> Kind:
+    """The kind of this name, singular or plural; BadInput if there is none."""
+    found = next((kind for kind in KINDS if name.lower() in (kind.name, kind.one)), None)
+    if found is None:
+        raise BadInput(name, "", f"expected one of {', '.join(kind.name for kind in KINDS)}")
+    return found
+
+
+def find(name: str) -> Entry:
+    """What `name` names: alone, as "kind:name", or an agent class as "module:Class" or "file.py:Class".
+
+    Keys of a scenario may leave out how they begin, as far as that is clear, and may hold a group's name for `*`.
+    BadInput if nothing has the name, with the nearest that there are, or if several things have it.
+    """
+    before, colon, rest = name.partition(":")
+    chosen = [kind for kind in KINDS if colon and before.lower() in (kind.name, kind.one)]
+    if colon and not chosen:
+        return behaviour(name)
+    entries = [entry for kind in chosen or KINDS for entry in kind.entries()]
+    asked = rest if chosen else name
+    found = [entry for entry in entries if _is(entry.name, asked)] or [
+        entry for entry in entries if _is(entry.name, asked, ends=True)
+    ]
+    if not found:
+        raise BadInput(name, "", _nearest(asked, entries))
+    if len(found) > 1:
+        raise BadInput(name, "", f"several things have this name; say which: {', '.join(_full_names(found))}")
+    return found[0]
+
+
+def _is(name: str, asked: str, ends: bool = False) -> bool:
+    """Whether `asked` is the name, whole or how it `ends`, part by part; a `*` in it is any part."""
+    parts, wanted = name.lower().split("."), asked.lower().split(".")
+    if ends:
+        parts = parts[-len(wanted) :]
+        if parts[-1] != wanted[-1]:  # else any word would name the table robots.*
+            return False
+    return len(parts) == len(wanted) and all(part in ("*", want) for part, want in zip(parts, wanted, strict=True))
+
+
+def _full_names(entries: Sequence[Entry]) -> list[str]:
+    names = [entry.name for entry in entries]
+    return names if len(set(names)) == len(names) else [f"{entry.kind}:{entry.name}" for entry in entries]
+
+
+def _nearest(asked: str, entries: Sequence[Entry]) -> str:
+    """What to try instead: the names nearest to the one asked for, or to the last part of a path."""
+    if any(asked.lower() in (kind.name, kind.one) for kind in KINDS):
+        return f"this is a kind of things; swarmwire list {kind_named(asked).name} names them"
+    names = {entry.name.lower(): entry.name for entry in entries}
+    names |= {entry.name.rpartition(".")[2].lower(): entry.name for entry in reversed(entries) if "." in entry.name}
+    close = dict.fromkeys(names[match] for match in get_close_matches(asked.lower(), names, n=4, cutoff=0.6))
+    nearest = f"nearest: {', '.join(close)}" if close else "nothing is near it"
+    return f"nothing has this name; {nearest} (swarmwire list names all)"

@@ -1,0 +1,37 @@
+"""The kinds of things that have a name. A new kind is one entry here."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from swarmwire.deploy.catalogue.behaviours import behaviours
+from swarmwire.deploy.catalogue.bodies import bodies
+from swarmwire.deploy.catalogue.entry import Entry
+from swarmwire.deploy.catalogue.events import events
+from swarmwire.deploy.catalogue.fates import fates
+from swarmwire.deploy.catalogue.metrics import metrics
+from swarmwire.deploy.catalogue.radio_stages import radio_stages
+from swarmwire.deploy.catalogue.scenario_keys import keys, radio_keys
+from swarmwire.deploy.catalogue.senses import senses
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind."""
+
+    name: str  # as in `swarmwire list NAME`
+    one: str  # as in `swarmwire describe ONE:name`, and the `kind` of its entries
+    help: str  # one line
+    entries: Callable[[], list[Entry]]
+
+
+KINDS = (
+    Kind("bodies", "body", "kinds of robot: size, drive and senses", bodies),
+    Kind("senses", "sense", "what an agent may read of its robot and of packets, if its needs name it", senses),
+    Kind("behaviours", "behaviour", "agents that come with swarmwire, with their parameters", behaviours),
+    Kind("events", "event", "what may happen to robots and radios on the way", events),
+    Kind("metrics", "metric", "what is measured of every run", metrics),
+    Kind("radio", "radio", "keys of a scenario's radio", radio_keys),
+    Kind("stages", "stage", "what a packet passes on its way to a receiver, in order", radio_stages),
+    Kind("fates", "fate", "what may become of a packet for one receiver", fates),
+    Kind("keys", "key", "all other keys of a scenario", keys),
+)

@@ -1,0 +1,48 @@
+"""Senses: what an agent's `needs` may name, of its body and of the packets that it hears."""
+
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import Any, get_args, get_type_hints
+
+from swarmwire.agent.packet import Packet
+from swarmwire.agent.robot import Robot
+from swarmwire.comms.air.radio import Gives
+from swarmwire.comms.body import body_names, load_body
+from swarmwire.comms.sheets import SHEETS
+from swarmwire.deploy.catalogue.docs import first_line, paragraphs
+from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
+from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
+
+
+def senses() -> list[Entry]:
+    """Those of bodies, then those of packets."""
+    return [*_of_bodies(), *_of_packets()]
+
+
+def _of_bodies() -> Iterator[Entry]:
+    bodies = [load_body(name) for name in body_names()]
+    for name, sheet in SHEETS.items():
+        have = ", ".join(body.name for body in bodies if name in body.senses)
+        told = first_line(getattr(Robot, name).__doc__)
+        yield _sense(name, sheet, f"robot.{name}: {told}", ("bodies", have or "none that comes with swarmwire"))
+
+
+def _of_packets() -> Iterator[Entry]:
+    hints = get_type_hints(Gives)
+    for of in fields(Gives):
+        kind = next(arg for arg in get_args(hints[of.name]) if arg is not type(None))
+        (column,) = Gives(**{of.name: kind()}).columns
+        told = first_line(getattr(Packet, column).__doc__)
+        yield _sense(f"radio.{of.name}", kind, f"packet.{column}: {told}", ("given by", f"[radio] gives.{of.name}"))
+
+
+def _sense(name: str, sheet: type[Any], read: str, where: tuple[str, str]) -> Entry:
+    parameters = parameters_of_dataclass(sheet)
+    return Entry(
+        kind="sense",
+        name=name,
+        help=first_line(sheet.__doc__),
+        facts=(("in an agent", f'needs = ("{name}", …)'), ("read as", read), where),
+        tables=(ParameterTable("data sheet", parameters),) if parameters else (),
+        text=paragraphs(sheet.__doc__),
+    )

@@ -1,0 +1,80 @@
+"""Who decides for the robots of a run: agents in this process, or runners that this machine starts."""
+
+from collections.abc import Callable, Generator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.clock import Clock
+from swarmwire.comms.protocols import Crew
+from swarmwire.comms.truth import Static
+from swarmwire.deploy.endpoint import local_endpoint
+from swarmwire.deploy.runner_processes import RunnerProcesses
+from swarmwire.world import assignments
+from swarmwire.world.pace import Pace
+from swarmwire.world.realtime_crew import PacedCrew, RealTimeCrew
+from swarmwire.world.remote_crew import RemoteCrew
+from swarmwire.world.roster import Loss
+from swarmwire.world.runner_crew import Surroundings
+from swarmwire.world.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Crews:
+    """How a run's crew is made. `agents` names, by group, the spec of the agent."""
+
+    scenario: Scenario
+    static: Static
+    agents: Mapping[str, str]
+    runners: int  # 0: all agents in this process
+    run_id: str
+    clock: Clock
+    pace: Pace | None  # of real time; None: as fast as the machine allows
+    socket: Path | None  # where runners meet the world; None: at a private place
+    stopped: Callable[[], bool]  # whether waiting for runners is to end
+    lost: Callable[[Loss], None]  # is told of a runner that was lost while the run went on
+    say: Callable[[str], None]  # what people should know at once
+
+    @contextmanager
+    def crew(self) -> Generator[Crew]:
+        """The crew, ended with the context."""
+        whole = assignments.whole(self.scenario, self.static, dict(self.agents))
+        if not self.runners:
+            with closing(LocalCrew(whole)) as local:
+                yield PacedCrew(local, self.pace) if self.pace else local
+            return
+        processes: list[RunnerProcesses] = []
+
+        def trouble() -> str | None:
+            return processes[0].trouble() if processes else None
+
+        parts = assignments.split(whole, self.runners)
+        names = [f"r{i}" for i in range(len(parts))]
+        with local_endpoint(self.socket) as endpoint:
+            around = Surroundings(trouble, self.stopped, lambda loss: self._survive(loss, endpoint))
+            crew = self._remote(endpoint, parts, around)
+            try:
+                crew.open()
+                processes.append(RunnerProcesses(endpoint, self.run_id, sorted(set(self.agents.values())), names))
+                yield crew
+            finally:
+                crew.close()
+                for process in processes:
+                    process.stop()
+
+    def _remote(self, endpoint: str, parts: list[Assignment], around: Surroundings) -> RemoteCrew | RealTimeCrew:
+        table = self.scenario.run
+        common = endpoint, self.run_id, parts, table.runner_timeout_s, self.clock, around, table.on_runner_loss
+        return RealTimeCrew(*common, self.pace, table.watchdog_s) if self.pace else RemoteCrew(*common)
+
+    def _survive(self, loss: Loss, endpoint: str) -> None:
+        """Tell people of a runner that was lost, and of what they can do."""
+        self.lost(loss)
+        if self.scenario.run.on_runner_loss == "dead":
+            self.say(f"lost runner {loss}; its robots stand still")
+            return
+        agents = ",".join(sorted(set(self.agents.values())))
+        takeover = f"python -m swarmwire.agent.nursery {endpoint} {self.run_id} {agents} NAME"
+        self.say(f"lost runner {loss}; waiting for another, such as: {takeover}")

@@ -1,0 +1,57 @@
+"""Run a scenario to its end and give back what came of it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from swarmwire.comms.protocols import Observer
+from swarmwire.deploy.arguments import Runners
+from swarmwire.deploy.recording import Recording
+from swarmwire.deploy.result import Result
+from swarmwire.deploy.simulation import Simulation
+from swarmwire.world.scenario import Scenario
+
+
+def run(
+    scenario: Scenario | Path | str,
+    *,
+    seed: int | None = None,
+    seeds: Sequence[int] | None = None,
+    runners: Runners = None,
+    overrides: Sequence[str] = (),
+    out: Path | str | None = None,
+    observers: Sequence[Observer] = (),
+    socket: Path | None = None,
+    realtime: float | None = None,
+    record: Recording | None = None,
+) -> Result:
+    """Run a scenario and return its result; with `seeds`, one arena per seed, side by side in one world.
+
+    `runners` is None (all agents in this process), a number of runner processes, or "per-robot". `overrides` are
+    "path=value" as for `--set`. With `out`, a new or empty folder, the run folder is written there; `record` says what
+    goes into it. `realtime` keeps
+    the run to the wall clock, so many simulated seconds per second, and waits for no runner; None runs as fast as the
+    machine allows.
+
+    Raises BadInput for anything wrong with the scenario or these arguments, AgentFailed with the agent's traceback, and
+    RunnerLost if a runner's process or link is gone.
+    """
+    simulation = Simulation(
+        scenario,
+        seed=seed,
+        seeds=seeds,
+        runners=runners,
+        overrides=overrides,
+        out=out,
+        observers=observers,
+        socket=socket,
+        realtime=realtime,
+        record=record,
+    )
+    return finished(simulation)
+
+
+def finished(simulation: Simulation) -> Result:
+    """The result of a simulation that is run to its end here; Ctrl-C ends it after the tick under way."""
+    with simulation.interrupt, simulation:
+        simulation.run()
+    return simulation.result

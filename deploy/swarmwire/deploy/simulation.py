@@ -1,0 +1,251 @@
+"""One execution of a scenario, tick by tick or to its end."""
+
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, cast
+
+from swarmwire.comms.air.air import Air
+from swarmwire.comms.clock import WallClock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.protocols import Crew, Observer
+from swarmwire.comms.truth import Static, Truth
+from swarmwire.deploy import machine
+from swarmwire.deploy.agents import agent_specs, check_agents
+from swarmwire.deploy.arguments import Runners, choose_seeds, real_time_factor, runner_count
+from swarmwire.deploy.controls import Controls
+from swarmwire.deploy.crews import Crews
+from swarmwire.deploy.endpoint import new_run_id
+from swarmwire.deploy.guarded import Guarded
+from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.recording import Recording
+from swarmwire.deploy.result import EventResult, Result, arena_result
+from swarmwire.deploy.run_record import RunRecord, dropped_rows
+from swarmwire.metrics.event_log import EventLog
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.radio_tally import RadioTally
+from swarmwire.metrics.record.recorders import record_summary
+from swarmwire.world.loop import Loop
+from swarmwire.world.pace import Pace
+from swarmwire.world.realtime_crew import PacedCrew, RealTimeCrew, RealTimeReport
+from swarmwire.world.roster import Loss
+from swarmwire.world.runner_crew import RunnerCrew
+from swarmwire.world.runner_health import RunnerHealth
+from swarmwire.world.scenario import Scenario
+from swarmwire.world.scenario_file import load_scenario
+from swarmwire.world.world import World
+
+GLOBAL_SENSES = ("compass", "positioning")
+
+
+class Simulation:
+    """A scenario, checked and ready; entered, it has its agents and can be stepped; left, it has a result.
+
+    So::
+
+        with Simulation("scenario.toml", seed=3) as simulation:
+            while simulation.tick < 100:
+                truth = simulation.step()
+        print(simulation.result.metrics["order"].final)
+
+    The arguments are those of `swarmwire.deploy.run`, and so are the errors.
+
+    Attributes:
+        scenario: as checked.
+        world: every arena's bodies and senses; do not move it by hand.
+        metrics: what was measured up to the last tick, in `metrics.latest`.
+        ticks: of the whole run.
+        runners: processes that run the agents; 0: none, they are in this one.
+        interrupt: entered, SIGINT ends `run` after the tick under way.
+        controls: pause, step, speed and end of `run`, for other threads.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario | Path | str,
+        *,
+        seed: int | None = None,
+        seeds: Sequence[int] | None = None,
+        runners: Runners = None,
+        overrides: Sequence[str] = (),
+        out: Path | str | None = None,
+        observers: Sequence[Observer] = (),
+        socket: Path | None = None,
+        realtime: float | str | None = None,
+        record: Recording | None = None,
+    ) -> None:
+        self._clock = WallClock()
+        self._called_ns = self._clock.now_ns()
+        if isinstance(scenario, Scenario) and overrides:
+            raise BadInput("overrides", "", "expected a path of a scenario; a Scenario is complete as it is")
+        self.scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
+        factor, rate_hz = real_time_factor(realtime), self.scenario.time.rate_hz
+        specs = agent_specs(self.scenario)
+        needs = {name: kind.needs for name, kind in check_agents(self.scenario, specs).items()}
+        self.world = World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
+        self.ticks = _ticks(self.scenario)
+        self.runners = runner_count(runners, self.static.arenas * self.static.robots)
+        self.run_id = new_run_id()
+        self.interrupt = Interrupt()
+        self.metrics = Metrics()
+        place = None if out is None else Path(out)
+        self._record = RunRecord(place, record or Recording(), self.metrics, self._clock, may_drop=factor is not None)
+        pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
+        self.controls = Controls(self._clock, rate_hz, pace)
+        self._observers: list[Guarded] = []
+        for observer in (*self._record.observers, *observers):
+            self.watch(observer)
+        self._losses: list[Loss] = []
+        self._crews = Crews(
+            scenario=self.scenario,
+            static=self.static,
+            agents=specs,
+            runners=self.runners,
+            run_id=self.run_id,
+            clock=self._clock,
+            pace=pace,
+            socket=socket,
+            stopped=self._stopped,
+            lost=self._losses.append,
+            say=self._record.say,
+        )
+        self._crew: Crew | None = None
+        self._loop: Loop | None = None
+        self._result: Result | None = None
+
+    @property
+    def static(self) -> Static:
+        """What does not change during the run."""
+        return self.world.static
+
+    @property
+    def tick(self) -> int:
+        """Ticks done so far; also the number of the next one."""
+        return self._loop.ticks_done if self._loop else 0
+
+    @property
+    def result(self) -> Result:
+        """What came of the run, once it is over; RuntimeError before."""
+        if self._result is None:
+            raise RuntimeError("the run is not over yet: leave the `with` block first")
+        return self._result
+
+    def watch(self, observer: Observer) -> None:
+        """Add an observer, before the run begins; if it fails, it is counted and left out."""
+        self._observers.append(Guarded(observer, self._record.say))
+
+    def __enter__(self) -> Self:
+        """Start the agents; AgentFailed or RunnerLost if that fails."""
+        if self._loop is not None:
+            raise RuntimeError("a simulation runs once; make another one")
+        with ExitStack() as stack:
+            crew = self._crew = stack.enter_context(self._crews.crew())
+            self._watching: list[Observer] = [self.metrics, RadioTally(), EventLog(), *self._observers]
+            self._loop = Loop(self.world, self._air(), crew, self._watching, self.scenario.events)
+            crew.start()
+            for observer in self._watching:
+                observer.begin(self.static)
+            self._exit = stack.pop_all()
+        self._started_ns = self._clock.now_ns()
+        return self
+
+    def step(self) -> Truth:
+        """One tick; what the observers saw of it. It may go on beyond the scenario's duration."""
+        return self._entered().step()
+
+    def run(self, ticks: int | None = None) -> None:
+        """Run up to tick `ticks`, or to the scenario's end, or until an interrupt."""
+        loop = self._entered()
+        with suppress(Interrupted):  # asked for while it waited for runners: the summary says how far it came
+            until = self.ticks if ticks is None else ticks
+            loop.run(until, self._stopped, lambda tick: self.controls.hold(tick, self._stopped))
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        """End the agents, and close the records with a summary: also of a run that failed, when it is worth most."""
+        loop, ended_ns = self._entered(), self._clock.now_ns()
+        with self._exit:
+            last = loop.end()
+            parts: dict[str, Any] = {}
+            for observer in self._watching:
+                parts.update(observer.end(last))
+            failed = {f"observer_failed_{observer.name}": 1 for observer in self._observers if observer.failed}
+            crew = self._crew
+            report = crew.report() if isinstance(crew, PacedCrew | RealTimeCrew) else None
+            counts = {**loop.counts(), **failed, **dropped_rows(record_summary(parts))}
+            wall_ns = ended_ns - self._started_ns - self.controls.paused_ns
+            self._result = self._outcome(loop, parts, counts, wall_ns, report, self._ended(error), error)
+        self._record.close(self._result)
+
+    def _air(self) -> Air | None:
+        """A new air of the scenario's radio, if it has one."""
+        static, radio = self.static, self.scenario.radio
+        if radio is None:
+            return None
+        obstacles = obstacle_arrays(static.obstacles)
+        size_m, every = static.arena_size_m, static.act_every_ticks
+        return Air(radio, self.world.keys, static.robots, size_m, obstacles, static.rate_hz, every)
+
+    def health(self) -> RunnerHealth | None:
+        """How the runners are doing; None if there are none."""
+        return cast("RunnerCrew[Any]", self._crew).health() if isinstance(self._crew, RunnerCrew) else None
+
+    def _stopped(self) -> bool:
+        return self.interrupt.asked or self.controls.quit_asked
+
+    def _entered(self) -> Loop:
+        if self._loop is None or self._result is not None:
+            raise RuntimeError("a simulation is stepped within its `with` block")
+        return self._loop
+
+    def _ended(self, error: BaseException | None) -> str:
+        if isinstance(error, KeyboardInterrupt | Interrupted):
+            return "interrupted"
+        if error is not None:
+            return "failed"
+        if self.tick >= self.ticks:
+            return "duration"
+        return "interrupted" if self._stopped() else "left"
+
+    def _outcome(
+        self,
+        loop: Loop,
+        parts: dict[str, Any],
+        counts: dict[str, int],
+        wall_ns: int,
+        report: RealTimeReport | None,
+        ended: str,
+        error: BaseException | None,
+    ) -> Result:
+        static = self.static
+        radios: list[Any] = parts.get("radio", [None] * static.arenas)
+        arenas = zip(static.seeds, loop.hexdigests(), radios, parts["metrics"], strict=True)
+        senses = {group.body.name: [s for s in GLOBAL_SENSES if s in group.body.senses] for group in static.groups}
+        return Result(
+            scenario=static.name,
+            robots=static.robots,
+            runners=self.runners,
+            mode="realtime" if report else "lockstep" if self.runners else "local",
+            ended=ended,
+            error=str(error) if ended == "failed" else None,
+            ticks=loop.ticks_done,
+            sim_time_s=to_s(tick_start_ns(loop.ticks_done, static.rate_hz)),
+            wall_time_s=to_s(wall_ns),
+            start_time_s=to_s(self._started_ns - self._called_ns),
+            arenas=tuple(arena_result(*arena) for arena in arenas),
+            events=tuple(EventResult(**event) for event in parts["events"]),
+            global_senses={body: found for body, found in senses.items() if found},
+            counts=counts,
+            cpu=machine.cpu(),
+            versions=machine.versions(),
+            lost_runners=tuple(str(loss) for loss in self._losses),
+            realtime=report,
+            record=record_summary(parts),
+            out=self._record.folder,
+        )
+
+
+def _ticks(scenario: Scenario) -> int:
+    """Ticks that start before the scenario's duration is over; the first always does."""
+    return max(1, -(-to_ns(scenario.duration_s) * scenario.time.rate_hz // 10**9))
