@@ -17,6 +17,7 @@ from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
 from swarmwire.deploy.commands.verify import verify_command
+from swarmwire.deploy.commands.view import view_command
 
 app = typer.Typer(
     help="A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own.",
@@ -30,6 +31,7 @@ app.command("repeat")(repeat_command)
 app.command("check")(check_command)
 app.command("draw")(draw_command)
 app.command("export", cls=ExportCommand)(export_command)
+app.command("view")(view_command)
 app.command("screenshot")(screenshot_command)
 app.command("schema")(schema_command)
 app.command("list")(list_command)

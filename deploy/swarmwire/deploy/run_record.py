@@ -33,12 +33,12 @@ class RunRecord:
         self._log = RunLog(self.folder, clock) if self.folder else None
 
     def observers(
-        self, what: Recording, metrics: Metrics, hashes: Callable[[], list[str]], *, may_drop: bool
+        self, what: Recording, run_id: str, metrics: Metrics, hashes: Callable[[], list[str]], *, may_drop: bool
     ) -> Sequence[Observer]:
         """Those that fill the folder."""
         if self.folder is None:
             return ()
-        recorders = what.observers(self.folder, metrics, self._clock, may_drop)
+        recorders = what.observers(self.folder, run_id, metrics, self._clock, may_drop)
         return (*recorders, TrajectoryLog(self.folder, hashes))
 
     def begin(

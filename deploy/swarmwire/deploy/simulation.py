@@ -93,13 +93,12 @@ class Simulation:
         self.run_id = new_run_id()
         self.interrupt = Interrupt()
         self.metrics = Metrics()
-        place = None if out is None else Path(out)
-        self._record = RunRecord(place, self._clock)
+        what, may_drop = record or Recording(), factor is not None
+        what.check(self.static)
+        self._record = RunRecord(None if out is None else Path(out), self._clock)
         self._pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
         self.controls = Controls(self._clock, rate_hz, self._pace)
-        recorders = self._record.observers(
-            record or Recording(), self.metrics, self.hashes, may_drop=factor is not None
-        )
+        recorders = self._record.observers(what, self.run_id, self.metrics, self.hashes, may_drop=may_drop)
         self._observers: list[Guarded] = []
         for observer in (*recorders, *observers):
             self.watch(observer)

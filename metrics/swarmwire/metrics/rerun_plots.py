@@ -9,8 +9,8 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.fates import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static, Truth
-from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.palette import Color
+from swarmwire.metrics.plotted import Plotted
 from swarmwire.metrics.rerun_colors import FATES, MARK
 from swarmwire.metrics.rerun_series import RerunSeries
 
@@ -28,7 +28,7 @@ class RerunPlots:
     second by fate, once one has had it. Those out of range are left out: they would dwarf the others.
     """
 
-    def __init__(self, static: Static, metrics: Sequence[Metric], arena: int) -> None:
+    def __init__(self, static: Static, metrics: Sequence[Plotted], arena: int) -> None:
         """Plots of one arena."""
         self._arena, self._rate_hz, self._radio = arena, static.rate_hz, static.range_m is not None
         self._names = {"shares": [m.name for m in metrics if _plot(m) == "shares"]}
@@ -86,5 +86,5 @@ class RerunPlots:
         return {name: rate if name in self._occurred else np.nan for name, rate in rates.items()}
 
 
-def _plot(metric: Metric) -> str:
+def _plot(metric: Plotted) -> str:
     return "shares" if metric.bounds == (0.0, 1.0) else _PLOTS.get(metric.unit, "numbers")

@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.metrics.event_log import names
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.plotted import Measured
 from swarmwire.metrics.rerun_about import about
 from swarmwire.metrics.rerun_arena import RerunArena
 from swarmwire.metrics.rerun_layout import layout
@@ -26,13 +26,14 @@ class RerunRecording:
     time in it), but not equal bytes: rerun numbers its chunks at random and cuts them as they come.
     """
 
-    def __init__(self, path: Path, metrics: Metrics, arena: int = 0, selected: str | None = None) -> None:
+    def __init__(self, path: Path | None, metrics: Measured, arena: int = 0, selected: str | None = None) -> None:
         """Record to this file, which is replaced; BadInput without the extra [view].
 
         `selected` names the robot that is shown in detail: its rays, its ring, its radio's range. None: the first robot
-        of the first group that has rays or photocells.
+        of the first group that has rays or photocells. A subclass that leads elsewhere has no path.
         """
-        need_view_extra(f"recording {path.name}")
+        self._what = f"recording {path.name}" if path else "live view"
+        need_view_extra(self._what)
         self._path, self._metrics, self._arena, self._selected = path, metrics, arena, selected
 
     def begin(self, static: Static) -> None:
@@ -40,15 +41,15 @@ class RerunRecording:
         import rerun as rr
 
         if not 0 <= self._arena < static.arenas:
-            raise BadInput(f"recording {self._path.name}", "arena", f"expected 0 to {static.arenas - 1}")
+            raise BadInput(self._what, "arena", f"expected 0 to {static.arenas - 1}")
         self._static, seed = static, static.seeds[self._arena]
-        selected = selected_robot(static, self._selected, f"recording {self._path.name}")
+        selected = selected_robot(static, self._selected, self._what)
         self._arena_view = RerunArena(static, self._arena, selected)
         self._plots = RerunPlots(static, self._metrics.metrics, self._arena)
         self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
         self._rec.set_log_time_enabled(False)
         self._rec.set_log_tick_enabled(False)
-        self._rec.save(self._path, default_blueprint=layout(static, selected))
+        self._connect(layout(static, selected))
         self._rec.send_recording_name(f"{static.name}, seed {seed}")
         links_every = self._arena_view.links_every_ticks
         run = rr.AnyValues(scenario=static.name, seed=seed, robots=static.robots, links_every_ticks=links_every)
@@ -73,6 +74,10 @@ class RerunRecording:
             robots = ", ".join(names(event, self._static)[self._arena])
             self._rec.log("events", rr.TextLog(f"{event.do}{' ended' if event.ended else ''}: {robots or 'no robot'}"))
         self._plots.log(self._rec, self._metrics.latest, truth)
+
+    def _connect(self, layout: Any) -> None:
+        """Lead the stream to where it goes."""
+        self._rec.save(self._path, default_blueprint=layout)
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """Close the file; a recording adds nothing to the summary."""
