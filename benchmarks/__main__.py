@@ -126,13 +126,13 @@ class Timed:
         return [100.0 * s / (w - o - s) for s, o, w in zip(spent_ns, own_ns, whole_ns, strict=True)]
 
 
-def view_cost(name: str, *, robots: int, ticks: int) -> None:
+def view_cost(name: str, *, robots: int, ticks: int, radio: bool) -> None:
     """What recording for the viewer adds to a run, in percent, and the size of the recording.
 
     Both parts are timed in the same runs, second by second, so that what else the machine does falls on both; rerun's
     own threads, which compress and write, are not in it while there is a core for them.
     """
-    scenario = scenario_from(scenes.diffusion(robots, 5, ticks / 10, radio=True), name)
+    scenario = scenario_from(scenes.diffusion(robots, 5, ticks / 10, radio=radio), name)
     run(scenario.model_copy(update={"duration_s": 2.0}))
     with TemporaryDirectory() as folder:
         rrd = Path(folder, "run.rrd")
@@ -177,7 +177,8 @@ BENCHMARKS: dict[str, Callable[[str], None]] = {
     "inprocess-1000-d1-radio": lambda name: in_process(name, robots=1000, steps=5, ticks=200, radio=True),
     "wire-1000x2": lambda name: in_process(name, robots=1000, steps=5, ticks=200, radio=True, runners=2),
     "record-cost": lambda name: record_cost(name, robots=1000, ticks=600),
-    "view-cost": lambda name: view_cost(name, robots=1000, ticks=600),
+    "view-cost": lambda name: view_cost(name, robots=1000, ticks=600, radio=False),
+    "view-cost-radio": lambda name: view_cost(name, robots=1000, ticks=600, radio=True),
     "processes-100": lambda name: processes(name, robots=100, ticks=300),
 }
 

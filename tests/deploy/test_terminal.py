@@ -45,7 +45,7 @@ def test_keys_pause_step_and_end_a_run(tmp_path):
         assert user.output.rfind(b"\x1b[?25h") > user.output.rfind(b"\x1b[?25l")  # the cursor is there again
     after = text[text.rindex("─╯") :]
     assert "interrupted" in after
-    assert "summary.json" in after
+    assert "swarmwire view" in after
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["ended"] == "interrupted"
     assert summary["ticks"] > stands + 1

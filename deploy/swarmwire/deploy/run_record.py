@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -55,8 +56,9 @@ class RunRecord:
         origin = origin_of(
             scenario, agents, seeds=seeds, ticks=ticks, runners=runners, realtime=realtime, folder=self.folder
         )
-        version = origin.versions.get("swarmwire", "")
-        self.note(f"swarmwire {version}: {scenario.name}, seeds {list(seeds)}, {ticks} ticks, {runners} runners")
+        self.note(
+            f"swarmwire {version('swarmwire-deploy')}: {scenario.name}, seeds {list(seeds)}, {ticks} ticks, {runners} runners"
+        )
         return origin
 
     def say(self, text: str) -> None:

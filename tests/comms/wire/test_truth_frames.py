@@ -35,7 +35,7 @@ STATIC = Static(
     range_m=2.0,
     lights=((Light(0.5, 0.5, 2.0),), ()),
 )
-SCENE = Scene(STATIC, (Series("order", "", (0.0, 1.0)), Series("min_gap", "m", (None, None))))
+SCENE = Scene(STATIC, (Series("order", "", (0.0, 1.0)), Series("min_gap", "m", (None, None))), STATIC.robot_names[1])
 I64 = np.iinfo(np.int64)
 
 
@@ -221,7 +221,7 @@ def test_one_arena_of_several_is_a_run_of_its_own(glimpse, arena):
     if truth.edges is not None:  # no edge joins robots of different arenas
         truth = replace(truth, edges=truth.edges[truth.edges[:, 0] // ROBOTS == truth.edges[:, 1] // ROBOTS])
     one = truth_of(truth, STATIC, arena)
-    scene = Scene(static_of(STATIC, arena), SCENE.series)
+    scene = Scene(static_of(STATIC, arena), SCENE.series, SCENE.selected)
     values = glimpse.values[:, arena : arena + 1]
     decoded = decode_truth(frames.decode(encode_truth(replace(glimpse, truth=one, values=values))), scene)
     assert equal(decoded.truth.pose, truth.pose[rows])
