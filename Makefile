@@ -29,6 +29,10 @@ check: sync ## lint, format, types, and who may import whom
 docs: sync ## build these pages and the reference as a site, docs/_build/html/index.html
 	$(RUN) python -m sphinx -W --keep-going -n -q docs docs/_build/html
 
+.PHONY: pictures
+pictures: sync ## draw the pictures under docs/ anew; needs a Vulkan driver
+	@docs/pictures/draw.sh
+
 .PHONY: bench
 bench: sync ## measure; ONLY=name for one of them
 	$(RUN) python -m benchmarks $(ONLY)

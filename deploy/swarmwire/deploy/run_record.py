@@ -7,14 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.clock import WallClock
+from swarmwire.comms.messages import DICT_TAG, Message
 from swarmwire.comms.protocols import Observer
 from swarmwire.deploy.folder import make_folder
+from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.origin import Origin, origin_of
 from swarmwire.deploy.recording import Recording
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.trajectory_log import TrajectoryLog
 from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.record.recorders import recorders
 from swarmwire.metrics.record.run_log import RunLog
+from swarmwire.metrics.rerun_recording import RerunRecording
 from swarmwire.world.scenario import Scenario
 
 SUMMARY = "summary.json"
@@ -36,11 +40,17 @@ class RunRecord:
     def observers(
         self, what: Recording, run_id: str, metrics: Metrics, hashes: Callable[[], list[str]], *, may_drop: bool
     ) -> Sequence[Observer]:
-        """Those that fill the folder."""
-        if self.folder is None:
+        """Those that fill the folder, and let others look on; `metrics` must see each tick before them."""
+        folder, clock = self.folder, self._clock
+        if folder is None:
             return ()
-        recorders = what.observers(self.folder, run_id, metrics, self._clock, may_drop)
-        return (*recorders, TrajectoryLog(self.folder, hashes))
+        found: list[Observer] = [TrajectoryLog(folder, hashes)]
+        if what.tables:
+            topics = _topics(Message)
+            found += recorders(folder, metrics, clock, packets=what.packets, topics=topics, may_drop=may_drop)
+        if what.rrd:
+            found.append(RerunRecording(folder / "run.rrd", metrics, selected=what.select))
+        return (*found, Published(folder, run_id, metrics, clock, selected=what.select))
 
     def begin(
         self,
@@ -56,9 +66,8 @@ class RunRecord:
         origin = origin_of(
             scenario, agents, seeds=seeds, ticks=ticks, runners=runners, realtime=realtime, folder=self.folder
         )
-        self.note(
-            f"swarmwire {version('swarmwire-deploy')}: {scenario.name}, seeds {list(seeds)}, {ticks} ticks, {runners} runners"
-        )
+        what = f"{scenario.name}, seeds {list(seeds)}, {ticks} ticks, {runners} runners"
+        self.note(f"swarmwire {version('swarmwire-deploy')}: {what}")
         return origin
 
     def say(self, text: str) -> None:
@@ -83,3 +92,11 @@ class RunRecord:
 def dropped_rows(record: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
     """Rows that a slow disk cost, by name, as they are counted in the summary."""
     return {f"rows_dropped_{table}": of["dropped"] for table, of in record.items() if of["dropped"]}
+
+
+def _topics(kind: type[Message]) -> dict[int, str]:
+    """The names of all messages that agents known to this process have defined, by tag."""
+    names = {DICT_TAG: "dict"}
+    for below in kind.__subclasses__():
+        names |= {below.tag: below.__name__, **_topics(below)}
+    return names

@@ -1,0 +1,16 @@
+#!/usr/bin/env bash
+# Draws the pictures of README and docs from runs that it makes. Needs a Vulkan driver for those of rerun's viewer.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+swarmwire() { .ci/uv run --no-sync swarmwire "$@"; }
+runs="$(mktemp -d)"
+trap 'rm -rf "$runs"' EXIT
+swarmwire run scenarios/flocking-disrupted.toml --quiet --select flock-8 --out "$runs/flocking-disrupted"
+swarmwire run scenarios/split.toml --quiet --out "$runs/split"
+swarmwire run scenarios/pso.toml --quiet --out "$runs/pso"
+swarmwire screenshot "$runs/flocking-disrupted" --tick 300 --to docs/rerun.png
+swarmwire export "$runs/flocking-disrupted" --gif --to docs/demo.gif
+swarmwire export "$runs/split" --png 35 --to docs/split.png
+swarmwire export "$runs/pso" --png 55 --to docs/pso.png
+swarmwire draw footbot --to docs/footbot.png
+.ci/uv run --no-sync python docs/pictures/panel.py
