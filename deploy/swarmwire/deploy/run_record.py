@@ -4,12 +4,13 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from types import TracebackType
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.messages import DICT_TAG, Message
-from swarmwire.comms.protocols import Observer
+from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.deploy.folder import make_folder
+from swarmwire.deploy.inputs import InputsRecord, RecordedCrew
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.origin import Origin, origin_of
 from swarmwire.deploy.recording import Recording
@@ -36,6 +37,7 @@ class RunRecord:
         self.folder = None if out is None else make_folder(out)
         self._clock = clock
         self._log = RunLog(self.folder, clock) if self.folder else None
+        self._recorded: RecordedCrew | None = None
 
     def observers(
         self, what: Recording, run_id: str, metrics: Metrics, hashes: Callable[[], list[str]], *, may_drop: bool
@@ -56,8 +58,8 @@ class RunRecord:
         self,
         scenario: Scenario,
         agents: Mapping[str, str],
-        *,
         seeds: tuple[int, ...],
+        *,
         ticks: int,
         runners: int,
         realtime: float | None,
@@ -69,6 +71,24 @@ class RunRecord:
         what = f"{scenario.name}, seeds {list(seeds)}, {ticks} ticks, {runners} runners"
         self.note(f"swarmwire {version('swarmwire-deploy')}: {what}")
         return origin
+
+    def failed_to_start(
+        self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
+    ) -> None:
+        """Say in the log why there was no first tick; there is nothing to sum up."""
+        if error is not None:
+            self.note(f"failed to start: {error}")
+
+    def recorded(self, crew: Crew, outside: Callable[[int], bool]) -> Crew:
+        """The crew, with its actions kept in the folder from the first tick on at which `outside(tick)` holds."""
+        if self.folder is None:
+            return crew
+        self._recorded = RecordedCrew(crew, self.folder, outside)
+        return self._recorded
+
+    def inputs(self) -> InputsRecord | None:
+        """What was recorded of the crew; None if nothing."""
+        return self._recorded.record() if self._recorded else None
 
     def say(self, text: str) -> None:
         """Tell people at once, and keep it in the log."""
@@ -87,11 +107,6 @@ class RunRecord:
             self._log.close()
         if self.folder:
             result.write(self.folder / SUMMARY)
-
-
-def dropped_rows(record: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
-    """Rows that a slow disk cost, by name, as they are counted in the summary."""
-    return {f"rows_dropped_{table}": of["dropped"] for table, of in record.items() if of["dropped"]}
 
 
 def _topics(kind: type[Message]) -> dict[int, str]:

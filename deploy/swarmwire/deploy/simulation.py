@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from swarmwire.comms.air.air import Air
-from swarmwire.comms.clock import WallClock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.protocols import Crew, Observer
@@ -18,27 +18,24 @@ from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.crews import Crews
 from swarmwire.deploy.endpoint import new_run_id
 from swarmwire.deploy.guarded import Guarded
-from swarmwire.deploy.inputs import RecordedCrew, RecordedInputs, ReplayedCrew
+from swarmwire.deploy.inputs import RecordedInputs, ReplayedCrew
 from swarmwire.deploy.interrupt import Interrupt
-from swarmwire.deploy.origin import Origin
+from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.recording import Recording
-from swarmwire.deploy.result import EventResult, Result, arena_result
-from swarmwire.deploy.run_record import RunRecord, dropped_rows
+from swarmwire.deploy.result import Result
+from swarmwire.deploy.run_record import RunRecord
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.radio_tally import RadioTally
-from swarmwire.metrics.record.recorders import record_summary
 from swarmwire.world.loop import Loop
 from swarmwire.world.pace import Pace
-from swarmwire.world.realtime_crew import PacedCrew, RealTimeCrew, RealTimeReport
+from swarmwire.world.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.remote_crew import RemoteCrew
 from swarmwire.world.roster import Loss
 from swarmwire.world.runner_health import RunnerHealth
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.world import World
-
-GLOBAL_SENSES = ("compass", "positioning")
 
 
 class Simulation:
@@ -118,7 +115,6 @@ class Simulation:
         )
         self.inputs: RecordedInputs | None = None
         self._crew: Crew | None = None
-        self._recorded: RecordedCrew | None = None
         self._loop: Loop | None = None
         self._result: Result | None = None
 
@@ -156,11 +152,17 @@ class Simulation:
         """Start the agents; AgentFailed or RunnerLost if that fails."""
         if self._loop is not None:
             raise RuntimeError("a simulation runs once; make another one")
-        self._origin = self._keep()
+        rows, realtime = self.static.arenas * self.static.robots, self._pace.factor if self._pace else None
+        self._origin = self._record.begin(
+            self.scenario, self.agents, self.static.seeds, ticks=self.ticks, runners=self.runners, realtime=realtime
+        )
         with ExitStack() as stack:
+            stack.push(self._record.failed_to_start)
             crew = self._crew = stack.enter_context(self._crews.crew())
             self._watching: list[Observer] = [self.metrics, RadioTally(), EventLog(), *self._observers]
-            self._loop = Loop(self.world, self._air(), self._acting(crew), self._watching, self.scenario.events)
+            acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows)
+            acting = self._record.recorded(acting, self._from_outside)
+            self._loop = Loop(self.world, self._air(), acting, self._watching, self.scenario.events)
             crew.start()
             for observer in self._watching:
                 observer.begin(self.static)
@@ -189,11 +191,28 @@ class Simulation:
                 parts.update(observer.end(last))
             failed = {f"observer_failed_{observer.name}": 1 for observer in self._observers if observer.failed}
             crew = self._crew
-            report = crew.report() if isinstance(crew, PacedCrew | RealTimeCrew) else None
-            counts = {**loop.counts(), **failed, **dropped_rows(record_summary(parts))}
-            wall_ns = ended_ns - self._started_ns - self.controls.paused_ns
-            self._result = self._outcome(loop, parts, counts, wall_ns, report, self._ended(error), error)
+            self._result = outcome(
+                self.static,
+                parts,
+                ended=self._ended(error),
+                error=error,
+                runners=self.runners,
+                ticks=loop.ticks_done,
+                hashes=loop.hexdigests(),
+                wall_s=to_s(ended_ns - self._started_ns - self.controls.paused_ns),
+                start_s=to_s(self._started_ns - self._called_ns),
+                counts={**loop.counts(), **failed},
+                origin=self._origin,
+                inputs=self._record.inputs(),
+                losses=self._losses,
+                realtime=crew.report() if isinstance(crew, PacedCrew | RealTimeCrew) else None,
+                folder=self.folder,
+            )
         self._record.close(self._result)
+
+    def health(self) -> RunnerHealth | None:
+        """How the runners are doing; None if there are none."""
+        return self._crew.health() if isinstance(self._crew, RemoteCrew | RealTimeCrew) else None
 
     def _air(self) -> Air | None:
         """A new air of the scenario's radio, if it has one."""
@@ -203,31 +222,6 @@ class Simulation:
         obstacles = obstacle_arrays(static.obstacles)
         size_m, every = static.arena_size_m, static.act_every_ticks
         return Air(radio, self.world.keys, static.robots, size_m, obstacles, static.rate_hz, every)
-
-    def health(self) -> RunnerHealth | None:
-        """How the runners are doing; None if there are none."""
-        return self._crew.health() if isinstance(self._crew, RemoteCrew | RealTimeCrew) else None
-
-    def _keep(self) -> Origin:
-        """From what this run is made, put into its folder before anything happens."""
-        realtime = self._pace.factor if self._pace else None
-        return self._record.begin(
-            self.scenario,
-            self.agents,
-            seeds=self.static.seeds,
-            ticks=self.ticks,
-            runners=self.runners,
-            realtime=realtime,
-        )
-
-    def _acting(self, crew: Crew) -> Crew:
-        """The crew as the loop has it: replayed as far as there are inputs, and recorded as far as need be."""
-        if self.inputs is not None:
-            crew = ReplayedCrew(crew, self.inputs, self.static.arenas * self.static.robots)
-        if self.folder is None:
-            return crew
-        self._recorded = RecordedCrew(crew, self.folder, self._from_outside)
-        return self._recorded
 
     def _from_outside(self, tick: int) -> bool:
         """Whether the actions of this tick need not follow from scenario and seed."""
@@ -251,46 +245,6 @@ class Simulation:
         if self.tick >= self.ticks:
             return "duration"
         return "interrupted" if self._stopped() else "left"
-
-    def _outcome(
-        self,
-        loop: Loop,
-        parts: dict[str, Any],
-        counts: dict[str, int],
-        wall_ns: int,
-        report: RealTimeReport | None,
-        ended: str,
-        error: BaseException | None,
-    ) -> Result:
-        static = self.static
-        radios: list[Any] = parts.get("radio", [None] * static.arenas)
-        arenas = zip(static.seeds, loop.hexdigests(), radios, parts["metrics"], strict=True)
-        senses = {group.body.name: [s for s in GLOBAL_SENSES if s in group.body.senses] for group in static.groups}
-        return Result(
-            scenario=static.name,
-            robots=static.robots,
-            runners=self.runners,
-            mode="realtime" if report else "lockstep" if self.runners else "local",
-            ended=ended,
-            error=str(error) if ended == "failed" else None,
-            ticks=loop.ticks_done,
-            sim_time_s=to_s(tick_start_ns(loop.ticks_done, static.rate_hz)),
-            wall_time_s=to_s(wall_ns),
-            start_time_s=to_s(self._started_ns - self._called_ns),
-            arenas=tuple(arena_result(*arena) for arena in arenas),
-            events=tuple(EventResult(**event) for event in parts["events"]),
-            global_senses={body: found for body, found in senses.items() if found},
-            counts=counts,
-            cpu=self._origin.cpu,
-            versions=dict(self._origin.versions),
-            modules=dict(self._origin.modules),
-            files=self._origin.files,
-            inputs=self._recorded.record() if self._recorded else None,
-            lost_runners=tuple(str(loss) for loss in self._losses),
-            realtime=report,
-            record=record_summary(parts),
-            out=self.folder,
-        )
 
 
 def _ticks(scenario: Scenario) -> int:

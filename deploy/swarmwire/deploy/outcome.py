@@ -1,0 +1,75 @@
+"""From what a run left in loop, observers and crew to its result."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.clock import tick_start_ns, to_s
+from swarmwire.comms.truth import Static
+from swarmwire.deploy.inputs import InputsRecord
+from swarmwire.deploy.origin import Origin
+from swarmwire.deploy.result import EventResult, Result, arena_result
+from swarmwire.metrics.record.recorders import record_summary
+from swarmwire.world.realtime_crew import RealTimeReport
+from swarmwire.world.roster import Loss
+
+GLOBAL_SENSES = ("compass", "positioning")
+
+
+def outcome(
+    static: Static,
+    parts: Mapping[str, Any],
+    *,
+    ended: str,
+    error: BaseException | None,
+    runners: int,
+    ticks: int,
+    hashes: Sequence[str],
+    wall_s: float,
+    start_s: float,
+    counts: Mapping[str, int],
+    origin: Origin,
+    inputs: InputsRecord | None,
+    losses: Sequence[Loss],
+    realtime: RealTimeReport | None,
+    folder: Path | None,
+) -> Result:
+    """The result; `parts` are the observers' parts of the summary, `hashes` the trajectory hash of each arena."""
+    radios: list[Any] = parts.get("radio", [None] * static.arenas)
+    arenas = zip(static.seeds, hashes, radios, parts["metrics"], strict=True)
+    record = record_summary(parts)
+    return Result(
+        scenario=static.name,
+        robots=static.robots,
+        runners=runners,
+        mode="realtime" if realtime else "lockstep" if runners else "local",
+        ended=ended,
+        error=str(error) if ended == "failed" else None,
+        ticks=ticks,
+        sim_time_s=to_s(tick_start_ns(ticks, static.rate_hz)),
+        wall_time_s=wall_s,
+        start_time_s=start_s,
+        arenas=tuple(arena_result(*arena) for arena in arenas),
+        events=tuple(EventResult(**event) for event in parts["events"]),
+        global_senses=_global_senses(static),
+        counts={**counts, **_dropped_rows(record)},
+        cpu=origin.cpu,
+        versions=dict(origin.versions),
+        modules=dict(origin.modules),
+        files=origin.files,
+        inputs=inputs,
+        lost_runners=tuple(str(loss) for loss in losses),
+        realtime=realtime,
+        record=record,
+        out=folder,
+    )
+
+
+def _global_senses(static: Static) -> dict[str, list[str]]:
+    found = {group.body.name: [s for s in GLOBAL_SENSES if s in group.body.senses] for group in static.groups}
+    return {body: senses for body, senses in found.items() if senses}
+
+
+def _dropped_rows(record: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
+    """Rows that a slow disk cost, by name, as they are counted in the summary."""
+    return {f"rows_dropped_{table}": of["dropped"] for table, of in record.items() if of["dropped"]}
