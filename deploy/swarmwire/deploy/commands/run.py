@@ -1,5 +1,6 @@
 """`swarmwire run`."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -100,6 +101,15 @@ def _seed_list(text: str) -> list[int]:
 
 def _say_where(result: Result, folder: Path, console: Console) -> None:
     recorded = f" (the pictures of seed {result.arenas[0].seed})" if len(result.arenas) > 1 else ""
+    program = _program()
     console.print(f"written: {folder}{recorded}", soft_wrap=True)
-    console.print(f"look at it: swarmwire view {folder}", soft_wrap=True)
-    console.print(f"as a film: swarmwire export {folder} --gif", soft_wrap=True)
+    console.print(f"look at it: {program} view {folder}", soft_wrap=True)
+    console.print(f"as a film: {program} export {folder} --gif", soft_wrap=True)
+
+
+def _program() -> Path:
+    """This program as people can type it here: it need not be on their path, as with `uv run`."""
+    program = Path(sys.argv[0])
+    if program.name != "swarmwire":  # python -m
+        return Path("swarmwire")
+    return program.relative_to(Path.cwd()) if program.is_relative_to(Path.cwd()) else program
