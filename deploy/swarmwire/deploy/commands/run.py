@@ -82,6 +82,8 @@ def run_command(
         result = finished(simulation)
         print_result(result, console)
         _say_where(result, folder, console)
+        if live.pid is not None:
+            console.print("the view stays open: close it, or press Ctrl-C, to end it")
         live.wait()
     if result.ended == "interrupted":
         raise typer.Exit(INTERRUPTED)
