@@ -3,6 +3,7 @@
 import numpy as np
 import polars as pl
 
+from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import RecordFailed
 from swarmwire.comms.fates import FATE_NAMES, Fate
 from swarmwire.deploy import run
@@ -13,7 +14,7 @@ from swarmwire.metrics.record.tick_recorder import TickRecorder
 from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.verify import verify
 from tests.deploy.commands import LOSSY
-from tests.deploy.recorded import HastyClock, record_run
+from tests.deploy.recorded import hastily, record_run
 
 EVENTS = [
     "duration_s=6",
@@ -57,11 +58,11 @@ class Keeper:
 def test_what_was_recorded_is_what_an_observer_saw_and_what_the_summary_says(tmp_path):
     (tmp_path / "stating.py").write_text(STATING)
     folder, keeper = tmp_path / "run", Keeper()
-    folder.mkdir()
     scenario = tmp_path / "scenario.toml"
     scenario.write_text(LOSSY.read_text())
     agent = ["robots.flock.agent=stating.py:Stating", "robots.flock.params={}"]
-    result = record_run(folder, scenario, [keeper], HastyClock(), seeds=[3, 8], overrides=[*EVENTS, *agent])
+    with hastily():
+        result = record_run(folder, scenario, observers=[keeper], seeds=[3, 8], overrides=[*EVENTS, *agent])
     recorded = RunFolder(folder)
     assert all(finding.good for finding in verify(folder)), verify(folder)
 
@@ -101,7 +102,6 @@ def test_the_same_packets_are_sampled_in_every_layout(tmp_path):
         "among others": {"seeds": [9, 3]},
     }.items():
         folder = tmp_path / name
-        folder.mkdir()
         record_run(folder, packets=0.1, overrides=["duration_s=3"], **options)
         arena = 1 if "seeds" in options else 0
         tables.append(RunFolder(folder).packets(arena).drop("arena"))
@@ -125,8 +125,9 @@ def test_a_full_disk_leaves_the_run_going_and_what_was_written_readable(tmp_path
 
     monkeypatch.setattr(table_writer, "write_file", full)
     metrics, keeper = Metrics(), Keeper()
-    recorder = TickRecorder(tmp_path, metrics, HastyClock())
-    result = run(LOSSY, overrides=["duration_s=40"], observers=[metrics, recorder, keeper])
+    with hastily():
+        recorder = TickRecorder(tmp_path, metrics, WallClock())
+        result = run(LOSSY, overrides=["duration_s=40"], observers=[metrics, recorder, keeper])
     assert result.ended == "duration"
     assert result.counts["observer_failed_TickRecorder"] == 1
     assert len(keeper.seen) == result.ticks == 400

@@ -14,8 +14,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.deploy import repeat, run
-from swarmwire.deploy.inputs import INPUTS, RecordedCrew
+from swarmwire.deploy.inputs import RecordedCrew
 from swarmwire.deploy.run_record import RunRecord
+from swarmwire.metrics.record.names import INPUTS
 from tests.deploy.commands import LOSSY
 from tests.deploy.test_realtime import Watcher, runners_here, still
 

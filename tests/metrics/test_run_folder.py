@@ -76,11 +76,14 @@ def test_pandas_gets_the_same(recorded):
 def test_the_summary_is_there_once_the_run_has_ended(tmp_path):
     folder = RunFolder(tmp_path)
     assert folder.summary is None
-    (tmp_path / "summary.json").write_text(json.dumps({"ticks": 3}))
-    assert folder.summary == {"ticks": 3}
-    (tmp_path / "summary.json").write_text("{")
-    with pytest.raises(BadInput, match=r"summary\.json: expected JSON"):
-        _ = folder.summary
+    summary = {"format": 1, "arenas": 1, "ticks": 3, "sim_time_s": 0.3, "ended": "duration", "events": []}
+    summary |= {"metrics": {}, "record": {}, "trajectory_sha256": ["a"]}
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    assert folder.summary == summary
+    for wrong in ("{", "[]", "{}", json.dumps({**summary, "ticks": -3}), json.dumps({**summary, "arenas": 2})):
+        (tmp_path / "summary.json").write_text(wrong)
+        with pytest.raises(BadInput, match=r"summary\.json: expected"):
+            _ = folder.summary
 
 
 def test_parts_that_are_joined_while_they_are_read_do_no_harm(recorded, monkeypatch):

@@ -20,6 +20,8 @@ from tests.metrics.recorded import links, record, wandering
 from tests.metrics.truths import static, tally
 
 TICKS, ARENAS = 10, 2
+HASHES = ["a" * 64, "b" * 64]
+DIGEST = sha256("".join(HASHES).encode()).digest()[:8]
 
 
 def seen_ticks(of):
@@ -37,7 +39,8 @@ def summarise(folder, of, recorded, **given):
         for seen in seen_ticks(of):
             observer.see(seen)
         parts.update(observer.end(tally({Fate.IN_FLIGHT: 4}, {})))
-    run = {"arenas": ARENAS, "ticks": TICKS, "sim_time_s": 1.0, "ended": "duration", "record": recorded}
+    run = {"format": 1, "arenas": ARENAS, "ticks": TICKS, "sim_time_s": 1.0, "ended": "duration", "record": recorded}
+    run |= {"trajectory_sha256": HASHES, "inputs": None}
     (folder / "summary.json").write_text(json.dumps({**run, **parts, **given}))
 
 
@@ -49,6 +52,8 @@ def fill(folder, **given):
     log = RunLog(folder)
     log.say("begins")
     log.close()
+    (folder / "run.json").write_text(json.dumps({"format": 1, "seeds": [1, 2], "ticks": TICKS}))
+    (folder / "trajectory.digests").write_bytes(bytes(8 * (TICKS - 1)) + DIGEST)
 
 
 def states(folder):
@@ -68,6 +73,8 @@ def test_a_whole_folder_has_nothing_wrong_and_is_left_as_it_is(tmp_path):
         "summary.json": State.WHOLE,
         "static.json": State.WHOLE,
         "log.txt": State.WHOLE,
+        "run.json": State.WHOLE,
+        "trajectory.digests": State.WHOLE,
         "run.rrd": State.NOT_RECORDED,
         "ticks": State.WHOLE,
         "packets": State.WHOLE,
@@ -81,9 +88,11 @@ def test_a_whole_folder_has_nothing_wrong_and_is_left_as_it_is(tmp_path):
 @pytest.mark.parametrize(
     ("gone", "wrong"),
     [
-        ("summary.json", {"summary.json": State.MISSING}),
+        ("summary.json", {"summary.json": State.MISSING, "trajectory.digests": State.PARTIAL}),
         ("static.json", {"static.json": State.MISSING}),
         ("log.txt", {"log.txt": State.MISSING}),
+        ("run.json", {"run.json": State.MISSING}),
+        ("trajectory.digests", {"trajectory.digests": State.MISSING}),
         ("ticks.parquet", {"ticks": State.MISSING}),
         ("packets.parquet", {"packets": State.MISSING}),
         ("events.parquet", {"events": State.MISSING}),
@@ -101,7 +110,9 @@ def test_what_was_cut_off_is_damaged(tmp_path, part, cut):
     fill(tmp_path)
     whole = (tmp_path / part).read_bytes()
     (tmp_path / part).write_bytes(whole[: int(cut * len(whole))])
-    assert states(tmp_path) == {part.removesuffix(".parquet"): State.DAMAGED}
+    found = states(tmp_path)
+    assert found.pop(part.removesuffix(".parquet")) == State.DAMAGED
+    assert found == ({"trajectory.digests": State.PARTIAL} if part == "summary.json" else {})
 
 
 def test_bytes_turned_over_within_a_table_are_found(tmp_path):
@@ -126,7 +137,7 @@ def killed(folder, monkeypatch, in_chunk=3):
 def test_of_a_killed_run_it_says_up_to_where_it_can_be_read(tmp_path, monkeypatch):
     killed(tmp_path, monkeypatch)
     (tmp_path / "ticks" / "part-000003.parquet.aside").write_bytes(b"PAR1 half of it")
-    partial = dict.fromkeys(("ticks", "packets", "events"), State.PARTIAL)
+    partial = dict.fromkeys(("ticks", "packets", "events", "trajectory.digests"), State.PARTIAL)
     assert states(tmp_path) == {"summary.json": State.MISSING, **partial}
     assert "up to tick 8 (0.8 s); 3 parts, never joined" in text_of(tmp_path, "ticks")
 
@@ -178,7 +189,7 @@ def test_ticks_that_were_dropped_make_the_table_partial(tmp_path):
 )
 def test_tables_that_differ_from_the_summary_are_found(tmp_path, change, part, text):
     fill(tmp_path, **change)
-    assert states(tmp_path) == {part: State.DIFFERS}
+    assert states(tmp_path)[part] == State.DIFFERS
     assert text in text_of(tmp_path, part)
 
 
@@ -242,3 +253,57 @@ def test_without_rerun_a_recording_is_only_seen(tmp_path, monkeypatch):
     fill(tmp_path)
     shutil.copy(tmp_path / "log.txt", tmp_path / "run.rrd")
     assert "not read" in text_of(tmp_path, "run.rrd")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "state"),
+    [
+        ("summary.json", b"{}", State.DAMAGED),
+        ("summary.json", b"[]", State.DAMAGED),
+        ("run.json", b"[]", State.DAMAGED),
+        ("run.json", b"\xff", State.DAMAGED),
+        ("log.txt", b"\xff\xfe", State.DAMAGED),
+        ("trajectory.digests", DIGEST, State.DIFFERS),
+        ("trajectory.digests", bytes(8 * TICKS), State.DIFFERS),
+    ],
+)
+def test_what_says_something_else_is_found(tmp_path, name, content, state):
+    fill(tmp_path)
+    (tmp_path / name).write_bytes(content)
+    assert states(tmp_path)[name] == state
+
+
+def test_a_folder_in_place_of_a_file_is_damage(tmp_path):
+    fill(tmp_path)
+    for name in ("summary.json", "run.json", "trajectory.digests", "log.txt"):
+        (tmp_path / name).unlink()
+        (tmp_path / name).mkdir()
+    found = states(tmp_path)
+    assert [found[name] for name in ("summary.json", "run.json", "trajectory.digests", "log.txt")] == [
+        State.DAMAGED
+    ] * 4
+
+
+def test_a_table_of_other_columns_is_damaged(tmp_path):
+    fill(tmp_path)
+    pl.DataFrame({"x": [1]}).write_parquet(tmp_path / "packets.parquet")
+    assert states(tmp_path) == {"packets": State.DAMAGED}
+    assert "no column" in text_of(tmp_path, "packets")
+
+
+def test_inputs_are_compared_with_the_summary(tmp_path):
+    data = b"inputs"
+    recorded = {"sha256": sha256(data).hexdigest(), "first_tick": 3, "ticks": 7}
+    fill(tmp_path, inputs=recorded)
+    assert states(tmp_path) == {"inputs/actions.frames": State.MISSING}
+    (tmp_path / "inputs").mkdir()
+    (tmp_path / "inputs" / "actions.frames").write_bytes(data)
+    assert states(tmp_path) == {}
+    (tmp_path / "inputs" / "actions.frames").write_bytes(data + b"!")
+    assert states(tmp_path) == {"inputs/actions.frames": State.DIFFERS}
+
+
+def test_a_recording_that_was_made_and_is_gone_is_missing(tmp_path):
+    recorded = {"rows": TICKS, "dropped": 0}
+    fill(tmp_path, share=0.0, record={"ticks": recorded, "events": recorded, "rrd": recorded})
+    assert states(tmp_path) == {"run.rrd": State.MISSING}

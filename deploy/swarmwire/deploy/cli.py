@@ -1,5 +1,6 @@
 """The command line `swarmwire`: its commands, and errors as one line each with their exit code."""
 
+import io
 import sys
 
 import typer
@@ -42,6 +43,9 @@ app.command("verify")(verify_command)
 
 def main() -> None:
     """Entry point of `swarmwire`: every error of ours is one line; a failed agent's traceback is its own."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a letter that a terminal lacks must not end a run
+            stream.reconfigure(errors="replace")
     try:
         app(_with_factor(sys.argv[1:]))
     except BadInput as error:

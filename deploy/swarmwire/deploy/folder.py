@@ -1,5 +1,6 @@
 """The run folder."""
 
+from itertools import chain, count
 from pathlib import Path
 
 from swarmwire.comms.clock import WallClock
@@ -7,9 +8,11 @@ from swarmwire.comms.errors import BadInput
 
 
 def default_folder(scenario: str, seeds: tuple[int, ...]) -> Path:
-    """runs/<scenario>-s<seed>-<UTC>."""
+    """runs/<scenario>-s<seed>-<UTC>, with a number behind it if another run has taken that in the same second."""
     seed = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]}to{seeds[-1]}"
-    return Path("runs") / f"{scenario}-s{seed}-{WallClock().utc_stamp()}"
+    wanted = Path("runs") / f"{scenario}-s{seed}-{WallClock().utc_stamp()}"
+    numbered = (wanted.with_name(f"{wanted.name}-{number}") for number in count(2))
+    return next(folder for folder in chain([wanted], numbered) if not folder.exists())
 
 
 def make_folder(out: Path) -> Path:
@@ -22,10 +25,3 @@ def make_folder(out: Path) -> Path:
     if not empty:
         raise BadInput("--out", str(out), "expected a new or empty folder")
     return out
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Write a file aside first, then rename it, so that no half of it is ever seen."""
-    aside = path.with_suffix(".part")
-    aside.write_text(text, encoding="utf-8")
-    aside.replace(path)

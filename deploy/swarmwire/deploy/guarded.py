@@ -37,7 +37,8 @@ class Guarded:
     def _try(self, call: Callable[[], Any]) -> Any:
         try:
             return call()
-        except Exception:  # noqa: BLE001 - whatever it is, the run goes on without it
+        # Whatever it is, the run goes on without it; rich leaves a program whose output nobody reads any more.
+        except (Exception, SystemExit):  # noqa: BLE001
             if not self.failed:
                 self._say(f"observer {self.name} failed:\n{traceback.format_exc()}")
             self.failed = True

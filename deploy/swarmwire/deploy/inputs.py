@@ -17,8 +17,8 @@ from swarmwire.comms.protocols import Crew
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions
+from swarmwire.metrics.record.names import INPUTS
 
-INPUTS = "inputs/actions.frames"
 LENGTH_BYTES = 4
 
 
@@ -89,7 +89,10 @@ class RecordedInputs:
     def __init__(self, path: Path) -> None:
         """Read the file; BadInput if it is none of ours."""
         self._path = path
-        self._data = path.read_bytes()
+        try:
+            self._data = path.read_bytes()
+        except OSError as error:
+            raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
         self._spans: list[slice] = []
         start = 0
         while (body := start + LENGTH_BYTES) <= len(self._data):

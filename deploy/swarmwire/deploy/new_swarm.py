@@ -2,6 +2,7 @@
 
 import re
 from importlib.resources import files
+from keyword import iskeyword
 from pathlib import Path
 from string import Template
 
@@ -12,7 +13,7 @@ NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
 def new_swarm(name: str, within: Path) -> list[Path]:
     """Make the folder `name` in `within`; its files. BadInput for a bad name, or where the folder cannot be made."""
-    if not NAME.fullmatch(name):
+    if not NAME.fullmatch(name) or iskeyword(name):
         expected = f"expected at most 40 small letters, digits and _ that start with a letter, got {name!r}"
         raise BadInput("NAME", "", expected)
     folder = within / name

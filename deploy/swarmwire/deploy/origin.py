@@ -11,13 +11,13 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import machine
-from swarmwire.deploy.folder import write_whole
 from swarmwire.deploy.modules import changed_modules, module_digests
 from swarmwire.deploy.scenario_copy import CopiedFile, changed_files, copy_scenario
+from swarmwire.metrics.record.names import RUN_JSON
+from swarmwire.metrics.record.whole_text import write_whole
 from swarmwire.world.scenario import Scenario
 
 RUN_FORMAT = 1
-RUN_JSON = "run.json"
 
 
 @dataclass(frozen=True)

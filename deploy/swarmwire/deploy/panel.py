@@ -39,20 +39,25 @@ class Panel:
         self._keys = Keys(partial(press, controls))
         self._live = Live(self, console=console, auto_refresh=False, transient=True, vertical_overflow="crop")
         self._next_ns = 0  # no picture before
-        self._broken: OSError | None = None
+        self._broken: Exception | None = None
 
     def begin(self, static: Static) -> None:
         """Show it."""
         self.figures.begin(static)
         self._controls.on_wait = self._wait
         self._keys.start()
-        self._live.start()
-        self._draw()
+        try:
+            self._live.start()
+            self._draw()
+        except BaseException:
+            self.end(None)
+            raise
 
     def see(self, truth: Truth) -> None:
         """Add a tick, and draw it if it is time; OSError if the terminal is gone."""
         self.figures.see(truth)
         if self._broken is not None:
+            self._controls.on_wait = lambda: None
             raise self._broken
         if self._clock.now_ns() >= self._next_ns:
             cost_ns = self._draw()
@@ -78,7 +83,7 @@ class Panel:
         if self._broken is None and self._clock.now_ns() >= self._next_ns:
             try:
                 self._draw()
-            except OSError as error:  # nothing catches it here; the next tick reports it as any observer's
+            except Exception as error:  # noqa: BLE001 - nothing catches it here; the next tick reports it
                 self._broken = error
 
     def _draw(self) -> int:

@@ -1,6 +1,5 @@
 """A run again, from its folder alone: from the scenario, files and inputs in it; and whether it came out the same."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,15 +8,15 @@ from typing import Any
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.protocols import Observer
 from swarmwire.deploy.arguments import Runners
-from swarmwire.deploy.inputs import INPUTS, RecordedInputs, recorded_inputs
+from swarmwire.deploy.inputs import RecordedInputs, recorded_inputs
 from swarmwire.deploy.origin import Origin, read_origin
 from swarmwire.deploy.recording import Recording
 from swarmwire.deploy.result import Result
-from swarmwire.deploy.run_record import SUMMARY
 from swarmwire.deploy.running import finished
-from swarmwire.deploy.scenario_copy import SCENARIO
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.deploy.trajectory_log import TrajectoryCheck
+from swarmwire.deploy.trajectory_log import TrajectoryCheck, ticks_logged
+from swarmwire.metrics.record.names import INPUTS, SCENARIO, SUMMARY
+from swarmwire.metrics.run_folder import RunFolder
 
 
 @dataclass(frozen=True)
@@ -49,8 +48,8 @@ def repeat(
 ) -> Repetition:
     """Run the run of this folder again, and compare the trajectory hashes.
 
-    It has as many ticks as the run had, also if that was interrupted or failed; all that it was to have, if it was
-    killed. `runners` are as for `run`; a run into which
+    It has as many ticks as the run had, also if that was interrupted, failed or killed; with `out`, one that was killed
+    has all that it was to have. `runners` are as for `run`; a run into which
     something came from outside takes none, since its record plays their part. `out`, a new or empty folder, becomes the
     repetition's own run folder, with what `record` says in it.
 
@@ -112,7 +111,12 @@ class RepeatedRun:
         )
 
     def _ticks(self) -> int:
-        wanted = self._summary.ticks if self._summary else self.origin.ticks
+        """As many as the run had; of one that was killed, if it is to be recorded anew, all that it was to have."""
+        if self._summary:
+            wanted = self._summary.ticks
+        else:
+            known = ticks_logged(self._folder)
+            wanted = known if known and self.simulation.folder is None else self.origin.ticks
         return min(wanted, self._inputs.end_tick) if self._inputs else wanted
 
     def _why_not_all(self, result: Result) -> str:
@@ -132,20 +136,11 @@ class _Summary:
 
 def _read_summary(folder: Path) -> _Summary | None:
     """What there is to compare with; None if the run left no summary."""
-    path = folder / SUMMARY
-    if not path.exists():
+    found = RunFolder(folder).summary
+    if found is None:
         return None
-    try:
-        found: Any = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError:
-        found = None
-    match found:
-        case {"ticks": int(ticks), "trajectory_sha256": [str(), *_] as hashes, "inputs": None}:
-            return _Summary(ticks, tuple(hashes), None)
-        case {"ticks": int(ticks), "trajectory_sha256": [str(), *_] as hashes, "inputs": {"sha256": str(sha256)}}:
-            return _Summary(ticks, tuple(hashes), sha256)
-        case _:
-            raise BadInput(str(path), "", "expected the summary of a run")
+    inputs: dict[str, Any] = found.get("inputs") or {}
+    return _Summary(found["ticks"], tuple(found["trajectory_sha256"]), inputs.get("sha256"))
 
 
 def _inputs(folder: Path, origin: Origin, summary: _Summary | None) -> RecordedInputs | None:

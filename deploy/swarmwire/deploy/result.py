@@ -5,9 +5,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from swarmwire.deploy.folder import write_whole
 from swarmwire.deploy.inputs import InputsRecord
 from swarmwire.deploy.scenario_copy import CopiedFile
+from swarmwire.metrics.record.whole_text import write_whole
 from swarmwire.world.realtime_crew import RealTimeReport
 
 SUMMARY_FORMAT = 1

@@ -17,12 +17,11 @@ from swarmwire.deploy.recording import Recording
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.trajectory_log import TrajectoryLog
 from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.record.names import RECORDING, SUMMARY
 from swarmwire.metrics.record.recorders import recorders
 from swarmwire.metrics.record.run_log import RunLog
 from swarmwire.metrics.rerun_recording import RerunRecording
 from swarmwire.world.scenario import Scenario
-
-SUMMARY = "summary.json"
 
 
 class RunRecord:
@@ -51,7 +50,7 @@ class RunRecord:
             topics = _topics(Message)
             found += recorders(folder, metrics, clock, packets=what.packets, topics=topics, may_drop=may_drop)
         if what.rrd:
-            found.append(RerunRecording(folder / "run.rrd", metrics, selected=what.select))
+            found.append(RerunRecording(folder / RECORDING, metrics, selected=what.select))
         return (*found, Published(folder, run_id, metrics, clock, selected=what.select))
 
     def begin(
@@ -91,9 +90,12 @@ class RunRecord:
         return self._recorded.record() if self._recorded else None
 
     def say(self, text: str) -> None:
-        """Tell people at once, and keep it in the log."""
-        print(text, file=sys.stderr, flush=True)
+        """Keep it in the log, and tell people at once; a terminal that is gone must not end a run."""
         self.note(text)
+        try:
+            print(text, file=sys.stderr, flush=True)
+        except (OSError, ValueError) as error:
+            self.note(f"(nobody could be told: {error})")
 
     def note(self, text: str) -> None:
         """Keep it in the log."""

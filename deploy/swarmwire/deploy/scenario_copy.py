@@ -16,10 +16,10 @@ from pathlib import Path
 import tomli_w
 
 from swarmwire.agent.loading import resolve
+from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.scenario_mapping import mapping_of
 
-SCENARIO = "scenario.toml"
 FILES = "files"
 
 

@@ -9,10 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static, Tally, Truth
-
-DIGESTS = "trajectory.digests"
-BYTES = 8
+from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS
 
 Hashes = Callable[[], list[str]]  # the trajectory hash of each arena so far
 
@@ -49,8 +48,7 @@ class TrajectoryCheck:
     """
 
     def __init__(self, folder: Path, hashes: Hashes) -> None:
-        path = folder / DIGESTS
-        self._expected, self._hashes = path.read_bytes() if path.exists() else b"", hashes
+        self._expected, self._hashes = _logged(folder), hashes
         self.compared = 0
         self.first_difference: int | None = None
 
@@ -59,9 +57,9 @@ class TrajectoryCheck:
 
     def see(self, truth: Truth) -> None:
         """Compare this tick."""
-        start = truth.tick * BYTES
-        expected = self._expected[start : start + BYTES]
-        if len(expected) < BYTES:
+        start = truth.tick * DIGEST_BYTES
+        expected = self._expected[start : start + DIGEST_BYTES]
+        if len(expected) < DIGEST_BYTES:
             return
         self.compared += 1
         if self.first_difference is None and _digest(self._hashes) != expected:
@@ -73,4 +71,18 @@ class TrajectoryCheck:
 
 
 def _digest(hashes: Hashes) -> bytes:
-    return hashlib.sha256("".join(hashes()).encode()).digest()[:BYTES]
+    return hashlib.sha256("".join(hashes()).encode()).digest()[:DIGEST_BYTES]
+
+
+def ticks_logged(folder: Path) -> int:
+    """How many ticks the run of this folder logged."""
+    return len(_logged(folder)) // DIGEST_BYTES
+
+
+def _logged(folder: Path) -> bytes:
+    try:
+        return (folder / DIGESTS).read_bytes()
+    except FileNotFoundError:
+        return b""
+    except OSError as error:
+        raise BadInput(str(folder / DIGESTS), "", f"expected a readable file: {error.strerror}") from None

@@ -4,20 +4,20 @@ import json
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.record.event_recorder import event_schema
+from swarmwire.metrics.record.names import STATIC, SUMMARY
 from swarmwire.metrics.record.packet_columns import packet_schema
 from swarmwire.metrics.record.part_files import parts_of, table_file
-from swarmwire.metrics.record.static_file import NAME, read_static
+from swarmwire.metrics.record.static_file import read_static
 from swarmwire.metrics.record.tick_columns import ROBOT_COLUMNS
 
 if TYPE_CHECKING:
     import polars as pl
 
-SUMMARY = "summary.json"
 SCHEMAS = {"packets": packet_schema, "events": event_schema}  # which may well have no rows
 CHANGES_UNDERFOOT = 3  # times that the files of a running run may be joined while they are read
 
@@ -33,22 +33,25 @@ class RunFolder:
         """Look at this folder; BadInput unless there is one."""
         self.path = Path(path)
         if not self.path.is_dir():
-            raise BadInput(str(path), "", "expected a run folder")
+            raise BadInput(str(path), "", "expected a run folder: there is none")
 
     @property
     def summary(self) -> dict[str, Any] | None:
         """`summary.json`; None if the run has not ended, or was killed."""
         path = self.path / SUMMARY
         try:
-            return json.loads(path.read_text(encoding="utf-8"))
+            found: object = json.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
             return None
-        except ValueError as error:
-            raise BadInput(str(path), "", f"expected JSON: {error}") from error
+        except (OSError, ValueError) as error:
+            raise BadInput(str(path), "", f"expected the summary of a run: {error}") from error
+        if not _is_summary(found):
+            raise BadInput(str(path), "", "expected the summary of a run, format 1")
+        return cast("dict[str, Any]", found)
 
     @cached_property
     def _static(self) -> Static:
-        return read_static(self.path / NAME)
+        return read_static(self.path / STATIC)
 
     @property
     def static(self) -> Static:
@@ -137,3 +140,16 @@ def _repeated(rows: int, times: int) -> "pl.Series":
     import polars as pl
 
     return pl.Series(np.repeat(np.arange(rows, dtype=np.uint32), times))
+
+
+def _is_summary(found: Any) -> bool:
+    """Whether all is there, of the right kind, that is read from a summary."""
+    kinds = {"ticks": int, "sim_time_s": (int, float), "ended": str, "events": list, "metrics": (dict, list)}
+    kinds |= {"record": dict, "arenas": int, "trajectory_sha256": list}
+    if not isinstance(found, dict) or found.get("format") != 1:  # pyright: ignore[reportUnknownMemberType]
+        return False
+    summary = cast("dict[str, Any]", found)
+    if not all(isinstance(summary.get(key), kind) for key, kind in kinds.items()) or summary["ticks"] < 0:
+        return False
+    hashes: list[Any] = summary["trajectory_sha256"]
+    return len(hashes) == summary["arenas"] and all(isinstance(item, str) for item in hashes)

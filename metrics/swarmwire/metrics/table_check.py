@@ -1,5 +1,6 @@
 """A table of a run folder as it lies on disk: whole, in parts, damaged, or not there."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,18 +17,18 @@ class TableCheck:
     text: str
 
 
-def check_table(folder: Path, name: str) -> TableCheck:
-    """Read every file of a table to its end, a column at a time."""
+def check_table(folder: Path, name: str, columns: Collection[str]) -> TableCheck:
+    """Read every file of a table to its end, a column at a time; it must have at least these columns."""
     whole, parts = table_file(folder, name), parts_of(folder, name)
     if whole.exists():
-        fault = _fault(whole)
+        fault = _fault(whole, columns)
         if fault is None:
             # A run killed between the two leaves both; whoever reads takes the whole.
             return TableCheck(State.WHOLE, [whole], "its parts were not cleared away" if parts else "")
         return TableCheck(State.DAMAGED, [], f"{whole.name}: {fault}")
     if not (folder / name).is_dir():
         return TableCheck(State.MISSING, [], f"there is neither {whole.name} nor a folder of its parts")
-    faults = {part: fault for part in parts if (fault := _fault(part)) is not None}
+    faults = {part: fault for part in parts if (fault := _fault(part, columns)) is not None}
     for number, part in enumerate(parts):
         if part != part_file(folder, name, number):
             faults.setdefault(part, f"expected {part_file(folder, name, number).name} before it")
@@ -40,11 +41,15 @@ def check_table(folder: Path, name: str) -> TableCheck:
     return TableCheck(State.PARTIAL, parts, text)
 
 
-def _fault(file: Path) -> str | None:
+def _fault(file: Path, columns: Collection[str]) -> str | None:
     import polars as pl
 
     try:
-        for column in pl.read_parquet_schema(file):
+        there = pl.read_parquet_schema(file)
+        missing = [column for column in columns if column not in there]
+        if missing:
+            return f"no column {missing[0]}"
+        for column in there:
             pl.read_parquet(file, columns=[column])
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
         return str(error).splitlines()[0]

@@ -1,6 +1,6 @@
 """Check a run folder: what is whole, what a killed run left, what is missing, what does not agree."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from hashlib import file_digest
 from pathlib import Path
 from typing import Any
@@ -8,21 +8,22 @@ from typing import Any
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.agreement import Verdict, events_agree, packets_agree, ticks_agree
 from swarmwire.metrics.finding import Finding, State
-from swarmwire.metrics.record import run_log, static_file
+from swarmwire.metrics.origin_check import check_digests, check_inputs, check_run_json
+from swarmwire.metrics.record.names import LOG, RECORDING, RUN_JSON, STATIC, SUMMARY
+from swarmwire.metrics.record.tick_columns import ROBOT_COLUMNS
 from swarmwire.metrics.recording_check import check_recording
-from swarmwire.metrics.run_folder import SUMMARY, RunFolder
+from swarmwire.metrics.run_folder import SCHEMAS, RunFolder
 from swarmwire.metrics.table_check import check_table
 
 Agreement = Callable[[list[Path], Mapping[str, Any] | None], Verdict]
 TABLES: dict[str, Agreement] = {"ticks": ticks_agree, "packets": packets_agree, "events": events_agree}
 ALWAYS = ("ticks", "events")  # recorded unless the summary says otherwise
-RECORDING = "run.rrd"
 
 
 def verify(path: Path | str) -> list[Finding]:
     """A finding for each part of a run folder; nothing is changed. BadInput if this is no run folder."""
     folder = RunFolder(path)
-    parts = (SUMMARY, static_file.NAME, run_log.NAME, RECORDING, *TABLES, *(f"{name}.parquet" for name in TABLES))
+    parts = (SUMMARY, RUN_JSON, STATIC, LOG, RECORDING, *TABLES, *(f"{name}.parquet" for name in TABLES))
     if not any((folder.path / part).exists() for part in parts):
         raise BadInput(str(path), "", "expected a run folder; there is nothing of a run in it")
     summary, of_summary = _summary(folder)
@@ -30,8 +31,11 @@ def verify(path: Path | str) -> list[Finding]:
         of_summary,
         _static(folder),
         *(_table(folder, name, summary) for name in TABLES),
-        _recording(folder),
+        _recording(folder, summary),
         _log(folder),
+        check_run_json(folder.path),
+        check_digests(folder.path, summary),
+        *check_inputs(folder.path, summary),
         *_copies(folder, summary),
     ]
 
@@ -49,19 +53,19 @@ def _summary(folder: RunFolder) -> tuple[dict[str, Any] | None, Finding]:
 
 
 def _static(folder: RunFolder) -> Finding:
-    if not (folder.path / static_file.NAME).exists():
-        return Finding(static_file.NAME, State.MISSING, "without it rows have no robots' names")
+    if not (folder.path / STATIC).exists():
+        return Finding(STATIC, State.MISSING, "without it rows have no robots' names")
     try:
         static = folder.static
     except BadInput as error:
-        return Finding(static_file.NAME, State.DAMAGED, error.expected)
-    return Finding(static_file.NAME, State.WHOLE, f"{static.name}: {static.robots} robots, {static.rate_hz} Hz")
+        return Finding(STATIC, State.DAMAGED, error.expected)
+    return Finding(STATIC, State.WHOLE, f"{static.name}: {static.robots} robots, {static.rate_hz} Hz")
 
 
 def _table(folder: RunFolder, name: str, summary: dict[str, Any] | None) -> Finding:
-    found = check_table(folder.path, name)
+    found = check_table(folder.path, name, _columns(name))
     if found.state is State.MISSING:
-        expected = name in (summary["record"] if summary and "record" in summary else ALWAYS)
+        expected = name in (summary["record"] if summary else ALWAYS)
         return Finding(name, State.MISSING, found.text) if expected else Finding(name, State.NOT_RECORDED, "")
     if not found.files:
         return Finding(name, found.state, found.text)
@@ -69,6 +73,10 @@ def _table(folder: RunFolder, name: str, summary: dict[str, Any] | None) -> Find
     verdict = TABLES[name](found.files, summary) if found.state is not State.DAMAGED else None
     state, text = verdict or (found.state, "")
     return Finding(name, state, f"{text}; {reach}" if text else reach)
+
+
+def _columns(name: str) -> Collection[str]:
+    return SCHEMAS[name]() if name in SCHEMAS else ("tick", "time_s", "arena", *ROBOT_COLUMNS)
 
 
 def _reach(name: str, files: list[Path]) -> str:
@@ -84,20 +92,22 @@ def _reach(name: str, files: list[Path]) -> str:
     return text
 
 
-def _recording(folder: RunFolder) -> Finding:
+def _recording(folder: RunFolder, summary: dict[str, Any] | None) -> Finding:
     path = folder.path / RECORDING
     if not path.exists():
-        return Finding(RECORDING, State.NOT_RECORDED, "")
+        return Finding(RECORDING, State.MISSING if summary and "rrd" in summary["record"] else State.NOT_RECORDED, "")
     return Finding(RECORDING, *check_recording(path))
 
 
 def _log(folder: RunFolder) -> Finding:
-    path = folder.path / run_log.NAME
+    path = folder.path / LOG
     if not path.exists():
-        return Finding(run_log.NAME, State.MISSING, "what was said during the run")
-    with path.open("rb") as file:
-        lines = sum(1 for _ in file)
-    return Finding(run_log.NAME, State.WHOLE if lines else State.DAMAGED, f"{lines} lines")
+        return Finding(LOG, State.MISSING, "what was said during the run")
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        return Finding(LOG, State.DAMAGED, str(error))
+    return Finding(LOG, State.WHOLE if lines else State.DAMAGED, f"{len(lines)} lines")
 
 
 def _copies(folder: RunFolder, summary: dict[str, Any] | None) -> list[Finding]:

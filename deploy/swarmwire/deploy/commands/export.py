@@ -81,7 +81,7 @@ def export_command(
         _refuse_film_options({"--from": from_s, "--until": until_s, "--fps": fps, "--speed": speed})
     film = _film(run, arena)
     check_path(target, SUFFIXES[kind])
-    figure = FilmFigure(film, size or USUAL_SIZE_PX[kind], metric)
+    figure = FilmFigure(film, USUAL_SIZE_PX[kind] if size is None else size, metric)
     if kind == "png":
         figure.save(film.index_at(_time_s(png or END, film)), target)
     else:

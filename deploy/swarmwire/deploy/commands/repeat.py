@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
+from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import DIFFERENT, INTERRUPTED
 from swarmwire.deploy.commands.options import Packets
 
@@ -36,6 +37,8 @@ def repeat_command(
 
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     record = Recording(packets=packet_share(packets))
+    if record.packets and out is None:
+        raise BadInput("--packets", "", "expected --out with it: a folder in which to record them")
     repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
     repeated.simulation.watch(progress(repeated.simulation, console))
     repetition = repeated.run()

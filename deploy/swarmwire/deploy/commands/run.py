@@ -93,9 +93,10 @@ def _seed_list(text: str) -> list[int]:
     first, colon, last = text.partition(":")
     try:
         found = range(int(first), int(last)) if colon else [int(item) for item in text.split(",")]
-    except ValueError:
-        found = []
-    if not 0 < len(found) <= MOST_SEEDS:
+        fits = 0 < len(found) <= MOST_SEEDS
+    except (ValueError, OverflowError):  # no number, or more than can be counted
+        found, fits = [], False
+    if not fits:
         expected = f"expected FIRST:END (END left out) or a list such as 1,5,7, {MOST_SEEDS} at most; got {text!r}"
         raise BadInput("--seeds", "", expected)
     return list(found)

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from swarmwire.metrics.record.names import RECORDING
+
 
 def screenshot_command(
     recording: Annotated[Path, typer.Argument(help="A run folder, or its run.rrd.", metavar="RUN")],
@@ -14,5 +16,5 @@ def screenshot_command(
     """Draw a recording as rerun's viewer shows it, without a screen. Needs a Vulkan driver; Mesa's will do."""
     from swarmwire.metrics.picture import render_png
 
-    render_png(recording / "run.rrd" if recording.is_dir() else recording, to, tick)
+    render_png(recording / RECORDING if recording.is_dir() else recording, to, tick)
     typer.echo(f"written: {to}")

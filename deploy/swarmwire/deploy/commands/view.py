@@ -10,8 +10,7 @@ import typer
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
-
-RECORDING = "run.rrd"
+from swarmwire.metrics.record.names import RECORDING
 
 
 def view_command(

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.record.whole_text import write_whole
 
 LIVE = "live.json"
 
@@ -22,9 +23,7 @@ class Live:
 
     def write(self, folder: Path) -> None:
         """Tell of it in the run folder; whoever reads the file finds all of it or none."""
-        aside = folder / f".{LIVE}"
-        aside.write_text(json.dumps(asdict(self)), encoding="utf-8")
-        aside.rename(folder / LIVE)
+        write_whole(folder / LIVE, json.dumps(asdict(self)))
 
 
 def read_live(folder: Path) -> Live | None:

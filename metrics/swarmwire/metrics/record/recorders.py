@@ -12,7 +12,7 @@ from swarmwire.metrics.record.packet_recorder import PacketRecorder
 from swarmwire.metrics.record.static_recorder import StaticRecorder
 from swarmwire.metrics.record.tick_recorder import TickRecorder
 
-TABLES = ("ticks", "packets", "events")
+TABLES = ("ticks", "packets", "events", "rrd")  # the last is the recording for the viewer
 
 
 def recorders(

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from swarmwire.comms.clock import WallClock
-
-NAME = "log.txt"
+from swarmwire.metrics.record.names import LOG
 
 
 class RunLog:
@@ -17,7 +16,7 @@ class RunLog:
         """Open the log of this run folder, which must be there; OSError if it cannot be written."""
         self.lost = 0
         self._clock = clock or WallClock()
-        self._file = (folder / NAME).open("a", encoding="utf-8", buffering=1)
+        self._file = (folder / LOG).open("a", encoding="utf-8", buffering=1)
 
     def say(self, text: str) -> None:
         """Append a text; of several lines, those after the first are indented."""

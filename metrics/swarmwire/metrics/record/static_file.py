@@ -9,17 +9,14 @@ from typing import Any, cast
 from swarmwire.comms.body import body_from
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
-from swarmwire.metrics.record.part_files import ASIDE
+from swarmwire.metrics.record.whole_text import write_whole
 
-NAME = "static.json"
 FORMAT = 1
 
 
 def write_static(static: Static, path: Path) -> None:
     """Write it aside, then rename, so that no half of it is ever seen."""
-    aside = path.with_name(path.name + ASIDE)
-    aside.write_text(json.dumps({"format": FORMAT, **asdict(static)}, indent=2) + "\n", encoding="utf-8")
-    aside.replace(path)
+    write_whole(path, json.dumps({"format": FORMAT, **asdict(static)}, indent=2) + "\n")
 
 
 def read_static(path: Path) -> Static:

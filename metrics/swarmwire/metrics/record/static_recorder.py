@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.metrics.record.static_file import NAME, write_static
+from swarmwire.metrics.record.names import STATIC
+from swarmwire.metrics.record.static_file import write_static
 
 
 class StaticRecorder:
@@ -15,7 +16,7 @@ class StaticRecorder:
 
     def begin(self, static: Static) -> None:
         """Write it."""
-        write_static(static, self._folder / NAME)
+        write_static(static, self._folder / STATIC)
 
     def see(self, truth: Truth) -> None:
         """Nothing: what is static does not change."""
