@@ -49,8 +49,8 @@ def record_run(folder: Path, scenario=LOSSY, packets=1.0, **options):
 def started(folder: Path, *overrides: str) -> "subprocess.Popen[str]":
     """Such a run in a process of its own, in haste; it prints a line per tick."""
     program = (
-        "import sys; from pathlib import Path; from tests.deploy.recorded import Saying, hastily, record_run;"
-        "hastily().__enter__(); record_run(Path(sys.argv[1]), observers=[Saying()], overrides=sys.argv[2:])"
+        "import sys; from pathlib import Path; from tests.deploy.recorded import Saying, hastily, record_run\n"
+        "with hastily(): record_run(Path(sys.argv[1]), observers=[Saying()], overrides=sys.argv[2:])"
     )
     command = [sys.executable, "-c", program, str(folder), *overrides]
     return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT)
