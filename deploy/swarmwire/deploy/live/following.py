@@ -37,6 +37,7 @@ class Following:
         self.over = False  # the run has ended, or its process is gone
         self._frames, self._token = frames, token
         self._serial: int | None = None
+        self._gone = False
 
     @property
     def metrics(self) -> tuple[Series, ...]:
@@ -47,8 +48,9 @@ class Following:
         """The next glimpse, None if there is none yet; looks also whether the run is over."""
         sample = self._frames.try_recv()
         if sample is None:
-            gone = self._token.try_recv()
-            self.over = self.over or (gone is not None and gone.kind == zenoh.SampleKind.DELETE)
+            self.over = self._gone  # once nothing is left of what came before
+            token = self._token.try_recv()
+            self._gone = self._gone or (token is not None and token.kind == zenoh.SampleKind.DELETE)
             return None
         try:
             glimpse = decode_truth(decode(sample.payload.to_bytes()), self.scene)

@@ -96,15 +96,25 @@ class Published:
         if self._frames.full():
             self.left_out += 1
             return
-        latest = self._metrics.latest
-        values = np.array([latest[metric.name] for metric in self._metrics.metrics])
-        self._frames.put_nowait(self._sampling.glimpse(*self._since.take(), values, now_ns))
-        self.frames += 1
+        self._put(now_ns)
 
     def end(self, last: Tally | None) -> dict[str, Any]:
-        """Close the endpoint; whoever looks on learns that the run is over."""
+        """Show how it ended and close the endpoint; whoever looks on learns that the run is over."""
+        if self._watched and self._since.ticks and self._fault is None:
+            self._put(self._clock.now_ns())
         self._open.close()
         return {"published": {"frames": self.frames, "left_out": self.left_out}}
+
+    def _put(self, now_ns: int) -> None:
+        """Hand what has not been shown to the sender; at the end it may be busy for a while."""
+        latest = self._metrics.latest
+        values = np.array([latest[metric.name] for metric in self._metrics.metrics])
+        try:
+            self._frames.put(self._sampling.glimpse(*self._since.take(), values, now_ns), timeout=LEAVE_S)
+        except queue.Full:
+            self.left_out += 1
+        else:
+            self.frames += 1
 
     def _is_watched(self) -> bool:
         status: Any = self._publisher.matching_status  # an object, where zenoh's stub promises a bool

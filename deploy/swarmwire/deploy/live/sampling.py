@@ -1,6 +1,7 @@
 """How much of a run is shown: so many ticks a second of wall time, and of large swarms fewer links and senses.
 
-What adds up from tick to tick (packets, contacts, events) is shown in full with the next tick that is.
+What adds up from tick to tick (counts of packets, contacts, events) is shown in full with the next tick that is; of the
+links that ended, those of that tick alone.
 """
 
 from dataclasses import dataclass, replace
