@@ -108,3 +108,13 @@ def test_hidden_senders_lose_more_the_more_they_send():
         for slower, faster in pairwise(group):
             assert slower["interval_s"] > faster["interval_s"]
             assert falls(slower, faster, "delivery_ratio"), faster
+
+
+def test_full_queues_collide_as_often_as_saturated_contention_theory_says():
+    """Each sends in a slot with 2 / (W + 1), alone with (1 - that)^(n - 1); few nodes, as freezing is left out."""
+    windows = {"802.11a 6 Mbit/s": 16, "802.11b 1 Mbit/s": 32}
+    full = [row for row in rows("80211_contention") if row["queue_bound"] and row["nodes"] <= 5]
+    assert {row["technology"] for row in full} == set(windows)
+    for row in full:
+        alone = (1.0 - 2.0 / (windows[row["technology"]] + 1)) ** (row["nodes"] - 1)
+        assert row["on_air_delivery_ratio"] == pytest.approx(alone, abs=0.02), row
