@@ -9,17 +9,17 @@ from unittest.mock import patch
 
 from swarmwire.deploy import Recording, run
 from swarmwire.metrics.record import chunk_limit, table_writer
+from swarmwire.metrics.record.part_files import join_parts
 from tests.deploy.commands import LOSSY, ROOT
 
 
 @contextmanager
 def hastily() -> Generator[None]:
     """A recorder's two seconds pass in 40 ms, and it says when it joins the parts of a table."""
-    join = table_writer.join_parts
 
     def say_and_join(folder: Path, name: str) -> None:
         print("ends", flush=True)
-        join(folder, name)
+        join_parts(folder, name)
 
     with (
         patch.object(chunk_limit, "LONGEST_S", chunk_limit.LONGEST_S / 50),
