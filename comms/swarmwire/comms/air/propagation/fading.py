@@ -9,9 +9,9 @@ Haber, IEEE Trans. Vehicular Techn. 35, 1986). So no link has a state, both dire
 depend on what was sent before, and while one end moves by s, h is correlated by J0(2 pi s / lambda), Jakes' spectrum;
 while both move, by the product.
 
-The directions are a lattice of N points over both circles, turned by a keyed amount around each; phases are keyed. Keyed
-means by the unordered pair: the robots' indices in their arena, and the arena's key. |h|^2 is exponential but for
-O(1/N): E g^2 = 2 - 1/N.
+The directions are a lattice of N points over both circles, which keyed amounts turn around either robot; the phases are
+keyed, too, all by the arena's key and the unordered pair of indices in it. |h|^2 is exponential but for O(1/N):
+E g^2 = 2 - 1/N.
 """
 
 # pyright: basic, reportUnknownMemberType=false
