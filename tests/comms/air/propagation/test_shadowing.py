@@ -1,6 +1,7 @@
 """Shadowing: what the field's definition says of variance and correlation, and that both directions agree.
 
-Keys are fixed. Each statistic is taken over independent arenas and held to 4.4 standard errors: false alarm 1 in 90 000.
+Keys are fixed. Each statistic is taken over independent arenas and held to 4.4 standard errors (false alarm
+1 in 90 000).
 """
 
 import numpy as np

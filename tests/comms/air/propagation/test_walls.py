@@ -67,7 +67,10 @@ def test_both_directions_agree_to_the_last_bit(ax: float, ay: float, bx: float, 
 @given(PLACES, PLACES, PLACES, PLACES, st.floats(0.0, 1.0))
 def test_chords_of_parts_add_up(ax: float, ay: float, bx: float, by: float, share: float):
     mx, my = ax + share * (bx - ax), ay + share * (by - ay)
-    whole, parts = through(ARENAS, ax, ay, bx, by)[1], (through(ARENAS, ax, ay, mx, my), through(ARENAS, mx, my, bx, by))
+    whole, parts = (
+        through(ARENAS, ax, ay, bx, by)[1],
+        (through(ARENAS, ax, ay, mx, my), through(ARENAS, mx, my, bx, by)),
+    )
     # A point in the middle is off the line by rounding; a chord that grazes a circle changes by the root of that.
     assert parts[0][1] + parts[1][1] == pytest.approx(whole, abs=1e-6)
 

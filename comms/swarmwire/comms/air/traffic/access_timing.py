@@ -16,6 +16,7 @@ class UnslottedCsma:
     symbol_ns: int = 16 * US
     backoff_ns: int = 320 * US  # aUnitBackoffPeriod, 20 symbols
     cca_ns: int = 128 * US  # 8 symbols
+    busy_above_sensitivity_db: float = 10.0  # energy that counts as busy (6.9.9)
     turnaround_ns: int = 192 * US  # aTurnaroundTime, 12 symbols
     short_space_ns: int = 192 * US  # SIFS, 12 symbols: after frames of up to `short_frame_octets`
     long_space_ns: int = 640 * US  # LIFS, 40 symbols
@@ -44,6 +45,8 @@ class Dcf:
     least_window: int  # CWmin, slots
     most_window: int = 1023  # CWmax, slots
     most_retries: int = 7  # of short unicast frames
+    busy_frame_dbm: float = -82.0  # a frame of its own kind that counts as busy (17.3.10.5)
+    busy_energy_dbm: float = -62.0  # anything else
 
     @property
     def difs_ns(self) -> int:
