@@ -104,6 +104,18 @@ def test_where_both_robots_move_correlations_multiply():
         assert is_mean((there * here.conj()).real, float(expected))
 
 
+def test_a_single_link_decorrelates_as_all_do_while_both_robots_move():
+    """Averaged over 4000 places of one pair's ends: 0.016 of deviation, and 0.01 for a link's 32 waves."""
+    places = np.random.default_rng(6).uniform(-1000.0, 1000.0, (4000, 4))
+    step = np.array([0.25, 0.0, 0.0, 0.25]) / PER_M
+    expected = special.j0(0.5 * np.pi) ** 2
+    for a, b in ROBOTS[::2500]:
+        here, there = (
+            np.array([complex(*scattered(KEY, a, b, PER_M, *at)) for at in xs]) for xs in (places, places + step)
+        )
+        assert np.mean((there * here.conj()).real) == pytest.approx(expected, abs=0.08)
+
+
 def test_a_robots_signal_fades_as_often_and_as_long_as_theory_says():
     """At 1 m/s and 2.44 GHz it falls by 10 dB 5.838 times a second, for 16.3 ms each; over 400 s of 40 pairs.
 
@@ -139,8 +151,8 @@ def test_both_directions_agree_to_the_last_bit(a, b, ax, ay, bx, by, k):
     )
 
 
-def test_pairs_fade_on_their_own():
-    place = np.array([1.0, 2.0, 30.0, -7.0])
+@pytest.mark.parametrize("place", [(1.0, 2.0, 30.0, -7.0), (0.0, 0.0, 0.0, 0.0)])
+def test_pairs_fade_on_their_own(place: tuple[float, ...]):
     gains = np.array([[rayleigh_gain(KEY, a, b, PER_M, *place) for b in range(100, 103)] for a in range(100)])
     one, other = gains[:, 0], gains[:, 1]
     assert is_mean((one - 1.0) * (other - 1.0), 0.0)

@@ -78,6 +78,14 @@ def test_variogram_over_a_robots_way_is_that_of_the_field():
         assert abs(half_square.mean() - expected) < STANDARD_ERRORS * half_square.std() / np.sqrt(ARENAS)
 
 
+def test_wave_numbers_are_quantiles_of_the_planes_spectrum_one_to_a_stratum():
+    """F(k) = 1 - 1 / sqrt(1 + (2 pi delta k)^2) for the exponential covariance of scale delta."""
+    k = np.hypot(WAVES[:50, 0], WAVES[:50, 1])
+    share = 1.0 - 1.0 / np.sqrt(1.0 + (2.0 * np.pi * DELTA_M * k) ** 2)
+    count = k.shape[1]
+    assert np.all(np.abs(share * count - np.arange(count) - 0.5) <= 0.5 + 1e-9)
+
+
 @pytest.mark.parametrize("length_m", [2.0, 20.0, 80.0])
 def test_shadowing_is_normal(length_m: float):
     """Kolmogorov-Smirnov, false alarm 1 in 1000."""
