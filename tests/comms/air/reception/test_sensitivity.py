@@ -5,7 +5,7 @@ import math
 import pytest
 
 from swarmwire.comms.air.decibels import from_db
-from swarmwire.comms.air.reception.noise import noise_dbm
+from swarmwire.comms.air.reception.noise import Noise, noise_dbm
 from swarmwire.comms.air.reception.reception import by_table, chunk_success, ieee80211ag, ieee802154
 from swarmwire.comms.air.reception.sensitivity import LEAST_DB, MOST_DB, sensitivity_dbm, sinr_for_db
 from swarmwire.comms.air.reception.success_table import SuccessTable
@@ -26,6 +26,10 @@ def test_thermal_noise_is_k_t_b(bandwidth_hz: float, stated_dbm: float):
 def test_thermal_noise_is_that_of_ns3_but_for_its_boltzmann_constant(bandwidth_hz: float, stated_dbm: float):
     """It has 1.3803e-23 J/K, which is 0.0011 dB less."""
     assert noise_dbm(bandwidth_hz) + NS3_BOLTZMANN_DB == pytest.approx(stated_dbm, abs=6e-4)
+
+
+def test_a_receivers_noise_is_thermal_noise_in_its_bandwidth_and_its_figure():
+    assert Noise(bandwidth_hz=20e6, figure_db=7.0).power_dbm == noise_dbm(20e6, 7.0)
 
 
 def test_sensitivity_of_802_15_4_is_that_of_ns3():

@@ -15,7 +15,7 @@ from swarmwire.comms.air.propagation.gamma import gamma_quantile
 
 @njit(cache=True)
 def nakagami_gain(rayleigh_gain, m):
-    """The power gain of which Rayleigh's would be as rare; m >= 0.5. About 2 us; nothing to do for m = 1."""
+    """The power gain of which Rayleigh's would be as rare; m >= 0.5. About 0.5 us; nothing to do for m = 1."""
     if m == 1.0:
         return rayleigh_gain
     return gamma_quantile(m, -math.expm1(-rayleigh_gain), math.exp(-rayleigh_gain)) / m

@@ -1,6 +1,6 @@
 """Shadowing: one Gaussian field per arena stands for all that is not modelled, and a link collects it along its way.
 
-The model NeSh (P. Agrawal and N. Patwari, IEEE Trans. Wireless Comm. 8(10), 2009): a field p over the plane with
+The model NeSh (P. Agrawal and N. Patwari, IEEE Trans. Wireless Comm. 8, 2009): a field p over the plane with
 E[p(x) p(y)] = sigma^2 / (2 delta) exp(-|x - y| / delta), and on a link of length d from a to b
 
     X = 1/sqrt(d) * integral of p along the link, in dB;   Var X = sigma^2 (1 - delta/d (1 - exp(-d/delta))).
@@ -65,7 +65,7 @@ def amplitude_db(shadowing: Shadowing) -> float:
 def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
     """X of the link between (ax, ay) and (bx, by) in m, in dB to be added to the loss; equal both ways to the last bit.
 
-    `waves` (3, WAVES) are those of one arena. About 0.5 us.
+    `waves` (3, WAVES) are those of one arena. About 0.3 us.
     """
     dx, dy = bx - ax, by - ay
     parts = np.empty(waves.shape[1])

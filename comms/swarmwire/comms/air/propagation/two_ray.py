@@ -12,7 +12,7 @@ from swarmwire.comms.parameters import parameter
 class TwoRay:
     """Friis up to the crossover d = 4 pi h1 h2 f / c, beyond it L(d) = 40 log10 d - 20 log10(h1 h2) dB, d and h in m.
 
-    As in ns-2 and ns-3 (T. S. Rappaport, Wireless Communications, 1996, 4.6). Both lines meet at the crossover, which
+    As in ns-2 and ns-3 (T. S. Rappaport, Wireless Communications, 1996). Both lines meet at the crossover, which
     is near: 4 m for two antennas 0.2 m above the ground at 2.4 GHz.
     """
 

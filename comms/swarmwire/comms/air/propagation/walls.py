@@ -1,6 +1,6 @@
 """Walls: what a straight line loses in the obstacles that it passes, per obstacle and per metre inside.
 
-The multi-wall model (COST 231 final report, 1999, 4.7) with exact chords through the obstacles of the arena. A radio
+The multi-wall model (COST 231 final report, 1999) with exact chords through the obstacles of the arena. A radio
 that any obstacle stops is `line_of_sight`, not this.
 """
 

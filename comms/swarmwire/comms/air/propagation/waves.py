@@ -1,6 +1,6 @@
 """Sine and cosine of phases in turns, by one polynomial: + - * only, so that compilers take several at a time.
 
-Sums of plane waves need many per link; with the mathematical library's they would take five times as long.
+Sums of plane waves need many per link; with the mathematical library's they would take ten times as long.
 """
 
 # pyright: basic, reportUnknownMemberType=false

@@ -84,8 +84,8 @@ class BurstStates:
 def _place(links, link):
     """Where a link is, or where it belongs."""
     mask = np.uint64(len(links) - 1)
-    # The product's high bits are the scattered ones; its low ones would keep the order of the low bits of the link.
-    at = ((np.uint64(link) * SCATTER) >> np.uint64(24)) & mask
+    # The upper half of the product depends on all bits of the link; its lowest bits would only on the lowest.
+    at = ((np.uint64(link) * SCATTER) >> np.uint64(32)) & mask
     while links[at] != NOBODY and links[at] != link:
         at = (at + np.uint64(1)) & mask
     return at

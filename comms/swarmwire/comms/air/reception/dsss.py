@@ -1,7 +1,7 @@
 """IEEE 802.11b: direct sequence at 1 and 2 Mbit/s, complementary codes (CCK) at 5.5 and 11, in 22 MHz.
 
 Formulas as in ns-3 (G. Pei and T. R. Henderson, Validation of ns-3 802.11b PHY model, 2009). A CCK symbol is four (5.5)
-or eight (11 Mbit/s) bits, chosen among biorthogonal codes (J. G. Proakis, Digital Communications, 4th ed., 5.2.35).
+or eight (11 Mbit/s) bits, chosen among biorthogonal codes (J. G. Proakis, Digital Communications, 4th ed., 5.2).
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -57,7 +57,7 @@ def biorthogonal_errors(signal):
 
 @njit(cache=True)
 def dsss_success(rate, sinr, bits):
-    """The probability that so many bits arrive right at one of RATES_BPS, by index; 2 us for CCK, else 0.1 us.
+    """The probability that so many bits arrive right at one of RATES_BPS, by index; 1.5 us for CCK, else 0.1 us.
 
     At 5.5 Mbit/s four bits are one choice, at 11 eight are two of half the signal: so both count quarters of the bits.
     """

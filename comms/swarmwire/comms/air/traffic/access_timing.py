@@ -34,7 +34,7 @@ class UnslottedCsma:
 
 @dataclass(frozen=True, slots=True)
 class Dcf:
-    """The distributed coordination function of IEEE 802.11 (2007: 9.2, 15.3.3, 17.5.2, 18.3.3, 19.8.4).
+    """The distributed coordination function of IEEE 802.11 (2007: 9.2, and 15 to 19 for the numbers).
 
     A sender waits until the air was free for DIFS, then U{0 .. CW} slots of free air. A broadcast goes out at a basic
     rate, without acknowledgement and retries, so its CW stays at the least.
