@@ -11,7 +11,8 @@ from swarmwire.comms.air.propagation.friis import Friis, loss_at_1_m_db
 from swarmwire.comms.air.propagation.itu_indoor import ItuIndoor
 from swarmwire.comms.air.propagation.link_budget import rssi_dbm
 from swarmwire.comms.air.propagation.log_distance import LogDistance
-from swarmwire.comms.air.propagation.path_loss import LossCurve, loss_db, reach_m
+from swarmwire.comms.air.propagation.loss_curve import LossCurve
+from swarmwire.comms.air.propagation.path_loss import loss_db, reach_m
 from swarmwire.comms.air.propagation.two_ray import TwoRay
 from swarmwire.comms.air.reception.reception import chunk_success, ieee802154
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.air.decibels import from_db, to_db
 from swarmwire.comms.air.reception import dsss, ofdm
 from swarmwire.comms.air.reception.bits import all_right
+from swarmwire.comms.air.reception.parameters import SuccessTable
 from swarmwire.comms.air.reception.reception import (
     by_table,
     by_threshold,
@@ -18,7 +19,6 @@ from swarmwire.comms.air.reception.reception import (
     ieee80211b,
     ieee802154,
 )
-from swarmwire.comms.air.reception.success_table import SuccessTable
 
 getcontext().prec = 40
 THRESHOLD = by_threshold(4.0)

@@ -6,9 +6,9 @@ import pytest
 
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.reception.noise import Noise, noise_dbm
+from swarmwire.comms.air.reception.parameters import SuccessTable
 from swarmwire.comms.air.reception.reception import by_table, chunk_success, ieee80211ag, ieee802154
 from swarmwire.comms.air.reception.sensitivity import LEAST_DB, MOST_DB, sensitivity_dbm, sinr_for_db
-from swarmwire.comms.air.reception.success_table import SuccessTable
 
 NS3_BOLTZMANN_DB = 10.0 * math.log10(1.3803e-23 / 1.380649e-23)
 

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
-from swarmwire.comms.air.traffic.delays import DISTRIBUTIONS, LONGEST_NS, Delays, delay_law, varying_delay_ns
+from swarmwire.comms.air.traffic.delays import LONGEST_NS, delay_law, varying_delay_ns
+from swarmwire.comms.air.traffic.parameters import DISTRIBUTIONS, Delays, refuse_negative
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key, uniform
 from swarmwire.comms.errors import BadInput
@@ -20,7 +21,9 @@ UNITS = st.floats(0.0, LAST_DRAW)
 
 
 def law_of(distribution: str, mean_s: float = 0.02, deviation_s: float = 0.008):
-    return delay_law(Delays(distribution, mean_s, deviation_s), "a.toml", "radio.delay")
+    delays = Delays(distribution, mean_s, deviation_s)
+    refuse_negative(delays, "a.toml", "radio.delay")
+    return delay_law(delays)
 
 
 def reference(distribution: str, mean_s: float, deviation_s: float):

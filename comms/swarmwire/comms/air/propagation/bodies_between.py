@@ -2,21 +2,9 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from dataclasses import dataclass
-
 from numba import njit
 
 from swarmwire.comms import grid
-from swarmwire.comms.parameters import parameter
-
-
-@dataclass(frozen=True)
-class Bodies:
-    """What robots take that stand between two others."""
-
-    crossing_db: float = parameter(
-        1.0, help="loss in each robot on the line between two others", unit="dB", at_least=0, at_most=1000
-    )
 
 
 @njit(cache=True)

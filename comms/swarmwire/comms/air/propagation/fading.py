@@ -3,32 +3,17 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from numba import njit
 
+from swarmwire.comms.air.propagation.loss_curve import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.air.propagation.nakagami import nakagami_gain
-from swarmwire.comms.air.propagation.path_loss import SPEED_OF_LIGHT_MPS
+from swarmwire.comms.air.propagation.parameters import FADINGS, Fading
 from swarmwire.comms.air.propagation.scattering import scattered
 from swarmwire.comms.air.propagation.waves import cosine, sine
-from swarmwire.comms.parameters import parameter
 
-DISTRIBUTIONS = ("rayleigh", "rician", "nakagami")
-RAYLEIGH, RICIAN, NAKAGAMI = range(3)
-
-
-@dataclass(frozen=True)
-class Fading:
-    """How a link's power varies over fractions of a wavelength."""
-
-    distribution: str = parameter("rayleigh", help="how waves arrive", choices=DISTRIBUTIONS)
-    k: float = parameter(
-        4.0, help="of rician: power of the direct wave over that of all others", at_least=0, at_most=1e6
-    )
-    m: float = parameter(
-        1.5, help="of nakagami: 1 is rayleigh, less is worse, more is milder", at_least=0.5, at_most=200
-    )
+_, RICIAN, NAKAGAMI = range(len(FADINGS))
 
 
 class FadingLaw(NamedTuple):
@@ -42,7 +27,7 @@ class FadingLaw(NamedTuple):
 
 def fading_law(fading: Fading, frequency_hz: float) -> FadingLaw:
     """The law at this frequency."""
-    kind = DISTRIBUTIONS.index(fading.distribution)
+    kind = FADINGS.index(fading.distribution)
     return FadingLaw(kind, fading.k, fading.m, frequency_hz / SPEED_OF_LIGHT_MPS)
 
 

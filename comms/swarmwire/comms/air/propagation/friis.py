@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from swarmwire.comms.air.propagation.path_loss import SPEED_OF_LIGHT_MPS, LossCurve, straight
+from swarmwire.comms.air.propagation.loss_curve import SPEED_OF_LIGHT_MPS, LossCurve, straight
 
 
 def loss_at_1_m_db(frequency_hz: float) -> float:

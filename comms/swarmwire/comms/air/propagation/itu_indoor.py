@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from swarmwire.comms.air.propagation.path_loss import LossCurve, straight
+from swarmwire.comms.air.propagation.loss_curve import LossCurve, straight
 from swarmwire.comms.parameters import parameter
 
 # Kind of building: distance coefficient N; floor penetration in dB for one floor, and for each further one.

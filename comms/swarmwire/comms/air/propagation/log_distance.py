@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from swarmwire.comms.air.propagation.friis import loss_at_1_m_db
-from swarmwire.comms.air.propagation.path_loss import LossCurve, straight
+from swarmwire.comms.air.propagation.loss_curve import LossCurve, straight
 from swarmwire.comms.parameters import parameter
 
 

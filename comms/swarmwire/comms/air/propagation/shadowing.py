@@ -18,33 +18,20 @@ should, too.
 # pyright: basic, reportUnknownMemberType=false
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
+from swarmwire.comms.air.propagation.parameters import Shadowing
 from swarmwire.comms.air.propagation.waves import cosine, sine, total
 from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.draws import purpose, uniform
-from swarmwire.comms.parameters import parameter
 
 WAVES = 128
 NEARLY_NO_TURN = 1e-9  # instead of a branch for a wave that runs straight across the link
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 SHADOWING = purpose("shadowing")
 QUANTILE, PHASE, TURN = 0, 1, 2  # what the draws of an arena are for
-
-
-@dataclass(frozen=True)
-class Shadowing:
-    """How strongly and over which distance the surroundings vary."""
-
-    deviation_db: float = parameter(
-        4.0, help="sigma: standard deviation of the loss on long links", unit="dB", at_least=0, at_most=40
-    )
-    correlation_m: float = parameter(
-        5.0, help="delta: distance over which the surroundings change", unit="m", above=0, at_most=10_000
-    )
 
 
 def field_waves(keys: KeyArray, shadowing: Shadowing) -> FloatArray:

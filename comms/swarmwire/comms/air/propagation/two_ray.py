@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from swarmwire.comms.air.propagation.friis import loss_at_1_m_db
-from swarmwire.comms.air.propagation.path_loss import SPEED_OF_LIGHT_MPS, LossCurve
+from swarmwire.comms.air.propagation.loss_curve import SPEED_OF_LIGHT_MPS, LossCurve
 from swarmwire.comms.parameters import parameter
 
 

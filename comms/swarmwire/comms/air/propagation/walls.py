@@ -7,25 +7,10 @@ that any obstacle stops is `line_of_sight`, not this.
 # pyright: basic, reportUnknownMemberType=false
 
 import math
-from dataclasses import dataclass
 
 from numba import njit
 
-from swarmwire.comms.parameters import parameter
-
 PARALLEL = 1e-12  # as in `geometry.ray_to_polygon`
-
-
-@dataclass(frozen=True)
-class Walls:
-    """What obstacles take. ns-3's buildings have 4 dB for wood, 7 concrete with windows, 12 stone, 15 concrete."""
-
-    crossing_db: float = parameter(
-        5.0, help="loss in each obstacle on the line between two robots", unit="dB", at_least=0, at_most=1000
-    )
-    inside_db_per_m: float = parameter(
-        0.0, help="loss in obstacles per metre of the line inside them", unit="dB/m", at_least=0, at_most=100_000
-    )
 
 
 @njit(cache=True)

@@ -9,44 +9,11 @@ burst lasts as long however often robots speak: good turns bad at rate a, bad tu
 # pyright: basic, reportUnknownMemberType=false
 
 import math
-from dataclasses import dataclass
 
 from numba import njit
 
-from swarmwire.comms.parameters import parameter
-
 # Beyond this many relaxation times 1 / (a + b) the past counts for nothing: exp(-40) is lost in a draw's 53 bits.
 FORGOTTEN = 40.0
-
-
-@dataclass(frozen=True)
-class Bursts:
-    """How long bad and good spells last, and what they lose."""
-
-    bad_s: float = parameter(0.5, help="mean duration of a burst: 1 / b", unit="s", above=0, at_most=1e6)
-    good_s: float = parameter(10.0, help="mean time between bursts: 1 / a", unit="s", above=0, at_most=1e6)
-    loss_bad: float = parameter(1.0, help="probability that a packet is lost in a burst", at_least=0, at_most=1)
-    loss_good: float = parameter(0.0, help="probability that a packet is lost otherwise", at_least=0, at_most=1)
-
-    @property
-    def bad_share(self) -> float:
-        """The share of time that is bad: pi."""
-        return self.bad_s / (self.bad_s + self.good_s)
-
-    @property
-    def loss(self) -> float:
-        """The share of packets that are lost in the long run."""
-        return self.bad_share * self.loss_bad + (1.0 - self.bad_share) * self.loss_good
-
-
-def bursts_from_steps(p: float, r: float, loss_bad: float, loss_good: float, interval_s: float) -> Bursts:
-    """The chain that packets `interval_s` apart see as the one of netem's `gemodel p r 1-h 1-k`; needs p + r < 1.
-
-    p and r are the probabilities from one packet to the next that good turns bad and bad good: (a + b) interval =
-    -ln(1 - p - r), and a / b = p / r.
-    """
-    relaxation_s = -interval_s / math.log1p(-(p + r))
-    return Bursts(relaxation_s * (p + r) / r, relaxation_s * (p + r) / p, loss_bad, loss_good)
 
 
 @njit(cache=True)

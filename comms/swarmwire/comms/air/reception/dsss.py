@@ -12,10 +12,11 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.reception.bits import all_right
+from swarmwire.comms.air.traffic.airtime import DSSS_RATES_BPS
 
 BANDWIDTH_HZ = 22e6
 DBPSK_1, DQPSK_2, CCK_5_5, CCK_11 = range(4)
-RATES_BPS = (1_000_000, 2_000_000, 5_500_000, 11_000_000)
+RATES_BPS = DSSS_RATES_BPS
 SQRT2 = math.sqrt(2.0)
 # The integrand of CCK is a bell of variance 1/2 or less: 48 nodes over 6 to either side give 1e-12 of the greatest.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)

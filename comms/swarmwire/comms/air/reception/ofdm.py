@@ -12,9 +12,10 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.reception.bits import all_right
+from swarmwire.comms.air.traffic.airtime import OFDM_BITS_PER_SYMBOL
 
 BANDWIDTH_HZ = 20e6
-RATES_BPS = tuple(1_000_000 * rate for rate in (6, 9, 12, 18, 24, 36, 48, 54))
+RATES_BPS = tuple(OFDM_BITS_PER_SYMBOL)
 # By rate: points of the constellation, and the code of SPECTRA.
 _POINTS = (2, 2, 4, 4, 16, 16, 64, 64)
 _CODE = (0, 2, 0, 2, 0, 2, 1, 2)

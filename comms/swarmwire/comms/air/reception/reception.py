@@ -16,7 +16,8 @@ from swarmwire.comms.air.reception import dsss, ofdm
 from swarmwire.comms.air.reception.dsss import dsss_success
 from swarmwire.comms.air.reception.ofdm import ofdm_success
 from swarmwire.comms.air.reception.oqpsk import oqpsk_success
-from swarmwire.comms.air.reception.success_table import SuccessTable, table_success
+from swarmwire.comms.air.reception.parameters import Reception, SuccessTable
+from swarmwire.comms.air.reception.success_table import table_success
 from swarmwire.comms.air.reception.threshold import threshold_success
 from swarmwire.comms.arrays import FloatArray
 
@@ -70,6 +71,17 @@ def ieee80211b(rate_bps: int) -> Receiver:
 def ieee80211ag(rate_bps: int) -> Receiver:
     """A receiver of IEEE 802.11a or g at one of `ofdm.RATES_BPS`; ValueError at any other."""
     return Receiver(int(Model.OFDM), ofdm.RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
+
+
+def receiver_of(reception: Reception, bit_rate_bps: int) -> Receiver:
+    """The receiver that a scenario asks for, which `refuse_unfit` has let pass."""
+    if reception.model == "threshold":
+        return by_threshold(reception.least_sinr_db)
+    if reception.table is not None and reception.model == "table":
+        return by_table(reception.table)
+    if reception.model == "802.11b":
+        return ieee80211b(bit_rate_bps)
+    return ieee80211ag(bit_rate_bps) if reception.model == "802.11ag" else ieee802154()
 
 
 @njit(cache=True)

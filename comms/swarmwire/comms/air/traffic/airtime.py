@@ -11,6 +11,7 @@ from swarmwire.comms.clock import NS_PER_S
 Octets = TypeVar("Octets", int, IntArray)
 
 US = 1_000  # ns
+DSSS_RATES_BPS = (1_000_000, 2_000_000, 5_500_000, 11_000_000)
 OFDM_BITS_PER_SYMBOL = {
     6_000_000: 24,
     9_000_000: 36,

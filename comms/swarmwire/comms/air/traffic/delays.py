@@ -3,29 +3,17 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from numba import njit
 
+from swarmwire.comms.air.traffic.parameters import DISTRIBUTIONS, Delays
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws_compiled import normal_quantile
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parameters import parameter
 
-DISTRIBUTIONS = ("uniform", "normal", "lognormal", "pareto")
 UNIFORM, NORMAL, LOGNORMAL, PARETO = range(4)
 LONGEST_NS = 86_400 * NS_PER_S  # a day: a heavy tail's time still fits an integer
 SMALLEST_TAIL = 2.0**-54  # half a step of a draw, so that no quantile is infinite
-
-
-@dataclass(frozen=True)
-class Delays:
-    """Mean and spread of a delay; a normal one is cut off below 0, which lifts a mean of less than 3 deviations."""
-
-    distribution: str = parameter("lognormal", help="how delays are spread", choices=DISTRIBUTIONS)
-    mean_s: float = parameter(0.01, help="mean delay", unit="s", above=0, at_most=3600)
-    deviation_s: float = parameter(0.005, help="standard deviation of the delay", unit="s", above=0, at_most=3600)
 
 
 class DelayLaw(NamedTuple):
@@ -37,8 +25,8 @@ class DelayLaw(NamedTuple):
     third: float
 
 
-def delay_law(delays: Delays, where: str, key: str) -> DelayLaw:
-    """The law with this mean and deviation; raises `BadInput` for a uniform one that would reach below 0.
+def delay_law(delays: Delays) -> DelayLaw:
+    """The law with this mean and deviation.
 
     Uniform: lowest (s) and width (s). Normal: mean (s), deviation (s), share that is cut off. Lognormal: mean and
     deviation of ln(delay / s). Pareto: least delay (s) and -1 / shape, with shape 1 + sqrt(1 + mean^2 / variance).
@@ -47,8 +35,6 @@ def delay_law(delays: Delays, where: str, key: str) -> DelayLaw:
     kind = DISTRIBUTIONS.index(delays.distribution)
     if kind == UNIFORM:
         half_s = math.sqrt(3.0) * deviation_s
-        if half_s > mean_s:
-            raise BadInput(where, f"{key}.deviation_s", f"expected at most {mean_s / math.sqrt(3.0):g} s for this mean")
         return DelayLaw(kind, mean_s - half_s, 2.0 * half_s, 0.0)
     if kind == NORMAL:
         return DelayLaw(kind, mean_s, deviation_s, 0.5 * math.erfc(mean_s / (deviation_s * math.sqrt(2.0))))

@@ -3,7 +3,7 @@
 import pytest
 
 from swarmwire.comms.air.reception import dsss, ofdm
-from swarmwire.comms.air.reception.choice import Reception, receiver_of
+from swarmwire.comms.air.reception.parameters import Reception, SuccessTable, refuse_unfit
 from swarmwire.comms.air.reception.reception import (
     by_table,
     by_threshold,
@@ -11,8 +11,8 @@ from swarmwire.comms.air.reception.reception import (
     ieee80211ag,
     ieee80211b,
     ieee802154,
+    receiver_of,
 )
-from swarmwire.comms.air.reception.success_table import SuccessTable
 from swarmwire.comms.errors import BadInput
 
 TABLE = SuccessTable((0.0, 6.0), (0.0, 1.0), 800)
@@ -29,7 +29,8 @@ TABLE = SuccessTable((0.0, 6.0), (0.0, 1.0), 800)
     ],
 )
 def test_the_receiver_is_the_one_that_is_named(reception: Reception, bit_rate_bps: int, expected):
-    receiver = receiver_of(reception, bit_rate_bps, "a.toml", "radio.reception")
+    refuse_unfit(reception, bit_rate_bps, "a.toml", "radio.reception")
+    receiver = receiver_of(reception, bit_rate_bps)
     assert receiver[:4] == expected[:4]
     for sinr in (0.1, 1.0, 1.99, 2.0, 3.0, 10.0, 100.0):
         assert chunk_success(receiver, sinr, 400) == chunk_success(expected, sinr, 400)
@@ -46,5 +47,5 @@ def test_the_receiver_is_the_one_that_is_named(reception: Reception, bit_rate_bp
 )
 def test_what_does_not_go_together_is_refused(reception: Reception, key: str):
     with pytest.raises(BadInput) as refused:
-        receiver_of(reception, 250_000, "a.toml", "radio.reception")
+        refuse_unfit(reception, 250_000, "a.toml", "radio.reception")
     assert refused.value.key == key
