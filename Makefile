@@ -25,6 +25,10 @@ check: sync ## lint, format, types, and who may import whom
 	$(RUN) pyright
 	$(RUN) lint-imports
 
+.PHONY: docs
+docs: sync ## build these pages and the reference as a site, docs/_build/html/index.html
+	$(RUN) python -m sphinx -W --keep-going -n -q docs docs/_build/html
+
 .PHONY: bench
 bench: sync ## measure; ONLY=name for one of them
 	$(RUN) python -m benchmarks $(ONLY)

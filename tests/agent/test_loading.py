@@ -88,3 +88,16 @@ def test_a_file_that_holds_no_agent_says_at_which_point(tmp_path: Path, code: st
 def test_a_file_that_did_not_import_may_be_mended(tmp_path: Path) -> None:
     refused(written(tmp_path, "1 / 0\n"))
     assert load_agent(written(tmp_path, "class Mine(Agent):\n    def step(self, robot): ...\n")).__name__ == "Mine"
+
+
+def test_an_edited_file_is_loaded_anew_and_no_bytecode_is_left_beside_it(tmp_path: Path) -> None:
+    code = "class Mine(Agent):\n    number = 1\n    def step(self, robot): ...\n"
+    first = load_agent(written(tmp_path, code))
+    edited = load_agent(written(tmp_path, code.replace("1", "2")))  # of the same size, within the same second
+    assert (vars(first)["number"], vars(edited)["number"]) == (1, 2)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.py"]
+
+
+def test_what_lies_beside_a_file_is_not_there_for_it(tmp_path: Path) -> None:
+    (tmp_path / "swarmwire_test_beside.py").write_text("")
+    assert "No module named" in refused(written(tmp_path, "import swarmwire_test_beside\n"))

@@ -65,7 +65,7 @@ def test_which_runner_plays_which_robots_does_not_matter(local):
         processes = RunnerProcesses(endpoint, run_id, sorted(specs.values()), ["c", "b", "a"])
         try:
             crew.start()
-            loop = Loop(simulation.world, simulation.air(), crew, [])
+            loop = Loop(simulation.world, simulation._air(), crew, [])
             loop.run(simulation.ticks)
         finally:
             crew.close()

@@ -34,7 +34,13 @@ def test_the_summary_of_the_command_is_the_result_from_python(tmp_path):
     assert summary.keys() >= REQUIRED
     assert set(summary["metrics"]) >= {"order", "largest_component", "components", "collisions"}
     result = run(LOSSY, overrides=["duration_s=4"])
-    measured = ("wall_time_s", "start_time_s", "realtime_factor")
+    measured = (
+        "wall_time_s",
+        "start_time_s",
+        "realtime_factor",
+        "files",
+        "record",
+    )  # the last two: only with a run folder
     same = {key: value for key, value in summary.items() if key not in measured}
     assert same == {
         key: value for key, value in json.loads(json.dumps(result.summary())).items() if key not in measured
@@ -75,7 +81,14 @@ def test_without_a_radio_there_is_no_radio_part(tmp_path):
 def test_the_terminal_shows_how_it_went_and_where_to_look(tmp_path):
     ended = swarmwire("run", LOSSY, "--set", "duration_s=4", "--out", tmp_path / "run", "--runners", "2")
     assert ended.returncode == 0
-    for text in ("tick 40/40", "2 processes, lockstep", "of those in range heard it", "order", "run.rrd", "rerun"):
+    for text in (
+        "tick 40/40",
+        "2 processes, lockstep",
+        "of those in range heard it",
+        "order",
+        "swarmwire view",
+        "--gif",
+    ):
         assert text in ended.stdout
 
 

@@ -34,4 +34,4 @@ def test_a_recording_says_what_happened_in_its_arena(tmp_path):
         metrics.see(one)
         recording.see(one)
     recording.end(None)
-    assert column(tmp_path / "run.rrd", "/events", "TextLog:text") == {1: ["kill: flock-0, flock-1"]}
+    assert column(tmp_path / "run.rrd", "/events", "TextLog:text")[1] == ["kill: flock-0, flock-1"]

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -5,8 +6,9 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.truth import Light, Obstacle
+from swarmwire.comms.truth import Finished, Group, Happened, Light, Obstacle
 from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.rerun_colors import DEAD, FATES, packed
 from swarmwire.metrics.rerun_recording import RerunRecording
 from tests.metrics.truths import edges, static, tally, truth
 
@@ -84,38 +86,164 @@ def test_links_of_large_swarms_are_thinned(tmp_path, robots, expected):
     assert list(column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips")) == expected
 
 
-def test_plots_hold_what_the_metrics_measured_and_the_delivery_of_the_last_second(tmp_path):
-    of = static(4)
-    before, after = tally({Fate.HEARD: 1, Fate.LOST: 3}), tally({Fate.HEARD: 4})
-    fields = {"edges": edges((0, 1)), "contact_onsets": np.array([[1, 0]])}
-    ticks = [truth(of, tick, tally=after if tick >= 10 else before, **fields) for tick in range(21)]
+def series(path, plot):
+    """Every line of a plot: {name: {tick: value}}, of the ticks in which it was drawn."""
+    found = {}
+    for before in range(20):
+        entity = f"/plots/{plot}/since_{before}"
+        for names in column(path, entity, "SeriesLines:names").values():
+            rows = column(path, entity, "Scalars:scalars").items()
+            found |= {name: {tick: row[i] for tick, row in rows} for i, name in enumerate(names)}
+    return found
+
+
+def test_plots_hold_what_the_metrics_measured_in_each_tick(tmp_path):
+    of, metrics = static(4), Metrics()
+    expected = {metric.name: {} for metric in metrics.metrics}
+    ticks = list(moving(of, 30, edges=edges((0, 1)), contact_onsets=np.array([[1, 0]])))
+    metrics.begin(of)
+    for seen in ticks:
+        metrics.see(seen)
+        for name, value in metrics.latest.items():
+            expected[name][seen.tick] = value[0]
     record(tmp_path / "run.rrd", of, ticks)
-    shares = column(tmp_path / "run.rrd", "/plots/shares", "Scalars:scalars")
-    assert column(tmp_path / "run.rrd", "/plots/shares", "SeriesLines:names") == {
-        None: ["order", "order_velocity", "largest_component", "unrejoined", "delivery"]
-    }
-    assert shares[0] == pytest.approx([1.0, 0.0, 0.5, np.nan, 0.25], nan_ok=True)
-    assert shares[14] == pytest.approx([1.0, 0.0, 0.5, np.nan, (5 * 4 + 5 * 1) / 40], nan_ok=True)
-    assert shares[20] == pytest.approx([1.0, 0.0, 0.5, np.nan, 1.0], nan_ok=True)
-    assert column(tmp_path / "run.rrd", "/plots/packets", "Scalars:scalars")[20] == [40.0, 0.0]
-    assert column(tmp_path / "run.rrd", "/plots/numbers", "Scalars:scalars")[20] == pytest.approx(
-        [3.0, 0.0, np.nan, np.nan, 21.0, 0.0], nan_ok=True
+    drawn = {}
+    for plot in ("shares", "distances", "times", "numbers"):
+        drawn |= series(tmp_path / "run.rrd", plot)
+    valued = {name for name, values in expected.items() if not all(map(np.isnan, values.values()))}
+    assert drawn.keys() == valued
+    assert {"order", "components", "collisions", "min_gap"} <= valued
+    assert not {"target_best", "rejoin_median"} & valued
+    for name, values in drawn.items():
+        assert values == {tick: pytest.approx(expected[name][tick], nan_ok=True) for tick in values}
+        assert all(np.isnan(expected[name][tick]) for tick in expected[name].keys() - values.keys())
+
+
+def test_packets_are_drawn_by_fate_as_receivers_per_second_once_a_fate_occurs(tmp_path):
+    of = static(4)
+    counts = [{Fate.HEARD: tick % 3, Fate.LOST: 2 if tick >= 12 else 0, Fate.OUT_OF_RANGE: 9} for tick in range(40)]
+    record(tmp_path / "run.rrd", of, [truth(of, tick, tally=tally(count)) for tick, count in enumerate(counts)])
+    drawn = series(tmp_path / "run.rrd", "packets")
+    assert drawn.keys() == {"heard", "lost"}
+    assert min(drawn["lost"]) == 12
+    for fate, name in ((Fate.HEARD, "heard"), (Fate.LOST, "lost")):
+        for tick, value in drawn[name].items():
+            last = [count[fate] for count in counts[max(0, tick - 9) : tick + 1]]
+            assert value == pytest.approx(10 * sum(last) / len(last))
+    delivery = series(tmp_path / "run.rrd", "shares")["delivery"]
+    heard, in_range = (
+        sum(sum(count[f] for f in fates) for count in counts[-10:]) for fates in ([Fate.HEARD], [Fate.HEARD, Fate.LOST])
     )
-    assert column(tmp_path / "run.rrd", "/plots/distances", "SeriesLines:names") == {
-        None: ["min_gap", "target_best", "target_mean"]
-    }
-    assert column(tmp_path / "run.rrd", "/plots/distances", "Scalars:scalars")[20][0] == pytest.approx(-0.07)
+    assert delivery[39] == pytest.approx(heard / in_range)
 
 
-def test_the_dead_change_colour_and_back(tmp_path):
+def class_names(path):
+    """{class: (name, colour)} of the robots."""
+    (context,) = column(path, "/world", "AnnotationContext:context").values()
+    infos = [item["class_description"]["info"] for item in context[0]]
+    return {info["id"]: (info["label"], info["color"]) for info in infos}
+
+
+def test_robots_are_told_apart_by_group_and_state_and_the_dead_are_grey(tmp_path):
+    of = static(3)
+    of = replace(of, groups=(replace(of.groups[0], stop=2), Group("b", of.groups[0].body, 2, 3)))
+    states = ("", "search", "carry")
+    alive = [[True, True, True], [True, True, True], [True, False, True], [True, True, True], [True, True, True]]
+    at = [[0, 0, 0], [1, 0, 0], [1, 0, 2], [1, 1, 2], [1, 1, 2]]
+    ticks = [
+        truth(of, tick, alive=np.array(living), state=np.array(state), states=states)
+        for tick, (living, state) in enumerate(zip(alive, at, strict=True))
+    ]
+    record(tmp_path / "run.rrd", of, ticks)
+    named = class_names(tmp_path / "run.rrd")
+    for entity, archetype in (("robots", "Points2D"), ("headings", "Arrows2D")):
+        classes = column(tmp_path / "run.rrd", f"/world/{entity}", f"{archetype}:class_ids")
+        assert {tick: [named[one][0] for one in row] for tick, row in classes.items()} == {
+            0: ["flock", "flock", "b"],
+            1: ["flock: search", "flock", "b"],
+            2: ["flock: search", "dead", "b: carry"],
+            3: ["flock: search", "flock: search", "b: carry"],
+        }
+    grey = named[0][1]
+    assert grey == packed(DEAD, 255)
+    assert len({color for _, color in named.values()}) == len(named)
+    (legend,) = column(tmp_path / "run.rrd", "/legend", "Points2D:labels").values()
+    (colors,) = column(tmp_path / "run.rrd", "/legend", "Points2D:colors").values()
+    assert dict(zip(legend, colors, strict=True)) == dict(named.values())
+
+
+def test_a_legend_says_how_many_classes_it_has_no_line_for_and_has_letters_for_all(tmp_path):
+    of, states = static(3), ("", "\u2192 caf\u00e9", *(f"state {i}" for i in range(20)))
+    ticks = [truth(of, tick, state=np.full(3, tick + 1), states=states) for tick in range(10)]
+    record(tmp_path / "run.rrd", of, ticks)
+    (legend,) = column(tmp_path / "run.rrd", "/legend", "Points2D:labels").values()
+    assert legend == ["? caf\u00e9", "state 0", "state 1", "state 2", "state 3", "... and 5 more"]
+
+
+def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_path):
+    of = static(3, arenas=2)
+    own = Finished(
+        arena=np.array([1, 1, 1, 0, 1]),
+        sender=np.array([0, 1, 2, 0, 0]),
+        receiver=np.array([1, 2, 0, 1, -1]),
+        receivers=np.array([1, 1, 1, 1, 2]),
+        **dict.fromkeys(
+            ("sequence", "sent_at_ns", "on_air_at_ns", "final_at_ns", "size_bytes", "tag"), np.zeros(5, int)
+        ),
+        fate=np.array([Fate.LOST, Fate.HEARD, Fate.BLOCKED, Fate.LOST, Fate.QUEUE_FULL]),
+    )
+    first, second = moving(of, 2)
+    record(tmp_path / "run.rrd", of, [replace(first, finished=own), second], arena=1)
+    lines = column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:strips")
+    position_m = first.pose[3:, :2].astype(np.float32)
+    assert lines == {0: [position_m[[0, 1]].tolist(), position_m[[2, 0]].tolist()]}
+    colors = column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:colors")[0]
+    assert [color >> 8 for color in colors] == [packed(FATES[fate], 0) >> 8 for fate in (Fate.LOST, Fate.BLOCKED)]
+
+
+def test_events_are_told_and_marked_where_they_take_effect(tmp_path):
     of = static(2)
-    alive = [np.array(state) for state in ([True, True], [True, False], [True, False], [True, True])]
-    record(tmp_path / "run.rrd", of, [truth(of, tick, alive=state) for tick, state in enumerate(alive)])
-    color = column(tmp_path / "run.rrd", "/world/robots", "Points2D:colors")
-    assert list(color) == [0, 1, 3]
-    assert color[0] == color[3]
-    assert color[1][0] == color[0][0]
-    assert color[1][1] != color[0][1]
+    kill = Happened(0, 0.15, "kill", False, np.array([False, True]))
+    record(tmp_path / "run.rrd", of, [truth(of), truth(of, 1), truth(of, 2, events=(kill,))])
+    told = column(tmp_path / "run.rrd", "/events", "TextLog:text")
+    assert told == {0: ["the run begins: 2 robots"], 2: ["kill: flock-1"]}
+    assert list(column(tmp_path / "run.rrd", "/plots/shares/event", "Scalars:scalars")) == [2]
+
+
+def test_calls_per_tick_do_not_depend_on_the_number_of_robots(tmp_path, monkeypatch):
+    calls, log = [], rerun.RecordingStream.log
+    monkeypatch.setattr(rerun.RecordingStream, "log", lambda *args, **more: (calls.append(args[1]), log(*args, **more)))
+    per_tick = []
+    for robots in (3, 150):
+        of, metrics = static(robots), Metrics()
+        recording = RerunRecording(tmp_path / f"{robots}.rrd", metrics)
+        metrics.begin(of)
+        recording.begin(of)
+        for seen in moving(of, 3, edges=edges((0, 1), (1, 2)), tally=tally({Fate.HEARD: robots})):
+            calls.clear()
+            metrics.see(seen)
+            recording.see(seen)
+        per_tick.append(sorted(calls))
+        recording.end(None)
+    assert per_tick[0] == per_tick[1]
+    assert len(per_tick[0]) == len(set(per_tick[0])) < 15
+
+
+def view_names(path):
+    [blueprint] = rerun.chunk.RrdReader(str(path)).blueprints()
+    batches = [chunk.to_record_batch() for chunk in rerun.chunk.RrdReader(str(path)).stream(store=blueprint)]
+    names = "ViewBlueprint:display_name"
+    return {name for batch in batches if names in batch.schema.names for [name] in batch[names].to_pylist()}
+
+
+@pytest.mark.parametrize(("radio", "size_m"), [(True, (8.0, 6.0)), (True, (2.0, 9.0)), (False, (8.0, 6.0))])
+def test_it_opens_with_named_views_of_all_that_was_recorded(tmp_path, radio, size_m):
+    of = replace(static(2, radio=radio), arena_size_m=size_m)
+    record(tmp_path / "run.rrd", of, moving(of, 1))
+    views = {"Robots", "Robot flock-0", "About", "Arena", "Events", "Distances in m", "Counts"}
+    views.add("Order and connectivity, as shares")
+    with_radio = {"Receivers per second, by a packet's fate", "Times in s"}
+    assert view_names(tmp_path / "run.rrd") == (views | with_radio if radio else views)
 
 
 def test_a_recording_has_no_wall_clock_time_and_equal_runs_have_equal_contents(tmp_path):
@@ -136,10 +264,9 @@ def test_a_run_without_a_radio_has_no_links_and_no_plot_of_packets(tmp_path):
     of = static(3, radio=False)
     record(tmp_path / "run.rrd", of, moving(of, 3))
     assert column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips") == {}
-    assert column(tmp_path / "run.rrd", "/plots/packets", "Scalars:scalars") == {}
-    assert column(tmp_path / "run.rrd", "/plots/shares", "SeriesLines:names") == {
-        None: ["order", "order_velocity", "largest_component", "unrejoined"]
-    }
+    assert column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:strips") == {}
+    assert series(tmp_path / "run.rrd", "packets") == {}
+    assert series(tmp_path / "run.rrd", "shares").keys() == {"order", "order_velocity"}
 
 
 def test_obstacles_and_lights_are_drawn_once_where_they_are(tmp_path):

@@ -80,3 +80,16 @@ def test_a_local_crew_is_paced_and_does_what_it_does_otherwise() -> None:
         assert got.linear_mps.tolist() == expected.linear_mps.tolist()
     assert clock.slept_until == [ORIGIN_NS + 100 * MS, ORIGIN_NS + 200 * MS]
     assert (held.report().factor, held.report().missed_ticks, held.report().late_answers) == (1.0, 0, {})
+
+
+def test_a_schedule_that_begins_anew_forgets_lag_and_pause() -> None:
+    clock, pace, said = paced()
+    pace.begin()
+    pace.hold(0)
+    clock.time_ns += 3600 * NS_PER_S
+    pace.begin_anew(1, 2.0, 3600 * NS_PER_S)
+    assert pace.begin() == ORIGIN_NS + 100 * MS  # when it would be without the pause
+    pace.hold(1)
+    pace.hold(2)
+    assert [at_ns - ORIGIN_NS - 3600 * NS_PER_S for at_ns in clock.slept_until[1:]] == [150 * MS, 200 * MS]
+    assert (pace.missed_ticks, said) == (0, [])

@@ -12,9 +12,12 @@ from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import encode_actions
+from swarmwire.world.pace import Pace
 from swarmwire.world.realtime import RealTime
 from swarmwire.world.roster import OnLoss
+from swarmwire.world.runner_health import RunnerHealth
 from tests.agent.hosts import GIVES, assignment, group, heard_from, one_group
+from tests.world.test_pace import FakeClock
 
 ROWS = [0, 1, 2, 3]
 OWN = {"a": [0, 2], "b": [1, 3]}
@@ -224,3 +227,36 @@ def test_a_runner_that_is_silent_for_too_long_is_lost() -> None:
         runners.answer("b", said("b", tick, 1.0))
         assert len(runners.losses) == (tick > 10)  # asked at 0.0 s
     assert runners.losses[0].reason == "no answer for 1 s"
+
+
+def test_health_counts_runners_and_what_they_missed() -> None:
+    runners = playing("dead")
+    assert runners.health() == RunnerHealth(ready=2, lost=0)
+    for tick in range(7):
+        opened(runners, tick)
+        runners.answer("a", said("a", tick, 1.0))
+        taken(runners)
+    runners.answer("b", said("b", 5, 1.0))
+    assert runners.health() == RunnerHealth(2, 0, late_answers=2, frames_dropped=5, watchdog_stops=2)
+    runners.gone("a", "its link is gone")
+    assert (runners.health().ready, runners.health().lost) == (1, 1)
+
+
+def test_a_pause_loses_no_runner_and_stops_no_robot_and_an_answer_from_before_it_counts() -> None:
+    clock, pause_ns = FakeClock(), 3600 * NS_PER_S
+    pace = Pace(clock, 10, 1.0, lambda _: None)
+    runners = playing("dead", timeout_s=1.0)
+    runners.open_tick(0, pace.begin(), one_group(0, ROWS), Heard.none(GIVES))
+    pace.hold(0)
+    assert taken(runners) == ({}, [])
+    clock.time_ns += pause_ns
+    pace.begin_anew(1, 1.0, pause_ns)
+    runners.open_tick(1, pace.begin(), one_group(1, ROWS), Heard.none(GIVES))
+    assert not runners.losses
+    for name in OWN:
+        runners.answer(name, said(name, 0, 1.0))
+    assert taken(runners) == (dict.fromkeys(ROWS, 1.0), [0] * 4)
+    assert not runners.watchdog_stops.any()
+    clock.time_ns += 2 * NS_PER_S  # not a pause: a loop that lags
+    runners.open_tick(2, pace.begin(), one_group(2, ROWS), Heard.none(GIVES))
+    assert [loss.reason for loss in runners.losses] == ["no answer for 1 s"] * 2

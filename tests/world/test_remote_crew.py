@@ -8,7 +8,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Generator, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 import msgpack
@@ -18,7 +18,7 @@ import pytest
 from swarmwire.agent import runner
 from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.clock import WallClock, to_ns
 from swarmwire.comms.errors import AgentFailed, BadInput, Interrupted, RunnerLost
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions
@@ -27,6 +27,7 @@ from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.world.remote_crew import RemoteCrew
 from swarmwire.world.runner_crew import Surroundings
+from swarmwire.world.runner_health import RunnerHealth
 from tests.agent.hosts import GIVES, assignment, group, heard_from, one_group, plain, spec
 
 RUN = "r1"
@@ -274,7 +275,7 @@ def test_a_crew_may_be_closed_twice_and_before_it_opened(endpoint: str) -> None:
 def test_runners_leave_when_the_world_is_killed(endpoint: str) -> None:
     """A world in a process of its own, killed without a word."""
     program = f"""
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.clock import WallClock, to_ns
 from swarmwire.world.remote_crew import RemoteCrew
 from tests.world.test_remote_crew import RUN, parts
 
@@ -332,3 +333,28 @@ def test_a_run_that_waits_for_a_runner_can_be_ended(endpoint: str) -> None:
                 crew.act(0, one_group(0, [0, 1]), Heard.none(GIVES))
         finally:
             crew.close()
+
+
+class LeapingClock(WallClock):
+    """The wall clock, which a test may set forward."""
+
+    def __init__(self) -> None:
+        self.ahead_ns = 0
+
+    def now_ns(self) -> int:
+        return super().now_ns() + self.ahead_ns
+
+
+def test_a_pause_between_ticks_that_is_longer_than_the_time_out_loses_no_runner(endpoint: str) -> None:
+    clock = LeapingClock()
+    with thread(endpoint, "r0") as ends:
+        crew = RemoteCrew(endpoint, RUN, parts("Counter", ROWS), TIMEOUT_S, clock)
+        with closing(crew):
+            crew.start()
+            for tick in range(3):
+                actions = crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
+                assert actions.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
+                clock.ahead_ns += to_ns(10 * TIMEOUT_S)
+            assert not crew.counts()
+            assert crew.health() == RunnerHealth(ready=1, lost=0)
+        assert ends.get(timeout=20.0) is None

@@ -1,10 +1,16 @@
-"""From the text that names an agent to its class."""
+"""From the text that names an agent to its class.
+
+A file is loaded alone: its folder does not come onto `sys.path`, so it imports what is installed and nothing that
+merely lies beside it. Its content is part of its module's name: an edited file is loaded anew, also in a notebook.
+"""
 
 import hashlib
 import importlib
 import importlib.util
 import sys
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from types import CodeType
 from typing import Any, cast
 
 from swarmwire.agent.agent import Agent
@@ -53,12 +59,21 @@ def load_agent(spec: str) -> AgentClass:
     return kind
 
 
+class _SourceLoader(SourceFileLoader):
+    """Neither reads nor leaves bytecode, which knows its source by size and whole seconds, and litters folders."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        """The compiled source, as it is now."""
+        return self.source_to_code(self.get_data(self.path), self.path)
+
+
 def _load_file(path: Path) -> Any:
     # A name of its own, so that two files called agent.py do not meet in sys.modules.
-    name = f"swarmwire_user_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
+    digest = hashlib.sha256(str(path).encode() + b"\0" + path.read_bytes()).hexdigest()
+    name = f"swarmwire_user_{path.stem}_{digest[:12]}"
     if name in sys.modules:
         return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, path)
+    spec = importlib.util.spec_from_file_location(name, path, loader=_SourceLoader(name, str(path)))
     if spec is None or spec.loader is None:
         raise FileNotFoundError(path)
     module = importlib.util.module_from_spec(spec)

@@ -4,6 +4,7 @@ SwarmwireError
 ├── BadInput            a scenario, a body, an option: refused at the door (exit code 2)
 ├── AgentFailed         the user's agent raised (exit code 1)
 ├── RunnerLost          a runner's process or link is gone (exit code 1)
+├── RecordFailed        a table of the run folder cannot be written: the run goes on without it
 ├── Interrupted         somebody asked for the end of the run (exit code 130)
 └── BadFrame            a message on the wire breaks the protocol: counted and dropped, never fatal
 """
@@ -38,6 +39,10 @@ class RunnerLost(SwarmwireError):
     def __init__(self, runner: str, robots: str, reason: str) -> None:
         self.runner, self.robots, self.reason = runner, robots, reason
         super().__init__(f"runner {runner} ({robots}) was lost: {reason}")
+
+
+class RecordFailed(SwarmwireError):
+    """A table of the run folder cannot be written any more: the disk is full, or refuses."""
 
 
 class Interrupted(SwarmwireError):

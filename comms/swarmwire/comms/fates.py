@@ -1,22 +1,32 @@
 """What may become of a packet for one intended receiver."""
 
 from enum import IntEnum
+from typing import Self
 
 
 class Fate(IntEnum):
-    """One per (packet, intended receiver); the order is that of the tally's columns."""
+    """One per (packet, intended receiver), with its meaning; the order is that of the tally's columns."""
 
-    HEARD = 0  # reached the receiver
-    OUT_OF_RANGE = 1  # the receiver was farther than the radio reaches when the packet went on air
-    BLOCKED = 2  # an obstacle stood in the line of sight
-    LOST = 3  # within reach, but lost by the medium's fixed loss
-    QUEUE_FULL = 4  # the sender's queue was full: never on air
-    TOO_LARGE = 5  # above the medium's largest payload: never on air
-    IN_FLIGHT = 6  # queued or on its way when the run ended
-    SENDER_DEAD = 7  # the sender died before the packet went on air
-    RECEIVER_DEAD = 8  # within reach, but dead when the packet went on air, or before it was handed over
-    BLACKOUT = 9  # the sender's radio was off, or that of a receiver within reach
-    PARTITIONED = 10  # within reach, but a partition kept the two apart when the packet went on air
+    meaning: str
+
+    def __new__(cls, value: int, meaning: str) -> Self:
+        """The fate of this number."""
+        fate = int.__new__(cls, value)
+        fate._value_ = value
+        fate.meaning = meaning
+        return fate
+
+    HEARD = 0, "reached the receiver"
+    OUT_OF_RANGE = 1, "the receiver was farther than the radio reaches when the packet went on air"
+    BLOCKED = 2, "an obstacle stood in the line of sight"
+    LOST = 3, "within reach, but lost by the medium's fixed loss"
+    QUEUE_FULL = 4, "the sender's queue was full: never on air"
+    TOO_LARGE = 5, "above the medium's largest payload: never on air"
+    IN_FLIGHT = 6, "queued or on its way when the run ended"
+    SENDER_DEAD = 7, "the sender died before the packet went on air"
+    RECEIVER_DEAD = 8, "within reach, but dead when the packet went on air, or before it was handed over"
+    BLACKOUT = 9, "the sender's radio was off, or that of a receiver within reach"
+    PARTITIONED = 10, "within reach, but a partition kept the two apart when the packet went on air"
 
 
 FATE_NAMES = tuple(fate.name.lower() for fate in Fate)

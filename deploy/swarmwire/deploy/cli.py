@@ -7,12 +7,17 @@ import typer
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.commands.check import check_command
 from swarmwire.deploy.commands.describe import describe_command
+from swarmwire.deploy.commands.draw import draw_command
 from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
+from swarmwire.deploy.commands.export import ExportCommand, export_command
 from swarmwire.deploy.commands.list_kinds import list_command
 from swarmwire.deploy.commands.new import new_command
+from swarmwire.deploy.commands.repeat import repeat_command
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
+from swarmwire.deploy.commands.verify import verify_command
+from swarmwire.deploy.commands.view import view_command
 
 app = typer.Typer(
     help="A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own.",
@@ -22,12 +27,17 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 app.command("run")(run_command)
+app.command("repeat")(repeat_command)
 app.command("check")(check_command)
+app.command("draw")(draw_command)
+app.command("export", cls=ExportCommand)(export_command)
+app.command("view")(view_command)
 app.command("screenshot")(screenshot_command)
 app.command("schema")(schema_command)
 app.command("list")(list_command)
 app.command("describe")(describe_command)
 app.command("new")(new_command)
+app.command("verify")(verify_command)
 
 
 def main() -> None:

@@ -31,7 +31,7 @@ class Crews:
     runners: int  # 0: all agents in this process
     run_id: str
     clock: Clock
-    factor: float | None  # simulated s per s of wall time; None: as fast as the machine allows
+    pace: Pace | None  # of real time; None: as fast as the machine allows
     socket: Path | None  # where runners meet the world; None: at a private place
     stopped: Callable[[], bool]  # whether waiting for runners is to end
     lost: Callable[[Loss], None]  # is told of a runner that was lost while the run went on
@@ -43,7 +43,7 @@ class Crews:
         whole = assignments.whole(self.scenario, self.static, dict(self.agents))
         if not self.runners:
             with closing(LocalCrew(whole)) as local:
-                yield local if self.factor is None else PacedCrew(local, self._pace(self.factor))
+                yield PacedCrew(local, self.pace) if self.pace else local
             return
         processes: list[RunnerProcesses] = []
 
@@ -67,12 +67,7 @@ class Crews:
     def _remote(self, endpoint: str, parts: list[Assignment], around: Surroundings) -> RemoteCrew | RealTimeCrew:
         table = self.scenario.run
         common = endpoint, self.run_id, parts, table.runner_timeout_s, self.clock, around, table.on_runner_loss
-        if self.factor is None:
-            return RemoteCrew(*common)
-        return RealTimeCrew(*common, self._pace(self.factor), table.watchdog_s)
-
-    def _pace(self, factor: float) -> Pace:
-        return Pace(self.clock, self.scenario.time.rate_hz, factor, self.say)
+        return RealTimeCrew(*common, self.pace, table.watchdog_s) if self.pace else RemoteCrew(*common)
 
     def _survive(self, loss: Loss, endpoint: str) -> None:
         """Tell people of a runner that was lost, and of what they can do."""

@@ -22,3 +22,10 @@ def make_folder(out: Path) -> Path:
     if not empty:
         raise BadInput("--out", str(out), "expected a new or empty folder")
     return out
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file aside first, then rename it, so that no half of it is ever seen."""
+    aside = path.with_suffix(".part")
+    aside.write_text(text, encoding="utf-8")
+    aside.replace(path)

@@ -4,8 +4,6 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-from rich.console import Console
-
 from swarmwire.comms.protocols import Observer
 from swarmwire.comms.truth import Static, Tally, Truth
 
@@ -13,8 +11,9 @@ from swarmwire.comms.truth import Static, Tally, Truth
 class Guarded:
     """An observer whose errors end with it."""
 
-    def __init__(self, observer: Observer) -> None:
-        self._observer = observer
+    def __init__(self, observer: Observer, say: Callable[[str], None]) -> None:
+        """`say` is told what failed."""
+        self._observer, self._say = observer, say
         self.failed = False
 
     @property
@@ -40,6 +39,6 @@ class Guarded:
             return call()
         except Exception:  # noqa: BLE001 - whatever it is, the run goes on without it
             if not self.failed:
-                Console(stderr=True).print(f"observer {self.name} failed:\n{traceback.format_exc()}", markup=False)
+                self._say(f"observer {self.name} failed:\n{traceback.format_exc()}")
             self.failed = True
             return None

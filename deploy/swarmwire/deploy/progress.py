@@ -1,59 +1,49 @@
-"""The progress line of a run."""
+"""The progress of a run in plain lines, for what is no terminal."""
 
+import math
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from swarmwire.comms.clock import Clock, to_s
 from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.deploy.figures import Figures
+from swarmwire.metrics.metrics import Metrics
 
-REDRAW_S = 0.1
-PLAIN_SHARE = 0.25  # without a terminal: a line each time that so much more is done
+SHARE = 0.25  # a line each time that so much more is done
 
 
-class ProgressLine:
-    """Observer that shows how far a run is and how fast: a line that moves, or a few plain ones without a terminal."""
+class ProgressLines:
+    """Observer that prints a few lines: how far a run is, how fast, and how the swarm and its radio are doing."""
 
-    def __init__(self, ticks: int, clock: Clock, console: Console) -> None:
+    def __init__(self, ticks: int, metrics: Metrics, clock: Clock, console: Console) -> None:
+        """Of a run of so many ticks; `metrics` must see each tick before."""
+        self._figures = Figures(ticks, metrics, clock)
         self._ticks, self._clock, self._console = ticks, clock, console
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[speed]}"),
-            TimeRemainingColumn(),
-            console=console,
-            auto_refresh=False,
-            transient=True,
-        )
-        self._drawn_s = 0.0
-        self._next_share = PLAIN_SHARE
+        self._next_share = SHARE
 
     def begin(self, static: Static) -> None:
-        """Show the line."""
+        """Say what runs."""
+        self._figures.begin(static)
         self._began_ns = self._clock.now_ns()
-        if self._console.is_terminal:
-            self._progress.start()
-            self._task = self._progress.add_task(static.name, total=self._ticks, speed="")
-        else:
-            size = f"{static.robots} robots" + (f" in each of {static.arenas} arenas" if static.arenas > 1 else "")
-            self._console.print(f"{static.name}: {size}, {self._ticks} ticks at {static.rate_hz} Hz")
+        size = f"{static.robots} robots" + (f" in each of {static.arenas} arenas" if static.arenas > 1 else "")
+        self._print(f"{static.name}: {size}, {self._ticks} ticks at {static.rate_hz} Hz")
 
     def see(self, truth: Truth) -> None:
-        """Move it, a few times a second at most."""
-        wall_s = to_s(self._clock.now_ns() - self._began_ns)
-        done = truth.tick + 1
-        speed = f"{to_s(truth.time_ns) / wall_s if wall_s else 0.0:.1f} x real time"
-        if self._console.is_terminal:
-            if wall_s - self._drawn_s >= REDRAW_S:
-                self._drawn_s = wall_s
-                self._progress.update(self._task, completed=done, speed=f"tick {done}/{self._ticks}, {speed}")
-                self._progress.refresh()
-        elif done >= self._next_share * self._ticks:
-            self._next_share += PLAIN_SHARE
-            self._console.print(f"tick {done}/{self._ticks}, {to_s(truth.time_ns):.1f} s simulated, {speed}")
+        """Say how it goes, four times in all."""
+        figures = self._figures
+        figures.see(truth)
+        if figures.done >= self._next_share * self._ticks:
+            self._next_share += SHARE
+            wall_s = to_s(self._clock.now_ns() - self._began_ns)
+            speed = f"{figures.time_s / wall_s if wall_s > 0 else 0.0:.1f} x real time"
+            levels = [(name, figures.level(name)) for name in figures.levels] + [("delivery", figures.pdr)]
+            known = "".join(f", {name} {value:.3g}" for name, value in levels if not math.isnan(value))
+            self._print(f"tick {figures.done}/{self._ticks}, {figures.time_s:.1f} s simulated, {speed}{known}")
 
     def end(self, last: Tally | None) -> dict[str, Any]:
-        """Take it away."""
-        self._progress.stop()
+        """Nothing is left to say."""
         return {}
+
+    def _print(self, text: str) -> None:
+        self._console.print(text, markup=False, soft_wrap=True)

@@ -5,6 +5,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from swarmwire.deploy.folder import write_whole
+from swarmwire.deploy.inputs import InputsRecord
+from swarmwire.deploy.scenario_copy import CopiedFile
 from swarmwire.world.realtime_crew import RealTimeReport
 
 SUMMARY_FORMAT = 1
@@ -82,9 +85,13 @@ class Result:
     counts: dict[str, int]  # late, missing, malformed, clipped: whatever was not as it should be, by name
     cpu: str
     versions: dict[str, str]
+    modules: dict[str, str]  # sha256 of the installed code: swarmwire's parts and packages of agents
+    files: tuple[CopiedFile, ...] = ()  # in the run folder, from which the run can be repeated
+    inputs: InputsRecord | None = None  # what came from outside, if anything did
     lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
     realtime: RealTimeReport | None = None
     error: str | None = None  # why it failed
+    record: dict[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]], compare=False)  # tables
     out: Path | None = field(default=None, compare=False)  # the run folder
 
     @property
@@ -136,15 +143,17 @@ class Result:
             "counts": self.counts,
             "lost_runners": list(self.lost_runners),
             "realtime": asdict(self.realtime) if self.realtime else None,
+            "record": self.record,
             "cpu": self.cpu,
             "versions": self.versions,
+            "modules": self.modules,
+            "files": [asdict(file) for file in self.files],
+            "inputs": asdict(self.inputs) if self.inputs else None,
         }
 
     def write(self, path: Path) -> None:
-        """Write `summary.json`: aside first, then renamed, so that no half of it is ever seen."""
-        aside = path.with_suffix(".part")
-        aside.write_text(json.dumps(self.summary(), indent=2) + "\n", encoding="utf-8")
-        aside.replace(path)
+        """Write `summary.json`."""
+        write_whole(path, json.dumps(self.summary(), indent=2) + "\n")
 
 
 def arena_result(seed: int, sha256: str, radio: dict[str, Any] | None, metrics: dict[str, Any]) -> ArenaResult:

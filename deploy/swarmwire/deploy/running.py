@@ -5,6 +5,7 @@ from pathlib import Path
 
 from swarmwire.comms.protocols import Observer
 from swarmwire.deploy.arguments import Runners
+from swarmwire.deploy.recording import Recording
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.scenario import Scenario
@@ -21,11 +22,13 @@ def run(
     observers: Sequence[Observer] = (),
     socket: Path | None = None,
     realtime: float | None = None,
+    record: Recording | None = None,
 ) -> Result:
     """Run a scenario and return its result; with `seeds`, one arena per seed, side by side in one world.
 
     `runners` is None (all agents in this process), a number of runner processes, or "per-robot". `overrides` are
-    "path=value" as for `--set`. With `out`, a new or empty folder, the run folder is written there. `realtime` keeps
+    "path=value" as for `--set`. With `out`, a new or empty folder, the run folder is written there; `record` says what
+    goes into it. `realtime` keeps
     the run to the wall clock, so many simulated seconds per second, and waits for no runner; None runs as fast as the
     machine allows.
 
@@ -42,6 +45,7 @@ def run(
         observers=observers,
         socket=socket,
         realtime=realtime,
+        record=record,
     )
     return finished(simulation)
 

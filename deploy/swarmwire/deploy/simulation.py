@@ -1,6 +1,5 @@
 """One execution of a scenario, tick by tick or to its end."""
 
-import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -13,22 +12,28 @@ from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.comms.truth import Static, Truth
-from swarmwire.deploy import machine
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.arguments import Runners, choose_seeds, real_time_factor, runner_count
+from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.crews import Crews
 from swarmwire.deploy.endpoint import new_run_id
-from swarmwire.deploy.folder import make_folder
 from swarmwire.deploy.guarded import Guarded
+from swarmwire.deploy.inputs import RecordedCrew, RecordedInputs, ReplayedCrew
 from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.origin import Origin
+from swarmwire.deploy.recording import Recording
 from swarmwire.deploy.result import EventResult, Result, arena_result
+from swarmwire.deploy.run_record import RunRecord, dropped_rows
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.radio_tally import RadioTally
-from swarmwire.metrics.rerun_recording import RerunRecording
+from swarmwire.metrics.record.recorders import record_summary
 from swarmwire.world.loop import Loop
+from swarmwire.world.pace import Pace
 from swarmwire.world.realtime_crew import PacedCrew, RealTimeCrew, RealTimeReport
+from swarmwire.world.remote_crew import RemoteCrew
 from swarmwire.world.roster import Loss
+from swarmwire.world.runner_health import RunnerHealth
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.world import World
@@ -38,6 +43,8 @@ GLOBAL_SENSES = ("compass", "positioning")
 
 class Simulation:
     """A scenario, checked and ready; entered, it has its agents and can be stepped; left, it has a result.
+
+    So::
 
         with Simulation("scenario.toml", seed=3) as simulation:
             while simulation.tick < 100:
@@ -52,8 +59,10 @@ class Simulation:
         metrics: what was measured up to the last tick, in `metrics.latest`.
         ticks: of the whole run.
         runners: processes that run the agents; 0: none, they are in this one.
-        folder: the run folder, if any.
+        agents: the spec of each group's agent.
+        inputs: of a run that is repeated, what came into it from outside.
         interrupt: entered, SIGINT ends `run` after the tick under way.
+        controls: pause, step, speed and end of `run`, for other threads.
     """
 
     def __init__(
@@ -68,39 +77,55 @@ class Simulation:
         observers: Sequence[Observer] = (),
         socket: Path | None = None,
         realtime: float | str | None = None,
+        record: Recording | None = None,
     ) -> None:
         self._clock = WallClock()
         self._called_ns = self._clock.now_ns()
         if isinstance(scenario, Scenario) and overrides:
             raise BadInput("overrides", "", "expected a path of a scenario; a Scenario is complete as it is")
         self.scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
-        factor = real_time_factor(realtime)
-        specs = agent_specs(self.scenario)
-        needs = {name: kind.needs for name, kind in check_agents(self.scenario, specs).items()}
+        factor, rate_hz = real_time_factor(realtime), self.scenario.time.rate_hz
+        self.agents = agent_specs(self.scenario)
+        needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
         self.world = World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
         self.ticks = _ticks(self.scenario)
         self.runners = runner_count(runners, self.static.arenas * self.static.robots)
         self.run_id = new_run_id()
         self.interrupt = Interrupt()
         self.metrics = Metrics()
-        self.folder = None if out is None else make_folder(Path(out))
-        self._observers = [Guarded(observer) for observer in (*self._recorders(), *observers)]
+        what, may_drop = record or Recording(), factor is not None
+        what.check(self.static)
+        self._record = RunRecord(None if out is None else Path(out), self._clock)
+        self._pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
+        self.controls = Controls(self._clock, rate_hz, self._pace)
+        recorders = self._record.observers(what, self.run_id, self.metrics, self.hashes, may_drop=may_drop)
+        self._observers: list[Guarded] = []
+        for observer in (*recorders, *observers):
+            self.watch(observer)
         self._losses: list[Loss] = []
         self._crews = Crews(
             scenario=self.scenario,
             static=self.static,
-            agents=specs,
+            agents=self.agents,
             runners=self.runners,
             run_id=self.run_id,
             clock=self._clock,
-            factor=factor,
+            pace=self._pace,
             socket=socket,
-            stopped=lambda: self.interrupt.asked,
+            stopped=self._stopped,
             lost=self._losses.append,
-            say=_say,
+            say=self._record.say,
         )
+        self.inputs: RecordedInputs | None = None
+        self._crew: Crew | None = None
+        self._recorded: RecordedCrew | None = None
         self._loop: Loop | None = None
         self._result: Result | None = None
+
+    @property
+    def folder(self) -> Path | None:
+        """The run folder, if any."""
+        return self._record.folder
 
     @property
     def static(self) -> Static:
@@ -119,19 +144,24 @@ class Simulation:
             raise RuntimeError("the run is not over yet: leave the `with` block first")
         return self._result
 
+    def hashes(self) -> list[str]:
+        """The trajectory hash of each arena, up to the last tick."""
+        return self._loop.hexdigests() if self._loop else []
+
     def watch(self, observer: Observer) -> None:
         """Add an observer, before the run begins; if it fails, it is counted and left out."""
-        self._observers.append(Guarded(observer))
+        self._observers.append(Guarded(observer, self._record.say))
 
     def __enter__(self) -> Self:
         """Start the agents; AgentFailed or RunnerLost if that fails."""
         if self._loop is not None:
             raise RuntimeError("a simulation runs once; make another one")
+        self._origin = self._keep()
         with ExitStack() as stack:
-            self._crew: Crew = stack.enter_context(self._crews.crew())
+            crew = self._crew = stack.enter_context(self._crews.crew())
             self._watching: list[Observer] = [self.metrics, RadioTally(), EventLog(), *self._observers]
-            self._loop = Loop(self.world, self.air(), self._crew, self._watching, self.scenario.events)
-            self._crew.start()
+            self._loop = Loop(self.world, self._air(), self._acting(crew), self._watching, self.scenario.events)
+            crew.start()
             for observer in self._watching:
                 observer.begin(self.static)
             self._exit = stack.pop_all()
@@ -146,7 +176,8 @@ class Simulation:
         """Run up to tick `ticks`, or to the scenario's end, or until an interrupt."""
         loop = self._entered()
         with suppress(Interrupted):  # asked for while it waited for runners: the summary says how far it came
-            loop.run(self.ticks if ticks is None else ticks, stopped=lambda: self.interrupt.asked)
+            until = self.ticks if ticks is None else ticks
+            loop.run(until, self._stopped, lambda tick: self.controls.hold(tick, self._stopped))
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         """End the agents, and close the records with a summary: also of a run that failed, when it is worth most."""
@@ -159,13 +190,12 @@ class Simulation:
             failed = {f"observer_failed_{observer.name}": 1 for observer in self._observers if observer.failed}
             crew = self._crew
             report = crew.report() if isinstance(crew, PacedCrew | RealTimeCrew) else None
-            counts = {**loop.counts(), **failed}
-            wall_ns = ended_ns - self._started_ns
+            counts = {**loop.counts(), **failed, **dropped_rows(record_summary(parts))}
+            wall_ns = ended_ns - self._started_ns - self.controls.paused_ns
             self._result = self._outcome(loop, parts, counts, wall_ns, report, self._ended(error), error)
-        if self.folder:
-            self._result.write(self.folder / "summary.json")
+        self._record.close(self._result)
 
-    def air(self) -> Air | None:
+    def _air(self) -> Air | None:
         """A new air of the scenario's radio, if it has one."""
         static, radio = self.static, self.scenario.radio
         if radio is None:
@@ -174,8 +204,39 @@ class Simulation:
         size_m, every = static.arena_size_m, static.act_every_ticks
         return Air(radio, self.world.keys, static.robots, size_m, obstacles, static.rate_hz, every)
 
-    def _recorders(self) -> list[Observer]:
-        return [RerunRecording(self.folder / "run.rrd", self.metrics)] if self.folder else []
+    def health(self) -> RunnerHealth | None:
+        """How the runners are doing; None if there are none."""
+        return self._crew.health() if isinstance(self._crew, RemoteCrew | RealTimeCrew) else None
+
+    def _keep(self) -> Origin:
+        """From what this run is made, put into its folder before anything happens."""
+        realtime = self._pace.factor if self._pace else None
+        return self._record.begin(
+            self.scenario,
+            self.agents,
+            seeds=self.static.seeds,
+            ticks=self.ticks,
+            runners=self.runners,
+            realtime=realtime,
+        )
+
+    def _acting(self, crew: Crew) -> Crew:
+        """The crew as the loop has it: replayed as far as there are inputs, and recorded as far as need be."""
+        if self.inputs is not None:
+            crew = ReplayedCrew(crew, self.inputs, self.static.arenas * self.static.robots)
+        if self.folder is None:
+            return crew
+        self._recorded = RecordedCrew(crew, self.folder, self._from_outside)
+        return self._recorded
+
+    def _from_outside(self, tick: int) -> bool:
+        """Whether the actions of this tick need not follow from scenario and seed."""
+        if self.inputs is not None:
+            return tick >= self.inputs.first_tick
+        return bool(self._losses) or (self._pace is not None and self.runners > 0)
+
+    def _stopped(self) -> bool:
+        return self.interrupt.asked or self.controls.quit_asked
 
     def _entered(self) -> Loop:
         if self._loop is None or self._result is not None:
@@ -189,7 +250,7 @@ class Simulation:
             return "failed"
         if self.tick >= self.ticks:
             return "duration"
-        return "interrupted" if self.interrupt.asked else "left"
+        return "interrupted" if self._stopped() else "left"
 
     def _outcome(
         self,
@@ -220,10 +281,14 @@ class Simulation:
             events=tuple(EventResult(**event) for event in parts["events"]),
             global_senses={body: found for body, found in senses.items() if found},
             counts=counts,
-            cpu=machine.cpu(),
-            versions=machine.versions(),
+            cpu=self._origin.cpu,
+            versions=dict(self._origin.versions),
+            modules=dict(self._origin.modules),
+            files=self._origin.files,
+            inputs=self._recorded.record() if self._recorded else None,
             lost_runners=tuple(str(loss) for loss in self._losses),
             realtime=report,
+            record=record_summary(parts),
             out=self.folder,
         )
 
@@ -231,8 +296,3 @@ class Simulation:
 def _ticks(scenario: Scenario) -> int:
     """Ticks that start before the scenario's duration is over; the first always does."""
     return max(1, -(-to_ns(scenario.duration_s) * scenario.time.rate_hz // 10**9))
-
-
-def _say(text: str) -> None:
-    """Something that people should know at once, while a run goes on."""
-    print(text, file=sys.stderr, flush=True)

@@ -1,7 +1,6 @@
 """A picture of a recording as rerun's own viewer shows it, drawn without a screen."""
 
 import os
-import socket
 import subprocess
 from collections import deque
 from collections.abc import Callable, Generator
@@ -12,6 +11,7 @@ from typing import Any, TypeVar
 
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.metrics.rerun_program import end, free_port, program
 from swarmwire.metrics.view_extra import need_view_extra
 
 PATIENCE_NS = 60 * NS_PER_S  # for each of: the viewer is up, the picture stands still
@@ -110,21 +110,17 @@ class _Viewer:
 
 @contextmanager
 def _viewer(rrd: Path, size: tuple[int, int]) -> Generator[_Viewer]:
-    import rerun_cli
-
-    # Not `rerun` on the path: that is a wrapper, and ending it would leave the viewer behind.
-    program = Path(rerun_cli.__file__).with_name("rerun")
-    port = _free_port()
+    port = free_port()
     window = f"{size[0]}x{size[1]}"
     options = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", window]
     with TemporaryDirectory(prefix="swarmwire-picture-") as home:
         log = Path(home, "log")
         with log.open("wb") as out:
-            process = subprocess.Popen([program, *options, rrd], env=_environment(home), stdout=out, stderr=out)
+            process = subprocess.Popen([program(), *options, rrd], env=_environment(home), stdout=out, stderr=out)
         try:
             yield _Viewer(process, port, log)
         finally:
-            _end(process)
+            end(process)
 
 
 def _environment(home: str) -> dict[str, str]:
@@ -143,19 +139,3 @@ def _death(log: str) -> SwarmwireError:
             "mesa-vulkan-drivers` brings one that needs no GPU"
         )
     return SwarmwireError(f"rerun's viewer ended by itself:\n{log[-2000:]}")
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    process.terminate()
-    try:
-        process.wait(5.0)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()

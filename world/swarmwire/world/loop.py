@@ -31,9 +31,17 @@ class Loop:
         self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
 
-    def run(self, ticks: int, stopped: Callable[[], bool] = lambda: False) -> None:
-        """Run up to tick `ticks`, or until `stopped()`; the crew must have been started."""
-        while self.ticks_done < ticks and not stopped():
+    def run(
+        self, ticks: int, stopped: Callable[[], bool] = lambda: False, hold: Callable[[int], None] = lambda _: None
+    ) -> None:
+        """Run up to tick `ticks`, or until `stopped()`; the crew must have been started.
+
+        `hold` returns when the tick that it is given may begin; it changes when a tick begins, never what is in it.
+        """
+        while self.ticks_done < ticks:
+            hold(self.ticks_done)
+            if stopped():
+                return
             self.step()
 
     def step(self) -> Truth:

@@ -15,7 +15,7 @@ How runners join and are lost stands in `roster`, and so does what becomes of fr
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +30,7 @@ from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
 from swarmwire.world.roster import OnLoss, Roster, Slot, rows_of
+from swarmwire.world.runner_health import RunnerHealth
 from swarmwire.world.split_tick import acting, split_heard, split_senses
 
 ANSWERED = -1
@@ -41,7 +42,7 @@ class _Asked(NamedTuple):
     tick: int
     rows: IntArray  # (n,) in the order of the answer
     packets: int  # heard, that it carried
-    at_ns: int  # wall time
+    at_ns: int  # wall time, pauses left out
 
 
 @dataclass
@@ -73,8 +74,17 @@ class RealTime(Roster[_Slot]):
         self.late, self.watchdog_stops = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
         self.frames_dropped = self.packets_dropped = 0
 
+    def health(self) -> RunnerHealth:
+        """How the runners are doing."""
+        return replace(
+            super().health(),
+            late_answers=int(self.late.sum()),
+            frames_dropped=self.frames_dropped,
+            watchdog_stops=int(self.watchdog_stops.sum()),
+        )
+
     def open_tick(self, tick: int, now_ns: int, senses: Senses, heard: Heard) -> list[tuple[str, bytes]]:
-        """Begin a tick at wall time `now_ns`: one frame for each runner that is ready."""
+        """Begin a tick at wall time `now_ns`, pauses left out: one frame for each runner that is ready."""
         self._tick = tick
         start_ns = tick_start_ns(tick, self._rate_hz)
         parts = split_senses(senses, self._owner, [slot.assignment for slot in self._slots])

@@ -25,6 +25,7 @@ from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
 from swarmwire.comms.wire import frames
+from swarmwire.world.runner_health import RunnerHealth
 
 NAME = re.compile(r"[\w.-]{1,64}", re.ASCII)  # of a runner: it is part of a key, so no wildcard, slash or hash
 OnLoss = Literal["stop", "dead", "wait"]
@@ -96,6 +97,11 @@ class Roster(ABC, Generic[S]):
     def counts(self) -> dict[str, int]:
         """What was dropped or lost, by name."""
         return dict(self._counts)
+
+    def health(self) -> RunnerHealth:
+        """How the runners are doing."""
+        playing = sum(slot.state in ("ready", "waiting") for slot in self._slots)
+        return RunnerHealth(playing, len(self.losses), frames_dropped=self._counts["frames_dropped_by_runners"])
 
     def join(self, request: bytes) -> tuple[str, bytes]:
         """Give the next free robots to a runner: its name and the reply; Refused with a reason for the runner."""

@@ -19,6 +19,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys, runner_of
 from swarmwire.comms.wire.sessions import open_world
 from swarmwire.world.roster import Loss, Refused, Roster
+from swarmwire.world.runner_health import RunnerHealth
 
 POLL_S = 0.2  # how often a wait looks up whether to go on waiting
 START_S = 60.0  # how long runners may take to join and build their agents
@@ -98,6 +99,10 @@ class RunnerCrew(ABC, Generic[R]):
     def counts(self) -> dict[str, int]:
         """Frames that were dropped and runners that were lost, by name."""
         return self._roster.counts()
+
+    def health(self) -> RunnerHealth:
+        """How the runners are doing."""
+        return self._roster.health()
 
     def close(self) -> None:
         """Tell the runners that the run is over, give them a moment to leave, and close the session."""

@@ -231,15 +231,21 @@ class Scenario(Table):
     """Runners."""
 
     _source: str = PrivateAttr("")
+    _given: dict[str, Any] | None = PrivateAttr(None)
 
     @property
     def source(self) -> str:
         """The file, or whatever else the scenario came from, for messages."""
         return self._source
 
-    def with_source(self, source: str) -> "Scenario":
-        """This scenario, which says that it comes from `source`."""
-        self._source = source
+    @property
+    def given(self) -> dict[str, Any] | None:
+        """The mapping that it was read from, with overrides; None if it was made in Python. `mapping_of` copies it."""
+        return self._given
+
+    def with_source(self, source: str, given: dict[str, Any] | None = None) -> "Scenario":
+        """This scenario, which says that it comes from `source`, and that it was read from the mapping `given`."""
+        self._source, self._given = source, given
         return self
 
     def groups(self) -> Groups:

@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from pathlib import Path
 from typing import Any, cast
 
@@ -25,7 +26,7 @@ def scenario_from(mapping: Mapping[str, Any], where: str) -> Scenario:
     except ValidationError as error:
         raise fault(error, scenario_schema(), where) from None
     check(scenario, where)
-    return scenario.with_source(where)
+    return scenario.with_source(where, deepcopy(dict(mapping)))
 
 
 def load_scenario(path: Path | str, overrides: Sequence[str] = ()) -> Scenario:

@@ -1,8 +1,8 @@
-"""Key expressions on the agents' endpoint, under `swarmwire/{run}/`."""
+"""Key expressions on the agents' and on the observers' endpoint."""
 
 
 class Keys:
-    """The keys of one run."""
+    """The keys of one run on the agents' endpoint, under `swarmwire/{run}/`."""
 
     def __init__(self, run: str) -> None:
         self.root = f"swarmwire/{run}"
@@ -27,3 +27,13 @@ class Keys:
 def runner_of(key: str) -> str:
     """The runner that an `answer` or `alive` key names."""
     return key.rsplit("/", 1)[-1]
+
+
+class ObserverKeys:
+    """The keys of one run on the observers' endpoint, under `swarmwire/{run}/`."""
+
+    def __init__(self, run: str) -> None:
+        root = f"swarmwire/{run}"
+        self.published = f"{root}/published"  # liveliness token: the run goes on and can be looked at
+        self.scene = f"{root}/scene"  # queryable: what does not change
+        self.truth = f"{root}/truth"  # glimpses, so many a second at most; may be lost

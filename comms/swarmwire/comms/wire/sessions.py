@@ -1,4 +1,6 @@
-"""zenoh sessions: the world routes on one endpoint, each runner is a client of it. Nothing scouts, nothing gossips.
+"""zenoh sessions: the world routes on an endpoint for runners and on one for observers, who are clients of it.
+
+Nothing scouts, nothing gossips. The two endpoints are sessions of their own, so that no runner can see the truth.
 
 Two peers on one hub are not routed by zenoh, or link past it; so the world is a router and runners are clients. The
 start-up delay of scouting is set to 0 even where it is off (it costs half a second otherwise). Frames in lockstep block
@@ -31,6 +33,16 @@ def open_runner(endpoint: str, connect_s: float = 10.0) -> zenoh.Session:
         "retry": {"period_init_ms": 50, "period_max_ms": 1000, "period_increase_factor": 1.5},
     }
     return zenoh.open(_config("client", {"connect": connect}))
+
+
+def open_observed(endpoint: str) -> zenoh.Session:
+    """A router that listens on `endpoint`, for observers; zenoh.ZError if it is taken."""
+    return zenoh.open(_config("router", {"listen": {"endpoints": [endpoint]}}))
+
+
+def open_observer(endpoint: str, connect_s: float = 2.0) -> zenoh.Session:
+    """A client of the observers' endpoint, tried for `connect_s`; zenoh.ZError if nobody answers."""
+    return open_runner(endpoint, connect_s)
 
 
 def unix_endpoint(path: str) -> str:

@@ -11,6 +11,7 @@ from swarmwire.comms.notes import MOST_STATES, Notes, checked_state
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.checked import checked_array
 from swarmwire.comms.wire.frames import Frame
 
 
@@ -76,18 +77,18 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
 def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     """The actions of the robots `rows`; BadFrame if the frame is not for exactly these or contradicts itself."""
     n = len(rows)
-    if (_checked(frame, "rows", "<i8", (n,)) != rows).any():
+    if (checked_array(frame, "rows", "<i8", (n,)) != rows).any():
         raise BadFrame("malformed", "rows: expected the runner's own robots")
-    drive, linear_mps, angular_radps = _checked(frame, "command", "<f8", (3, n))
+    drive, linear_mps, angular_radps = checked_array(frame, "command", "<f8", (3, n))
     sent = _sent(frame, rows) if "sent" in frame.arrays else Sent.none()
     notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
     return Actions(rows, drive != 0.0, linear_mps, angular_radps, sent, notes)
 
 
 def _sent(frame: Frame, rows: IntArray) -> Sent:
-    sender, to = _checked(frame, "sent", "<i8", (2, None))
-    offset = _checked(frame, "sent/offset", "<i8", (len(sender) + 1,))
-    data = _checked(frame, "sent/data", "|u1", (None,))
+    sender, to = checked_array(frame, "sent", "<i8", (2, None))
+    offset = checked_array(frame, "sent/offset", "<i8", (len(sender) + 1,))
+    data = checked_array(frame, "sent/data", "|u1", (None,))
     if offset[0] != 0 or offset[-1] != len(data) or (offset[1:] < offset[:-1]).any():
         raise BadFrame("malformed", "sent/offset: expected rising offsets into sent/data")
     if not _own(sender, rows) or (to < BROADCAST).any():
@@ -96,7 +97,7 @@ def _sent(frame: Frame, rows: IntArray) -> Sent:
 
 
 def _notes(frame: Frame, rows: IntArray) -> Notes:
-    noted, code = _checked(frame, "notes", "<i8", (2, None))
+    noted, code = checked_array(frame, "notes", "<i8", (2, None))
     names: object = frame.values.get("states")
     if type(names) is not list or not 0 < len(cast("list[object]", names)) <= MOST_STATES:
         raise BadFrame("malformed", f"states: expected a list of 1 to {MOST_STATES} texts")
@@ -117,12 +118,3 @@ def _own(some: IntArray, rows: IntArray) -> bool:
         return not len(some)
     known = np.sort(rows)
     return bool((known[np.searchsorted(known[:-1], some)] == some).all())
-
-
-def _checked(frame: Frame, name: str, code: str, shape: tuple[int | None, ...]) -> AnyArray:
-    """An array of the frame, of this dtype and shape (None: any length)."""
-    array = frame.arrays.get(name)
-    fits = array is not None and array.dtype == frames.DTYPES[code] and array.ndim == len(shape)
-    if array is None or not fits or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True)):
-        raise BadFrame("malformed", f"{name}: expected {code} of shape {shape}")
-    return array

@@ -15,3 +15,10 @@ Overrides = Annotated[
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
+Packets = Annotated[
+    str,
+    typer.Option(
+        help='Packets to record in packets.parquet: "off", "all", or a share of them, such as 0.1.',
+        metavar="off|all|SHARE",
+    ),
+]

@@ -1,16 +1,14 @@
 """`swarmwire run`."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
-from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
-from swarmwire.deploy.commands.options import Overrides, ScenarioFile
+from swarmwire.deploy.commands.options import Overrides, Packets, ScenarioFile
 from swarmwire.deploy.folder import default_folder
 from swarmwire.deploy.report import print_result
 from swarmwire.deploy.result import Result
@@ -39,16 +37,27 @@ def run_command(
             metavar="[FACTOR]",
         ),
     ] = None,
+    packets: Packets = "off",
+    rrd: Annotated[bool, typer.Option(help="Record run.rrd, for rerun's viewer.")] = True,
+    select: Annotated[
+        str | None,
+        typer.Option(help="Robot that the views show in detail. Default: the first with rays.", metavar="ROBOT"),
+    ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="Look at it while it goes on, as `swarmwire view` does.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Run a scenario, print what came of it, and write summary.json and run.rrd into the run folder.
+    """Run a scenario, show how it goes, and leave a run folder: summary, tables, recording, log.
 
     Without --realtime the same scenario and seed give the same run bit for bit, whatever --runners says.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.arguments import choose_seeds
-    from swarmwire.deploy.progress import ProgressLine
+    from swarmwire.deploy.live.live_view import LiveView
+    from swarmwire.deploy.recording import Recording, packet_share
     from swarmwire.deploy.running import finished
+    from swarmwire.deploy.shown import progress
     from swarmwire.deploy.simulation import Simulation
     from swarmwire.world.scenario_file import load_scenario
 
@@ -56,11 +65,23 @@ def run_command(
     checked = load_scenario(scenario, overrides or [])
     chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
     folder = out or default_folder(scenario.stem, chosen)
-    simulation = Simulation(checked, seeds=chosen, runners=runners, out=folder, socket=socket, realtime=realtime)
-    simulation.watch(ProgressLine(simulation.ticks, WallClock(), console))
-    result = finished(simulation)
-    print_result(result, console)
-    _say_where(result, folder, console)
+    simulation = Simulation(
+        checked,
+        seeds=chosen,
+        runners=runners,
+        out=folder,
+        socket=socket,
+        realtime=realtime,
+        record=Recording(packets=packet_share(packets), rrd=rrd, select=select),
+    )
+    simulation.watch(progress(simulation, console))
+    with LiveView(folder) as live:
+        if view:
+            simulation.watch(live)
+        result = finished(simulation)
+        print_result(result, console)
+        _say_where(result, folder, console)
+        live.wait()
     if result.ended == "interrupted":
         raise typer.Exit(INTERRUPTED)
 
@@ -78,10 +99,7 @@ def _seed_list(text: str) -> list[int]:
 
 
 def _say_where(result: Result, folder: Path, console: Console) -> None:
-    recorded = f" of seed {result.arenas[0].seed}" if len(result.arenas) > 1 else ""
-    console.print(f"written: {folder}/summary.json and the recording{recorded} {folder}/run.rrd", soft_wrap=True)
-    viewer = Path(sys.executable).with_name("rerun")
-    if viewer.is_relative_to(Path.cwd()):
-        viewer = viewer.relative_to(Path.cwd())
-    console.print(f"look at it: {viewer} {folder}/run.rrd", soft_wrap=True)
-    console.print(f"  without a screen: {viewer} --serve-web --bind 127.0.0.1 {folder}/run.rrd", soft_wrap=True)
+    recorded = f" (the pictures of seed {result.arenas[0].seed})" if len(result.arenas) > 1 else ""
+    console.print(f"written: {folder}{recorded}", soft_wrap=True)
+    console.print(f"look at it: swarmwire view {folder}", soft_wrap=True)
+    console.print(f"as a film: swarmwire export {folder} --gif", soft_wrap=True)

@@ -1,0 +1,33 @@
+"""What recording costs: the same run with and without it, in turns, and how large its tables are."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from swarmwire.comms.clock import WallClock, to_s
+from swarmwire.comms.protocols import Observer
+from swarmwire.deploy import Result, run
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.record.recorders import recorders
+from swarmwire.world.scenario import Scenario
+
+
+def one_run(scenario: Scenario, folder: Path | None) -> tuple[float, Result]:
+    """Seconds from the first tick until everything is on disk and joined, and what came of the run."""
+    clock, metrics = WallClock(), Metrics()  # measured a second time in both runs: the recorder reads these
+    observers: list[Observer] = [metrics, *(recorders(folder, metrics, clock) if folder else [])]
+    called_ns = clock.now_ns()
+    result = run(scenario, observers=observers)
+    return to_s(clock.now_ns() - called_ns) - result.start_time_s, result
+
+
+def compared(scenario: Scenario, repeats: int) -> tuple[list[float], list[float], dict[str, float], Result]:
+    """Seconds of each run without and with recording, sizes of the tables in MB, and the first result."""
+    without: list[tuple[float, Result]] = []
+    recorded: list[tuple[float, Result]] = []
+    sizes_mb: dict[str, float] = {}
+    for _ in range(repeats):
+        without.append(one_run(scenario, None))
+        with TemporaryDirectory() as folder:
+            recorded.append(one_run(scenario, Path(folder)))
+            sizes_mb = {file.stem: round(file.stat().st_size / 1e6, 3) for file in Path(folder).glob("*.parquet")}
+    return [spent_s for spent_s, _ in without], [spent_s for spent_s, _ in recorded], sizes_mb, without[0][1]

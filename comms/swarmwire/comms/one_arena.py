@@ -1,0 +1,64 @@
+"""One arena of several, as if it were the only one: robot rows become indices."""
+
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.senses import GroupSenses, Senses
+from swarmwire.comms.truth import Finished, Static, Tally, Truth
+
+
+def static_of(static: Static, arena: int) -> Static:
+    """What does not change in this arena."""
+    one = slice(arena, arena + 1)
+    return replace(static, seeds=static.seeds[one], obstacles=static.obstacles[one], lights=static.lights[one])
+
+
+def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
+    """A tick of this arena; `static` is that of all."""
+    if static.arenas == 1:
+        return truth
+    rows = slice(arena * static.robots, (arena + 1) * static.robots)
+    within = senses_within(truth.senses, rows)
+    senses = {name: GroupSenses(group.rows - rows.start, group.fields) for name, group in within.items()}
+    edges, tally, finished = truth.edges, truth.tally, truth.finished
+    if edges is not None:
+        edges = edges[(edges[:, 0] >= rows.start) & (edges[:, 0] < rows.stop)] - rows.start
+    return replace(
+        truth,
+        alive=truth.alive[rows],
+        pose=truth.pose[rows],
+        velocity=truth.velocity[rows],
+        command=truth.command[rows],
+        state=truth.state[rows],
+        senses=senses,
+        contact_onsets=truth.contact_onsets[arena : arena + 1],
+        edges=edges,
+        tally=None if tally is None else _tally_of(tally, arena),
+        finished=None if finished is None else _finished_of(finished, arena),
+        events=tuple(replace(event, changed=event.changed[rows]) for event in truth.events),
+    )
+
+
+def senses_within(senses: Senses, rows: slice) -> Senses:
+    """The senses of these robots alone."""
+    found: Senses = {}
+    for name, group in senses.items():
+        first, last = np.searchsorted(group.rows, [rows.start, rows.stop])
+        if first < last:
+            columns = {sense: column[first:last] for sense, column in group.fields.items()}
+            found[name] = GroupSenses(group.rows[first:last], columns)
+    return found
+
+
+def _tally_of(tally: Tally, arena: int) -> Tally:
+    one = slice(arena, arena + 1)
+    return Tally(tally.sent[one], tally.intended[one], tally.in_range[one], tally.fates[one])
+
+
+def _finished_of(finished: Finished, arena: int) -> Finished:
+    own = finished.arena == arena
+    columns: dict[str, Any] = {field.name: getattr(finished, field.name) for field in fields(Finished)}
+    kept: dict[str, Any] = {name: None if column is None else column[own] for name, column in columns.items()}
+    return Finished(**{**kept, "arena": np.zeros_like(kept["arena"])})

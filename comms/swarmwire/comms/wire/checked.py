@@ -1,0 +1,14 @@
+"""Arrays of a frame that came over the wire, checked before they are used."""
+
+from swarmwire.comms.arrays import AnyArray
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.wire.frames import DTYPES, Frame
+
+
+def checked_array(frame: Frame, name: str, code: str, shape: tuple[int | None, ...]) -> AnyArray:
+    """An array of the frame, of this dtype and shape (None: any length); BadFrame otherwise."""
+    array = frame.arrays.get(name)
+    fits = array is not None and array.dtype == DTYPES[code] and array.ndim == len(shape)
+    if array is None or not fits or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True)):
+        raise BadFrame("malformed", f"{name}: expected {code} of shape {shape}")
+    return array

@@ -1,0 +1,175 @@
+"""A glimpse of a run as a frame: the tick's arrays, and what was measured; checked on arrival."""
+
+from dataclasses import fields
+from typing import Any, cast
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.glimpse import Glimpse, Scene
+from swarmwire.comms.notes import LONGEST_STATE
+from swarmwire.comms.senses import GroupSenses, Senses
+from swarmwire.comms.truth import Finished, Happened, Static, Tally, Truth
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.checked import checked_array
+from swarmwire.comms.wire.frames import Frame
+from swarmwire.comms.wire.scene_frames import OBSERVED_VERSION, check_version
+
+_FINISHED = tuple(field.name for field in fields(Finished) if field.name != "rssi_dbm")
+_COUNTED = ("sent", "intended", "in_range")  # a row each; the fates have an array of their own
+
+
+def encode_truth(glimpse: Glimpse) -> bytes:
+    """A `truth` frame."""
+    truth = glimpse.truth
+    arrays: dict[str, AnyArray] = {
+        "alive": truth.alive,
+        "pose": truth.pose,
+        "velocity": truth.velocity,
+        "command": truth.command,
+        "state": truth.state,
+        "contact_onsets": truth.contact_onsets,
+        "values": glimpse.values,
+    }
+    for name, group in truth.senses.items():
+        arrays[f"sense/{name}/rows"] = group.rows
+        for sense, column in group.fields.items():
+            arrays[f"sense/{name}/{sense}"] = column
+    if truth.edges is not None:
+        arrays["edges"] = truth.edges
+    if truth.tally is not None:
+        arrays["tally"] = np.array([getattr(truth.tally, name) for name in _COUNTED])
+        arrays["tally/fates"] = truth.tally.fates
+    if truth.finished is not None:
+        arrays["finished"] = np.array([getattr(truth.finished, name) for name in _FINISHED])
+        if truth.finished.rssi_dbm is not None:
+            arrays["finished/rssi_dbm"] = truth.finished.rssi_dbm
+    if truth.events:
+        arrays["events"] = np.array([event.changed for event in truth.events])
+    values: dict[str, Any] = {
+        "version": OBSERVED_VERSION,
+        "time_ns": truth.time_ns,
+        "serial": glimpse.serial,
+        "ticks": glimpse.ticks,
+        "states": truth.states,
+        "events": [(event.serial, float(event.at_s), event.do, event.ended) for event in truth.events],
+    }
+    return frames.encode("truth", truth.tick, arrays, values)
+
+
+def decode_truth(frame: Frame, scene: Scene) -> Glimpse:
+    """The glimpse of a `truth` frame of this scene's run; BadFrame if it holds none, or one that contradicts itself."""
+    check_version(frame, "truth")
+    static = scene.static
+    n = static.arenas * static.robots
+    states = _states(frame)
+    state = checked_array(frame, "state", "<i8", (n,))
+    _within("state", state, len(states))
+    truth = Truth(
+        tick=_least(frame.tick, 0, "tick"),
+        time_ns=_least(frame.values.get("time_ns"), 0, "time_ns"),
+        alive=checked_array(frame, "alive", "|b1", (n,)),
+        pose=checked_array(frame, "pose", "<f8", (n, 3)),
+        velocity=checked_array(frame, "velocity", "<f8", (n, 3)),
+        command=checked_array(frame, "command", "<f8", (n, 2)),
+        state=state,
+        states=states,
+        senses=_senses(frame, static),
+        contact_onsets=checked_array(frame, "contact_onsets", "<i8", (static.arenas, 2)),
+        edges=_edges(frame, n),
+        tally=_tally(frame, static.arenas),
+        finished=_finished(frame, static),
+        events=_events(frame, n),
+    )
+    values = checked_array(frame, "values", "<f8", (len(scene.series), static.arenas))
+    serial, ticks = _least(frame.values.get("serial"), 0, "serial"), _least(frame.values.get("ticks"), 1, "ticks")
+    return Glimpse(truth, serial, ticks, values)
+
+
+def _least(value: object, least: int, name: str) -> int:
+    if type(value) is not int or value < least:
+        raise BadFrame("malformed", f"{name}: expected a whole number of at least {least}")
+    return value
+
+
+def _within(name: str, array: AnyArray, end: int, first: int = 0) -> None:
+    if ((array < first) | (array >= end)).any():
+        raise BadFrame("malformed", f"{name}: expected {first} to {end - 1}")
+
+
+def _states(frame: Frame) -> tuple[str, ...]:
+    found: object = frame.values.get("states")
+    if type(found) is list:
+        states = cast("list[object]", found)
+        if states and all(type(state) is str and len(state) <= LONGEST_STATE for state in states):
+            return tuple(cast("list[str]", states))
+    raise BadFrame("malformed", "states: expected a list of texts")
+
+
+def _edges(frame: Frame, n: int) -> AnyArray | None:
+    if "edges" not in frame.arrays:
+        return None
+    edges = checked_array(frame, "edges", "<i8", (None, 2))
+    _within("edges", edges, n)
+    return edges
+
+
+def _tally(frame: Frame, arenas: int) -> Tally | None:
+    if "tally" not in frame.arrays:
+        return None
+    sent, intended, in_range = checked_array(frame, "tally", "<i8", (len(_COUNTED), arenas))
+    return Tally(sent, intended, in_range, checked_array(frame, "tally/fates", "<i8", (arenas, len(Fate))))
+
+
+def _finished(frame: Frame, static: Static) -> Finished | None:
+    if "finished" not in frame.arrays:
+        return None
+    columns = dict(zip(_FINISHED, checked_array(frame, "finished", "<i8", (len(_FINISHED), None)), strict=True))
+    _within("finished.arena", columns["arena"], static.arenas)
+    _within("finished.sender", columns["sender"], static.robots)
+    _within("finished.receiver", columns["receiver"], static.robots, first=-1)
+    _within("finished.fate", columns["fate"], len(Fate))
+    rssi_dbm = None
+    if "finished/rssi_dbm" in frame.arrays:
+        rssi_dbm = checked_array(frame, "finished/rssi_dbm", "<f8", (len(columns["arena"]),))
+    return Finished(**columns, rssi_dbm=rssi_dbm)
+
+
+def _events(frame: Frame, n: int) -> tuple[Happened, ...]:
+    found: object = frame.values.get("events")
+    if type(found) is not list:
+        raise BadFrame("malformed", "events: expected a list")
+    told = cast("list[object]", found)
+    if not told:
+        return ()
+    changed = checked_array(frame, "events", "|b1", (len(told), n))
+    return tuple(_event(item, row) for item, row in zip(told, changed, strict=True))
+
+
+def _event(item: object, changed: AnyArray) -> Happened:
+    if type(item) is list and [type(part) for part in cast("list[object]", item)] == [int, float, str, bool]:
+        serial, at_s, do, ended = cast("tuple[int, float, str, bool]", item)
+        return Happened(serial, at_s, do, ended, changed)
+    raise BadFrame("malformed", "events: expected serial, at_s, do and ended of each")
+
+
+def _senses(frame: Frame, static: Static) -> Senses:
+    """The senses of some robots; of which groups and in which shapes must agree, which senses is the bodies' affair."""
+    found: dict[str, dict[str, AnyArray]] = {}
+    for key in frame.arrays:
+        if key.startswith("sense/"):
+            _, name, sense = (*key.split("/", 2), "")[:3]
+            found.setdefault(name, {})[sense] = frame.arrays[key]
+    if not found.keys() <= {group.name for group in static.groups}:
+        raise BadFrame("malformed", "sense: expected groups of this run")
+    senses: Senses = {}
+    for name, columns in found.items():
+        rows = checked_array(frame, f"sense/{name}/rows", "<i8", (None,))
+        _within(f"sense/{name}/rows", rows, static.arenas * static.robots)
+        del columns["rows"]
+        if any(column.dtype != np.float64 or len(column) != len(rows) for column in columns.values()):
+            raise BadFrame("malformed", f"sense/{name}: expected a row of numbers for each robot")
+        senses[name] = GroupSenses(rows, columns)
+    return senses

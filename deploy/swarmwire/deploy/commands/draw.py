@@ -1,0 +1,85 @@
+"""`swarmwire draw`."""
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.commands.options import Overrides
+
+USUAL_SIZE_PX = 1280
+_ONLY_IN_BODIES = ("like", "drive", "radius_m")
+
+
+def draw_command(
+    subject: Annotated[
+        str,
+        typer.Argument(help="A scenario or a body's data sheet, both TOML files, or a body's name.", metavar="WHAT"),
+    ],
+    to: Annotated[
+        Path | None, typer.Option(help="The picture: .png, .svg or .pdf. Default: NAME.png in this folder.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed instead of the scenario's.")] = None,
+    size: Annotated[int, typer.Option(help="Longer side in pixels.")] = USUAL_SIZE_PX,
+    overrides: Overrides = None,
+) -> None:
+    """Draw a scenario as it starts, or a body with its senses, without running anything.
+
+    A scenario: arena, obstacles, lights, every robot where the seed puts it, and how far the radio reaches.
+    A body: to scale and from above, with wheels, rays and photocells, its figures and their source.
+    """
+    path = Path(subject)
+    if path.suffix != ".toml":
+        written = to or Path(f"{subject}.png")
+        _refuse_settings(seed, overrides)
+        _draw_named_body(subject, written, size)
+    else:
+        written = to or Path(f"{path.stem}.png")
+        sheet = _body_sheet(path)
+        if sheet is None:
+            _draw_scenario(path, seed, overrides or [], written, size)
+        else:
+            _refuse_settings(seed, overrides)
+            _draw_sheet(sheet, path, written, size)
+    typer.echo(f"written: {written}")
+
+
+def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path, size_px: int) -> None:
+    from swarmwire.deploy.simulation import Simulation
+    from swarmwire.metrics.drawing.scenario_sheet import draw_scenario
+
+    simulation = Simulation(path, seed=seed, overrides=overrides)
+    draw_scenario(simulation.static, simulation.world.pose, simulation.scenario.duration_s, to, size_px)
+
+
+def _draw_named_body(name: str, to: Path, size_px: int) -> None:
+    from swarmwire.comms.body import body_names, load_body
+    from swarmwire.metrics.drawing.body_sheet import draw_body
+
+    if name not in body_names():
+        raise BadInput(name, "", f"expected a scenario's or a body's .toml, or one of {', '.join(body_names())}")
+    draw_body(load_body(name), to, size_px)
+
+
+def _draw_sheet(sheet: dict[str, Any], path: Path, to: Path, size_px: int) -> None:
+    from swarmwire.comms.body import body_from
+    from swarmwire.metrics.drawing.body_sheet import draw_body
+
+    draw_body(body_from(sheet, str(path)), to, size_px)
+
+
+def _body_sheet(path: Path) -> dict[str, Any] | None:
+    """What the file says, if it describes a body; None for all else, which a scenario's reader refuses if need be."""
+    try:
+        found = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return found if "robots" not in found and any(key in found for key in _ONLY_IN_BODIES) else None
+
+
+def _refuse_settings(seed: int | None, overrides: list[str] | None) -> None:
+    for option, given in (("--seed", seed is not None), ("--set", bool(overrides))):
+        if given:
+            raise BadInput(option, "", "expected a scenario; a body has nothing to set")

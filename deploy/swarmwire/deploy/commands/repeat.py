@@ -1,0 +1,72 @@
+"""`swarmwire repeat`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from swarmwire.deploy.commands.exit_codes import DIFFERENT, INTERRUPTED
+from swarmwire.deploy.commands.options import Packets
+
+if TYPE_CHECKING:
+    from swarmwire.deploy.repetition import Repetition
+
+
+def repeat_command(
+    folder: Annotated[Path, typer.Argument(help="The run folder.", metavar="RUN")],
+    runners: Annotated[
+        str, typer.Option(help='Processes that run the agents: "none" (all in this one), a number, or "per-robot".')
+    ] = "none",
+    out: Annotated[
+        Path | None, typer.Option(help="A run folder for the repetition, new or empty. Default: nothing is written.")
+    ] = None,
+    packets: Packets = "off",
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Run a run again from its folder alone, and tell whether it came out the same, bit for bit.
+
+    Exit code 0: the same, as far as can be compared; 1: different, or there is nothing to compare with; 2: the folder
+    holds no run that can be repeated.
+    """
+    # Imported here: numba and zenoh take a second, which --help and typing errors should not.
+    from swarmwire.deploy.recording import Recording, packet_share
+    from swarmwire.deploy.repetition import RepeatedRun
+    from swarmwire.deploy.shown import progress
+
+    console = Console(quiet=quiet, highlight=False, soft_wrap=True)
+    record = Recording(packets=packet_share(packets))
+    repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
+    repeated.simulation.watch(progress(repeated.simulation, console))
+    repetition = repeated.run()
+    _print(repetition, console)
+    if out is not None:
+        console.print(f"written: {out}")
+    if repetition.result.ended == "interrupted":
+        raise typer.Exit(INTERRUPTED)
+    if not repetition.same:
+        raise typer.Exit(DIFFERENT)
+
+
+def _print(repetition: "Repetition", console: Console) -> None:
+    for arena in repetition.result.arenas:
+        console.print(f"seed {arena.seed}: trajectory {arena.trajectory_sha256[:16]}…")
+    console.print(_verdict(repetition))
+    if repetition.changes:
+        console.print("changed since the run:")
+    elif repetition.same is False:
+        console.print("files, modules, versions and CPU are the same: does an agent draw or read the time by itself?")
+    for change in repetition.changes:
+        console.print(f"  {change}", markup=False)
+
+
+def _verdict(repetition: "Repetition") -> str:
+    why_not_all = repetition.why_not_all
+    if repetition.same is None:
+        return f"nothing to compare with: {why_not_all}"
+    if not repetition.same:
+        at = repetition.first_difference
+        return "a different run" + ("" if at is None else f" from tick {at} on")
+    if why_not_all:
+        return f"the same, bit for bit, in the {repetition.compared} ticks that can be compared: {why_not_all}"
+    return f"the same run, bit for bit: {repetition.result.ticks} ticks"

@@ -1,0 +1,68 @@
+"""`swarmwire view`."""
+
+import os
+import select
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.errors import BadInput
+
+RECORDING = "run.rrd"
+
+
+def view_command(
+    run: Annotated[Path, typer.Argument(help="A run folder, or a recording (.rrd).", metavar="RUN")],
+    web: Annotated[bool, typer.Option("--web", help="In a browser, also if there is a screen.")] = False,
+    port: Annotated[
+        int | None, typer.Option(help="Port of the pages for a browser. Default: a free one.", min=1, max=65535)
+    ] = None,
+    with_parent: Annotated[
+        bool, typer.Option("--with-parent", hidden=True, help="End when standard input is closed.")
+    ] = False,
+) -> None:
+    """Look at a run: live while it goes on, its recording afterwards. Ctrl-C, or closing the window, ends the view.
+
+    Opens a window if there is a screen; else prints an address for a browser on this machine.
+    """
+    # Imported here: rerun and zenoh take a second, which --help and typing errors should not.
+    from swarmwire.deploy.interrupt import Interrupt
+    from swarmwire.deploy.live.following import RunGone
+    from swarmwire.deploy.live.live_file import read_live
+    from swarmwire.deploy.live.showing import Way, show_live, show_recording
+    from swarmwire.deploy.live.viewer_program import has_screen
+    from swarmwire.metrics.view_extra import need_view_extra
+
+    need_view_extra("view")
+    os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
+    live = read_live(run) if run.is_dir() else None
+    recording = run / RECORDING if run.is_dir() else run
+    with Interrupt() as interrupt:
+        way = Way(
+            clock=WallClock(),
+            say=lambda text: typer.echo(text, err=True),
+            stopped=lambda: interrupt.asked or (with_parent and _closed()),
+            web=web or port is not None or not has_screen(),
+            port=port,
+        )
+        if live is not None:
+            try:
+                show_live(live, way)
+            except RunGone:
+                if not recording.is_file():
+                    raise
+            else:
+                return
+        if not recording.is_file():
+            raise BadInput(
+                str(run), "", f"expected a run folder with {RECORDING} or a run that goes on, or a recording"
+            )
+        show_recording(recording, way)
+
+
+def _closed() -> bool:
+    """Whether standard input is at its end; nobody writes to it."""
+    return bool(select.select([sys.stdin], [], [], 0)[0])

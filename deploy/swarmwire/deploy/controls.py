@@ -1,0 +1,142 @@
+"""What people ask of a run while it goes on: pause, step, another speed, the end. What the run does is the same."""
+
+import threading
+from collections.abc import Callable
+
+from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
+from swarmwire.world.pace import Pace
+
+SPEEDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # simulated s per s of wall time
+LOOK_NS = to_ns(0.02)  # how often a loop that is held looks up what people ask
+
+
+class Controls:
+    """Any thread may ask; the loop calls `hold` before each tick, which costs nothing while nobody asked for anything.
+
+    Attributes:
+        paused: no tick begins but those that `step` asks for.
+        speed: simulated s per s of wall time: in real time the pace's factor, else a limit; None as fast as possible.
+        quit_asked: the run is to end before the next tick.
+        help_asked: people want to know what the keys do.
+        paused_ns: wall time spent in pauses so far.
+        on_wait: called while the loop is held, many times a second.
+    """
+
+    def __init__(self, clock: Clock, rate_hz: int, pace: Pace | None = None) -> None:
+        """With a `pace` the run is in real time."""
+        self._clock, self._rate_hz, self._pace = clock, rate_hz, pace
+        self._lock = threading.Lock()
+        self.paused = self.quit_asked = self.help_asked = False
+        self.speed = pace.factor if pace else None
+        self.paused_ns = 0
+        self.on_wait: Callable[[], None] = lambda: None
+        self._asked = False  # whether `hold` has anything to do
+        self._steps = 0
+        self._next_ns = 0  # under a limit no tick begins before
+        self._free_speed = SPEEDS[-1]  # of the run without a limit, as far as is known
+        self._tick = 0  # the newest to begin
+        self._since: tuple[int, int] | None = None  # tick and wall time from which the free speed is measured
+
+    @property
+    def real_time(self) -> bool:
+        """Whether the wall clock paces the run."""
+        return self._pace is not None
+
+    @property
+    def missed_ticks(self) -> int:
+        """Ticks that real time did not wait for; 0 in a run that is not in real time."""
+        return self._pace.missed_ticks if self._pace else 0
+
+    def toggle_pause(self) -> None:
+        """Pause, or go on."""
+        with self._lock:
+            self.paused, self._steps, self._asked = not self.paused, 0, True
+
+    def step(self) -> None:
+        """One tick, then pause again; a run that is not paused pauses."""
+        with self._lock:
+            self._steps += self.paused
+            self.paused = self._asked = True
+
+    def faster(self) -> None:
+        """The next speed of `SPEEDS`; beyond what the run did without a limit there is none."""
+        with self._lock:
+            if self.speed is None:
+                return
+            above = next((speed for speed in SPEEDS if speed > self.speed), None)
+            if self._pace:
+                self._set_speed(above or self.speed)
+            else:
+                self._set_speed(above if above and above < self._free_speed else None)
+
+    def slower(self) -> None:
+        """The speed of `SPEEDS` below the present one; without a limit, below that at which the run goes."""
+        with self._lock:
+            if self.speed is None:
+                self._free_speed = self._measured()
+            present = self.speed or self._free_speed
+            self._set_speed(max((speed for speed in SPEEDS if speed < present), default=min(present, SPEEDS[0])))
+
+    def quit(self) -> None:
+        """End the run after the tick that is under way."""
+        self.quit_asked = True
+
+    def toggle_help(self) -> None:
+        """Show what the keys do, or no longer."""
+        self.help_asked = not self.help_asked
+
+    def hold(self, tick: int, stopped: Callable[[], bool]) -> None:
+        """Return when the tick may begin, or when the run is to end."""
+        self._tick = tick
+        if self._asked or self._since is None:
+            self._attend(tick, stopped)
+
+    def _attend(self, tick: int, stopped: Callable[[], bool]) -> None:
+        paused_ns = 0
+        while not (self.quit_asked or stopped()):
+            now_ns = self._clock.now_ns()
+            paused, wait_ns = self._wait(now_ns)
+            if wait_ns <= 0:
+                break
+            self.on_wait()
+            self._clock.sleep_until(now_ns + min(wait_ns, LOOK_NS))
+            paused_ns += (self._clock.now_ns() - now_ns) if paused else 0
+        self._begin(tick, paused_ns)
+
+    def _wait(self, now_ns: int) -> tuple[bool, int]:
+        """Whether the run is paused, and how long the next tick is to wait, in ns."""
+        with self._lock:
+            if self.paused:
+                held = not self._steps
+                self._steps -= not held
+                return held, LOOK_NS * held
+            return False, 0 if self._pace or self.speed is None else self._next_ns - now_ns
+
+    def _begin(self, tick: int, paused_ns: int) -> None:
+        with self._lock:
+            now_ns = self._clock.now_ns()
+            self.paused_ns += paused_ns
+            if self._since is None or paused_ns:
+                self._since = tick, now_ns
+            self._asked = self.paused
+            if self._pace:
+                if paused_ns or self.speed != self._pace.factor:
+                    self._pace.begin_anew(tick, self.speed or self._pace.factor, paused_ns)
+            elif self.speed is not None:
+                # What one wait was too long may be made up for in the next; more would be a burst beyond the limit.
+                period_ns = round(tick_start_ns(1, self._rate_hz) / self.speed)
+                self._next_ns = max(self._next_ns, now_ns - period_ns) + period_ns
+                self._asked = True
+
+    def _measured(self) -> float:
+        """Simulated s per s of wall time since the start or the last pause or change of speed."""
+        if self._since is None or self._tick <= self._since[0]:
+            return self._free_speed
+        tick, at_ns = self._since
+        wall_s = to_s(self._clock.now_ns() - at_ns)
+        return (self._tick - tick) / self._rate_hz / wall_s if wall_s > 0 else self._free_speed
+
+    def _set_speed(self, speed: float | None) -> None:
+        self.speed, self._asked = speed, True
+        self._next_ns = self._clock.now_ns()
+        self._since = None  # measured anew from the next tick on

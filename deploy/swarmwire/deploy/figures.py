@@ -1,0 +1,128 @@
+"""The figures of a run that people see while it goes on: of its last tick, its last second and its last minute."""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.truth import Happened, Static, Truth
+from swarmwire.metrics.event_log import names
+from swarmwire.metrics.metrics import Metrics
+
+SHOWN = ("order", "largest_component", "components")  # of the metrics
+HISTORY_S = 60  # simulated; one value a second
+EVENTS = 3  # newest
+NAMED = 4  # robots of an event that are named, at most
+MARK_NS, MARKS = to_ns(0.1), 100  # wall time between two marks of how far the run was, and how many are kept
+
+
+class Figures:
+    """Looks at each tick; with several arenas levels are means over them, packets are added up.
+
+    Attributes:
+        done: ticks that are over.
+        fates: packets per intended receiver so far, by fate.
+        events: the newest, in words, newest last.
+    """
+
+    def __init__(self, ticks: int, metrics: Metrics, clock: Clock) -> None:
+        """Of a run of so many ticks; `metrics` must see each tick before."""
+        self.ticks, self._metrics, self._clock = ticks, metrics, clock
+
+    def begin(self, static: Static) -> None:
+        """Start afresh."""
+        self.static, self.done = static, 0
+        measured = [metric.name for metric in self._metrics.metrics]
+        self.levels = tuple(name for name in SHOWN if name in measured)
+        self.fates: IntArray = np.zeros(len(FATE_NAMES), np.int64)
+        self.events: deque[str] = deque(maxlen=EVENTS)
+        self._in_range = 0
+        self._second: deque[tuple[int, int]] = deque(maxlen=static.rate_hz)  # per tick: heard, in range
+        self._history: deque[list[float]] = deque(maxlen=HISTORY_S)
+        self._seconds = 0  # values that the history ever held
+        self.forget_speed()
+
+    def see(self, truth: Truth) -> None:
+        """Add what a tick brought."""
+        self.done = truth.tick + 1
+        if truth.tally is not None:
+            fates, in_range = truth.tally.fates, truth.tally.in_range
+            # A sum takes ten times as long as an index, in every tick.
+            total, reached = (fates[0], in_range[0]) if len(fates) == 1 else (fates.sum(axis=0), in_range.sum())
+            self.fates += total
+            self._in_range += int(reached)
+            self._second.append((int(total[Fate.HEARD]), int(reached)))
+        if truth.tick % self.static.rate_hz == 0:
+            self._history.append([self.level(name) for name in self.levels])
+            self._seconds += 1
+        self.events.extend(_words(event, truth.time_ns, self.static) for event in truth.events)
+        now_ns = self._clock.now_ns()
+        if now_ns - self._marks[-1][0] >= MARK_NS:
+            self._marks.append((now_ns, self.done))
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time so far."""
+        return to_s(tick_start_ns(self.done, self.static.rate_hz))
+
+    @property
+    def duration_s(self) -> float:
+        """Simulated time of the whole run."""
+        return to_s(tick_start_ns(self.ticks, self.static.rate_hz))
+
+    @property
+    def pdr(self) -> float:
+        """Heard over in range, of all packets so far; NaN if none was in range."""
+        return _share(int(self.fates[Fate.HEARD]), self._in_range)
+
+    @property
+    def pdr_of_second(self) -> float:
+        """The same over the last simulated second."""
+        return _share(sum(heard for heard, _ in self._second), sum(in_range for _, in_range in self._second))
+
+    def level(self, name: str) -> float:
+        """A metric in the last tick; NaN where it has no value."""
+        return _mean(self._metrics.latest[name].tolist())
+
+    def history(self, name: str, per_value_s: int) -> list[float]:
+        """A metric over the last minute, a mean per so many seconds; what is averaged together stays so."""
+        column = self.levels.index(name)
+        first = self._seconds - len(self._history)
+        parts: dict[int, list[float]] = {}
+        for second, values in enumerate(self._history, first):
+            parts.setdefault(second // per_value_s, []).append(values[column])
+        return [_mean(values) for values in parts.values()]
+
+    def speed(self, over_s: float) -> float:
+        """Simulated s per s of wall time, over so many seconds of wall time up to now; NaN at the very start."""
+        now_ns = self._clock.now_ns()
+        older = [mark for mark in self._marks if now_ns - mark[0] >= to_ns(over_s)]
+        at_ns, done = older[-1] if older else self._marks[0]
+        simulated_s = (self.done - done) / self.static.rate_hz
+        return simulated_s / to_s(now_ns - at_ns) if now_ns - at_ns >= MARK_NS else math.nan
+
+    def forget_speed(self) -> None:
+        """Measure the speed from now on."""
+        self._marks: deque[tuple[int, int]] = deque([(self._clock.now_ns(), self.done)], maxlen=MARKS)
+
+
+def _words(event: Happened, time_ns: int, static: Static) -> str:
+    robots = [name for own in names(event, static) for name in own]
+    if static.arenas > 1:
+        who = f"{len(robots)} robots"
+    else:
+        more = len(robots) - NAMED
+        who = ", ".join(robots[:NAMED]) + (f" and {more} more" if more > 0 else "") or "no robot"
+    return f"{to_s(time_ns):.1f} s  {event.do}{' ended' if event.ended else ''}: {who}"
+
+
+def _mean(values: list[float]) -> float:
+    known = [value for value in values if not math.isnan(value)]
+    return sum(known) / len(known) if known else math.nan
+
+
+def _share(part: int, whole: int) -> float:
+    return part / whole if whole else math.nan

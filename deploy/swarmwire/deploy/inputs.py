@@ -1,0 +1,153 @@
+"""What came into a run from outside: its robots' actions, tick by tick, where scenario and seed do not give them.
+
+In lockstep all actions follow from scenario and seed until a runner is lost. With runners in real time none do: it
+matters when an answer comes. From the first such tick on, each tick's actions are appended to `inputs/actions.frames`:
+a length of 4 bytes, little-endian, and an `actions` frame of the wire. Each goes to the system in one write, so that a
+run that is killed keeps all its ticks; a frame that is cut off at the end of the file is passed over.
+"""
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.protocols import Crew
+from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions
+
+INPUTS = "inputs/actions.frames"
+LENGTH_BYTES = 4
+
+
+@dataclass(frozen=True)
+class InputsRecord:
+    """The recorded inputs of a run."""
+
+    path: str  # within the run folder
+    sha256: str  # of the file
+    first_tick: int  # before it, all follows from scenario and seed
+    ticks: int  # from there to the end of the run
+    ticks_not_recorded: int  # the disk was full, or the like
+
+
+class RecordedCrew:
+    """A crew whose actions are recorded from the first tick on at which `outside(tick)` holds."""
+
+    def __init__(self, crew: Crew, folder: Path, outside: Callable[[int], bool]) -> None:
+        self._crew, self._path, self._outside = crew, folder / INPUTS, outside
+        self._sha256 = hashlib.sha256()
+        self._first_tick: int | None = None
+        self._ticks = self._missed = 0
+        self.start, self.counts, self.close = crew.start, crew.counts, crew.close
+
+    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+        """What every robot does in this tick."""
+        actions = self._crew.act(tick, senses, heard)
+        if self._first_tick is not None or self._outside(tick):
+            self._record(tick, actions)
+        return actions
+
+    def record(self) -> InputsRecord | None:
+        """What was recorded; None if nothing came from outside."""
+        if self._first_tick is None:
+            return None
+        return InputsRecord(INPUTS, self._sha256.hexdigest(), self._first_tick, self._ticks, self._missed)
+
+    def _record(self, tick: int, actions: Actions) -> None:
+        if self._first_tick is None:
+            self._first_tick = tick
+        if self._missed:  # after a gap nothing can be replayed
+            self._missed += 1
+            return
+        frame = encode_actions(tick, actions)
+        data = len(frame).to_bytes(LENGTH_BYTES, "little") + frame
+        try:
+            self._path.parent.mkdir(exist_ok=True)
+            with self._path.open("ab", buffering=0) as file:
+                whole = file.write(data) == len(data)
+        except OSError:
+            whole = False
+        if whole:
+            self._ticks += 1
+            self._sha256.update(data)
+        else:  # the run is worth more than its record
+            self._missed += 1
+
+
+class RecordedInputs:
+    """The recorded inputs of a run folder.
+
+    Attributes:
+        sha256: of the whole frames.
+        ticks: how many there are.
+        first_tick: the tick of the first.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Read the file; BadInput if it is none of ours."""
+        self._path = path
+        self._data = path.read_bytes()
+        self._spans: list[slice] = []
+        start = 0
+        while (body := start + LENGTH_BYTES) <= len(self._data):
+            stop = body + int.from_bytes(self._data[start:body], "little")
+            if stop > len(self._data):
+                break
+            self._spans.append(slice(body, stop))
+            start = stop
+        self.sha256 = hashlib.sha256(self._data[:start]).hexdigest()
+        self.ticks = len(self._spans)
+        self.first_tick = self._frame(0).tick if self._spans else 0
+
+    @property
+    def end_tick(self) -> int:
+        """The first tick after those recorded."""
+        return self.first_tick + self.ticks
+
+    def actions(self, tick: int, robots: int) -> Actions:
+        """What the robots, so many in all arenas, did in a recorded tick; BadInput if the file does not say."""
+        frame = self._frame(tick - self.first_tick)
+        try:
+            if frame.kind != "actions" or frame.tick != tick or "rows" not in frame.arrays:
+                raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
+            rows = frame.arrays["rows"]
+            if ((rows < 0) | (rows >= robots)).any():
+                raise BadFrame("malformed", f"rows: expected robots of {robots}")
+            return decode_actions(frame, rows)
+        except BadFrame as fault:
+            raise self._damaged(tick, fault) from None
+
+    def _frame(self, place: int) -> frames.Frame:
+        try:
+            data = self._data[self._spans[place]]
+            return frames.decode(data, len(data))
+        except BadFrame as fault:
+            raise self._damaged(place, fault) from None
+
+    def _damaged(self, place: int, fault: BadFrame) -> BadInput:
+        return BadInput(str(self._path), f"frame {place}", f"expected the actions of a tick: {fault}")
+
+
+class ReplayedCrew:
+    """A crew whose agents act until the first recorded tick; from there on the record does."""
+
+    def __init__(self, agents: Crew, inputs: RecordedInputs, robots: int) -> None:
+        """`robots` in all arenas."""
+        self._agents, self._inputs, self._robots = agents, inputs, robots
+        self.start, self.counts, self.close = agents.start, agents.counts, agents.close
+
+    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+        """What every robot does in this tick, or did."""
+        if tick < self._inputs.first_tick:
+            return self._agents.act(tick, senses, heard)
+        return self._inputs.actions(tick, self._robots)
+
+
+def recorded_inputs(folder: Path) -> RecordedInputs | None:
+    """The inputs of a run folder; None if nothing came from outside."""
+    path = folder / INPUTS
+    inputs = RecordedInputs(path) if path.exists() else None
+    return inputs if inputs is not None and inputs.ticks else None

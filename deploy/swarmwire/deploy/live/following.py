@@ -1,0 +1,88 @@
+"""A run that goes on in another process, as this one gets to see it."""
+
+# zenoh's stubs leave out the return types of put, reply and close.
+# pyright: reportUnknownMemberType=false
+
+from collections.abc import Generator
+from contextlib import contextmanager
+
+import numpy as np
+import zenoh
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.errors import BadFrame, SwarmwireError
+from swarmwire.comms.glimpse import Glimpse, Scene, Series
+from swarmwire.comms.wire.frames import decode
+from swarmwire.comms.wire.keys import ObserverKeys
+from swarmwire.comms.wire.scene_frames import decode_scene
+from swarmwire.comms.wire.sessions import open_observer
+from swarmwire.comms.wire.truth_frames import decode_truth
+from swarmwire.deploy.live.live_file import Live
+
+KEPT = 8  # glimpses that wait here for a viewer that lags; older ones are dropped
+ANSWER_S = 10.0  # how long the run may take to tell what does not change
+
+
+class RunGone(SwarmwireError):
+    """There is no run any more where one is said to be."""
+
+
+class Following:
+    """What a run publishes: its scene, glimpses as they come, what its metrics measured, and its end."""
+
+    def __init__(self, scene: Scene, frames: "zenoh.Subscriber[Frames]", token: "zenoh.Subscriber[Frames]") -> None:
+        self.scene = scene
+        self.latest: dict[str, FloatArray] = {}
+        self.lost = self.bad = 0  # glimpses that did not arrive, or were none
+        self.over = False  # the run has ended, or its process is gone
+        self._frames, self._token = frames, token
+        self._serial: int | None = None
+
+    @property
+    def metrics(self) -> tuple[Series, ...]:
+        """The metrics whose values come along."""
+        return self.scene.series
+
+    def next(self) -> Glimpse | None:
+        """The next glimpse, None if there is none yet; looks also whether the run is over."""
+        sample = self._frames.try_recv()
+        if sample is None:
+            gone = self._token.try_recv()
+            self.over = self.over or (gone is not None and gone.kind == zenoh.SampleKind.DELETE)
+            return None
+        try:
+            glimpse = decode_truth(decode(sample.payload.to_bytes()), self.scene)
+        except BadFrame:
+            self.bad += 1
+            return None
+        if self._serial is not None:
+            self.lost += max(glimpse.serial - self._serial - 1, 0)
+        self._serial = glimpse.serial
+        self.latest = {series.name: row for series, row in zip(self.metrics, np.asarray(glimpse.values), strict=True)}
+        return glimpse
+
+
+Frames = zenoh.handlers.Handler[zenoh.Sample]
+
+
+@contextmanager
+def following(live: Live) -> Generator[Following]:
+    """Follow a run until the end of the block; RunGone if it does not answer."""
+    keys = ObserverKeys(live.run)
+    try:
+        session = open_observer(live.endpoint)
+    except zenoh.ZError as error:
+        raise RunGone(f"the run of process {live.pid} cannot be reached: {str(error).split(' at ')[0]}") from error
+    with session:
+        token = session.liveliness().declare_subscriber(keys.published, zenoh.handlers.RingChannel(KEPT), history=True)
+        # Asked before there is a subscriber: until then the run publishes nothing.
+        scene = _scene(session, keys)
+        frames = session.declare_subscriber(keys.truth, zenoh.handlers.RingChannel(KEPT))
+        yield Following(scene, frames, token)
+
+
+def _scene(session: zenoh.Session, keys: ObserverKeys) -> Scene:
+    for reply in session.get(keys.scene, timeout=ANSWER_S):
+        if reply.ok is not None:
+            return decode_scene(decode(reply.ok.payload.to_bytes()))
+    raise RunGone("the run does not answer: it has ended, or has hung")

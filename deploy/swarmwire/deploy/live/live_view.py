@@ -1,0 +1,79 @@
+"""The live view of a run that this process executes: a viewing process beside it, which cannot disturb it."""
+
+import os
+import signal
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from swarmwire.comms.truth import Static, Tally, Truth
+
+LEAVE_S = 8.0  # how long the viewing process may take to end its viewer
+
+
+class LiveView:
+    """Observer that opens a view of the run in this folder, which must be published before it begins.
+
+    As a context manager it ends the viewing process and all that this started. Nothing here raises into a run: a view
+    that does not open says so on the terminal.
+    """
+
+    def __init__(self, folder: Path, web: bool = False, port: int | None = None) -> None:
+        """View the run in a window if there is a screen, else, or with `web`, in a browser at this port."""
+        options = [*(["--web"] if web else []), *([] if port is None else ["--port", str(port)])]
+        self._command = [sys.executable, "-m", "swarmwire.deploy", "view", str(folder), "--with-parent", *options]
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> "LiveView":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    @property
+    def pid(self) -> int | None:
+        """The viewing process, once it was started."""
+        return None if self._process is None else self._process.pid
+
+    def begin(self, static: Static) -> None:
+        """Start the viewing process."""
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        try:
+            # A session of its own: Ctrl-C is for the run. Its standard input tells it when this process is gone.
+            self._process = subprocess.Popen(
+                self._command, stdin=subprocess.PIPE, env=environment, start_new_session=True
+            )
+        except OSError as error:
+            print(f"no live view: {error}", file=sys.stderr, flush=True)
+
+    def see(self, truth: Truth) -> None:
+        """Nothing: what is seen is published."""
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """Leave the view open; it adds nothing to the summary."""
+        return {}
+
+    def wait(self) -> None:
+        """Return when the person has closed the view, at once if there is none; Ctrl-C ends the wait and the view."""
+        if self._process is None:
+            return
+        try:
+            self._process.wait()
+        except KeyboardInterrupt:
+            self.close()
+
+    def close(self) -> None:
+        """End the view; safe to call more than once."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        if process.stdin is not None:
+            process.stdin.close()
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(LEAVE_S)
+        with suppress(ProcessLookupError, PermissionError):  # also a viewer whose parent was killed
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()

@@ -1,0 +1,148 @@
+"""A run published for observers: whoever wants looks on from a process of its own, and the run does not notice."""
+
+# zenoh's stubs leave out the return types of put, reply and close.
+# pyright: reportUnknownMemberType=false
+
+import os
+import queue
+import threading
+from contextlib import ExitStack, suppress
+from math import isinf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zenoh
+
+from swarmwire.comms.clock import Clock
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.glimpse import Glimpse, Scene, Series
+from swarmwire.comms.one_arena import static_of
+from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.wire.keys import ObserverKeys
+from swarmwire.comms.wire.scene_frames import encode_scene
+from swarmwire.comms.wire.sessions import open_observed
+from swarmwire.comms.wire.truth_frames import encode_truth
+from swarmwire.deploy.endpoint import local_endpoint
+from swarmwire.deploy.live.live_file import Live, forget_live
+from swarmwire.deploy.live.sampling import FRAMES_PER_S, Rate, Sampling, Since
+from swarmwire.metrics.plotted import Measured
+from swarmwire.metrics.rerun_selected import selected_robot
+
+LEAVE_S = 2.0  # how long the last frame may take
+
+
+class Published:
+    """Observer that publishes one arena of a run on an endpoint of its own, as `live.json` in the run folder tells.
+
+    At most 30 ticks per second of wall time are published; nothing is encoded, nor even counted, while nobody looks on.
+    Frames are encoded and sent in a thread of their own, and a tick that finds it busy is left out: an observer that is
+    slow, frozen or dead does not hold the run. It publishes what `metrics` measured, so that must see each tick before.
+
+    Summary part: `published`: `frames` sent, and `left_out`: due while the one before was not yet sent.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        run_id: str,
+        metrics: Measured,
+        clock: Clock,
+        arena: int = 0,
+        selected: str | None = None,
+    ) -> None:
+        """Publish the run whose folder this is; `selected` is the robot that is shown in detail."""
+        self._folder, self._run_id, self._metrics, self._clock = folder, run_id, metrics, clock
+        self._arena, self._selected = arena, selected
+        self._open = ExitStack()
+        self.frames = self.left_out = 0
+
+    def begin(self, static: Static) -> None:
+        """Open the endpoint and tell where it is; BadInput if there is no such arena."""
+        if not 0 <= self._arena < static.arenas:
+            raise BadInput("live view", "arena", f"expected 0 to {static.arenas - 1}")
+        self._selected = selected_robot(static, self._selected, "live view")
+        self._sampling = Sampling(static, self._arena, self._selected)
+        self._since, self._rate = Since(), Rate(FRAMES_PER_S)
+        self._watched = False
+        self._fault: Exception | None = None
+        self._frames: queue.Queue[Glimpse | None] = queue.Queue(maxsize=1)
+        with ExitStack() as opening:
+            endpoint = opening.enter_context(local_endpoint(None))
+            session = opening.enter_context(open_observed(endpoint))
+            self._declare(session, encode_scene(self._scene(static)))
+            opening.callback(forget_live, self._folder)
+            Live(endpoint, self._run_id, os.getpid()).write(self._folder)
+            self._sender = threading.Thread(target=self._send_all, name="published", daemon=True)
+            self._sender.start()
+            opening.callback(self._stop_sender)
+            self._open = opening.pop_all()
+
+    def see(self, truth: Truth) -> None:
+        """Publish a tick if it is time to and somebody looks on."""
+        if self._watched:
+            self._since.add(truth)
+        now_ns = self._clock.now_ns()
+        if not self._rate.due(now_ns):
+            return
+        if self._fault is not None:
+            raise self._fault
+        watched_before, self._watched = self._watched, self._is_watched()
+        if not self._watched:
+            self._since = Since()
+            return
+        if not watched_before:
+            self._since.add(truth)
+        if self._frames.full():
+            self.left_out += 1
+            return
+        latest = self._metrics.latest
+        values = np.array([latest[metric.name] for metric in self._metrics.metrics])
+        self._frames.put_nowait(self._sampling.glimpse(*self._since.take(), values, now_ns))
+        self.frames += 1
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """Close the endpoint; whoever looks on learns that the run is over."""
+        self._open.close()
+        return {"published": {"frames": self.frames, "left_out": self.left_out}}
+
+    def _is_watched(self) -> bool:
+        status: Any = self._publisher.matching_status  # an object, where zenoh's stub promises a bool
+        return status.matching
+
+    def _scene(self, static: Static) -> Scene:
+        metrics = self._metrics.metrics
+        series = tuple(Series(metric.name, metric.unit, _finite(*metric.bounds)) for metric in metrics)
+        return Scene(static_of(static, self._arena), series, self._selected or "")
+
+    def _declare(self, session: zenoh.Session, scene: bytes) -> None:
+        keys = ObserverKeys(self._run_id)
+        # DROP is said though it is zenoh's default: to wait for an observer is the one thing that must not be.
+        drop = zenoh.CongestionControl.DROP
+        self._publisher = session.declare_publisher(keys.truth, congestion_control=drop)
+
+        # Answered in zenoh's own thread, since the loop may be long in a tick, or paused.
+        def answer(query: zenoh.Query) -> None:
+            query.reply(keys.scene, scene)
+
+        self._declared = (
+            session.declare_queryable(keys.scene, zenoh.handlers.Callback(answer, indirect=False)),
+            session.liveliness().declare_token(keys.published),  # last: it says that all is there
+        )
+
+    def _send_all(self) -> None:
+        try:
+            while (glimpse := self._frames.get()) is not None:
+                self._publisher.put(encode_truth(glimpse))
+        except Exception as error:  # noqa: BLE001 - the loop's thread raises it
+            self._fault = error
+
+    def _stop_sender(self) -> None:
+        with suppress(queue.Full):  # it has failed, or is still busy: the closed session ends it
+            self._frames.put(None, timeout=LEAVE_S)
+        self._sender.join(LEAVE_S)
+
+
+def _finite(*bounds: float | None) -> tuple[float | None, float | None]:
+    least, largest = (None if bound is None or isinf(bound) else bound for bound in bounds)
+    return least, largest

@@ -1,0 +1,157 @@
+"""A run again, from its folder alone: from the scenario, files and inputs in it; and whether it came out the same."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.protocols import Observer
+from swarmwire.deploy.arguments import Runners
+from swarmwire.deploy.inputs import INPUTS, RecordedInputs, recorded_inputs
+from swarmwire.deploy.origin import Origin, read_origin
+from swarmwire.deploy.recording import Recording
+from swarmwire.deploy.result import Result
+from swarmwire.deploy.run_record import SUMMARY
+from swarmwire.deploy.running import finished
+from swarmwire.deploy.scenario_copy import SCENARIO
+from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.trajectory_log import TrajectoryCheck
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """A run that was run again."""
+
+    result: Result  # of the repetition
+    before: tuple[str, ...] | None  # trajectory hash of each arena of the run; None: it left none, or not of this end
+    compared: int  # ticks, from the first, that could be compared
+    first_difference: int | None  # the first tick that came out differently
+    why_not_all: str  # why it is not the whole run that was compared, or ""
+    changes: tuple[str, ...]  # what is not as it was when the run began: files, modules, versions, CPU; a line each
+
+    @property
+    def same(self) -> bool | None:
+        """Whether it came out the same, bit for bit, as far as can be told; None: there is nothing to compare."""
+        if self.before is not None:
+            return self.before == tuple(self.result.trajectory_sha256)
+        return self.first_difference is None if self.compared else None
+
+
+def repeat(
+    folder: Path | str,
+    *,
+    runners: Runners = None,
+    out: Path | str | None = None,
+    observers: Sequence[Observer] = (),
+    record: Recording | None = None,
+) -> Repetition:
+    """Run the run of this folder again, and compare the trajectory hashes.
+
+    It has as many ticks as the run had, also if that was interrupted or failed; all that it was to have, if it was
+    killed. `runners` are as for `run`; a run into which
+    something came from outside takes none, since its record plays their part. `out`, a new or empty folder, becomes the
+    repetition's own run folder, with what `record` says in it.
+
+    Raises BadInput if this is no run folder or it cannot be run any more, and what `run` raises.
+    """
+    return RepeatedRun(folder, runners=runners, out=out, observers=observers, record=record).run()
+
+
+class RepeatedRun:
+    """A run on its way to its repetition, with the arguments of `repeat`.
+
+    Attributes:
+        simulation: what will run.
+        origin: from what the run was made.
+    """
+
+    def __init__(
+        self,
+        folder: Path | str,
+        *,
+        runners: Runners = None,
+        out: Path | str | None = None,
+        observers: Sequence[Observer] = (),
+        record: Recording | None = None,
+    ) -> None:
+        self._folder = folder = Path(folder)
+        self.origin = read_origin(folder)
+        self._summary = _read_summary(folder)
+        self._inputs = _inputs(folder, self.origin, self._summary)
+        if self._inputs is not None and runners not in (None, "none"):
+            raise BadInput("--runners", "", f'expected "none": {INPUTS} says what the runners did; got {runners!r}')
+        self.simulation = Simulation(
+            folder / SCENARIO,
+            seeds=self.origin.seeds,
+            runners=runners,
+            out=out,
+            observers=observers,
+            record=record,
+        )
+        self.simulation.inputs, self.simulation.ticks = self._inputs, self._ticks()
+        self._check = TrajectoryCheck(folder, self.simulation.hashes)
+        self.simulation.watch(self._check)
+
+    def run(self) -> Repetition:
+        """Run it, and compare."""
+        changes = self.origin.changes(self._folder, self.simulation.agents)
+        summary, inputs = self._summary, self._inputs
+        if summary and summary.inputs_sha256 and inputs and inputs.sha256 != summary.inputs_sha256:
+            changes.append(f"{INPUTS} is not as the run left it: its sha256 differs")
+        result = finished(self.simulation)
+        why_not_all = self._why_not_all(result)
+        return Repetition(
+            result=result,
+            before=summary.hashes if summary and not why_not_all else None,
+            compared=self._check.compared,
+            first_difference=self._check.first_difference,
+            why_not_all=why_not_all,
+            changes=tuple(changes),
+        )
+
+    def _ticks(self) -> int:
+        wanted = self._summary.ticks if self._summary else self.origin.ticks
+        return min(wanted, self._inputs.end_tick) if self._inputs else wanted
+
+    def _why_not_all(self, result: Result) -> str:
+        if self._summary is None:
+            return f"the run left no {SUMMARY}: it was killed, or still goes on"
+        if result.ticks < self._summary.ticks:
+            return f"this is {result.ticks} of the run's {self._summary.ticks} ticks"
+        return ""
+
+
+@dataclass(frozen=True)
+class _Summary:
+    ticks: int
+    hashes: tuple[str, ...]
+    inputs_sha256: str | None
+
+
+def _read_summary(folder: Path) -> _Summary | None:
+    """What there is to compare with; None if the run left no summary."""
+    path = folder / SUMMARY
+    if not path.exists():
+        return None
+    try:
+        found: Any = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        found = None
+    match found:
+        case {"ticks": int(ticks), "trajectory_sha256": [str(), *_] as hashes, "inputs": None}:
+            return _Summary(ticks, tuple(hashes), None)
+        case {"ticks": int(ticks), "trajectory_sha256": [str(), *_] as hashes, "inputs": {"sha256": str(sha256)}}:
+            return _Summary(ticks, tuple(hashes), sha256)
+        case _:
+            raise BadInput(str(path), "", "expected the summary of a run")
+
+
+def _inputs(folder: Path, origin: Origin, summary: _Summary | None) -> RecordedInputs | None:
+    inputs = recorded_inputs(folder)
+    from_outside = (origin.realtime is not None and origin.runners > 0) or bool(summary and summary.inputs_sha256)
+    if inputs is None and from_outside:
+        expected = "expected the record of what came from outside, on which this run depends"
+        raise BadInput(str(folder / INPUTS), "", expected)
+    return inputs

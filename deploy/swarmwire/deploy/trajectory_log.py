@@ -1,0 +1,76 @@
+"""How a run went, tick by tick, in 8 bytes each: `trajectory.digests`, by which two runs are told apart at the tick.
+
+Each is the start of a SHA-256 over the trajectory hashes of all arenas so far. A run that is killed leaves them for all
+ticks that it did.
+"""
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from swarmwire.comms.truth import Static, Tally, Truth
+
+DIGESTS = "trajectory.digests"
+BYTES = 8
+
+Hashes = Callable[[], list[str]]  # the trajectory hash of each arena so far
+
+
+class TrajectoryLog:
+    """Observer that writes the digest of each tick into the run folder, at once."""
+
+    def __init__(self, folder: Path, hashes: Hashes) -> None:
+        self._path, self._hashes = folder / DIGESTS, hashes
+        self._file: BinaryIO | None = None
+
+    def begin(self, static: Static) -> None:
+        """Open the file."""
+        self._file = self._path.open("wb", buffering=0)
+
+    def see(self, truth: Truth) -> None:
+        """Write the digest of this tick."""
+        if self._file is not None:
+            self._file.write(_digest(self._hashes))
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+        return {}
+
+
+class TrajectoryCheck:
+    """Observer that compares each tick with that of another run, as far as that logged it.
+
+    Attributes:
+        compared: ticks that were compared.
+        first_difference: the first tick that came out differently; None: so far none.
+    """
+
+    def __init__(self, folder: Path, hashes: Hashes) -> None:
+        path = folder / DIGESTS
+        self._expected, self._hashes = path.read_bytes() if path.exists() else b"", hashes
+        self.compared = 0
+        self.first_difference: int | None = None
+
+    def begin(self, static: Static) -> None:
+        """Nothing yet."""
+
+    def see(self, truth: Truth) -> None:
+        """Compare this tick."""
+        start = truth.tick * BYTES
+        expected = self._expected[start : start + BYTES]
+        if len(expected) < BYTES:
+            return
+        self.compared += 1
+        if self.first_difference is None and _digest(self._hashes) != expected:
+            self.first_difference = truth.tick
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """Nothing for the summary."""
+        return {}
+
+
+def _digest(hashes: Hashes) -> bytes:
+    return hashlib.sha256("".join(hashes()).encode()).digest()[:BYTES]

@@ -1,0 +1,60 @@
+"""The bodies that come with swarmwire, from their data sheets."""
+
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from itertools import pairwise
+from typing import Any, cast
+
+from reference.markdown import NOTHING, code, number, table
+from swarmwire.comms.body import Body, body_names, load_body
+from swarmwire.comms.parameters import limits_of
+
+Figure = tuple[str, str, object]  # path within the sheet, unit, value
+
+
+def body_table() -> str:
+    """Every figure of every body, a column each."""
+    sheets = [{path: (unit, value) for path, unit, value in _figures(load_body(name))} for name in body_names()]
+    paths = {path: unit for sheet in sheets for path, (unit, _) in sheet.items()}
+    rows = [
+        [code(path), unit, *(_value(sheet[path][1]) if path in sheet else NOTHING for sheet in sheets)]
+        for path, unit in paths.items()
+    ]
+    return table(["figure", "unit", *(code(name) for name in body_names())], rows)
+
+
+def body_sources() -> str:
+    """Where each body's figures come from."""
+    return "".join(f"- {code(name)}: {load_body(name).source}\n" for name in body_names())
+
+
+def _figures(body: Body) -> Iterator[Figure]:
+    yield from _of(body, "", skipped=("name", "source", "senses"))
+    yield "fastest ahead", "m/s", body.max_linear_mps
+    yield "fastest turn", "rad/s", body.max_angular_radps
+    for name, sheet in body.senses.items():
+        yield f"senses.{name}", "", "yes"
+        yield from _of(sheet, f"senses.{name}.")
+
+
+def _of(sheet: Any, prefix: str, skipped: tuple[str, ...] = ()) -> Iterator[Figure]:
+    for of in fields(sheet):
+        value = getattr(sheet, of.name)
+        if is_dataclass(value):
+            yield from _of(value, f"{prefix}{of.name}.")
+        elif of.name not in skipped:
+            yield prefix + of.name, limits_of(of).unit, value
+
+
+def _value(value: object) -> str:
+    if isinstance(value, tuple):
+        return _ring(cast("tuple[float, ...]", value))
+    return number(value) if isinstance(value, int | float) else str(value)
+
+
+def _ring(angles: tuple[float, ...]) -> str:
+    """So many sensors and where they look: evenly spaced, or one by one."""
+    steps = {round(later - earlier, 6) for earlier, later in pairwise(angles)}
+    if len(steps) == 1:
+        return f"{len(angles)}, every {number(steps.pop())} from {number(angles[0])}"
+    return f"{len(angles)}, at {', '.join(number(angle) for angle in angles)}"

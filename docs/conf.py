@@ -1,0 +1,32 @@
+"""How Sphinx builds the site: `make docs`. The reference is made from the code at each build; none of it is kept."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+
+project = "swarmwire"
+author = copyright = "the swarmwire authors"  # noqa: A001 - the name that Sphinx reads
+extensions = ["myst_parser", "sphinx.ext.autodoc", "reference"]
+exclude_patterns = ["_build", "_ext"]
+
+html_theme = "furo"
+html_title = "swarmwire"
+html_show_sphinx = False
+html_copy_source = False
+
+myst_heading_anchors = 3
+myst_disable_syntax = ["html_inline"]  # help texts say <seed> and mean it
+smartquotes = False  # --set and "none" stay as they are typed
+
+default_role = "code"  # docstrings write `name`, as Markdown does
+autodoc_class_signature = "separated"
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True, "exclude-members": "__init__, __new__"}
+autodoc_preserve_defaults = True
+
+nitpicky = True
+nitpick_ignore_regex = [
+    ("py:.*", r"(?!swarmwire\b).*"),  # other projects' names are not looked up: a build should not need the network
+    ("py:class", r"swarmwire\..*\.[A-Z]"),  # type variables
+]

@@ -1,0 +1,133 @@
+"""Frames of a film: the arena at one tick, with its trails, and the metrics beside it. One figure draws all of them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray, ByteArray, IntArray
+from swarmwire.metrics.drawing.canvas import new_figure, pixels, save
+from swarmwire.metrics.drawing.layout import add_arena_axes, lay_out
+from swarmwire.metrics.drawing.legend import (
+    add_legend,
+    columns_in,
+    dead_entry,
+    group_entries,
+    link_entry,
+    state_entries,
+)
+from swarmwire.metrics.drawing.looks import INK, LONG_SIDE_IN, STATE_COLORS, TITLE_PT
+from swarmwire.metrics.drawing.metric_strip import MetricStrip, choose
+from swarmwire.metrics.drawing.radio_range import in_range
+from swarmwire.metrics.drawing.scenery import draw_scale_bar, draw_scenery
+from swarmwire.metrics.drawing.swarm import Swarm
+from swarmwire.metrics.film import NO_STATE, Film
+
+TRAIL_S = 5.0
+MOST_TRAIL_POINTS = 64
+_STRIP_IN = 1.15  # height of the metrics where they stand below the arena
+_LEGEND_WIDTH_IN = LONG_SIDE_IN - 0.3
+
+
+class FilmFigure:
+    """Draws any tick of a film; what does not move is drawn once and kept as pixels."""
+
+    def __init__(self, film: Film, size_px: int, metrics: Sequence[str] | None = None) -> None:
+        """A figure whose longer side has this many pixels, with these metrics beside the arena (None: the usual ones).
+
+        BadInput for a metric that was not recorded, or a size that nobody could look at.
+        """
+        self._film, static = film, film.static
+        names = choose(film.metrics, metrics)
+        entries = _entries(film)
+        columns = columns_in(entries, _LEGEND_WIDTH_IN)
+        layout = lay_out(static.arena_size_m, _STRIP_IN if names else 0.0, -(-len(entries) // columns), axes_in=0.0)
+        self._figure = figure = new_figure(layout.width_in, layout.height_in, size_px)
+        axes = add_arena_axes(figure, layout, static.arena_size_m)
+        draw_scenery(axes, static, film.arena)
+        self._swarm = Swarm(axes, static)
+        self._state = _colored(film)
+        draw_scale_bar(axes, static.arena_size_m, self._swarm.enlargement)
+        title = f"{static.name}, seed {static.seeds[film.arena]}" if static.arenas > 1 else static.name
+        top = layout.below_top(0.22)
+        figure.text(layout.left, top, title, fontsize=TITLE_PT, fontweight="bold", color=INK)
+        self._time: Any = figure.text(layout.right, top, "", fontsize=TITLE_PT, color=INK, ha="right")
+        add_legend(figure, entries, layout.left, layout.below_top(0.34), columns)
+        self._strip = MetricStrip(figure, layout, film.time_s, film.metrics, names) if names else None
+        self._moving = [*self._swarm.artists, self._time, *(self._strip.artists if self._strip else ())]
+        self._still: Any = None  # pixels of what does not move
+
+    def frame(self, index: int) -> ByteArray:
+        """The pixels of a tick, (height, width, 3); a view that the next frame overwrites."""
+        canvas = self._figure.canvas
+        if self._still is None:
+            self._animate(True)
+            canvas.draw()
+            self._still = canvas.copy_from_bbox(self._figure.bbox)
+        self._show(index)
+        canvas.restore_region(self._still)
+        for artist in self._moving:
+            self._figure.draw_artist(artist)
+        return pixels(self._figure)
+
+    def save(self, index: int, to: Path) -> None:
+        """Write the picture of a tick as PNG, SVG or PDF; BadInput for another name or a folder that is not there."""
+        self._animate(False)
+        self._show(index)
+        save(self._figure, to)
+
+    def _animate(self, apart: bool) -> None:
+        """Let what moves be drawn apart from the rest, or with it."""
+        for artist in self._moving:
+            artist.set_animated(apart)
+
+    def _show(self, index: int) -> None:
+        film = self._film
+        pose, alive = film.pose[index], film.alive[index]
+        edges: IntArray | None = None
+        if film.static.range_m is not None:
+            edges = in_range(pose[:, :2], alive, film.static.range_m, film.static.obstacles[film.arena])
+        state = None if self._state is None else self._state[index]
+        self._swarm.show(pose, alive, edges, _trail(film, index), state)
+        self._time.set_text(f"t = {film.time_s[index]:.1f} s")
+        if self._strip:
+            self._strip.show(index)
+
+
+def _trail(film: Film, index: int) -> AnyArray:
+    """Where the robots were in the last seconds, (points, n, 2), thinned if the run has many ticks a second."""
+    since = film.index_at(float(film.time_s[index]) - TRAIL_S)
+    every = max(1, (index - since) // MOST_TRAIL_POINTS)
+    return film.pose[np.arange(index, since - 1, -every)[::-1], :, :2]
+
+
+def _colored(film: Film) -> IntArray | None:
+    """The states as places among the colours, which the most frequent ones get."""
+    if film.state is None:
+        return None
+    places = {name: i for i, name in enumerate(_frequent(film))}
+    colored = [places.get(name, NO_STATE) for name in film.state_names]
+    return np.array([*colored, NO_STATE])[film.state]  # NO_STATE is the last place, as -1 is
+
+
+def _frequent(film: Film) -> tuple[str, ...]:
+    """The states that get a colour: all, or the most frequent, in the order in which they came up."""
+    assert film.state is not None
+    counts = np.bincount(film.state[film.state >= 0], minlength=len(film.state_names))
+    most: list[int] = sorted(np.argsort(-counts, kind="stable")[: len(STATE_COLORS)].tolist())
+    return tuple(film.state_names[i] for i in most)
+
+
+def _entries(film: Film) -> list[Any]:
+    static = film.static
+    entries = group_entries(static, filled=film.state is None)
+    if film.state is not None:
+        names = _frequent(film)
+        stateless = len(names) < len(film.state_names) or bool((film.state == NO_STATE).any())
+        entries += state_entries(names, others=stateless)
+    if not film.alive.all():
+        entries.append(dead_entry())
+    if static.range_m is not None:
+        entries.append(link_entry(static.range_m))
+    return entries

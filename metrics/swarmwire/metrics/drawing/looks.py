@@ -1,0 +1,43 @@
+"""What every picture shares: its colours, sizes of letters, and the length that all of them are laid out for."""
+
+from typing import Any
+
+from swarmwire.metrics.palette import Color
+
+Look = dict[str, Any]  # arguments of matplotlib that say how a thing looks
+
+LONG_SIDE_IN = 6.4  # pictures are laid out in inches for this long side; pixels only scale them
+TITLE_PT, TEXT_PT, SMALL_PT = 9.5, 7.5, 6.5
+
+INK, SOFT, FAINT, GRID = "#20242b", "#69707d", "#b9bfc9", "#e6e9ee"
+PAPER, FLOOR = "#ffffff", "#f4f6f9"  # so far apart that a GIF's palette keeps both
+WALL, OBSTACLE, OBSTACLE_EDGE = "#5c6370", "#d3d8df", "#8f97a3"
+LIGHT, LIGHT_EDGE = "#ffd23f", "#c98f00"
+LINK = "#7d8aa5"
+DEAD: Color = (176, 180, 188)
+CURVE = "#2f6fae"
+STATE_COLORS: tuple[Color, ...] = (
+    (76, 120, 168),
+    (245, 133, 24),
+    (84, 162, 75),
+    (228, 87, 86),
+    (178, 121, 162),
+    (238, 202, 59),
+    (114, 183, 178),
+    (157, 117, 93),
+)
+OTHER_STATE: Color = (205, 208, 214)  # of robots in none of the states that have a colour
+
+_SHADE = 0.58  # how dark a colour's outline is beside it
+
+
+def rgb(color: Color) -> tuple[float, float, float]:
+    """A colour as matplotlib has it, 0 to 1."""
+    red, green, blue = color
+    return red / 255, green / 255, blue / 255
+
+
+def shade(color: Color) -> tuple[float, float, float]:
+    """The darker colour of the same hue, for outlines and thin lines on light ground."""
+    red, green, blue = rgb(color)
+    return red * _SHADE, green * _SHADE, blue * _SHADE

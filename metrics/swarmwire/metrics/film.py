@@ -1,0 +1,104 @@
+"""One arena of a run as it moved: what pictures and films of a run folder are drawn from."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.truth import Static
+
+if TYPE_CHECKING:
+    import polars as pl
+
+NO_STATE = -1
+DELIVERY = "delivery"  # over the last second
+
+
+class Recorded(Protocol):
+    """What a film needs of a run folder."""
+
+    @property
+    def static(self) -> Static:
+        """What did not change."""
+        ...
+
+    def ticks(self, arena: int | None = None) -> "pl.DataFrame":
+        """A row per tick of an arena, as far as it was written."""
+        ...
+
+
+@dataclass(frozen=True)
+class Film:
+    """An arena of a run, tick by tick, for T ticks and n robots."""
+
+    static: Static
+    arena: int
+    time_s: FloatArray  # (T,) rising
+    pose: AnyArray  # (T, n, 3) x, y in m, heading in rad, arena frame
+    alive: BoolArray  # (T, n)
+    metrics: dict[str, FloatArray]  # (T,) each, NaN where undefined
+    state: IntArray | None = None  # (T, n) places in `state_names`, NO_STATE for none; None if no robot has any
+    state_names: tuple[str, ...] = ()
+
+    def index_at(self, time_s: float) -> int:
+        """The last tick that had begun by then; the first if none had."""
+        return max(0, int(np.searchsorted(self.time_s, time_s + 1e-9, side="right")) - 1)
+
+
+def film_of(recorded: Recorded, arena: int, where: str) -> Film:
+    """The film of one arena; BadInput names `where` if there is no such arena, or no tick of it yet."""
+    static = recorded.static
+    if not 0 <= arena < static.arenas:
+        raise BadInput(where, "arena", f"expected 0 to {static.arenas - 1}, got {arena}")
+    frame = recorded.ticks(arena).sort("tick")
+    if frame.is_empty():
+        raise BadInput(where, "", "holds no tick yet")
+    pose = np.stack([frame[name].to_numpy() for name in ("x_m", "y_m", "heading_rad")], axis=-1)
+    names, state = states(frame)
+    return Film(
+        static=static,
+        arena=arena,
+        time_s=frame["time_s"].to_numpy(),
+        pose=pose,
+        alive=frame["alive"].to_numpy(),
+        metrics=_metrics(frame, static.rate_hz),
+        state=state,
+        state_names=names,
+    )
+
+
+def states(frame: "pl.DataFrame") -> tuple[tuple[str, ...], IntArray | None]:
+    """The names of the states that robots noted, in order of their first tick, and who was in which.
+
+    Null, the empty text and the number 0 are no state; other numbers are their own names. Second: (T, n) places in the
+    names or NO_STATE, or None if no robot ever noted a state.
+    """
+    import polars as pl
+
+    if "state" not in frame.columns:
+        return (), None
+    noted = frame["state"].explode()
+    unnoted = "0" if noted.dtype.is_integer() else ""
+    texts = noted.cast(pl.String)
+    names = [name for name in texts.unique(maintain_order=True).to_list() if name is not None and name != unnoted]
+    if not names:
+        return (), None
+    place = texts.cast(pl.Enum(names), strict=False).to_physical().cast(pl.Int64).fill_null(NO_STATE)
+    return tuple(names), place.to_numpy().reshape(frame.height, -1)
+
+
+def _metrics(frame: "pl.DataFrame", rate_hz: int) -> dict[str, FloatArray]:
+    """The columns that hold one number a tick, and `delivery`: receivers that heard, of those in range."""
+    import polars as pl
+
+    names = [name for name, kind in frame.schema.items() if kind == pl.Float64 and name != "time_s"]
+    found: dict[str, FloatArray] = {name: frame[name].fill_null(np.nan).to_numpy() for name in names}
+    if DELIVERY not in found and {"heard", "in_range"} <= set(frame.columns):
+        heard, in_range = (
+            frame[name].cast(pl.Float64).rolling_sum(rate_hz, min_samples=1).fill_null(np.nan).to_numpy()
+            for name in ("heard", "in_range")
+        )
+        found[DELIVERY] = np.divide(heard, in_range, out=np.full(len(heard), np.nan), where=in_range > 0)
+    return found

@@ -1,0 +1,119 @@
+"""The table of packets: a row per packet and receiver it might have reached, or per packet that never went on air."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.draws import LOW32, derive_key, purpose, uniform
+from swarmwire.comms.fates import FATE_NAMES
+from swarmwire.comms.truth import Finished, Static
+
+if TYPE_CHECKING:
+    import polars as pl
+
+NOBODY = -1  # Finished's receiver of a packet that never went on air
+
+
+def packet_schema() -> "dict[str, Any]":
+    """The type of each column."""
+    import polars as pl
+
+    return {
+        "arena": pl.Int32,
+        "sender": pl.Int32,
+        "receiver": pl.Int32,  # null: never on air
+        "receivers": pl.Int32,
+        "sequence": pl.Int64,
+        "sent_at_ns": pl.Int64,
+        "on_air_at_ns": pl.Int64,
+        "final_at_ns": pl.Int64,
+        "fate": pl.Enum(FATE_NAMES),
+        "rssi_dbm": pl.Float32,  # null: the radio knows none
+        "size_bytes": pl.Int32,
+        "topic": pl.String,
+        "distance_m": pl.Float32,  # null: never on air, or longer ago than poses are kept
+    }
+
+
+class PacketSample:
+    """Which packets are recorded: a share of them, the same whatever the layout, each with all of its receivers."""
+
+    def __init__(self, share: float, seeds: tuple[int, ...]) -> None:
+        self._share = share
+        self._keys: KeyArray = np.array([derive_key("recorded packets", seed) for seed in seeds], np.uint64)
+
+    def __call__(self, finished: Finished) -> BoolArray:
+        """Whether to keep each row, (k,)."""
+        if self._share >= 1.0:
+            return np.ones(len(finished.sender), np.bool_)
+        key, sequence = self._keys[finished.arena], finished.sequence
+        drawn = uniform(key, purpose("packet"), finished.sender, sequence & LOW32, sequence >> 32)
+        return drawn < self._share
+
+
+@dataclass
+class PacketColumns:
+    """The links that ended in some ticks, and the poses of these and some ticks before, as references."""
+
+    static: Static
+    sample: PacketSample
+    topics: Mapping[int, str]  # name of a message's class by its tag
+    first_tick: int  # of `poses`
+    poses: list[FloatArray]  # of each tick since, (rows, 3)
+    parts: list[Finished] = field(default_factory=list[Finished])
+
+    def frame(self) -> "pl.DataFrame":
+        """The rows of the packets in the sample, as they ended."""
+        import polars as pl
+
+        keep = [self.sample(part) for part in self.parts]
+        taken = {name: self._joined(name, keep) for name in Finished.__slots__ if name != "rssi_dbm"}
+        fate, tag = taken.pop("fate"), taken.pop("tag")
+        has_receiver = pl.Series(taken["receiver"] != NOBODY)
+        columns: dict[str, Any] = {
+            **taken,
+            "fate": pl.Series(FATE_NAMES).gather(fate),
+            "rssi_dbm": self._rssi_dbm(keep),
+            "topic": self._topic(tag),
+            "distance_m": pl.Series(self._distance_m(taken)).fill_nan(None),
+        }
+        schema = packet_schema()
+        frame = pl.DataFrame({name: columns[name] for name in schema}, schema_overrides=schema)
+        return frame.with_columns(receiver=pl.when(has_receiver).then("receiver"))
+
+    def _joined(self, name: str, keep: list[BoolArray]) -> IntArray:
+        return np.concatenate([getattr(part, name)[rows] for part, rows in zip(self.parts, keep, strict=True)])
+
+    def _rssi_dbm(self, keep: list[BoolArray]) -> "pl.Series":
+        import polars as pl
+
+        none: AnyArray = np.full(1, np.nan)
+        strengths = [none if part.rssi_dbm is None else part.rssi_dbm for part in self.parts]
+        strengths = [np.broadcast_to(rssi, rows.shape)[rows] for rssi, rows in zip(strengths, keep, strict=True)]
+        return pl.Series(np.concatenate(strengths)).fill_nan(None)
+
+    def _topic(self, tag: IntArray) -> "pl.Series":
+        import polars as pl
+
+        known, place = np.unique(tag, return_inverse=True)
+        return pl.Series([self.topics.get(one, f"0x{one:04x}") for one in known.tolist()], dtype=pl.String).gather(
+            place
+        )
+
+    def _distance_m(self, links: Mapping[str, IntArray]) -> FloatArray:
+        """Between sender and receiver when the packet went on air, (k,); NaN without a receiver or the tick's poses."""
+        # The last tick that starts no later than on_air_at: the air takes geometry from its poses.
+        tick = ((links["on_air_at_ns"] + 1) * self.static.rate_hz - 1) // NS_PER_S - self.first_tick
+        known = np.flatnonzero((links["receiver"] != NOBODY) & (tick >= 0) & (tick < len(self.poses)))
+        distance_m = np.full(len(tick), np.nan)
+        if len(known):
+            place = np.stack([pose[:, :2] for pose in self.poses])
+            first = links["arena"][known] * self.static.robots
+            sender = place[tick[known], first + links["sender"][known]]
+            receiver = place[tick[known], first + links["receiver"][known]]
+            distance_m[known] = np.hypot(*(sender - receiver).T)
+        return distance_m

@@ -1,0 +1,62 @@
+"""A table on disk: numbered part files while a run goes on, one file once it is over.
+
+`NAME/part-000000.parquet` and so on become `NAME.parquet`. Each file is written aside and renamed, so whatever carries
+its name is whole: a Parquet file that is cut off is unreadable. (Against a killed process; there is no sync to disk for
+a power cut.)
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import polars as pl
+
+ASIDE = ".aside"  # the end of a name while the file is being written
+# Level 3 saves nothing on poses. Statistics of lists take seven times as long as all the rest.
+PARQUET: dict[str, Any] = {"compression": "zstd", "compression_level": 1, "statistics": False}
+
+
+def table_file(folder: Path, name: str) -> Path:
+    """The table of a run that ended."""
+    return folder / f"{name}.parquet"
+
+
+def part_file(folder: Path, name: str, number: int) -> Path:
+    """A part of a table whose run goes on, or was killed."""
+    return folder / name / f"part-{number:06d}.parquet"
+
+
+def parts_of(folder: Path, name: str) -> list[Path]:
+    """The parts that are there, in order; none once they are joined."""
+    return sorted((folder / name).glob("part-*.parquet"))
+
+
+def write_file(frame: "pl.DataFrame", path: Path) -> None:
+    """Write a frame under this name, all of it or nothing; OSError if the disk will not have it."""
+    aside = path.with_name(path.name + ASIDE)
+    try:
+        frame.write_parquet(aside, **PARQUET)
+        aside.replace(path)
+    except BaseException:
+        aside.unlink(missing_ok=True)  # on a full disk the half of it is in the way
+        raise
+
+
+def join_parts(folder: Path, name: str) -> None:
+    """Make one file of the parts, which go; where they end does not show in it. Reads them piece by piece."""
+    import polars as pl
+
+    parts, whole = parts_of(folder, name), table_file(folder, name)
+    if len(parts) == 1:
+        parts[0].replace(whole)
+    else:
+        aside = whole.with_name(whole.name + ASIDE)
+        try:
+            pl.scan_parquet(parts).sink_parquet(aside, **PARQUET)
+            aside.replace(whole)
+        except BaseException:
+            aside.unlink(missing_ok=True)
+            raise
+        for part in parts:
+            part.unlink()
+    (folder / name).rmdir()

@@ -1,0 +1,58 @@
+"""What does not change in a run, `Static`, as JSON: `static.json` of a run folder."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, cast
+
+from swarmwire.comms.body import body_from
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.truth import Group, Light, Obstacle, Static
+from swarmwire.metrics.record.part_files import ASIDE
+
+NAME = "static.json"
+FORMAT = 1
+
+
+def write_static(static: Static, path: Path) -> None:
+    """Write it aside, then rename, so that no half of it is ever seen."""
+    aside = path.with_name(path.name + ASIDE)
+    aside.write_text(json.dumps({"format": FORMAT, **asdict(static)}, indent=2) + "\n", encoding="utf-8")
+    aside.replace(path)
+
+
+def read_static(path: Path) -> Static:
+    """What `write_static` wrote, equal to it; BadInput if there is no such file, or it holds something else."""
+    try:
+        read = json.loads(path.read_text(encoding="utf-8"))
+        found = read.pop("format")
+        if found != FORMAT:
+            raise BadInput(str(path), "format", f"expected {FORMAT}, got {found!r}")
+        return _static(read, str(path))
+    except FileNotFoundError:
+        raise BadInput(str(path), "", "expected a file that a run wrote; there is none") from None
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise BadInput(str(path), "", f"expected the static part of a run: {error}") from error
+
+
+def _static(read: Mapping[str, Any], where: str) -> Static:
+    fields: dict[str, Any] = {key: _as_tuples(value) for key, value in read.items()}
+    fields["obstacles"] = tuple(tuple(Obstacle(**_plain(item)) for item in own) for own in read["obstacles"])
+    fields["lights"] = tuple(tuple(Light(**_plain(item)) for item in own) for own in read["lights"])
+    fields["groups"] = tuple(_group(item, where) for item in read["groups"])
+    return Static(**fields)
+
+
+def _group(item: Mapping[str, Any], where: str) -> Group:
+    fields: dict[str, Any] = {**item, "body": body_from(item["body"], where)}
+    return Group(**fields)
+
+
+def _plain(item: Mapping[str, object]) -> dict[str, Any]:
+    return {key: _as_tuples(value) for key, value in item.items()}
+
+
+def _as_tuples(value: object) -> object:
+    """JSON has lists where these dataclasses have tuples."""
+    return tuple(_as_tuples(item) for item in cast("list[object]", value)) if isinstance(value, list) else value

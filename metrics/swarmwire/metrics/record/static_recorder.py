@@ -1,0 +1,25 @@
+"""`static.json`: arena, bodies, groups and names of a run, written as it begins."""
+
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.metrics.record.static_file import NAME, write_static
+
+
+class StaticRecorder:
+    """Observer that writes `static.json`, before the first tick. No summary part."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def begin(self, static: Static) -> None:
+        """Write it."""
+        write_static(static, self._folder / NAME)
+
+    def see(self, truth: Truth) -> None:
+        """Nothing: what is static does not change."""
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """Nothing to add."""
+        return {}

@@ -1,0 +1,108 @@
+"""The table of ticks: its columns, and a chunk of them being filled. One row per tick and arena."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray, FloatArray
+from swarmwire.comms.clock import to_s
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.truth import Static, Tally, Truth
+
+if TYPE_CHECKING:
+    import polars as pl
+
+POSE = ("x_m", "y_m", "heading_rad")  # arena frame
+VELOCITY = ("vx_mps", "vy_mps", "turn_radps")  # arena frame
+COMMAND = ("command_forward_mps", "command_turn_radps")  # as applied
+MOTION = (*POSE, *VELOCITY, *COMMAND)  # lists with a number per robot, float32
+ROBOT_COLUMNS = (*MOTION, "alive", "state")  # lists with an item per robot
+RADIO = ("sent", "heard", "in_range")  # packets; receivers; receivers: since the tick before
+KEYS = ("tick", "time_s", "arena", "seed")
+BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 2
+
+
+def tick_schema(robots: int, metrics: Sequence[str]) -> "dict[str, Any]":
+    """The type of each column, for so many robots in an arena and these metrics."""
+    import polars as pl
+
+    return {
+        "tick": pl.Int64,
+        "time_s": pl.Float64,
+        "arena": pl.Int32,
+        "seed": pl.Int64,
+        **dict.fromkeys(MOTION, pl.Array(pl.Float32, robots)),
+        "alive": pl.Array(pl.Boolean, robots),
+        "state": pl.Array(pl.String, robots),
+        **dict.fromkeys(metrics, pl.Float64),
+        **dict.fromkeys(RADIO, pl.Int64),
+    }
+
+
+class TickColumns:
+    """Room for `ticks` ticks, in arrays (ticks, arenas, robots) or (ticks, arenas)."""
+
+    def __init__(self, static: Static, metrics: Sequence[str], ticks: int) -> None:
+        shape = (ticks, static.arenas)
+        of_robots = (*shape, static.robots)
+        self.ticks = 0  # filled
+        self._static, self._metrics = static, metrics
+        self._tick: AnyArray = np.empty(ticks, np.int64)
+        self._time_s: AnyArray = np.empty(ticks, np.float64)
+        # As the truth has them, which copies fastest; the thread that writes puts them in columns.
+        self._pose: AnyArray = np.empty((*of_robots, len(POSE)), np.float32)
+        self._velocity: AnyArray = np.empty((*of_robots, len(VELOCITY)), np.float32)
+        self._command: AnyArray = np.empty((*of_robots, len(COMMAND)), np.float32)
+        self._alive: AnyArray = np.empty(of_robots, np.bool_)
+        self._state: AnyArray = np.empty(of_robots, np.uint16)
+        self._states: tuple[str, ...] = ("",)
+        self._measured: AnyArray = np.empty((len(metrics), *shape), np.float64)
+        self._radio: AnyArray = np.empty((len(RADIO), *shape), np.int64)
+        self._has_radio: AnyArray = np.empty(ticks, np.bool_)
+
+    def add(self, truth: Truth, latest: dict[str, FloatArray]) -> None:
+        """Copy a tick, with what the metrics say of it (arenas,) each."""
+        at, shape = self.ticks, (self._static.arenas, self._static.robots)
+        self._tick[at], self._time_s[at] = truth.tick, to_s(truth.time_ns)
+        self._pose[at] = truth.pose.reshape(*shape, -1)
+        self._velocity[at] = truth.velocity.reshape(*shape, -1)
+        self._command[at] = truth.command.reshape(*shape, -1)
+        self._alive[at] = truth.alive.reshape(shape)
+        self._state[at] = truth.state.reshape(shape)
+        self._states = truth.states  # it only grows
+        for place, name in enumerate(self._metrics):
+            self._measured[place, at] = latest[name]
+        self._has_radio[at] = truth.tally is not None
+        if truth.tally is not None:
+            self._radio[:, at] = _counts(truth.tally)
+        self.ticks += 1
+
+    def frame(self) -> "pl.DataFrame":
+        """The rows filled so far, by tick and arena."""
+        import polars as pl
+
+        ticks, arenas, robots = self.ticks, self._static.arenas, self._static.robots
+        per_robot = (ticks * arenas, robots)
+        columns: dict[str, Any] = {
+            "tick": np.repeat(self._tick[:ticks], arenas),
+            "time_s": np.repeat(self._time_s[:ticks], arenas),
+            "arena": np.tile(np.arange(arenas, dtype=np.int32), ticks),
+            "seed": np.tile(np.array(self._static.seeds, np.int64), ticks),
+        }
+        for names, values in ((POSE, self._pose), (VELOCITY, self._velocity), (COMMAND, self._command)):
+            for place, name in enumerate(names):
+                columns[name] = np.ascontiguousarray(values[:ticks, ..., place]).reshape(per_robot)
+        columns["alive"] = self._alive[:ticks].reshape(per_robot)
+        columns["state"] = pl.Series(self._states).gather(self._state[:ticks].reshape(-1)).reshape(per_robot)
+        measured = {name: self._measured[row, :ticks].reshape(-1) for row, name in enumerate(self._metrics)}
+        columns |= {name: pl.Series(values).fill_nan(None) for name, values in measured.items()}
+        no_radio = pl.Series(np.repeat(~self._has_radio[:ticks], arenas))
+        for row, name in enumerate(RADIO):
+            columns[name] = pl.Series(self._radio[row, :ticks].reshape(-1)).set(no_radio, None)
+        return pl.DataFrame(columns, schema=tick_schema(robots, self._metrics))
+
+
+def _counts(tally: Tally) -> AnyArray:
+    """Packets sent, receivers that heard, receivers in range, (3, arenas)."""
+    return np.stack([tally.sent, tally.fates[:, Fate.HEARD], tally.in_range])

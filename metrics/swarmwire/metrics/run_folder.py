@@ -1,0 +1,139 @@
+"""A run folder, read back: of runs that ended, that were killed, and that still go on."""
+
+import json
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.record.event_recorder import event_schema
+from swarmwire.metrics.record.packet_columns import packet_schema
+from swarmwire.metrics.record.part_files import parts_of, table_file
+from swarmwire.metrics.record.static_file import NAME, read_static
+from swarmwire.metrics.record.tick_columns import ROBOT_COLUMNS
+
+if TYPE_CHECKING:
+    import polars as pl
+
+SUMMARY = "summary.json"
+SCHEMAS = {"packets": packet_schema, "events": event_schema}  # which may well have no rows
+CHANGES_UNDERFOOT = 3  # times that the files of a running run may be joined while they are read
+
+
+class RunFolder:
+    """Tables of a run as polars frames (`.to_pandas()` gives pandas': needs pyarrow, which the extra [view] brings).
+
+    Of a run that was killed or still goes on they hold what is on disk; each call looks again. BadInput where a file is
+    missing or damaged.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        """Look at this folder; BadInput unless there is one."""
+        self.path = Path(path)
+        if not self.path.is_dir():
+            raise BadInput(str(path), "", "expected a run folder")
+
+    @property
+    def summary(self) -> dict[str, Any] | None:
+        """`summary.json`; None if the run has not ended, or was killed."""
+        path = self.path / SUMMARY
+        try:
+            return json.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return None
+        except ValueError as error:
+            raise BadInput(str(path), "", f"expected JSON: {error}") from error
+
+    @cached_property
+    def _static(self) -> Static:
+        return read_static(self.path / NAME)
+
+    @property
+    def static(self) -> Static:
+        """Arena, bodies, groups and names."""
+        return self._static
+
+    def ticks(self, arena: int | None = None) -> "pl.DataFrame":
+        """A row per tick and arena, of one arena or of all; lists with an item per robot in its order.
+
+        Columns: tick, time_s, arena, seed; lists x_m, y_m, heading_rad, vx_mps, vy_mps, turn_radps (arena frame),
+        command_forward_mps, command_turn_radps (as applied), all float32, alive, state ("": none named); each metric (a
+        count's total so far; null: undefined); sent, heard, in_range since the tick before (null without a radio).
+        """
+        return self._read("ticks", arena)
+
+    def robots(self, arena: int = 0) -> "pl.DataFrame":
+        """A row per tick and robot of one arena: tick, time_s, robot (name), group, the lists of `ticks`."""
+        import polars as pl
+
+        static, ticks = self.static, self.ticks(self._checked(arena))
+        names = pl.Series(static.robot_names, dtype=pl.Enum(static.robot_names))
+        in_order = [group.name for group in static.groups for _ in range(group.start, group.stop)]
+        groups = pl.Series(in_order, dtype=pl.Enum([group.name for group in static.groups]))
+        index = pl.Series(list(range(static.robots)) * len(ticks), dtype=pl.UInt32)
+        return pl.DataFrame(
+            [
+                *(ticks[name].gather(_repeated(len(ticks), static.robots)) for name in ("tick", "time_s")),
+                names.gather(index).alias("robot"),
+                groups.gather(index).alias("group"),
+                *(ticks[name].explode() for name in ROBOT_COLUMNS),
+            ]
+        )
+
+    def metrics(self, arena: int = 0) -> "pl.DataFrame":
+        """A row per tick of one arena: tick, time_s, each metric, and the radio's counts."""
+        return self._read("ticks", self._checked(arena), [*ROBOT_COLUMNS, "arena", "seed"])
+
+    def packets(self, arena: int | None = None) -> "pl.DataFrame":
+        """A row per (packet, receiver within reach), of one arena or of all; BadInput if none were recorded.
+
+        Columns: arena, sender and receiver (indices; receiver null: never on air, `receivers` tells how many it was
+        meant for), sequence, sent_at_ns, on_air_at_ns, final_at_ns, fate, rssi_dbm (null: unknown), size_bytes, topic,
+        distance_m (between the two when it went on air; null: unknown).
+        """
+        return self._read("packets", arena)
+
+    def events(self, arena: int | None = None) -> "pl.DataFrame":
+        """A row per event and arena: at_s, tick, time_s, do, ended, arena, robots (names of those it changed)."""
+        return self._read("events", arena)
+
+    def files(self, name: str) -> list[Path]:
+        """The files of a table: the whole of it, else the parts that are there, else none."""
+        whole = table_file(self.path, name)
+        return [whole] if whole.exists() else parts_of(self.path, name)
+
+    def _checked(self, arena: int) -> int:
+        if not 0 <= arena < self.static.arenas:
+            raise BadInput(str(self.path), "arena", f"expected 0 to {self.static.arenas - 1}, got {arena}")
+        return arena
+
+    def _read(self, name: str, arena: int | None, left_out: Sequence[str] = ()) -> "pl.DataFrame":
+        import polars as pl
+
+        for _ in range(CHANGES_UNDERFOOT):
+            files = self.files(name)
+            if not files:
+                break
+            try:
+                lazy = pl.scan_parquet(files)
+                if arena is not None:
+                    lazy = lazy.filter(pl.col("arena") == arena)
+                return lazy.drop(*left_out).collect()
+            except FileNotFoundError:
+                continue  # the run ended just now, and its parts were joined
+            except pl.exceptions.PolarsError as error:
+                where = str(self.path / name)
+                raise BadInput(where, "", f"expected whole Parquet files ({error}); see swarmwire verify") from error
+        if name in SCHEMAS and (self.path / name).is_dir():  # a run that was killed before anything happened
+            return pl.DataFrame(schema=SCHEMAS[name]())
+        raise BadInput(str(self.path), name, "expected this table; the folder holds nothing of it")
+
+
+def _repeated(rows: int, times: int) -> "pl.Series":
+    """0 `times` times, then 1, and so on up to rows - 1."""
+    import numpy as np
+    import polars as pl
+
+    return pl.Series(np.repeat(np.arange(rows, dtype=np.uint32), times))

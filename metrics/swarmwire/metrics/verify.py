@@ -1,0 +1,115 @@
+"""Check a run folder: what is whole, what a killed run left, what is missing, what does not agree."""
+
+from collections.abc import Callable, Mapping
+from hashlib import file_digest
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.agreement import Verdict, events_agree, packets_agree, ticks_agree
+from swarmwire.metrics.finding import Finding, State
+from swarmwire.metrics.record import run_log, static_file
+from swarmwire.metrics.recording_check import check_recording
+from swarmwire.metrics.run_folder import SUMMARY, RunFolder
+from swarmwire.metrics.table_check import check_table
+
+Agreement = Callable[[list[Path], Mapping[str, Any] | None], Verdict]
+TABLES: dict[str, Agreement] = {"ticks": ticks_agree, "packets": packets_agree, "events": events_agree}
+ALWAYS = ("ticks", "events")  # recorded unless the summary says otherwise
+RECORDING = "run.rrd"
+
+
+def verify(path: Path | str) -> list[Finding]:
+    """A finding for each part of a run folder; nothing is changed. BadInput if this is no run folder."""
+    folder = RunFolder(path)
+    parts = (SUMMARY, static_file.NAME, run_log.NAME, RECORDING, *TABLES, *(f"{name}.parquet" for name in TABLES))
+    if not any((folder.path / part).exists() for part in parts):
+        raise BadInput(str(path), "", "expected a run folder; there is nothing of a run in it")
+    summary, of_summary = _summary(folder)
+    return [
+        of_summary,
+        _static(folder),
+        *(_table(folder, name, summary) for name in TABLES),
+        _recording(folder),
+        _log(folder),
+        *_copies(folder, summary),
+    ]
+
+
+def _summary(folder: RunFolder) -> tuple[dict[str, Any] | None, Finding]:
+    try:
+        summary = folder.summary
+    except BadInput as error:
+        return None, Finding(SUMMARY, State.DAMAGED, error.expected)
+    if summary is None:
+        return None, Finding(SUMMARY, State.MISSING, "the run did not end by itself, or still goes on")
+    arenas = f", {summary['arenas']} arenas" if summary["arenas"] > 1 else ""
+    text = f"ended: {summary['ended']}; {summary['ticks']} ticks ({summary['sim_time_s']:g} s){arenas}"
+    return summary, Finding(SUMMARY, State.WHOLE, text)
+
+
+def _static(folder: RunFolder) -> Finding:
+    if not (folder.path / static_file.NAME).exists():
+        return Finding(static_file.NAME, State.MISSING, "without it rows have no robots' names")
+    try:
+        static = folder.static
+    except BadInput as error:
+        return Finding(static_file.NAME, State.DAMAGED, error.expected)
+    return Finding(static_file.NAME, State.WHOLE, f"{static.name}: {static.robots} robots, {static.rate_hz} Hz")
+
+
+def _table(folder: RunFolder, name: str, summary: dict[str, Any] | None) -> Finding:
+    found = check_table(folder.path, name)
+    if found.state is State.MISSING:
+        expected = name in (summary["record"] if summary and "record" in summary else ALWAYS)
+        return Finding(name, State.MISSING, found.text) if expected else Finding(name, State.NOT_RECORDED, "")
+    if not found.files:
+        return Finding(name, found.state, found.text)
+    reach = "; ".join(part for part in (_reach(name, found.files), found.text) if part)
+    verdict = TABLES[name](found.files, summary) if found.state is not State.DAMAGED else None
+    state, text = verdict or (found.state, "")
+    return Finding(name, state, f"{text}; {reach}" if text else reach)
+
+
+def _reach(name: str, files: list[Path]) -> str:
+    """How much a table holds, in words."""
+    import polars as pl
+
+    table, megabytes = pl.scan_parquet(files), sum(file.stat().st_size for file in files) / 1e6
+    rows = table.select(pl.len()).collect().item()
+    text = f"{rows} rows, {megabytes:.1f} MB"
+    if name == "ticks" and rows:
+        tick, time_s = table.select(pl.col("tick").max(), pl.col("time_s").max()).collect().row(0)
+        text += f", up to tick {tick} ({time_s:g} s)"
+    return text
+
+
+def _recording(folder: RunFolder) -> Finding:
+    path = folder.path / RECORDING
+    if not path.exists():
+        return Finding(RECORDING, State.NOT_RECORDED, "")
+    return Finding(RECORDING, *check_recording(path))
+
+
+def _log(folder: RunFolder) -> Finding:
+    path = folder.path / run_log.NAME
+    if not path.exists():
+        return Finding(run_log.NAME, State.MISSING, "what was said during the run")
+    with path.open("rb") as file:
+        lines = sum(1 for _ in file)
+    return Finding(run_log.NAME, State.WHOLE if lines else State.DAMAGED, f"{lines} lines")
+
+
+def _copies(folder: RunFolder, summary: dict[str, Any] | None) -> list[Finding]:
+    """Of each file that the summary lists, whether it is there and as it was."""
+    findings: list[Finding] = []
+    for copy in (summary or {}).get("files", []):
+        path = folder.path / copy["path"]
+        if not path.is_file():
+            findings.append(Finding(copy["path"], State.MISSING, "a file that the run used"))
+            continue
+        with path.open("rb") as file:
+            same = file_digest(file, "sha256").hexdigest() == copy["sha256"]
+        text = f"sha256 {copy['sha256'][:16]}…" if same else f"its sha256 is not {copy['sha256'][:16]}…"
+        findings.append(Finding(copy["path"], State.WHOLE if same else State.DIFFERS, text))
+    return findings

@@ -1,0 +1,233 @@
+"""What observers elsewhere get of a run comes over whole, and what contradicts itself is refused."""
+
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+
+from swarmwire.comms.body import load_body
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.glimpse import Glimpse, Scene, Series
+from swarmwire.comms.one_arena import static_of, truth_of
+from swarmwire.comms.senses import GroupSenses
+from swarmwire.comms.truth import Finished, Group, Happened, Light, Obstacle, Static, Tally, Truth
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.scene_frames import decode_scene, encode_scene
+from swarmwire.comms.wire.truth_frames import decode_truth, encode_truth
+
+ROBOTS, ARENAS = 3, 2
+ROWS = ROBOTS * ARENAS
+OBSTACLES = (Obstacle("box", 1.0, 0.5, 0.2, size_m=(1.0, 2.0)), Obstacle("polygon", 0, 0, points_m=((0, 0), (1, 0))))
+STATIC = Static(
+    name="two groups",
+    seeds=(4, 9),
+    rate_hz=10,
+    arena_size_m=(8.0, 6.0),
+    walled=True,
+    obstacles=(OBSTACLES, ()),
+    groups=(Group("a", load_body("epuck"), 0, 2), Group("b", load_body("footbot"), 2, 3, act_every_ticks=5)),
+    robot_names=("a-0", "a-1", "b-0"),
+    range_m=2.0,
+    lights=((Light(0.5, 0.5, 2.0),), ()),
+)
+SCENE = Scene(STATIC, (Series("order", "", (0.0, 1.0)), Series("min_gap", "m", (None, None))), STATIC.robot_names[1])
+I64 = np.iinfo(np.int64)
+
+
+def ints(*shape: int, least: int = I64.min, most: int = I64.max) -> st.SearchStrategy[Any]:
+    return npst.arrays(np.int64, shape, elements=st.integers(least, most))
+
+
+def floats(*shape: int) -> st.SearchStrategy[Any]:
+    return npst.arrays(np.float64, shape)
+
+
+@st.composite
+def finished_(draw: st.DrawFn) -> Finished:
+    k = draw(st.integers(0, 4))
+    bounds = {"arena": (0, ARENAS), "sender": (0, ROBOTS), "receiver": (-1, ROBOTS), "fate": (0, len(Fate))}
+    columns = {
+        of.name: draw(ints(k, least=bounds[of.name][0], most=bounds[of.name][1] - 1))
+        if of.name in bounds
+        else draw(ints(k))
+        for of in fields(Finished)
+        if of.name != "rssi_dbm"
+    }
+    return Finished(**columns, rssi_dbm=draw(st.none() | floats(k)))
+
+
+@st.composite
+def glimpses(draw: st.DrawFn) -> Glimpse:
+    states = ("", *draw(st.lists(st.text(max_size=64), max_size=3)))
+    rows = np.array(draw(st.lists(st.integers(0, ROWS - 1), unique=True)), np.int64)
+    senses = {"a": GroupSenses(np.sort(rows), {"compass.heading_rad": draw(floats(len(rows)))})}
+    flags = npst.arrays(np.bool_, ROWS)
+    happened = st.builds(Happened, st.integers(0, 99), st.floats(0, 1e9), st.text(max_size=9), st.booleans(), flags)
+    truth = Truth(
+        tick=draw(st.integers(0, 2**40)),
+        time_ns=draw(st.integers(0, 2**62)),
+        alive=draw(flags),
+        pose=draw(floats(ROWS, 3)),
+        velocity=draw(floats(ROWS, 3)),
+        command=draw(floats(ROWS, 2)),
+        state=draw(ints(ROWS, least=0, most=len(states) - 1)),
+        states=states,
+        senses=draw(st.sampled_from([{}, senses])),
+        contact_onsets=draw(ints(ARENAS, 2)),
+        edges=draw(st.none() | ints(draw(st.integers(0, 5)), 2, least=0, most=ROWS - 1)),
+        tally=draw(st.none() | st.builds(Tally, ints(2), ints(2), ints(2), ints(2, len(Fate)))),
+        finished=draw(st.none() | finished_()),
+        events=tuple(draw(st.lists(happened, max_size=3))),
+    )
+    return Glimpse(truth, draw(st.integers(0, 2**40)), draw(st.integers(1, 2**40)), draw(floats(2, ARENAS)))
+
+
+def equal(a: Any, b: Any) -> bool:
+    """Whether two truths, or parts of them, are the same in every bit."""
+    if isinstance(a, np.ndarray):
+        return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+    if hasattr(a, "__dataclass_fields__"):
+        return type(a) is type(b) and all(equal(getattr(a, of.name), getattr(b, of.name)) for of in fields(a))
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(equal(a[key], b[key]) for key in a)
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(map(equal, a, b))
+    return a == b
+
+
+@given(glimpses())
+@settings(max_examples=60)
+def test_a_glimpse_comes_over_whole(glimpse):
+    assert equal(decode_truth(frames.decode(encode_truth(glimpse)), SCENE), glimpse)
+
+
+def test_a_scene_comes_over_whole():
+    assert decode_scene(frames.decode(encode_scene(SCENE))) == SCENE
+
+
+def quiet(**given: Any) -> Glimpse:
+    truth = Truth(
+        tick=1,
+        time_ns=0,
+        alive=np.ones(ROWS, np.bool_),
+        pose=np.zeros((ROWS, 3)),
+        velocity=np.zeros((ROWS, 3)),
+        command=np.zeros((ROWS, 2)),
+        state=np.zeros(ROWS, np.int64),
+        states=("",),
+        senses={},
+        contact_onsets=np.zeros((ARENAS, 2), np.int64),
+        edges=None,
+        tally=None,
+        finished=None,
+    )
+    return Glimpse(replace(truth, **given), 0, 1, np.zeros((2, ARENAS)))
+
+
+def one_finished(**given: int) -> Finished:
+    names = [of.name for of in fields(Finished) if of.name != "rssi_dbm"]
+    return Finished(**{name: np.array([given.get(name, 0)]) for name in names})
+
+
+@pytest.mark.parametrize(
+    ("fault", "given"),
+    [
+        ("alive", {"alive": np.ones(ROWS - 1, np.bool_)}),
+        ("pose", {"pose": np.zeros((ROWS, 2))}),
+        ("velocity", {"velocity": np.zeros((ROWS, 3), np.int64)}),
+        ("state", {"state": np.full(ROWS, 1)}),
+        ("state", {"state": np.full(ROWS, -1)}),
+        ("states", {"states": ()}),
+        ("states", {"states": ("", "x" * 65)}),
+        ("edges", {"edges": np.array([[0, ROWS]])}),
+        ("edges", {"edges": np.array([[-1, 0]])}),
+        ("tick", {"tick": -1}),
+        ("time_ns", {"time_ns": -1}),
+        ("tally/fates", {"tally": Tally(*np.zeros((3, ARENAS), np.int64), np.zeros((ARENAS, 3), np.int64))}),
+        ("finished.fate", {"finished": one_finished(fate=len(Fate))}),
+        ("finished.receiver", {"finished": one_finished(receiver=-2)}),
+        ("finished.sender", {"finished": one_finished(sender=ROBOTS)}),
+        ("events", {"events": (Happened(0, 0.0, "kill", False, np.ones(2, np.bool_)),)}),
+        ("groups of this run", {"senses": {"c": GroupSenses(np.zeros(1, np.int64), {})}}),
+        ("sense/a/rows", {"senses": {"a": GroupSenses(np.array([ROWS]), {"x": np.zeros(1)})}}),
+        ("sense/a", {"senses": {"a": GroupSenses(np.array([0]), {"x": np.zeros(2)})}}),
+    ],
+)
+def test_a_glimpse_that_contradicts_itself_is_refused(fault, given):
+    with pytest.raises(BadFrame, match=fault):
+        decode_truth(frames.decode(encode_truth(quiet(**given))), SCENE)
+
+
+@pytest.mark.parametrize("change", [{"serial": -1}, {"ticks": 0}, {"values": np.zeros((3, ARENAS))}])
+def test_numbers_about_a_glimpse_are_checked(change):
+    with pytest.raises(BadFrame):
+        decode_truth(frames.decode(encode_truth(replace(quiet(), **change))), SCENE)
+
+
+@pytest.mark.parametrize("version", [None, 0, 2, "1", True])
+def test_frames_of_another_version_are_refused(version):
+    for kind, data in (("truth", encode_truth(quiet())), ("scene", encode_scene(SCENE))):
+        frame = frames.decode(data)
+        other = replace(frame, values={**frame.values, "version": version})
+        with pytest.raises(BadFrame, match=f"expected {kind} 1"):
+            decode_truth(other, SCENE) if kind == "truth" else decode_scene(other)
+
+
+def test_a_frame_is_not_taken_for_one_of_another_kind():
+    with pytest.raises(BadFrame, match="expected truth"):
+        decode_truth(frames.decode(encode_scene(SCENE)), SCENE)
+    with pytest.raises(BadFrame, match="expected scene"):
+        decode_scene(frames.decode(encode_truth(quiet())))
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"seeds": ()}, "seeds"),
+        ({"rate_hz": 0}, "rate_hz"),
+        ({"rate_hz": 10.5}, "scene.static.rate_hz"),
+        ({"arena_size_m": (8.0, 0.0)}, "arena_size_m"),
+        ({"arena_size_m": (8.0, float("nan"))}, r"scene.static.arena_size_m\[1\]"),
+        ({"arena_size_m": (8.0,)}, "expected 2 values"),
+        ({"obstacles": ((),)}, "obstacles"),
+        ({"lights": ((),)}, "lights"),
+        ({"robot_names": ("a-0", "a-1")}, "groups"),
+        ({"robot_names": ("a-0", "a-1", 7)}, r"robot_names\[2\]"),
+        ({"groups": (Group("b", load_body("footbot"), 1, 3),)}, "groups"),
+        ({"groups": (Group("b", load_body("footbot"), 0, 3, act_every_ticks=0),)}, "act_every_ticks"),
+    ],
+)
+def test_a_scene_that_contradicts_itself_is_refused(change, fault):
+    with pytest.raises(BadFrame, match=fault):
+        decode_scene(frames.decode(encode_scene(replace(SCENE, static=replace(STATIC, **change)))))
+
+
+@given(st.recursive(st.none() | st.booleans() | st.integers(0, 9) | st.text(max_size=3), st.lists))
+def test_a_scene_of_anything_else_is_refused(junk):
+    for scene in (junk, {"static": junk, "series": []}):
+        with pytest.raises(BadFrame):
+            decode_scene(frames.decode(frames.encode("scene", -1, {}, {"version": 1, "scene": scene})))
+
+
+@given(glimpses(), st.integers(0, ARENAS - 1))
+@settings(max_examples=40)
+def test_one_arena_of_several_is_a_run_of_its_own(glimpse, arena):
+    truth, rows = glimpse.truth, slice(arena * ROBOTS, (arena + 1) * ROBOTS)
+    if truth.edges is not None:  # no edge joins robots of different arenas
+        truth = replace(truth, edges=truth.edges[truth.edges[:, 0] // ROBOTS == truth.edges[:, 1] // ROBOTS])
+    one = truth_of(truth, STATIC, arena)
+    scene = Scene(static_of(STATIC, arena), SCENE.series, SCENE.selected)
+    values = glimpse.values[:, arena : arena + 1]
+    decoded = decode_truth(frames.decode(encode_truth(replace(glimpse, truth=one, values=values))), scene)
+    assert equal(decoded.truth.pose, truth.pose[rows])
+    if truth.edges is not None:
+        assert (one.edges + rows.start).tolist() == [e for e in truth.edges.tolist() if e[0] // ROBOTS == arena]
+    if truth.finished is not None and one.finished is not None:
+        assert len(one.finished.fate) == np.count_nonzero(truth.finished.arena == arena)
+    seen = [row for group in one.senses.values() for row in (group.rows + rows.start).tolist()]
+    assert seen == [row for g in truth.senses.values() for row in g.rows.tolist() if row // ROBOTS == arena]

@@ -1,0 +1,145 @@
+"""The site builds without a warning, and its reference names all that the registries hold."""
+
+import html
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.main import get_command
+
+from swarmwire import agent, deploy
+from swarmwire.agent import behaviours, readings, testing
+from swarmwire.agent.declared import parameters_of
+from swarmwire.comms import errors
+from swarmwire.comms.air.radio import Gives
+from swarmwire.comms.body import body_names, load_body
+from swarmwire.comms.events.registry import ACTIONS
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.sheets import SHEETS
+from swarmwire.deploy import run
+from swarmwire.deploy.cli import app
+from swarmwire.metrics.registry import METRICS
+from swarmwire.world.realtime_crew import RealTimeReport
+from swarmwire.world.scenario_file import scenario_schema
+from tests.docs.pages import ROOT
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory) -> Path:
+    """The built site; the build fails with any warning."""
+    place = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-n", "-q", "-d", place / "doctrees"]
+    done = subprocess.run(
+        [*command, ROOT / "docs", place / "html"], capture_output=True, text=True, check=False, timeout=110
+    )
+    assert done.returncode == 0, done.stderr
+    assert not done.stderr
+    return place / "html"
+
+
+def page(site: Path, name: str) -> str:
+    """The text of a page that is its own: without navigation."""
+    text = (site / f"{name}.html").read_text(encoding="utf-8")
+    return text[text.index("<article") : text.index("</article>")]
+
+
+def code(site: Path, name: str) -> set[str]:
+    """What a page names as code."""
+    found = re.findall(r"<code[^>]*>(.*?)</code>", page(site, name), re.DOTALL)
+    return {html.unescape(re.sub(r"<[^>]+>", "", item)) for item in found}
+
+
+def described(site: Path, name: str) -> set[str]:
+    """The Python names that a page describes."""
+    return set(re.findall(r'<dt class="sig[^"]*" id="([^"]+)"', page(site, name)))
+
+
+def keys_of(schema: dict[str, Any]) -> Iterator[str]:
+    yield from schema["properties"]
+    for definition in schema["$defs"].values():
+        yield from definition.get("properties", ())
+
+
+def test_the_scenario_page_names_every_key_and_choice(site):
+    named = code(site, "scenario")
+    headed = {name.strip("[]").split(".")[0] for name in named if name.startswith("[")}  # [time], [robots.GROUP], …
+    assert set(keys_of(scenario_schema())) <= named | headed
+    assert {"time", "physics", "arena", "robots", "radio", "events", "run"} <= headed
+    assert {'shape = "polygon"', 'how = "grid"', '"walls"', '"open"'} <= named
+
+
+def test_the_scenario_page_tells_every_tables_rows_once(site):
+    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", page(site, "scenario"), re.DOTALL)
+    texts = [re.sub(r"<[^>]+>", "", row) for row in rows]
+    assert sum("probability that a packet within reach is lost" in text.lower() for text in texts) == 1
+    assert sum("drawn; rounded half up" in text for text in texts) == 1  # the table that chooses robots comes once
+    assert any(row.count("required") == 1 and "duration_s" in row and "in s, above 0" in row for row in texts)
+
+
+def test_the_events_have_a_section_each(site):
+    text = page(site, "scenario")
+    for kind in ACTIONS:
+        assert re.search(rf"<h3><code[^>]*><span[^>]*>{kind.__name__.lower()}</span>", text), kind
+
+
+def test_the_bodies_page_names_bodies_senses_and_their_fields(site):
+    named = code(site, "bodies")
+    kinds = [kind for name, kind in vars(readings).items() if name.endswith("Readings")]
+    read = {name for kind in kinds for name in (*vars(kind), *(of.name for of in fields(kind))) if name[0] != "_"}
+    assert read - {"sheet", "vector_sum"} <= named
+    assert {*SHEETS, *(f"radio.{of.name}" for of in fields(Gives))} <= named
+    assert {*body_names(), *(f"[senses.{name}]" for name in SHEETS)} <= named
+    for name in body_names():
+        assert html.escape(load_body(name).source, quote=False) in page(site, "bodies")
+
+
+def test_the_summary_page_names_every_metric_fate_and_key(site):
+    named = code(site, "summary")
+    assert {*METRICS, *(fate.name.lower() for fate in Fate)} <= named
+    for fate in Fate:
+        assert fate.meaning[1:] in html.unescape(page(site, "summary"))
+    result = run(ROOT / "scenarios" / "flocking-lossy.toml", overrides=["duration_s=0.2"])
+    summary = result.summary()
+    assert {key for key in summary if key not in {"radio", "metrics"}} <= named
+    assert {f"radio.{key}" for key in summary["radio"]} <= named
+    assert all(of.name in page(site, "summary") for of in fields(RealTimeReport))
+
+
+def test_the_behaviours_page_names_every_behaviour_and_parameter(site):
+    named = code(site, "behaviours")
+    for name in behaviours.__all__:
+        assert {f"swarmwire.agent.behaviours:{name}", *parameters_of(getattr(behaviours, name))} <= named
+
+
+def test_the_command_line_page_names_every_command_and_option(site):
+    named = code(site, "command-line")
+    group: Any = get_command(app)
+    for name, command in group.commands.items():
+        assert name in named
+        for option in (option for of in command.params for option in of.opts if option.startswith("--")):
+            assert any(option in item for item in named), option
+    assert "runs/<scenario>-s<seed>-<UTC>" in html.unescape(page(site, "command-line"))  # no tags, no dashes
+    assert "Without --realtime" in page(site, "command-line")
+
+
+def test_the_python_pages_describe_all_that_is_public(site):
+    types = {"f4", "f8", "i1", "i2", "i4", "u1", "u2", "u4"}  # a table of their own
+    assert {f"swarmwire.agent.{name}" for name in {*agent.__all__} - types} <= described(site, "api/agent")
+    assert types <= code(site, "api/agent")
+    public = {f"{testing.__name__}.{name}" for name in ("Trial", "assert_equivalent", "assert_rows_independent")}
+    assert public <= described(site, "api/agent")
+    assert {f"swarmwire.deploy.{name}" for name in deploy.__all__} <= described(site, "api/deploy")
+    ours = [kind for kind in vars(errors).values() if isinstance(kind, type)]
+    assert {f"{errors.__name__}.{kind.__name__}" for kind in ours} <= described(site, "api/errors")
+
+
+def test_fields_are_described_by_the_comments_behind_them(site):
+    text = html.unescape(re.sub(r"<[^>]+>", "", page(site, "api/deploy")))
+    assert "receivers that they were meant for" in text
+    assert "start_time_s: float" in text
+    assert "ndarray" not in text

@@ -1,0 +1,130 @@
+import json
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.truth import Happened
+from swarmwire.metrics.record import recorders, table_writer, tick_recorder
+from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.run_folder import RunFolder
+from tests.metrics.recorded import links, record, wandering
+from tests.metrics.truths import static
+
+TICKS = 11
+
+
+@pytest.fixture(params=["ended", "killed"])
+def recorded(request, tmp_path, monkeypatch):
+    """A folder as a run leaves it that ended, or that was killed just before: parts, and no summary."""
+    if request.param == "killed":
+        monkeypatch.setattr(table_writer, "join_parts", lambda *_: None)
+    monkeypatch.setattr(tick_recorder, "MOST_TICKS", 4)
+    of, kill = static(3, arenas=2), Happened(0, 0.0, "kill", False, np.array([False, True, False] * 2))
+    seen = list(wandering(of, TICKS, events=(kill,), finished=links([0, 1], [2, 0], [5, 6], 0, arena=[0, 1])))
+    record(tmp_path, of, seen, packets=1.0)
+    assert (tmp_path / "ticks").is_dir() == (request.param == "killed")
+    return RunFolder(tmp_path), of, seen
+
+
+def test_tables_are_read_of_all_arenas_or_of_one(recorded):
+    folder, of, _ = recorded
+    assert folder.ticks()["tick"].to_list() == [tick for tick in range(TICKS) for _ in range(2)]
+    for arena in range(2):
+        assert folder.ticks(arena)["seed"].to_list() == [of.seeds[arena]] * TICKS
+        assert folder.packets(arena)["sender"].to_list() == [arena] * TICKS
+        assert folder.events(arena)["robots"].to_list() == [["flock-1"]] * TICKS
+    assert (len(folder.packets()), len(folder.events())) == (2 * TICKS, 2 * TICKS)
+    assert folder.static == of
+
+
+def test_robots_have_a_row_each_per_tick(recorded):
+    folder, of, seen = recorded
+    table = folder.robots(1)
+    assert table.columns[:6] == ["tick", "time_s", "robot", "group", "x_m", "y_m"]
+    assert len(table) == TICKS * of.robots
+    for row, name in enumerate(of.robot_names):
+        own = table.filter(pl.col("robot") == name)
+        at = of.robots + row
+        assert own["tick"].to_list() == list(range(TICKS))
+        assert own["group"].unique().to_list() == ["flock"]
+        assert np.array_equal(own["x_m"], np.array([one.pose[at, 0] for one in seen], np.float32))
+        assert np.array_equal(own["command_turn_radps"], np.array([one.command[at, 1] for one in seen], np.float32))
+        assert own["alive"].to_list() == [one.alive[at] for one in seen]
+        assert own["state"].to_list() == [one.states[one.state[at]] for one in seen]
+
+
+def test_metrics_have_a_row_per_tick_and_no_lists(recorded):
+    folder, _, _ = recorded
+    table = folder.metrics(1)
+    assert table.columns == ["tick", "time_s", *METRICS, "sent", "heard", "in_range"]
+    assert table["order"].to_list() == folder.ticks(1)["order"].to_list()
+
+
+def test_pandas_gets_the_same(recorded):
+    pytest.importorskip("pyarrow", reason="comes with the extra [view]")
+    folder, _, _ = recorded
+    for table in (folder.robots(), folder.metrics(), folder.packets(), folder.events()):
+        frame = table.to_pandas()
+        assert (len(frame), list(frame.columns)) == (len(table), table.columns)
+    frame = folder.robots().to_pandas()
+    assert list(frame["robot"][:3]) == ["flock-0", "flock-1", "flock-2"]
+    assert frame["x_m"].to_list() == folder.robots()["x_m"].to_list()
+
+
+def test_the_summary_is_there_once_the_run_has_ended(tmp_path):
+    folder = RunFolder(tmp_path)
+    assert folder.summary is None
+    (tmp_path / "summary.json").write_text(json.dumps({"ticks": 3}))
+    assert folder.summary == {"ticks": 3}
+    (tmp_path / "summary.json").write_text("{")
+    with pytest.raises(BadInput, match=r"summary\.json: expected JSON"):
+        _ = folder.summary
+
+
+def test_parts_that_are_joined_while_they_are_read_do_no_harm(recorded, monkeypatch):
+    folder, _, _ = recorded
+    files, looks = folder.files, []
+
+    def underfoot(name):
+        looks.append(name)
+        return files(name) if len(looks) > 1 else [folder.path / "ticks" / "part-000099.parquet"]
+
+    monkeypatch.setattr(folder, "files", underfoot)
+    assert len(folder.ticks(0)) == TICKS
+    assert len(looks) == 2
+
+
+def test_what_is_not_there_is_named(tmp_path):
+    with pytest.raises(BadInput, match=r"nowhere: expected a run folder"):
+        RunFolder(tmp_path / "nowhere")
+    with pytest.raises(BadInput, match=r"packets: expected this table"):
+        RunFolder(tmp_path).packets()
+    with pytest.raises(BadInput, match=r"static\.json"):
+        _ = RunFolder(tmp_path).static
+
+
+def test_of_a_killed_run_in_which_nothing_had_happened_the_events_are_none(tmp_path):
+    of = static(2)
+    (tmp_path / "ended").mkdir()
+    record(tmp_path / "ended", of, wandering(of, 2), packets=1.0)
+    for name in ("packets", "events"):
+        (tmp_path / name).mkdir()
+        left, ended = getattr(RunFolder(tmp_path), name)(), getattr(RunFolder(tmp_path / "ended"), name)()
+        assert len(left) == 0
+        assert left.schema == ended.schema
+
+
+def test_a_damaged_table_and_an_arena_that_is_not_there_are_named(recorded):
+    folder, _, _ = recorded
+    with pytest.raises(BadInput, match=r"arena: expected 0 to 1, got 2"):
+        folder.robots(2)
+    for file in folder.files("ticks"):
+        file.write_bytes(file.read_bytes()[:-9])
+    with pytest.raises(BadInput, match=r"ticks: expected whole Parquet files"):
+        folder.ticks()
+
+
+def test_the_summarys_part_leaves_out_what_was_not_recorded():
+    assert recorders.record_summary({"metrics": [], "record_ticks": {"rows": 1}}) == {"ticks": {"rows": 1}}

@@ -1,0 +1,14 @@
+"""How the runners of a run are doing, for whoever looks on."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class RunnerHealth:
+    """Counts since the start, but `ready`: now."""
+
+    ready: int  # runners that play their robots
+    lost: int  # runners
+    late_answers: int = 0  # after their own tick, one per robot; in real time
+    frames_dropped: int = 0  # to runners, never acted on
+    watchdog_stops: int = 0  # of robots; in real time
