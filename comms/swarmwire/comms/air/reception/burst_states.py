@@ -41,8 +41,7 @@ class BurstStates:
         """Which packets (k,) bursts take; rows of sender and receiver, times in ns that never fall for a link."""
         if not len(sender):
             return np.zeros(0, np.bool_)
-        if 2 * (self._kept + len(sender)) > len(self._link):
-            self._rebuild(int(at_ns.min()), len(sender))
+        self.make_room(int(at_ns.min()), len(sender))
         a, b = 1.0 / self._bursts.good_s, 1.0 / self._bursts.bad_s
         ends, added = _lost(
             self._link,
@@ -62,6 +61,20 @@ class BurstStates:
         )
         self._kept += added
         return ends
+
+    def make_room(self, now_ns: int, links: int) -> None:
+        """So many links may be added at `now_ns` or later."""
+        if 2 * (self._kept + links) > len(self._link):
+            self._rebuild(now_ns, links)
+
+    @property
+    def table(self) -> tuple[IntArray, IntArray, BoolArray]:
+        """Links, times and states for kernels, which add at most as many as there is room for; then call `added`."""
+        return self._link, self._at_ns, self._bad
+
+    def added(self, links: int) -> None:
+        """A kernel added so many links to the table."""
+        self._kept += links
 
     def _clear(self, capacity: int) -> None:
         self._link = np.full(capacity, NOBODY, np.int64)
@@ -120,14 +133,24 @@ def _lost(
     added = 0
     for i in range(len(sender)):
         key, s, r = keys[sender[i] // robots], sender[i] % robots, receiver[i] % robots
-        at = _place(links, sender[i] * rows + receiver[i])
-        silent_s = np.inf
-        if links[at] == NOBODY:
-            links[at] = sender[i] * rows + receiver[i]
-            added += 1
-        else:
-            silent_s = (at_ns[i] - links_at_ns[at]) / NS_PER_S
-        bad = bad_after(links_bad[at], silent_s, a, b, uniform(key, s, r, sequence[i], STATE))
-        links_at_ns[at], links_bad[at] = at_ns[i], bad
-        ends[i] = uniform(key, s, r, sequence[i], LOSS) < (loss_bad if bad else loss_good)
+        link = sender[i] * rows + receiver[i]
+        ends[i], new = takes(
+            links, links_at_ns, links_bad, link, key, s, r, sequence[i], 0, at_ns[i], a, b, loss_bad, loss_good
+        )
+        added += new
     return ends, added
+
+
+@njit(cache=True)
+def takes(links, links_at_ns, links_bad, link, key, s, r, sequence, attempt, at_ns, a, b, loss_bad, loss_good):
+    """Whether a burst takes a packet from s to r, indices in the arena, at `at_ns`; and 1 if the link is new here."""
+    at = _place(links, link)
+    silent_s, new = np.inf, 0
+    if links[at] == NOBODY:
+        links[at] = link
+        new = 1
+    else:
+        silent_s = (at_ns - links_at_ns[at]) / NS_PER_S
+    bad = bad_after(links_bad[at], silent_s, a, b, uniform(key, s, r, sequence, STATE + attempt))
+    links_at_ns[at], links_bad[at] = at_ns, bad
+    return uniform(key, s, r, sequence, LOSS + attempt) < (loss_bad if bad else loss_good), new

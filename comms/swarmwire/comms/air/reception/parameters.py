@@ -43,6 +43,24 @@ class Reception:
         6.0, help="of threshold: the ratio that a frame needs", unit="dB", at_least=-100, at_most=100
     )
     table: SuccessTable | None = parameter(None, help="of table: success by ratio")
+    preamble_sinr_db: float = parameter(
+        -5.0, help="a receiver finds a frame above this ratio, and nothing else until its end", unit="dB"
+    )
+    preamble_dbm: float = parameter(-200.0, help="a receiver finds no frame below this power", unit="dBm")
+    take_over_s: float = parameter(
+        0.0,
+        help="how long after its start a frame gives way to a stronger one; 0: only to one that starts with it",
+        unit="s",
+        at_least=0,
+        at_most=1,
+    )
+    sensitivity_dbm: float | None = parameter(
+        None,
+        help="least mean power that counts as in range; without it, what a data sheet of this receiver would say",
+        unit="dBm",
+        at_least=-200,
+        at_most=100,
+    )
 
 
 def refuse_unfit(reception: Reception, bit_rate_bps: int, where: str, key: str) -> None:
