@@ -6,6 +6,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
+
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.clock import WallClock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted
@@ -202,7 +204,8 @@ class Simulation:
             return None
         obstacles = obstacle_arrays(static.obstacles)
         size_m, every = static.arena_size_m, static.act_every_ticks
-        return Air(radio, self.world.keys, static.robots, size_m, obstacles, static.rate_hz, every)
+        radius_m = np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for group in static.groups])
+        return Air(radio, self.world.keys, static.robots, size_m, obstacles, static.rate_hz, every, radius_m)
 
     def health(self) -> RunnerHealth | None:
         """How the runners are doing; None if there are none."""

@@ -20,6 +20,9 @@ MODULES = [
         "propagation.itu_indoor",
         "reception.parameters",
         "reception.noise",
+        "signal.parameters",
+        "presets",
+        "radio_checks",
         "traffic.parameters",
         "traffic.access_timing",
         "traffic.airtime",
@@ -47,5 +50,5 @@ def test_defaults_are_within_limits_and_every_parameter_has_help(parameters: typ
         assert limits.help, field.name
         if isinstance(field.default, int | float):
             assert fault_of(field.default, limits) is None, field.name
-        if limits.choices and field.default is not MISSING:
+        if limits.choices and field.default not in (MISSING, None):
             assert field.default in limits.choices, field.name

@@ -22,6 +22,7 @@ from swarmwire.comms.geometry import Obstacles
 from swarmwire.comms.packets import BROADCAST, Heard, Sent
 from swarmwire.comms.truth import Finished, Tally
 
+
 @dataclass(frozen=True, slots=True)
 class News:
     """What became final while time passed."""

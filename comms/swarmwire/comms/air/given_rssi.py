@@ -37,7 +37,7 @@ class GivenRssi(Stage):
 
 @njit(cache=True)
 def error_db(keys, robots, sender, receiver, sequence, fate, noise_db):
-    """noise z, z normal, keyed by (sender, receiver, sequence); 0 for ended links; in dB, (k,)."""
+    """The error noise z, z normal, keyed by (sender, receiver, sequence); 0 for ended links; in dB, (k,)."""
     out_db = np.zeros(len(sender))
     for i in range(len(out_db)):
         if fate[i] == HEARD and noise_db > 0.0:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from swarmwire.comms.air.presets import PRESETS
 from swarmwire.comms.air.propagation.friis import Friis
 from swarmwire.comms.air.propagation.itu_indoor import ItuIndoor
 from swarmwire.comms.air.propagation.log_distance import LogDistance
@@ -72,7 +73,9 @@ class Radio:
         above=0,
     )
     model: str = parameter("disk", help="how the signal fades with distance", choices=MODELS)
-    preset: str | None = parameter(None, help="a kind of radio, whose values count where the scenario gives none")
+    preset: str | None = parameter(
+        None, help="a kind of radio, whose values count where the scenario gives none", choices=tuple(PRESETS)
+    )
     line_of_sight: bool | None = parameter(
         None, help="obstacles block the signal; without it true for the disk, false for signals"
     )

@@ -15,8 +15,8 @@ Decided = tuple[Transmissions, Links]
 class Way(ABC):
     """From the senders' radios to the receivers.
 
-    What `pass_time` and `disrupt` return are packets and what becomes of them at their receivers (`packet` is the row in
-    those packets); a fate may become final later than the time that has passed.
+    What `pass_time` and `disrupt` return are packets and what becomes of them at their receivers (`packet` is the row
+    in those packets); a fate may become final later than the time that has passed.
     """
 
     @property

@@ -16,7 +16,10 @@ ABSENT = -1
 
 
 class EventQueue(NamedTuple):
-    """A binary heap with places, so that an event can be moved or taken back. Event e is kind e // rows, row e % rows."""
+    """A binary heap with places, so that events can be moved and taken back.
+
+    Event e is that of kind e // rows and robot row e % rows.
+    """
 
     at_ns: IntArray  # (KINDS x rows,) when each event is due, if it is
     heap: IntArray  # (KINDS x rows,) events, the next one first

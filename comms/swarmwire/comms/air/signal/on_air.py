@@ -70,7 +70,7 @@ def take_off_air(rules, bursts, state, queue, s, now_ns):
         if rules.method == ALONE:
             if link.now == RECEIVING:
                 success = _alone(rules, link.power_mw, me.bits)
-                link.now = _fate(rules, bursts, state, s, i, success, now_ns)
+                link.now = _fate(rules, bursts, state, s, i, success)
         elif link.fate == HEARD:
             _leave(rules, bursts, state, s, i, now_ns)
             if rules.method == DCF:
@@ -117,7 +117,7 @@ def _leave(rules, bursts, state, s, i, now_ns):
     it.power_mw = it.power_mw - link.power_mw if it.signals > 0 else 0.0  # no rounding piles up
     if it.locked_to == s and it.link == i:
         it.locked_to = NOBODY
-        link.now = _fate(rules, bursts, state, s, i, it.success, now_ns)
+        link.now = _fate(rules, bursts, state, s, i, it.success)
         it.trust_from_ns = 0 if link.now == HEARD else now_ns + rules.distrust_ns
 
 
@@ -157,7 +157,7 @@ def _alone(rules, power_mw, bits):
 
 
 @njit(cache=True)
-def _fate(rules, bursts, state, s, i, success, now_ns):
+def _fate(rules, bursts, state, s, i, success):
     """What becomes of a frame that was received, by draws keyed by (sender, receiver, sequence), and attempt.
 
     The same draw tells why it was not right: COLLIDED if it would have been right without interference.

@@ -29,5 +29,8 @@ class Access:
         at_most=100,
     )
     most_retries: int | None = parameter(
-        None, help="how often an addressed packet is sent again; without it the standard's 3 or 7", at_least=0, at_most=7
+        None,
+        help="how often an addressed packet is sent again; without it the standard's 3 or 7",
+        at_least=0,
+        at_most=7,
     )

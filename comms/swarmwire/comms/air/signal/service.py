@@ -252,9 +252,8 @@ def _report(rules, state, queue, told, r, now_ns):
     me.last_fate, me.last_in_range, me.last_mw = NOBODY, 0, 0.0
     for i in range(me.first_link, me.stop_link):
         link = state.link[i]
-        if packet.to != NOBODY and link.receiver != packet.to:
-            continue
-        if not (link.is_listed or link.now == HEARD):
+        is_meant = packet.to == NOBODY or packet.to == link.receiver  # noqa: PLR1714 - `in` would make a tuple
+        if not (is_meant and (link.is_listed or link.now == HEARD)):
             continue
         in_range = 0 if link.now == BLOCKED else 1
         if packet.to == NOBODY:

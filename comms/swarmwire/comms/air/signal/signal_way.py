@@ -212,8 +212,9 @@ class SignalWay(Way):
         tried = np.flatnonzero((packets.fate != HEARD) & (packets.fate != Fate.TOO_LARGE))
         at, receiver = self._links.reached(packets.sender[tried])
         at = tried[at]
-        broadcast = packets.to[at] == BROADCAST
-        meant = np.where(broadcast, lives.intended(packets.epoch[at], receiver), receiver % self._medium.robots == packets.to[at])
+        to_all = packets.to[at] == BROADCAST
+        to_one = packets.to[at] == receiver % self._medium.robots
+        meant = to_one | (to_all & lives.intended(packets.epoch[at], receiver))
         np.add.at(found, at[meant], 1)
         return found
 
