@@ -57,7 +57,7 @@ def refuse(state, told, index, fate, now_ns):
     """A packet ends at its sender's radio."""
     packet = state.packet[index]
     packet.is_done, packet.fate, packet.on_air_at_ns = 1, fate, now_ns
-    _tell(told, index, NOBODY, fate, 0, now_ns, 0, 0.0)
+    _tell(state, told, index, NOBODY, fate, 0, now_ns, 0, 0.0)
 
 
 @njit(cache=True)
@@ -257,13 +257,13 @@ def _report(rules, state, queue, told, r, now_ns):
             continue
         in_range = 0 if link.now == BLOCKED else 1
         if packet.to == NOBODY:
-            _tell(told, me.packet, link.receiver, link.now, in_range, now_ns, me.hold, link.power_mw)
+            _tell(state, told, me.packet, link.receiver, link.now, in_range, now_ns, me.hold, link.power_mw)
             continue
         me.last_fate, me.last_in_range, me.last_mw = link.now, in_range, link.power_mw
         if link.now == HEARD:
             if not packet.is_settled:
                 packet.is_settled = 1
-                _tell(told, me.packet, link.receiver, HEARD, 1, now_ns, me.hold, link.power_mw)
+                _tell(state, told, me.packet, link.receiver, HEARD, 1, now_ns, me.hold, link.power_mw)
             if rules.acknowledged:
                 state.robot[link.receiver].answers_to = r
                 schedule(queue, ANSWER, link.receiver, now_ns + rules.short_space_ns)
@@ -277,7 +277,7 @@ def _settle(state, told, r, now_ns):
     packet.is_done = 1
     if not packet.is_settled and me.last_fate != NOBODY:
         packet.is_settled = 1
-        _tell(told, me.packet, packet.to, me.last_fate, me.last_in_range, now_ns, me.hold, me.last_mw)
+        _tell(state, told, me.packet, packet.to, me.last_fate, me.last_in_range, now_ns, me.hold, me.last_mw)
 
 
 @njit(cache=True)
@@ -297,9 +297,10 @@ def _acknowledged(rules, state, queue, told, r, now_ns):
 
 
 @njit(cache=True)
-def _tell(told, packet, receiver, fate, in_range, final_at_ns, hold, power_mw):
+def _tell(state, told, packet, receiver, fate, in_range, final_at_ns, hold, power_mw):
     at = told.count[0]
     row = told.row[at]
     row[0], row[1], row[2], row[3], row[4], row[5] = packet, receiver, fate, in_range, final_at_ns, hold
+    row[6] = state.packet[packet].on_air_at_ns  # of this attempt: more may follow
     told.power_mw[at] = power_mw
     told.count[0] += 1

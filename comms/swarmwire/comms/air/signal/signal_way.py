@@ -178,10 +178,11 @@ class SignalWay(Way):
         used = (packet["is_done"] > 0) & (self._queued.intended > 0)
         used[row[:, 0]] = True
         index, local = np.flatnonzero(used), np.cumsum(used) - 1
-        was_on_air = packet["fate"] == HEARD
+        was_on_air, on_air_at_ns = packet["fate"] == HEARD, packet["on_air_at_ns"].copy()
+        on_air_at_ns[row[:, 0]] = row[:, 6]
         packets = self._queued.select(index)._replace(
-            on_air_at_ns=packet["on_air_at_ns"][index],
-            off_air_at_ns=(packet["on_air_at_ns"] + np.where(was_on_air, packet["airtime_ns"], 0))[index],
+            on_air_at_ns=on_air_at_ns[index],
+            off_air_at_ns=(on_air_at_ns + np.where(was_on_air, packet["airtime_ns"], 0))[index],
             fate=packet["fate"][index],
         )
         kept = row[:, 1] != NOBODY

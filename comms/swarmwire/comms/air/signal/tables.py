@@ -145,7 +145,7 @@ class Bursting(NamedTuple):
 class Told(NamedTuple):
     """What the run of events tells: a row per packet and receiver, or per packet that never went on air."""
 
-    row: IntArray  # (capacity, 6) packet, receiver row or NOBODY, fate, in range, final_at_ns, hold
+    row: IntArray  # (capacity, 7) packet, receiver row or NOBODY, fate, in range, final_at, hold, on_air_at
     power_mw: FloatArray  # (capacity,) at the receiver
     count: IntArray  # (1,)
 
@@ -163,4 +163,4 @@ class State(NamedTuple):
 
 def told(capacity: int) -> Told:
     """Room for so many rows."""
-    return Told(np.empty((capacity, 6), np.int64), np.empty(capacity), np.zeros(1, np.int64))
+    return Told(np.empty((capacity, 7), np.int64), np.empty(capacity), np.zeros(1, np.int64))
