@@ -1,8 +1,8 @@
 """DCF of IEEE 802.11: who wants to send waits until the air was free for DIFS, then for its slots of free air.
 
-A robot that finds the air free for so long sends at once. Each frame on air is followed by new slots; those that are
-left when the air becomes busy count on when it is free again. After a frame that was not understood the air counts as
-free only EIFS later (IEEE 802.11-2007, 9.2.3.4 and 9.2.5).
+A robot that finds the air free sends after DIFS, as in ns-3; the standard lets it do so at once. Each frame on air is
+followed by new slots; those that are left when the air becomes busy count on when it is free again. After a frame that
+was not understood the air counts as free only EIFS later (IEEE 802.11-2007, 9.2.3.4 and 9.2.5).
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -26,7 +26,8 @@ def want(rules, state, queue, r, now_ns):
     if me.is_busy:
         _wait_if_none_left(rules, state, r)
         return
-    schedule(queue, SEND, r, max(now_ns, me.free_from_ns + rules.difs_ns + me.slots * rules.slot_ns))
+    counted_ns = me.free_from_ns + me.slots * rules.slot_ns
+    schedule(queue, SEND, r, max(now_ns, counted_ns) + rules.difs_ns)
 
 
 @njit(cache=True)
@@ -41,7 +42,6 @@ def sense(rules, state, queue, r, now_ns):
         # Who sends at this very moment cannot have heard the other.
         if me.stage == BACKING_OFF and due_ns(queue, SEND, r) > now_ns:
             cancel(queue, SEND, r)
-            _wait_if_none_left(rules, state, r)
     elif me.is_busy and not busy:
         me.is_busy = 0
         me.free_from_ns = max(now_ns, me.trust_from_ns)

@@ -106,9 +106,7 @@ def timer(rules, state, queue, told, r, now_ns):
     """What the robot waited for has passed."""
     me = state.robot[r]
     if me.stage == BACKING_OFF:
-        me.stage, me.peak_mw = LISTENING, me.power_mw
-        if me.on_air != SILENT:
-            me.peak_mw = np.inf
+        me.stage, me.peak_mw = LISTENING, 0.0
         schedule(queue, LISTENED, r, now_ns + rules.listen_ns)
     elif me.stage == AWAITING:
         fail(rules, state, queue, told, r, now_ns)
@@ -118,9 +116,12 @@ def timer(rules, state, queue, told, r, now_ns):
 
 @njit(cache=True)
 def listened(rules, state, queue, told, r, now_ns):
-    """CSMA: the radio has listened whether the air is free."""
+    """CSMA: the radio has listened whether the air is free.
+
+    As in ns-3, it is busy if a frame began meanwhile or is on air at the end; one that ended meanwhile does not count.
+    """
     me = state.robot[r]
-    if me.peak_mw < rules.busy_mw and me.on_air == SILENT:
+    if max(me.peak_mw, me.power_mw) < rules.busy_mw and me.on_air == SILENT:
         me.stage = TURNING
         on_air.turn_away(state, r)
         schedule(queue, SEND, r, now_ns + rules.turnaround_ns)
