@@ -14,6 +14,7 @@ from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.reception import Receiver, receiver_of
 from swarmwire.comms.air.reception.sensitivity import sensitivity_dbm, sinr_for_db
 from swarmwire.comms.air.signal.link_table import Surroundings
+from swarmwire.comms.air.signal.log_success import log_success_table
 from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import Rules
 from swarmwire.comms.air.traffic.access_timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G, IEEE_802_15_4
@@ -97,6 +98,7 @@ def rules_of(radio: Radio, robots: int) -> Rules:
         least_window=dcf.least_window,
         most_window=dcf.most_window,
         receiver=receiver,
+        log_success=log_success_table(receiver),
     )
 
 

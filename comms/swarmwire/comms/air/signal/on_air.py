@@ -7,15 +7,17 @@ disturb one another (access "none"), every receiver hears each of them on its ow
 
 # pyright: basic, reportUnknownMemberType=false
 
+import math
+
 import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.fixed_loss import LOSS
 from swarmwire.comms.air.reception.burst_states import takes
-from swarmwire.comms.air.reception.reception import chunk_success
 from swarmwire.comms.air.signal import dcf
 from swarmwire.comms.air.signal.event_queue import OFF_AIR, schedule
+from swarmwire.comms.air.signal.log_success import log_success
 from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import ACKNOWLEDGEMENT, DATA, NOBODY, RECEIVING, SILENT, TURNING
 from swarmwire.comms.draws import purpose
@@ -26,6 +28,7 @@ RECEPTION, ACKNOWLEDGED = purpose("reception"), purpose("reception of an acknowl
 ACKNOWLEDGED_LOSS = purpose("fixed loss of an acknowledgement")
 HEARD, LOST, TOO_WEAK = int(Fate.HEARD), int(Fate.LOST), int(Fate.TOO_WEAK)
 COLLIDED, BURST = int(Fate.COLLIDED), int(Fate.BURST)
+HOPELESS = -50.0  # a logarithm below that of the least draw
 ALONE, DCF = METHODS.index("none"), METHODS.index("dcf")
 
 
@@ -42,10 +45,11 @@ def put_on_air(rules, state, queue, s, kind, now_ns, airtime_ns, bits):
     turn_away(state, s)
     if rules.method == DCF:
         dcf.sense(rules, state, queue, s, now_ns)
+    robots, links = state.robot, state.link  # once: each look into `state` counts references
     for i in range(me.first_link, me.stop_link):
-        link = state.link[i]
+        link = links[i]
         if link.fate == HEARD:
-            _arrive(rules, state, s, i, now_ns)
+            _arrive(rules, robots, links, s, i, now_ns)
             if rules.method == DCF:
                 dcf.sense(rules, state, queue, link.receiver, now_ns)
         else:
@@ -65,14 +69,18 @@ def turn_away(state, r):
 def take_off_air(rules, bursts, state, queue, s, now_ns):
     """The frame of robot s ends: each of its links has a fate in `now`."""
     me = state.robot[s]
+    robots, links = state.robot, state.link
     for i in range(me.first_link, me.stop_link):
-        link = state.link[i]
+        link = links[i]
         if rules.method == ALONE:
             if link.now == RECEIVING:
                 success = _alone(rules, link.power_mw, me.bits)
                 link.now = _fate(rules, bursts, state, s, i, success)
         elif link.fate == HEARD:
-            _leave(rules, bursts, state, s, i, now_ns)
+            if _leave(rules, robots, links, s, i, now_ns):
+                it = robots[link.receiver]
+                link.now = _fate(rules, bursts, state, s, i, math.exp(it.log_success))
+                it.trust_from_ns = 0 if link.now == HEARD else now_ns + rules.distrust_ns
             if rules.method == DCF:
                 dcf.sense(rules, state, queue, link.receiver, now_ns)
     me.on_air = SILENT
@@ -80,12 +88,12 @@ def take_off_air(rules, bursts, state, queue, s, now_ns):
         dcf.sense(rules, state, queue, s, now_ns)
 
 
-@njit(cache=True)
-def _arrive(rules, state, s, i, now_ns):
+@njit(cache=True, inline="always")
+def _arrive(rules, robots, links, s, i, now_ns):
     """A frame reaches a receiver, which locks to it or takes it for noise."""
-    link = state.link[i]
-    it = state.robot[link.receiver]
-    _count_chunk(rules, state, link.receiver, now_ns)
+    link = links[i]
+    it = robots[link.receiver]
+    _count_chunk(rules, robots, link.receiver, now_ns)
     others_mw = it.power_mw
     it.power_mw += link.power_mw
     it.signals += 1
@@ -96,44 +104,45 @@ def _arrive(rules, state, s, i, now_ns):
     if it.on_air != SILENT or it.stage == TURNING:
         return
     if it.locked_to != NOBODY:
-        if now_ns - state.robot[it.locked_to].on_air_ns > rules.take_over_ns:
+        if now_ns - robots[it.locked_to].on_air_ns > rules.take_over_ns:
             return
         drowned = it.signal_mw < rules.least_sinr * (rules.noise_mw + max(it.power_mw - it.signal_mw, 0.0))
         if not drowned and not (does and link.power_mw > it.signal_mw):
             return
-        turn_away(state, link.receiver)
+        links[it.link].now = COLLIDED
+        it.locked_to = NOBODY
     if does:
         link.now = RECEIVING
-        it.locked_to, it.link, it.since_ns, it.signal_mw, it.success = s, i, now_ns, link.power_mw, 1.0
+        it.locked_to, it.link, it.since_ns, it.signal_mw, it.log_success = s, i, now_ns, link.power_mw, 0.0
 
 
-@njit(cache=True)
-def _leave(rules, bursts, state, s, i, now_ns):
-    """A frame ends at a receiver, which may have heard it."""
-    link = state.link[i]
-    it = state.robot[link.receiver]
-    _count_chunk(rules, state, link.receiver, now_ns)
+@njit(cache=True, inline="always")
+def _leave(rules, robots, links, s, i, now_ns):
+    """A frame ends at a receiver; whether it was receiving this one."""
+    link = links[i]
+    it = robots[link.receiver]
+    _count_chunk(rules, robots, link.receiver, now_ns)
     it.signals -= 1
     it.power_mw = it.power_mw - link.power_mw if it.signals > 0 else 0.0  # no rounding piles up
-    if it.locked_to == s and it.link == i:
-        it.locked_to = NOBODY
-        link.now = _fate(rules, bursts, state, s, i, it.success)
-        it.trust_from_ns = 0 if link.now == HEARD else now_ns + rules.distrust_ns
+    if it.locked_to != s or it.link != i:
+        return False
+    it.locked_to = NOBODY
+    return True
 
 
-@njit(cache=True)
-def _count_chunk(rules, state, r, now_ns):
+@njit(cache=True, inline="always")
+def _count_chunk(rules, robots, r, now_ns):
     """The interference at a robot is about to change: what it received so far counts."""
-    it = state.robot[r]
+    it = robots[r]
     if it.locked_to == NOBODY or now_ns == it.since_ns:
         return
     noise_mw = rules.noise_mw
     if it.signals > 1:
         noise_mw += max(it.power_mw - it.signal_mw, 0.0)
-    if it.signal_mw < rules.sure_sinr * noise_mw:
-        sender = state.robot[it.locked_to]
+    if it.signal_mw < rules.sure_sinr * noise_mw and it.log_success > HOPELESS:
+        sender = robots[it.locked_to]
         bits = sender.bits * ((now_ns - it.since_ns) / sender.airtime_ns)
-        it.success *= chunk_success(rules.receiver, it.signal_mw / noise_mw, bits)
+        it.log_success += log_success(rules.log_success, rules.receiver, it.signal_mw / noise_mw, bits)
     it.since_ns = now_ns
 
 
@@ -153,7 +162,7 @@ def _alone(rules, power_mw, bits):
         return 0.0
     if power_mw >= rules.sure_sinr * rules.noise_mw:
         return 1.0
-    return chunk_success(rules.receiver, power_mw / rules.noise_mw, bits)
+    return math.exp(log_success(rules.log_success, rules.receiver, power_mw / rules.noise_mw, bits))
 
 
 @njit(cache=True)

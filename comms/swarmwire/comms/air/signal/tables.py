@@ -48,9 +48,9 @@ ROBOT = np.dtype(
         # Reception.
         ("locked_to", _I),  # sender row of the frame being received, or NOBODY
         ("link", _I),  # and its link
-        ("since_ns", _I),  # start of the chunk that is not in `success` yet
+        ("since_ns", _I),  # start of the chunk that is not in `log_success` yet
         ("signal_mw", _F),
-        ("success", _F),  # of the chunks so far
+        ("log_success", _F),  # of the chunks so far
         ("power_mw", _F),  # all that is on air here
         ("signals", _I),  # of which there are so many
         # Acknowledgements.
@@ -126,6 +126,7 @@ class Rules(NamedTuple):
     least_window: int
     most_window: int
     receiver: Receiver
+    log_success: FloatArray  # by SINR, as `log_success_table` has it
 
 
 class Bursting(NamedTuple):
