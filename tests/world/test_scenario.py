@@ -98,7 +98,7 @@ FAULTS: list[tuple[str, Any, str]] = [
         "robots.flock: expected a pose for each of the 12 robots, got 1 poses",
     ),
     ("radio.loss", 2, "radio.loss: expected a number of at least 0 and at most 1, got 2"),
-    ("radio.model", "x", "radio.model: expected disk, got 'x'"),
+    ("radio.model", "x", "radio.model: expected one of disk, log-distance, friis, two-ray, itu-indoor, got 'x'"),
     ("radio.gives.range.noise_m", -1, "radio.gives.range.noise_m: expected a number of at least 0 (m), got -1"),
     ("radio.send_offset", "x", f"radio.send_offset: {OFFSET}; got 'x'"),
     ("radio.send_offset", 0.1, f"radio.send_offset: {OFFSET}; got 0.1"),
@@ -152,7 +152,7 @@ def test_robots_are_named_after_their_group() -> None:
 def test_the_schema_shows_bounds_units_and_help() -> None:
     schema = scenario_schema()
     reach = schema["$defs"]["Radio"]["properties"]["range_m"]
-    assert (reach["exclusiveMinimum"], reach["unit"]) == (0, "m")
+    assert (reach["anyOf"][0]["exclusiveMinimum"], reach["unit"]) == (0, "m")
     assert "receivers" in reach["description"]
     assert schema["properties"]["duration_s"]["unit"] == "s"
 

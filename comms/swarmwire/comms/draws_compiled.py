@@ -33,7 +33,12 @@ def uniform(key, c0, c1, c2, c3):
 @njit(cache=True)
 def normal(key, c0, c1, c2, c3):
     """Standard normal draw of a uint64 key and four counters."""
-    p = uniform(key, c0, c1, c2, c3) + 0.5 * _TO_UNIT
+    return normal_quantile(uniform(key, c0, c1, c2, c3) + 0.5 * _TO_UNIT)
+
+
+@njit(cache=True)
+def normal_quantile(p):
+    """The standard normal quantile of p in (0, 1)."""
     q = p - 0.5
     if abs(q) <= 0.425:
         return q * _ratio(_CENTRE, 0.180625 - q * q)

@@ -27,6 +27,10 @@ class Fate(IntEnum):
     RECEIVER_DEAD = 8, "within reach, but dead when the packet went on air, or before it was handed over"
     BLACKOUT = 9, "the sender's radio was off, or that of a receiver within reach"
     PARTITIONED = 10, "within reach, but a partition kept the two apart when the packet went on air"
+    TOO_WEAK = 11, "within reach on average, but too weak for the receiver's noise when the packet was on air"
+    COLLIDED = 12, "other packets on air disturbed it, or the receiver was busy with another or sending itself"
+    BURST = 13, "lost by a burst, while the link was in its bad state"
+    CHANNEL_BUSY = 14, "the sender found the air busy each time it listened: never on air"
 
 
 FATE_NAMES = tuple(fate.name.lower() for fate in Fate)

@@ -6,6 +6,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
+
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted
@@ -221,7 +223,8 @@ class Simulation:
             return None
         obstacles = obstacle_arrays(static.obstacles)
         size_m, every = static.arena_size_m, static.act_every_ticks
-        return Air(radio, self.world.keys, static.robots, size_m, obstacles, static.rate_hz, every)
+        radius_m = np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for group in static.groups])
+        return Air(radio, self.world.keys, static.robots, size_m, obstacles, static.rate_hz, every, radius_m)
 
     def _from_outside(self, tick: int) -> bool:
         """Whether the actions of this tick need not follow from scenario and seed."""

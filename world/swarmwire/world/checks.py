@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from swarmwire.comms.air.radio_checks import check_radio
 from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
@@ -20,6 +21,8 @@ def check(scenario: Scenario, where: str) -> None:
     for i, obstacle in enumerate(scenario.arena.obstacles):
         _check_obstacle(scenario, obstacle, f"arena.obstacles.{i}", where)
     _check_send_offset(scenario, where)
+    if scenario.radio is not None:
+        check_radio(scenario.radio, where)
     for i, event in enumerate(scenario.events):
         _check_event(scenario, event, f"events.{i}", where)
 

@@ -1,11 +1,12 @@
 """The scenario: everything that a run's file may say, as frozen tables. Unknown keys are refused."""
 
 from itertools import accumulate
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import BaseModel, Field, PrivateAttr, StringConstraints, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from swarmwire.comms.air.presets import with_preset
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.registry import ACTIONS
@@ -229,6 +230,11 @@ class Scenario(Table):
     """What happens to robots and radios on the way."""
     run: RunTable = RunTable()
     """Runners."""
+
+    @field_validator("radio", mode="before")
+    @classmethod
+    def _with_preset(cls, radio: Any) -> Any:
+        return with_preset(cast("dict[str, Any]", radio)) if isinstance(radio, dict) else radio
 
     _source: str = PrivateAttr("")
     _given: dict[str, Any] | None = PrivateAttr(None)

@@ -45,6 +45,13 @@ def load_scenario(path: Path | str, overrides: Sequence[str] = ()) -> Scenario:
         raise
 
 
+def with_settings(mapping: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:
+    """The mapping, in which settings such as "radio.loss=0.1" were put; BadInput for a path that leads nowhere."""
+    for keys, value, text in map(_parsed, settings):
+        _put(mapping, keys, value, text)
+    return mapping
+
+
 def _read(path: Path | str, where: str) -> dict[str, Any]:
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))

@@ -51,7 +51,8 @@ def table_of(kind: type[Any]) -> type[BaseModel]:
 def _hint(hint: Any, of: "Field[Any]") -> Any:
     limits = limits_of(of)
     if limits.choices:
-        return Literal[limits.choices]
+        choices: Any = Literal[limits.choices]
+        return choices | None if of.default is None else choices
     if get_origin(hint) in (Union, UnionType):
         return Union[tuple(_readable(item) for item in get_args(hint))]  # noqa: UP007 - made at run time
     return _readable(hint)

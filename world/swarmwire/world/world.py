@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from swarmwire.comms.air.signal.numbers import range_of
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.body import Body
 from swarmwire.comms.draws import derive_key
@@ -56,7 +57,7 @@ class World:
             obstacles=obstacles,
             groups=groups,
             robot_names=scenario.robot_names(),
-            range_m=scenario.radio.range_m if scenario.radio else None,
+            range_m=range_of(scenario.radio) if scenario.radio else None,
             lights=tuple(p.lights for p in placed),
         )
         tick_s, steps = 1.0 / scenario.time.rate_hz, scenario.physics.steps

@@ -6,16 +6,9 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.fates import Fate
 
 ACCEPTED, QUEUE_FULL, TOO_LARGE = int(Fate.HEARD), int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE)
-
-
-def airtime_ns(payload_bytes: IntArray, overhead_bytes: int, bit_rate_bps: int) -> IntArray:
-    """How long packets occupy the air: 8 x (payload + overhead) / bit rate, in ns rounded up, (k,)."""
-    bits = (payload_bytes + overhead_bytes) * 8
-    return -(-bits * NS_PER_S // bit_rate_bps)
 
 
 @njit(cache=True)

@@ -6,21 +6,21 @@ import numpy as np
 
 from swarmwire.comms.air import news
 from swarmwire.comms.air.accounts import Accounts
-from swarmwire.comms.air.channel import Channel
+from swarmwire.comms.air.disk_way import DiskWay
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.links import HEARD, THE_REST, Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.senders import Senders
+from swarmwire.comms.air.send_times import SendTimes
+from swarmwire.comms.air.signal.signal_way import SignalWay
 from swarmwire.comms.air.stage import Medium
 from swarmwire.comms.air.transmissions import Transmissions
+from swarmwire.comms.air.way import Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry import Obstacles
 from swarmwire.comms.packets import BROADCAST, Heard, Sent
 from swarmwire.comms.truth import Finished, Tally
-
-NEVER_NS = 2**63 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,17 +56,29 @@ class Air:
         obstacles: Obstacles,
         rate_hz: int,
         act_every_ticks: IntArray | None = None,
+        radius_m: FloatArray | None = None,
     ) -> None:
-        """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out."""
+        """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out.
+
+        `radius_m` (robots,) are their radii, which count for bodies between two robots; 0 each if left out. ValueError
+        for a disk without `range_m`.
+        """
+        if not radio.is_signal and radio.range_m is None:
+            raise ValueError("range_m: expected a range, as a disk has one")
         rows = len(keys) * robots
         self._radio, self._robots = radio, robots
         self._held, self._coming = Disruption.none(rows), Disruption.none(rows)
-        self._channel = Channel(Medium(radio, keys, robots, obstacles, self._held), size_m)
-        act_every_ticks = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
-        self._senders = Senders(radio, keys, act_every_ticks, rate_hz)
+        medium = Medium(radio, keys, robots, obstacles, self._held)
+        every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
+        send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
+        self._way: Way
+        if radio.is_signal:
+            radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
+            self._way = SignalWay(medium, size_m, send_times, radii_m)
+        else:
+            self._way = DiskWay(medium, size_m, send_times)
         self._accounts = Accounts(len(keys), robots)
         self._lives = Lives(rows)
-        self._pose = np.zeros((rows, 3))
         self._others_alive = np.zeros(rows, np.int64)
         self._now_ns = 0
         self._on_air = Transmissions.none()  # packets of `_links`
@@ -74,10 +86,10 @@ class Air:
 
     def hold(self, pose: FloatArray, alive: BoolArray) -> None:
         """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive."""
-        self._pose = pose.copy()
         self._lives.now(alive)
         self._held.alive = alive.copy()
         self._held.radio_on, self._held.sides = self._coming.radio_on, self._coming.sides
+        self._way.hold(pose.copy())
         in_arena = alive.reshape(-1, self._robots).sum(axis=1)
         self._others_alive = np.repeat(in_arena, self._robots) - alive
 
@@ -95,7 +107,7 @@ class Air:
         self._refuse(at_ns, sent)
         if not len(sent):
             return
-        packets = self._senders.accept(at_ns, tick, sent, self._others_alive, self._lives.epoch)
+        packets = self._way.accept(at_ns, tick, sent, self._others_alive, self._lives.epoch)
         self._accounts.take_up(packets)
 
     def advance(self, until_ns: int) -> News:
@@ -106,17 +118,17 @@ class Air:
         if until_ns < self._now_ns:
             raise ValueError(f"until_ns: expected at least {self._now_ns}, got {until_ns}")
         self._now_ns = until_ns
-        self._put_on_air(self._senders.leave(until_ns, self._held))
+        self._take(*self._way.pass_time(until_ns, self._lives))
         if not (self._coming.alive.all() and self._coming.radio_on.all()):
-            self._put_on_air(self._senders.die(until_ns, self._coming.alive))
+            self._take(*self._way.disrupt(until_ns, self._coming, self._lives))
             self._cut_off(until_ns)
-        self._lives.forget(self._senders.queued.epoch)
+        self._lives.forget(self._way.queued.epoch)
         final = self._links.final_at_ns <= until_ns
         ended = self._links.select(np.flatnonzero(final))
         self._accounts.settle(ended)
         told = News(
-            news.heard(ended, self._on_air, self._radio.gives.columns, self._robots, len(self._pose)),
-            news.finished(ended, self._on_air, self._robots),
+            news.heard(ended, self._on_air, self._radio.gives.columns, self._robots, len(self._others_alive)),
+            news.finished(ended, self._on_air, self._robots, self._radio.is_signal),
             self._accounts.close(),
         )
         self._keep(np.flatnonzero(~final))
@@ -124,7 +136,7 @@ class Air:
 
     def end(self) -> Tally:
         """The run is over: what is queued or on its way ends as IN_FLIGHT."""
-        self._accounts.strand(self._links, self._senders.leave(NEVER_NS, self._held))
+        self._accounts.strand(self._links, self._way.drain())
         self._keep(np.empty(0, np.int64))
         return self._accounts.close()
 
@@ -133,7 +145,7 @@ class Air:
 
         Two robots alive are joined where a lone packet gets through with at least `min_delivery`.
         """
-        return self._channel.edges(pose, alive)
+        return self._way.edges(pose, alive)
 
     def _refuse(self, at_ns: int, sent: Sent) -> None:
         if at_ns < self._now_ns:
@@ -150,12 +162,11 @@ class Air:
         links.fate[open_ & ~now.radio_on[links.receiver] & (links.final_at_ns > now_ns)] = Fate.BLACKOUT
         links.fate[open_ & ~now.alive[links.receiver]] = Fate.RECEIVER_DEAD
 
-    def _put_on_air(self, packets: Transmissions) -> None:
-        if not packets:
-            return
-        links = self._channel.decide(packets, self._pose, self._lives)
-        self._links = self._links.followed_by(links._replace(packet=links.packet + len(self._on_air.sender)))
-        self._on_air = self._on_air.followed_by(packets)
+    def _take(self, packets: Transmissions, links: Links) -> None:
+        """Keep links until they are final, and their packets."""
+        if packets:
+            self._links = self._links.followed_by(links._replace(packet=links.packet + len(self._on_air.sender)))
+            self._on_air = self._on_air.followed_by(packets)
 
     def _keep(self, index: IntArray) -> None:
         """Keep these links and their packets only."""

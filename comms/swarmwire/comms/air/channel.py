@@ -36,9 +36,24 @@ class Channel:
             packet, receiver = packet[meant], receiver[meant]
         sender, sequence, end_ns = packets.sender[packet], packets.sequence[packet], packets.off_air_at_ns[packet]
         links = Links.under_way(packet, sender, receiver, sequence, end_ns, self._columns)
+        refused = packets.fate != HEARD
+        in_range = np.zeros(len(packets.sender), np.int64)
+        if refused.any():
+            never = refused[links.packet]
+            in_range = self._would_reach(links.select(np.flatnonzero(never)), pose, len(in_range))
+            links = links.select(np.flatnonzero(~never))
         for stage in self._stages:
             stage.decide(links, pose)
-        return _with_the_rest(links, packets, self._columns)
+        return with_the_rest(links, packets, in_range, self._columns)
+
+    def _would_reach(self, links: Links, pose: FloatArray, packets: int) -> IntArray:
+        """How many receivers in range packets would have that never go on air, (packets,)."""
+        for stage in self._stages:
+            if not stage.remembers:
+                stage.decide(links, pose)
+        found = np.zeros(packets, np.int64)
+        np.add.at(found, links.packet, links.in_range)
+        return found
 
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
         """Pairs of robot rows a < b joined in the radio graph, sorted, (e, 2)."""
@@ -55,22 +70,20 @@ class Channel:
         return np.stack(np.divmod(np.sort(pair), len(pose)), axis=1)
 
     def _reach(self, pose: FloatArray, alive: BoolArray, sender: IntArray, to: IntArray) -> tuple[IntArray, IntArray]:
+        assert self._radio.range_m is not None  # `Air` has refused a disk without
         return links_in_range(pose, alive, self._arenas, self._size_m, self._radio.range_m, sender, to)
 
 
-def _with_the_rest(links: Links, packets: Transmissions, columns: int) -> Links:
-    """The links of packets that went on air, then a row per packet for all its other intended receivers."""
+def with_the_rest(links: Links, packets: Transmissions, in_range: IntArray, columns: int) -> Links:
+    """The links of packets that went on air, then a row per packet for all its other intended receivers.
+
+    `in_range` (packets,) are those that a packet would have reached that never went on air, else 0.
+    """
     k = len(packets.sender)
-    refused = packets.fate != HEARD
-    in_range = np.zeros(k, np.int64)
-    if refused.any():
-        never = refused[links.packet]
-        np.add.at(in_range, links.packet[never], links.in_range[never])
-        links = links.select(np.flatnonzero(~never))
     others = packets.intended - np.bincount(links.packet, minlength=k)
-    fate = np.where(refused, packets.fate, Fate.OUT_OF_RANGE)
-    receiver, given = np.full(k, THE_REST), np.zeros((k, columns))
-    final_at_ns = packets.off_air_at_ns
+    fate = np.where(packets.fate != HEARD, packets.fate, Fate.OUT_OF_RANGE)
+    receiver, rssi_dbm, given = np.full(k, THE_REST), np.full(k, np.nan), np.zeros((k, columns))
+    sender, sequence, final_at_ns = packets.sender, packets.sequence, packets.off_air_at_ns
     return links.followed_by(
-        Links(np.arange(k), packets.sender, receiver, packets.sequence, others, in_range, fate, final_at_ns, given)
+        Links(np.arange(k), sender, receiver, sequence, others, in_range, fate, final_at_ns, rssi_dbm, given)
     )

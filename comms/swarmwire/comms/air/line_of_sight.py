@@ -15,7 +15,7 @@ from swarmwire.comms.geometry import is_blocked
 def stage(medium: Medium) -> Stage | None:
     """The stage, where the radio needs a line of sight and there are obstacles."""
     any_obstacle = len(medium.obstacles.circle) or len(medium.obstacles.polygon)
-    return LineOfSight(medium) if medium.radio.line_of_sight and any_obstacle else None
+    return LineOfSight(medium) if medium.radio.needs_line_of_sight and any_obstacle else None
 
 
 class LineOfSight(Stage):

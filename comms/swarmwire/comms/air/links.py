@@ -26,6 +26,7 @@ class Links(NamedTuple):
     in_range: IntArray  # (k,) how many of them were in range after path loss and walls
     fate: IntArray  # (k,) a Fate
     final_at_ns: IntArray  # (k,) when the fate becomes final
+    rssi_dbm: FloatArray  # (k,) strength at the receiver; NaN where there is none
     given: FloatArray  # (k, columns) what the receiver learns, in the order of the radio's `gives.columns`
 
     @classmethod
@@ -41,7 +42,8 @@ class Links(NamedTuple):
         """Links that nothing has stopped so far, as the first stage gets them."""
         k = len(packet)
         one, zero = np.ones(k, np.int64), np.full(k, HEARD, np.int64)
-        return cls(packet, sender, receiver, sequence, one, one.copy(), zero, final_at_ns, np.zeros((k, columns)))
+        given, rssi_dbm = np.zeros((k, columns)), np.full(k, np.nan)
+        return cls(packet, sender, receiver, sequence, one, one.copy(), zero, final_at_ns, rssi_dbm, given)
 
     @classmethod
     def none(cls, columns: int) -> "Links":

@@ -30,7 +30,7 @@ def heard(ended: Links, packets: Transmissions, gives: tuple[str, ...], robots: 
     )
 
 
-def finished(ended: Links, packets: Transmissions, robots: int) -> Finished:
+def finished(ended: Links, packets: Transmissions, robots: int, has_strength: bool) -> Finished:
     """The links whose fate is final, and packets that never went on air; not receivers out of range."""
     the_rest = ended.receiver == THE_REST
     index = np.flatnonzero(~the_rest | (ended.fate != Fate.OUT_OF_RANGE))
@@ -47,6 +47,7 @@ def finished(ended: Links, packets: Transmissions, robots: int) -> Finished:
         fate=ended.fate[index],
         size_bytes=packets.payloads.sizes[packet],
         tag=packets.tag[packet],
+        rssi_dbm=ended.rssi_dbm[index] if has_strength else None,
     )
 
 

@@ -2,7 +2,20 @@
 
 from dataclasses import dataclass, field
 
+from swarmwire.comms.air.presets import PRESETS
+from swarmwire.comms.air.propagation.friis import Friis
+from swarmwire.comms.air.propagation.itu_indoor import ItuIndoor
+from swarmwire.comms.air.propagation.log_distance import LogDistance
+from swarmwire.comms.air.propagation.parameters import Antenna, Bodies, Fading, Shadowing, Walls
+from swarmwire.comms.air.propagation.two_ray import TwoRay
+from swarmwire.comms.air.reception.noise import Noise
+from swarmwire.comms.air.reception.parameters import Bursts, Reception
+from swarmwire.comms.air.signal.parameters import Access
+from swarmwire.comms.air.traffic.parameters import Delays
 from swarmwire.comms.parameters import parameter
+
+MODELS = ("disk", "log-distance", "friis", "two-ray", "itu-indoor")
+FRAMES = ("plain", "802.11a", "802.11b", "802.11g")
 
 
 @dataclass(frozen=True)
@@ -20,36 +33,52 @@ class BearingGiven:
 
 
 @dataclass(frozen=True)
+class RssiGiven:
+    """A receiver learns the strength of the signal, in dBm; only of a radio that knows one."""
+
+    noise_db: float = parameter(0.0, help="standard deviation of the error", unit="dB", at_least=0)
+
+
+@dataclass(frozen=True)
 class Gives:
     """What a receiver learns with a packet, taken when the packet went on air."""
 
     range: RangeGiven | None = parameter(None, help="the distance to the sender")
     bearing: BearingGiven | None = parameter(None, help="the direction to the sender")
+    rssi: RssiGiven | None = parameter(None, help="the strength of the signal; not with the model disk")
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the columns of `Heard.given`."""
-        return tuple(
-            name for name, given in (("range_m", self.range), ("bearing_rad", self.bearing)) if given is not None
-        )
+        return tuple(column for _, column, given in self._all() if given is not None)
 
     @property
     def needs(self) -> tuple[str, ...]:
         """Names under which agents declare that they need these."""
-        return tuple(
-            f"radio.{name}" for name, given in (("range", self.range), ("bearing", self.bearing)) if given is not None
-        )
+        return tuple(f"radio.{name}" for name, _, given in self._all() if given is not None)
+
+    def _all(self) -> tuple[tuple[str, str, object], ...]:
+        columns = (("range", "range_m"), ("bearing", "bearing_rad"), ("rssi", "rssi_dbm"))
+        return tuple((name, column, getattr(self, name)) for name, column in columns)
 
 
 @dataclass(frozen=True)
 class Radio:
-    """A radio that reaches to a fixed distance, loses a fixed share and takes its time."""
+    """The radio: either reaches to a fixed distance (disk), or sends signals that fade with distance."""
 
-    range_m: float = parameter(
-        help="a packet reaches receivers at this distance or nearer, centre to centre", unit="m", above=0
+    range_m: float | None = parameter(
+        None,
+        help="no packet reaches receivers farther than this, centre to centre; the disk needs it",
+        unit="m",
+        above=0,
     )
-    model: str = parameter("disk", help="how the signal fades with distance", choices=("disk",))
-    line_of_sight: bool = parameter(True, help="obstacles block the signal")
+    model: str = parameter("disk", help="how the signal fades with distance", choices=MODELS)
+    preset: str | None = parameter(
+        None, help="a kind of radio, whose values count where the scenario gives none", choices=tuple(PRESETS)
+    )
+    line_of_sight: bool | None = parameter(
+        None, help="obstacles block the signal; without it true for the disk, false for signals"
+    )
     loss: float = parameter(
         0.0, help="probability that a packet within reach is lost, for each receiver", at_least=0, at_most=1
     )
@@ -60,8 +89,13 @@ class Radio:
         0.0, help="further delay, uniform from 0 to this, for each receiver", unit="s", at_least=0, at_most=3600
     )
     bit_rate_bps: int = parameter(250_000, help="bits on air per second", unit="bit/s", at_least=1, at_most=10**12)
+    frame: str = parameter(
+        "plain",
+        help="airtime of a packet: its bits at the bit rate, or that of a standard, with its preamble",
+        choices=FRAMES,
+    )
     overhead_bytes: int = parameter(
-        0, help="bytes on air beyond the payload (preamble, headers)", unit="byte", at_least=0, at_most=65535
+        0, help="bytes on air beyond the payload (headers, plain: preamble)", unit="byte", at_least=0, at_most=65535
     )
     max_payload_bytes: int = parameter(
         100, help="a larger payload is refused by the radio", unit="byte", at_least=2, at_most=65535
@@ -79,4 +113,61 @@ class Radio:
         at_least=0,
         at_most=1,
     )
+    frequency_hz: float = parameter(2.44e9, help="of signals: the carrier", unit="Hz", at_least=1e6, at_most=1e12)
+    log_distance: LogDistance | None = parameter(None, help="of the model log-distance")
+    two_ray: TwoRay | None = parameter(None, help="of the model two-ray")
+    itu_indoor: ItuIndoor | None = parameter(None, help="of the model itu-indoor")
+    antenna: Antenna | None = parameter(None, help="of signals: power and gain")
+    shadowing: Shadowing | None = parameter(None, help="of signals: what is not modelled varies from place to place")
+    walls: Walls | None = parameter(None, help="of signals: obstacles weaken, where they do not block")
+    bodies: Bodies | None = parameter(None, help="of signals: robots in between weaken")
+    fading: Fading | None = parameter(None, help="of signals: power varies over fractions of a wavelength")
+    noise: Noise | None = parameter(None, help="of signals: the receiver's own noise")
+    reception: Reception | None = parameter(None, help="of signals: when a frame is right")
+    access: Access | None = parameter(None, help="of signals: who may send when, and whether frames collide")
+    bursts: Bursts | None = parameter(None, help="links are bad for a while, and good again")
+    delays: Delays | None = parameter(None, help="a further delay, for each receiver")
     gives: Gives = field(default_factory=Gives)
+
+    @property
+    def is_signal(self) -> bool:
+        """Whether there is a signal with a strength."""
+        return self.model != "disk"
+
+    @property
+    def needs_line_of_sight(self) -> bool:
+        """Whether obstacles block."""
+        return not self.is_signal if self.line_of_sight is None else self.line_of_sight
+
+    @property
+    def loss_model(self) -> LogDistance | Friis | TwoRay | ItuIndoor:
+        """Path loss by the signal's model; ValueError for the disk."""
+        if self.model == "log-distance":
+            return self.log_distance or LogDistance()
+        if self.model == "two-ray":
+            return self.two_ray or TwoRay()
+        if self.model == "itu-indoor":
+            return self.itu_indoor or ItuIndoor()
+        if self.model == "friis":
+            return Friis()
+        raise ValueError("model: a disk has no path loss")
+
+    @property
+    def antenna_or_default(self) -> Antenna:
+        """The antenna, standard values where nothing was given."""
+        return self.antenna or Antenna()
+
+    @property
+    def noise_or_default(self) -> Noise:
+        """The noise, standard values where nothing was given."""
+        return self.noise or Noise()
+
+    @property
+    def reception_or_default(self) -> Reception:
+        """The reception, standard values where nothing was given."""
+        return self.reception or Reception()
+
+    @property
+    def access_or_default(self) -> Access:
+        """The access, standard values where nothing was given."""
+        return self.access or Access()

@@ -4,23 +4,23 @@ import numpy as np
 
 from swarmwire.comms.air import access
 from swarmwire.comms.air.disruption import Disruption
+from swarmwire.comms.air.frames import airtime_ns
+from swarmwire.comms.air.intake import Intake
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.send_times import SendTimes
 from swarmwire.comms.air.transmissions import Transmissions
-from swarmwire.comms.arrays import BoolArray, IntArray, KeyArray
+from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.packets import BROADCAST, Sent
+from swarmwire.comms.packets import Sent
 
 
 class Senders:
     """Each robot's radio: a queue, first in, first out, and a count of the packets that it was handed."""
 
-    def __init__(self, radio: Radio, keys: KeyArray, act_every_ticks: IntArray, rate_hz: int) -> None:
-        self._radio = radio
-        self._send_times = SendTimes(radio.send_offset, keys, act_every_ticks, rate_hz)
-        self._rows = len(keys) * len(act_every_ticks)
-        self._sent_before = np.zeros(self._rows, np.int64)
-        self._free_at_ns = np.zeros(self._rows, np.int64)
+    def __init__(self, radio: Radio, send_times: SendTimes, rows: int) -> None:
+        self._radio, self._send_times = radio, send_times
+        self._intake = Intake(rows)
+        self._free_at_ns = np.zeros(rows, np.int64)
         self.queued = Transmissions.none()
 
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
@@ -28,24 +28,10 @@ class Senders:
 
         `others_alive` (rows,) are the receivers that a robot's broadcast intends, those of the epoch.
         """
-        # By sender, so that nothing depends on how the crew was divided.
-        order = np.argsort(sent.sender, kind="stable")
-        sender, to, payloads = sent.sender[order], sent.to[order], sent.payloads.rows(order)
         sent_at_ns = self._send_times.at(at_ns, tick)
-        on_air_at_ns, off_air_at_ns, fate = self._access(sent_at_ns, sender, payloads.sizes)
-        packets = Transmissions(
-            sender=sender,
-            to=to,
-            sequence=self._numbers(sender),
-            intended=np.where(to == BROADCAST, others_alive[sender], 1),
-            epoch=np.full(len(sender), epoch),
-            tag=payloads.tags(),
-            sent_at_ns=sent_at_ns[sender],
-            on_air_at_ns=on_air_at_ns,
-            off_air_at_ns=off_air_at_ns,
-            fate=fate,
-            payloads=payloads,
-        )
+        packets = self._intake.take(sent_at_ns, sent, others_alive, epoch)
+        on_air_at_ns, off_air_at_ns, fate = self._access(sent_at_ns, packets.sender, packets.payloads.sizes)
+        packets = packets._replace(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns, fate=fate)
         self.queued = self.queued.followed_by(packets)
         return packets
 
@@ -78,21 +64,15 @@ class Senders:
 
     def _access(self, sent_at_ns: IntArray, sender: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray, IntArray]:
         radio = self._radio
-        airtime_ns = access.airtime_ns(sizes, radio.overhead_bytes, radio.bit_rate_bps)
+        lasts_ns = airtime_ns(radio, sizes + radio.overhead_bytes)
         on_air_at_ns, fate, self._free_at_ns = access.enter(
             sent_at_ns,
             self._free_at_ns,
             self.queued.sender,
             self.queued.on_air_at_ns,
             sender,
-            airtime_ns,
+            lasts_ns,
             sizes > radio.max_payload_bytes,
             radio.queue_limit,
         )
-        return on_air_at_ns, on_air_at_ns + np.where(fate == access.ACCEPTED, airtime_ns, 0), fate
-
-    def _numbers(self, sender: IntArray) -> IntArray:
-        """The sequence numbers of packets sorted by sender."""
-        sequence = self._sent_before[sender] + np.arange(len(sender)) - np.searchsorted(sender, sender)
-        self._sent_before += np.bincount(sender, minlength=self._rows)
-        return sequence
+        return on_air_at_ns, on_air_at_ns + np.where(fate == access.ACCEPTED, lasts_ns, 0), fate

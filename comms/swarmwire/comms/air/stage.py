@@ -24,6 +24,8 @@ class Medium:
 class Stage(ABC):
     """One step in the life of a packet between the sender's radio and one receiver."""
 
+    remembers = False  # whether packets that never go on air must not be shown to it
+
     @abstractmethod
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Give a fate to links that end here, or change what becomes of the others; in place.

@@ -13,13 +13,30 @@ To add a stage:
    interference, reception, bursts, what the receiver learns, delay.
 """
 
-from swarmwire.comms.air import delay, disrupted, fixed_loss, given_bearing, given_range, line_of_sight
+from swarmwire.comms.air import (
+    bursts,
+    delay,
+    delays,
+    disrupted,
+    fixed_loss,
+    given_bearing,
+    given_range,
+    given_rssi,
+    line_of_sight,
+)
 from swarmwire.comms.air.stage import Medium, Stage
 
-ORDER = (line_of_sight, disrupted, fixed_loss, given_range, given_bearing, delay)
+AFTER_RECEPTION = (given_range, given_bearing, given_rssi, delay, delays)
+ORDER = (line_of_sight, disrupted, fixed_loss, bursts, *AFTER_RECEPTION)
 
 
 def chain(medium: Medium) -> tuple[Stage, ...]:
     """The stages that this medium has, in order."""
     made = (module.stage(medium) for module in ORDER)
+    return tuple(stage for stage in made if stage is not None)
+
+
+def chain_after_reception(medium: Medium) -> tuple[Stage, ...]:
+    """Those of them that a signal passes once it was received: what comes before is one with its events."""
+    made = (module.stage(medium) for module in AFTER_RECEPTION)
     return tuple(stage for stage in made if stage is not None)

@@ -9,6 +9,7 @@ from swarmwire.deploy.catalogue.entry import Entry
 from swarmwire.deploy.catalogue.events import events
 from swarmwire.deploy.catalogue.fates import fates
 from swarmwire.deploy.catalogue.metrics import metrics
+from swarmwire.deploy.catalogue.presets import presets
 from swarmwire.deploy.catalogue.radio_stages import radio_stages
 from swarmwire.deploy.catalogue.scenario_keys import keys, radio_keys
 from swarmwire.deploy.catalogue.senses import senses
@@ -31,6 +32,7 @@ KINDS = (
     Kind("events", "event", "what may happen to robots and radios on the way", events),
     Kind("metrics", "metric", "what is measured of every run", metrics),
     Kind("radio", "radio", "keys of a scenario's radio", radio_keys),
+    Kind("presets", "preset", "kinds of radio that a scenario may name", presets),
     Kind("stages", "stage", "what a packet passes on its way to a receiver, in order", radio_stages),
     Kind("fates", "fate", "what may become of a packet for one receiver", fates),
     Kind("keys", "key", "all other keys of a scenario", keys),

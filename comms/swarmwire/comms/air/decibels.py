@@ -1,0 +1,19 @@
+"""Decibels: 10 log10 of a ratio of powers; dBm is relative to one milliwatt."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import math
+
+from numba import njit
+
+
+@njit(cache=True)
+def to_db(ratio):
+    """A ratio of powers in dB: 10 log10 x; -inf for 0."""
+    return 10.0 * math.log10(ratio) if ratio > 0.0 else -math.inf
+
+
+@njit(cache=True)
+def from_db(db):
+    """The ratio of powers of a figure in dB: 10^(x / 10); from dBm, the power in mW."""
+    return 10.0 ** (db / 10.0)

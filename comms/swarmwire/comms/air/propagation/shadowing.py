@@ -1,0 +1,69 @@
+"""Shadowing: one Gaussian field per arena stands for all that is not modelled, and a link collects it along its way.
+
+The model NeSh (P. Agrawal and N. Patwari, IEEE Trans. Wireless Comm. 8, 2009): a field p over the plane with
+E[p(x) p(y)] = sigma^2 / (2 delta) exp(-|x - y| / delta), and on a link of length d from a to b
+
+    X = 1/sqrt(d) * integral of p along the link, in dB;   Var X = sigma^2 (1 - delta/d (1 - exp(-d/delta))).
+
+So both directions agree, who returns finds the same, links that share a region are correlated, and the shadowing of
+touching robots vanishes. Var X tends to sigma^2 for links much longer than delta.
+
+p is a sum of plane waves, sqrt(sigma^2 / (delta N)) cos(2 pi (k . x + phase)), whose integral is known in closed form.
+The covariance is exact if the wave vectors follow its spectrum, |k| with F(k) = 1 - 1/sqrt(1 + (2 pi delta k)^2) (the
+plane's Fourier transform of the exponential) and all directions alike. The N quantiles of |k| are one to a stratum, and
+directions turn by the golden section from one to the next: with 128 waves each single arena then varies about as it
+should, too.
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import math
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.air.propagation.parameters import Shadowing
+from swarmwire.comms.air.propagation.waves import cosine, sine, total
+from swarmwire.comms.arrays import FloatArray, KeyArray
+from swarmwire.comms.draws import purpose, uniform
+
+WAVES = 128
+NEARLY_NO_TURN = 1e-9  # instead of a branch for a wave that runs straight across the link
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+SHADOWING = purpose("shadowing")
+QUANTILE, PHASE, TURN = 0, 1, 2  # what the draws of an arena are for
+
+
+def field_waves(keys: KeyArray, shadowing: Shadowing) -> FloatArray:
+    """The waves of each arena's field (arenas, 3, WAVES): k_x and k_y in cycles per m, phase in turns. By arena key."""
+    key, wave = keys[:, None], np.arange(WAVES)
+    quantile = (wave + uniform(key, wave, QUANTILE, 0, SHADOWING)) / WAVES
+    k = np.sqrt((1.0 - quantile) ** -2 - 1.0) / (2.0 * np.pi * shadowing.correlation_m)
+    direction = 2.0 * np.pi * (wave * GOLDEN + uniform(key, 0, TURN, 0, SHADOWING))
+    return np.stack([k * np.cos(direction), k * np.sin(direction), uniform(key, wave, PHASE, 0, SHADOWING)], axis=1)
+
+
+def amplitude_db(shadowing: Shadowing) -> float:
+    """The amplitude of each wave, in dB per sqrt(m)."""
+    return shadowing.deviation_db / math.sqrt(shadowing.correlation_m * WAVES)
+
+
+@njit(cache=True)
+def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
+    """X of the link between (ax, ay) and (bx, by) in m, in dB to be added to the loss; equal both ways to the last bit.
+
+    `waves` (3, WAVES) are those of one arena. About 0.3 us.
+    """
+    dx, dy = bx - ax, by - ay
+    parts = np.empty(waves.shape[1])
+    _along(waves[0], waves[1], waves[2], dx, dy, 0.5 * (ax + bx), 0.5 * (ay + by), parts)
+    return total(parts) * amplitude_db * math.sqrt(math.sqrt(dx * dx + dy * dy))
+
+
+@njit(cache=True, error_model="numpy")
+def _along(kx, ky, phase, dx, dy, mx, my, mean):
+    """Each wave's mean along a link (dx, dy) around (mx, my): its value in the middle times sin(pi k.d) / (pi k.d)."""
+    for n in range(len(mean)):
+        half = abs(0.5 * (kx[n] * dx + ky[n] * dy)) + NEARLY_NO_TURN
+        middle = kx[n] * mx + ky[n] * my + phase[n]
+        mean[n] = cosine(middle) * (sine(half) / (2.0 * math.pi * half))

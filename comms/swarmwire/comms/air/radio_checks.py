@@ -1,0 +1,52 @@
+"""Checks of a radio that need more than one key: contradictions are refused with the key that makes them."""
+
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.reception.parameters import refuse_unfit
+from swarmwire.comms.air.traffic.airtime import DSSS_RATES_BPS, OFDM_BITS_PER_SYMBOL
+from swarmwire.comms.air.traffic.parameters import refuse_negative
+from swarmwire.comms.errors import BadInput
+
+OF_SIGNALS = ("antenna", "shadowing", "walls", "bodies", "fading", "noise", "reception", "access")
+OF_MODELS = {"log_distance": "log-distance", "two_ray": "two-ray", "itu_indoor": "itu-indoor"}
+RATES_BPS = {
+    "802.11a": tuple(OFDM_BITS_PER_SYMBOL),
+    "802.11b": DSSS_RATES_BPS,
+    "802.11g": tuple(OFDM_BITS_PER_SYMBOL),
+}
+
+
+def check_radio(radio: Radio, where: str) -> None:
+    """Raise BadInput for the first contradiction in a scenario's [radio]."""
+    for name, model in OF_MODELS.items():
+        if getattr(radio, name) is not None and radio.model != model:
+            raise BadInput(where, f"radio.{name}", f'expected model = "{model}" with it, got "{radio.model}"')
+    if radio.is_signal:
+        _check_signal(radio, where)
+    else:
+        _check_disk(radio, where)
+    if radio.delays is not None:
+        refuse_negative(radio.delays, where, "radio.delays")
+    rates_bps = RATES_BPS.get(radio.frame, (radio.bit_rate_bps,))
+    if radio.bit_rate_bps not in rates_bps:
+        listed = ", ".join(str(rate_bps) for rate_bps in rates_bps)
+        raise BadInput(where, "radio.bit_rate_bps", f"{radio.frame} has {listed}; got {radio.bit_rate_bps} bit/s")
+
+
+def _check_disk(radio: Radio, where: str) -> None:
+    if radio.range_m is None:
+        raise BadInput(where, "radio.range_m", "is missing; expected a number above 0 (m), as the model disk has one")
+    for name in OF_SIGNALS:
+        if getattr(radio, name) is not None:
+            raise BadInput(where, f"radio.{name}", "expected a model with signals: a disk knows no strength")
+    if radio.gives.rssi is not None:
+        raise BadInput(where, "radio.gives.rssi", "expected a model with signals: a disk knows no strength")
+
+
+def _check_signal(radio: Radio, where: str) -> None:
+    refuse_unfit(radio.reception_or_default, radio.bit_rate_bps, where, "radio.reception")
+    if radio.walls is not None and radio.needs_line_of_sight:
+        raise BadInput(where, "radio.walls", "expected no line_of_sight with it: obstacles either block or weaken")
+    if radio.access_or_default.method == "dcf" and radio.frame == "plain":
+        raise BadInput(where, "radio.access.method", 'expected a frame of IEEE 802.11 for "dcf", such as 802.11b')
+    if radio.access_or_default.method == "csma-802154" and radio.frame != "plain":
+        raise BadInput(where, "radio.access.method", f'expected frame = "plain" for "csma-802154", got {radio.frame}')

@@ -1,0 +1,1 @@
+"""Reception: whether a frame survives noise, interference and bursts. SINR is a ratio of powers; dB where named so."""

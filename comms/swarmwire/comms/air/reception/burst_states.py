@@ -1,0 +1,156 @@
+"""Burst states: which links were good or bad when they were last used, kept for as long as it matters."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import math
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.air.reception.bursts import FORGOTTEN, bad_after
+from swarmwire.comms.air.reception.parameters import Bursts
+from swarmwire.comms.arrays import BoolArray, IntArray, KeyArray
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.draws import purpose
+from swarmwire.comms.draws_compiled import uniform
+
+STATE, LOSS = purpose("burst state"), purpose("burst loss")
+NOBODY = -1
+LEAST_CAPACITY = 1024
+SCATTER = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden section: Knuth's multiplicative hashing
+
+
+class BurstStates:
+    """A sparse table of directed links: a hash by sender and receiver row, open addressing, at most half full.
+
+    Draws are keyed by (sender, receiver, sequence), so packets have the same fates however they are batched, as long as
+    those of a link come in the order of their time. A link that has been silent until its past no longer counts is
+    forgotten, which changes nothing.
+    """
+
+    def __init__(self, bursts: Bursts, keys: KeyArray, robots: int) -> None:
+        self._bursts, self._keys, self._robots = bursts, keys, robots
+        self._rows = len(keys) * robots
+        self._clear(LEAST_CAPACITY)
+
+    def __len__(self) -> int:
+        """How many links are kept."""
+        return self._kept
+
+    def lost(self, sender: IntArray, receiver: IntArray, sequence: IntArray, at_ns: IntArray) -> BoolArray:
+        """Which packets (k,) bursts take; rows of sender and receiver, times in ns that never fall for a link."""
+        if not len(sender):
+            return np.zeros(0, np.bool_)
+        self.make_room(int(at_ns.min()), len(sender))
+        a, b = 1.0 / self._bursts.good_s, 1.0 / self._bursts.bad_s
+        ends, added = _lost(
+            self._link,
+            self._at_ns,
+            self._bad,
+            self._keys,
+            self._robots,
+            self._rows,
+            sender,
+            receiver,
+            sequence,
+            at_ns,
+            a,
+            b,
+            self._bursts.loss_bad,
+            self._bursts.loss_good,
+        )
+        self._kept += added
+        return ends
+
+    def make_room(self, now_ns: int, links: int) -> None:
+        """So many links may be added at `now_ns` or later."""
+        if 2 * (self._kept + links) > len(self._link):
+            self._rebuild(now_ns, links)
+
+    @property
+    def table(self) -> tuple[IntArray, IntArray, BoolArray]:
+        """Links, times and states for kernels, which add at most as many as there is room for; then call `added`."""
+        return self._link, self._at_ns, self._bad
+
+    def added(self, links: int) -> None:
+        """A kernel added so many links to the table."""
+        self._kept += links
+
+    def _clear(self, capacity: int) -> None:
+        self._link = np.full(capacity, NOBODY, np.int64)
+        self._at_ns = np.zeros(capacity, np.int64)
+        self._bad = np.zeros(capacity, np.bool_)
+        self._kept = 0
+
+    def _rebuild(self, now_ns: int, room: int) -> None:
+        """A table for what still counts at `now_ns` and `room` links more, with as much to spare."""
+        relaxation_s = 1.0 / (1.0 / self._bursts.good_s + 1.0 / self._bursts.bad_s)
+        # One relaxation time more than `bad_after` needs: rounding then cannot make a difference.
+        silent_ns = math.ceil((FORGOTTEN + 1.0) * relaxation_s * NS_PER_S)
+        counts = (self._link != NOBODY) & (now_ns - self._at_ns <= silent_ns)
+        link, at_ns, bad = self._link[counts], self._at_ns[counts], self._bad[counts]
+        self._clear(max(1 << (4 * (len(link) + room) - 1).bit_length(), LEAST_CAPACITY))
+        _insert(self._link, self._at_ns, self._bad, link, at_ns, bad)
+        self._kept = len(link)
+
+
+@njit(cache=True)
+def _place(links, link):
+    """Where a link is, or where it belongs."""
+    mask = np.uint64(len(links) - 1)
+    # The upper half of the product depends on all bits of the link; its lowest bits would only on the lowest.
+    at = ((np.uint64(link) * SCATTER) >> np.uint64(32)) & mask
+    while links[at] != NOBODY and links[at] != link:
+        at = (at + np.uint64(1)) & mask
+    return at
+
+
+@njit(cache=True)
+def _insert(links, links_at_ns, links_bad, link, at_ns, bad):
+    for i in range(len(link)):
+        at = _place(links, link[i])
+        links[at], links_at_ns[at], links_bad[at] = link[i], at_ns[i], bad[i]
+
+
+@njit(cache=True)
+def _lost(
+    links,
+    links_at_ns,
+    links_bad,
+    keys,
+    robots,
+    rows,
+    sender,
+    receiver,
+    sequence,
+    at_ns,
+    a,
+    b,
+    loss_bad,
+    loss_good,
+):
+    ends = np.zeros(len(sender), np.bool_)
+    added = 0
+    for i in range(len(sender)):
+        key, s, r = keys[sender[i] // robots], sender[i] % robots, receiver[i] % robots
+        link = sender[i] * rows + receiver[i]
+        ends[i], new = takes(
+            links, links_at_ns, links_bad, link, key, s, r, sequence[i], 0, at_ns[i], a, b, loss_bad, loss_good
+        )
+        added += new
+    return ends, added
+
+
+@njit(cache=True)
+def takes(links, links_at_ns, links_bad, link, key, s, r, sequence, attempt, at_ns, a, b, loss_bad, loss_good):
+    """Whether a burst takes a packet from s to r, indices in the arena, at `at_ns`; and 1 if the link is new here."""
+    at = _place(links, link)
+    silent_s, new = np.inf, 0
+    if links[at] == NOBODY:
+        links[at] = link
+        new = 1
+    else:
+        silent_s = (at_ns - links_at_ns[at]) / NS_PER_S
+    bad = bad_after(links_bad[at], silent_s, a, b, uniform(key, s, r, sequence, STATE + attempt))
+    links_at_ns[at], links_bad[at] = at_ns, bad
+    return uniform(key, s, r, sequence, LOSS + attempt) < (loss_bad if bad else loss_good), new

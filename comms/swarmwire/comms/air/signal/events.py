@@ -1,0 +1,89 @@
+"""The run of events: what is due before a time happens, in order of (time, kind, robot row)."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from numba import njit
+
+from swarmwire.comms.air.signal import service
+from swarmwire.comms.air.signal.event_queue import ENTER, LISTENED, OFF_AIR, SEND, TIMER, cancel, schedule
+from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY, RECEIVING, SILENT
+from swarmwire.comms.fates import Fate
+
+SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_DEAD), int(Fate.BLACKOUT)
+FEW = 64  # rows that any one event tells beyond a frame's links
+
+
+@njit(cache=True)
+def line_up(state, queue, start):
+    """Before events run: the packets of robot r are order[start[r]:start[r + 1]], those done taken out."""
+    for r in range(len(state.robot)):
+        me = state.robot[r]
+        at, stop = start[r], start[r + 1]
+        me.stop = stop
+        me.packet = NOBODY
+        if me.stage >= BACKING_OFF:
+            me.packet = state.order[at]
+            at += 1
+        me.next = at
+        while at < stop and state.packet[state.order[at]].is_entered:
+            at += 1
+        me.entry = at
+        me.waiting = at - me.next
+        if at < stop:
+            schedule(queue, ENTER, r, state.packet[state.order[at]].sent_at_ns)
+
+
+@njit(cache=True)
+def run_until(rules, bursts, state, queue, told, first, stop, hold, most_links, until_ns):
+    """Let happen what is due before `until_ns`; False if `told` has no more room: then take it out and call again.
+
+    `first` and `stop` (rows,) are the links of each robot under the poses held, which are those of `hold`; no robot has
+    more than `most_links`.
+    """
+    rows = len(state.robot)
+    while queue.size[0] > 0:
+        event = queue.heap[0]
+        now_ns = queue.at_ns[event]
+        if now_ns >= until_ns:
+            break
+        kind, r = event // rows, event % rows
+        queued = state.robot[r].stop - state.robot[r].next
+        if told.count[0] + most_links + queued + FEW > len(told.power_mw):
+            return False
+        cancel(queue, kind, r)
+        if kind == OFF_AIR:
+            service.sent(rules, bursts, state, queue, told, r, now_ns)
+        elif kind == LISTENED:
+            service.listened(rules, state, queue, told, r, now_ns)
+        elif kind == TIMER:
+            service.timer(rules, state, queue, told, r, now_ns)
+        elif kind == SEND:
+            service.send(rules, state, queue, r, now_ns, first[r], stop[r], hold)
+        elif kind == ENTER:
+            service.enter(rules, state, queue, told, r, now_ns)
+        else:
+            service.answer(rules, state, queue, r, now_ns, first[r], stop[r], hold)
+    return True
+
+
+@njit(cache=True)
+def stop_the_dead(state, queue, told, alive, now_ns):
+    """The queues of robots that are not alive (rows,) end; after `line_up`."""
+    for r in range(len(state.robot)):
+        if not alive[r]:
+            service.stop(state, queue, told, r, now_ns, SENDER_DEAD)
+
+
+@njit(cache=True)
+def cut_off(state, alive, radio_on):
+    """Robots that are dead (rows,), or whose radio is off, do not hear the frames on air to their end."""
+    for s in range(len(state.robot)):
+        me = state.robot[s]
+        if me.on_air == SILENT:
+            continue
+        for i in range(me.first_link, me.stop_link):
+            link = state.link[i]
+            r = link.receiver
+            if link.now == RECEIVING and not (alive[r] and radio_on[r]):
+                link.now = BLACKOUT if alive[r] else RECEIVER_DEAD
+                state.robot[r].locked_to = NOBODY

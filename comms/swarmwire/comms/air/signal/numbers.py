@@ -1,0 +1,133 @@
+"""From a scenario's radio to the numbers that events and links are computed with."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import numpy as np
+
+from swarmwire.comms.air.decibels import from_db
+from swarmwire.comms.air.frames import acknowledgement_bytes, airtime_ns
+from swarmwire.comms.air.propagation.fading import fading_law
+from swarmwire.comms.air.propagation.parameters import Bodies, Fading, Shadowing, Walls
+from swarmwire.comms.air.propagation.path_loss import reach_m
+from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.reception.reception import Receiver, receiver_of
+from swarmwire.comms.air.reception.sensitivity import sensitivity_dbm, sinr_for_db
+from swarmwire.comms.air.signal.link_table import Surroundings
+from swarmwire.comms.air.signal.log_success import log_success_table
+from swarmwire.comms.air.signal.parameters import METHODS
+from swarmwire.comms.air.signal.tables import Rules
+from swarmwire.comms.air.traffic.access_timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G, IEEE_802_15_4
+from swarmwire.comms.arrays import FloatArray, KeyArray
+from swarmwire.comms.clock import to_ns
+
+# What counts as sensitivity in data sheets: share of frames that are right, and their bytes (see `sensitivity_dbm`).
+SHEETS = {"802.15.4": (0.99, 26), "802.11b": (0.92, 1024), "802.11ag": (0.9, 1000)}
+SURE = 1.0 - 1e-12
+CUT_OFF_DB = 10.0  # below the noise, or the sensitivity if that is lower
+SHADOWS_CUT_OFF = 2.5  # deviations of shadowing, if that is more
+DCF_OF = {"802.11a": IEEE_802_11A, "802.11b": IEEE_802_11B, "802.11g": IEEE_802_11G}
+
+
+def receiver_for(radio: Radio) -> Receiver:
+    """The receiver that the radio has."""
+    return receiver_of(radio.reception_or_default, radio.bit_rate_bps)
+
+
+def sensitivity_of(radio: Radio) -> float:
+    """The least mean power in dBm that counts as in range: as given, or as data sheets state it for this receiver."""
+    reception = radio.reception_or_default
+    if reception.sensitivity_dbm is not None:
+        return reception.sensitivity_dbm
+    success, frame_bytes = SHEETS.get(reception.model, (0.9, radio.max_payload_bytes + radio.overhead_bytes))
+    return sensitivity_dbm(receiver_for(radio), radio.noise_or_default.power_dbm, success, 8 * frame_bytes)
+
+
+def range_of(radio: Radio) -> float | None:
+    """Nominal reach in m: where path loss alone leaves the sensitivity, or the disk's radius; never above `range_m`."""
+    if not radio.is_signal:
+        return radio.range_m
+    antenna = radio.antenna_or_default
+    most_db = antenna.power_dbm + 2.0 * antenna.gain_dbi - sensitivity_of(radio)
+    found_m = float(reach_m(radio.loss_model.curve(radio.frequency_hz), most_db))
+    return found_m if radio.range_m is None else min(found_m, radio.range_m)
+
+
+def rules_of(radio: Radio, robots: int) -> Rules:
+    """What events go by."""
+    reception, access, receiver = radio.reception_or_default, radio.access_or_default, receiver_for(radio)
+    csma, dcf = IEEE_802_15_4, DCF_OF.get(radio.frame, IEEE_802_11B)
+    is_dcf = access.method == "dcf"
+    busy_dbm = access.busy_dbm
+    if busy_dbm is None:
+        busy_dbm = dcf.busy_energy_dbm if is_dcf else sensitivity_of(radio) + csma.busy_above_sensitivity_db
+    retries = access.most_retries
+    if retries is None:
+        retries = dcf.most_retries if is_dcf else csma.most_retries
+    answer_bytes = acknowledgement_bytes(radio)
+    answer_ns = int(airtime_ns(radio, np.array([answer_bytes]))[0])
+    short_space_ns = dcf.short_space_ns if is_dcf else csma.turnaround_ns
+    dcf_patience_ns = short_space_ns + answer_ns + dcf.slot_ns
+    most_bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
+    return Rules(
+        robots=robots,
+        method=METHODS.index(access.method),
+        acknowledged=access.acknowledged and access.method in ("csma-802154", "dcf"),
+        queue_limit=radio.queue_limit,
+        noise_mw=float(from_db(radio.noise_or_default.power_dbm)),
+        least_sinr=float(from_db(reception.preamble_sinr_db)),
+        least_mw=float(from_db(reception.preamble_dbm)),
+        sure_sinr=float(from_db(sinr_for_db(receiver, SURE, most_bits))),
+        take_over_ns=to_ns(reception.take_over_s),
+        loss=radio.loss,
+        busy_mw=float(from_db(busy_dbm)),
+        retries=retries,
+        short_space_ns=short_space_ns,
+        acknowledgement_ns=answer_ns,
+        acknowledgement_bits=8 * answer_bytes,
+        patience_ns=dcf_patience_ns if is_dcf else csma.acknowledgement_wait_ns,
+        backoff_ns=csma.backoff_ns,
+        listen_ns=csma.cca_ns,
+        turnaround_ns=csma.turnaround_ns,
+        least_exponent=csma.least_exponent,
+        most_exponent=csma.most_exponent,
+        most_backoffs=csma.most_backoffs,
+        slot_ns=dcf.slot_ns,
+        difs_ns=dcf.difs_ns,
+        distrust_ns=dcf.short_space_ns + answer_ns,  # EIFS - DIFS: SIFS and an acknowledgement
+        least_window=dcf.least_window,
+        most_window=dcf.most_window,
+        receiver=receiver,
+        log_success=log_success_table(receiver),
+    )
+
+
+def surroundings_of(radio: Radio, keys: KeyArray, radius_m: FloatArray) -> Surroundings:
+    """What links go by; `radius_m` (rows,) are the robots' radii."""
+    antenna, noise_dbm = radio.antenna_or_default, radio.noise_or_default.power_dbm
+    shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
+    curve = radio.loss_model.curve(radio.frequency_hz)
+    floor_dbm = min(noise_dbm, sensitivity_of(radio))
+    spread_db = SHADOWS_CUT_OFF * shadowing.deviation_db if shadowing else 0.0
+    budget_dbm = antenna.power_dbm + 2.0 * antenna.gain_dbi
+    far_m = float(reach_m(curve, budget_dbm - floor_dbm + max(CUT_OFF_DB, spread_db)))
+    return Surroundings(
+        power_dbm=antenna.power_dbm,
+        gain_dbi=antenna.gain_dbi,
+        curve=curve,
+        reach_m=far_m if radio.range_m is None else min(far_m, radio.range_m),
+        least_dbm=floor_dbm - CUT_OFF_DB,
+        shadows=shadowing is not None,
+        amplitude_db=amplitude_db(shadowing or Shadowing()),
+        waves=field_waves(keys, shadowing or Shadowing()),
+        walls=walls is not None,
+        crossing_db=(walls or Walls()).crossing_db,
+        inside_db_per_m=(walls or Walls()).inside_db_per_m,
+        line_of_sight=radio.needs_line_of_sight,
+        bodies=bodies is not None,
+        body_db=(bodies or Bodies()).crossing_db,
+        radius_m=radius_m,
+        most_radius_m=float(radius_m.max()),
+        fades=fading is not None,
+        law=fading_law(fading or Fading(), radio.frequency_hz),
+    )

@@ -1,0 +1,59 @@
+"""A scenario's radio: presets fill what it leaves open, contradictions are refused with key and reason."""
+
+from typing import Any
+
+import pytest
+
+from swarmwire.comms.air.presets import PRESETS
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.errors import BadInput
+from swarmwire.world.scenario_file import scenario_from
+from tests.world.samples import SAMPLE
+
+
+def radio_of(table: dict[str, Any]) -> Radio:
+    """The radio of the sample scenario with this table."""
+    radio = scenario_from({**SAMPLE, "radio": table}, "f").radio
+    assert radio is not None
+    return radio
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_preset_is_a_radio(name: str) -> None:
+    radio = radio_of({"preset": name})
+    assert radio.preset == name
+    assert PRESETS[name].source
+
+
+def test_what_a_scenario_says_wins_over_its_preset_key_by_key() -> None:
+    radio = radio_of({"preset": "ieee802154", "loss": 0.1, "log_distance": {"reference_loss_db": 50.0}})
+    assert radio.loss == 0.1
+    assert radio.log_distance is not None
+    assert (radio.log_distance.exponent, radio.log_distance.reference_loss_db) == (3.0, 50.0)
+    assert radio.access_or_default.method == "csma-802154"
+
+
+SIGNAL = {"model": "log-distance"}
+FAULTS: list[tuple[dict[str, Any], str]] = [
+    ({}, "radio.range_m: is missing"),
+    ({"preset": "nothing"}, "radio.preset: expected one of ideal, disk"),
+    ({"range_m": 2.0, "access": {}}, "radio.access: expected a model with signals"),
+    ({"range_m": 2.0, "reception": {}}, "radio.reception: expected a model with signals"),
+    ({"range_m": 2.0, "gives": {"rssi": {}}}, "radio.gives.rssi: expected a model with signals"),
+    ({"preset": "disk", "fading": {}}, "radio.fading: expected a model with signals"),
+    ({**SIGNAL, "two_ray": {}}, 'radio.two_ray: expected model = "two-ray"'),
+    ({**SIGNAL, "bit_rate_bps": 0}, "radio.bit_rate_bps: expected a whole number of at least 1"),
+    ({**SIGNAL, "walls": {}, "line_of_sight": True}, "radio.walls: expected no line_of_sight"),
+    ({**SIGNAL, "access": {"method": "dcf"}}, "radio.access.method: expected a frame of IEEE 802.11"),
+    ({**SIGNAL, "frame": "802.11b"}, "radio.bit_rate_bps: 802.11b has 1000000"),
+    ({**SIGNAL, "reception": {"model": "table"}}, "radio.reception.table: is missing"),
+    ({**SIGNAL, "delays": {"distribution": "uniform", "deviation_s": 1.0}}, "radio.delays.deviation_s"),
+    ({"preset": "ieee802154", "model": "disk", "range_m": 1.0}, "radio.log_distance: expected model"),
+]
+
+
+@pytest.mark.parametrize(("table", "text"), FAULTS)
+def test_a_contradiction_is_refused_with_its_key(table: dict[str, Any], text: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        radio_of(table)
+    assert str(caught.value).startswith(f"f: {text}")
