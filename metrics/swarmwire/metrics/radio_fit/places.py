@@ -8,7 +8,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.radio_fit.radio_log import RadioLog
 
 SAME_PLACE_M = 0.05
-MOST_PLACES = 400
+MOST_PLACES = 300
 
 
 @dataclass(frozen=True)
