@@ -12,6 +12,7 @@ from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.commands.export import ExportCommand, export_command
 from swarmwire.deploy.commands.list_kinds import list_command
 from swarmwire.deploy.commands.new import new_command
+from swarmwire.deploy.commands.radio.group import radio_app
 from swarmwire.deploy.commands.repeat import repeat_command
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
@@ -38,6 +39,7 @@ app.command("list")(list_command)
 app.command("describe")(describe_command)
 app.command("new")(new_command)
 app.command("verify")(verify_command)
+app.add_typer(radio_app, name="radio")
 
 
 def main() -> None:

@@ -79,7 +79,9 @@ def _refuse_disorder(
     gaps = np.where(same, steps - 1.0, 0.0)
     if gaps.sum() > MOST_LOST:
         widest = _rows(order, gaps == gaps.max())
-        table.refuse_where(widest, "seq", f"leaves {gaps.max():.0f} packets out; expected {MOST_LOST} lost in all at most")
+        table.refuse_where(
+            widest, "seq", f"leaves {gaps.max():.0f} packets out; expected {MOST_LOST} lost in all at most"
+        )
 
 
 def _rows(order: IntArray, wrong: AnyArray) -> BoolArray:
