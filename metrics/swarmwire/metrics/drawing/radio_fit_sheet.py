@@ -1,5 +1,6 @@
 """A radio's fit on one sheet: RSSI over distance, the residuals' correlogram, and how long bursts are."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -7,9 +8,20 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.canvas import new_figure, save
-from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, LONG_SIDE_IN, SMALL_PT, SOFT, TEXT_PT, TITLE_PT
+from swarmwire.metrics.drawing.looks import (
+    CURVE,
+    FAINT,
+    GRID,
+    INK,
+    LONG_SIDE_IN,
+    SMALL_PT,
+    SOFT,
+    TEXT_PT,
+    TITLE_PT,
+    Look,
+)
 from swarmwire.metrics.radio_fit.correlogram import correlogram
-from swarmwire.metrics.radio_fit.loss_fit import LossFit
+from swarmwire.metrics.radio_fit.expected_runs import expected_runs
 from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit
 from swarmwire.metrics.radio_fit.places import places_of
 from swarmwire.metrics.radio_fit.radio_fit import RadioFit
@@ -54,12 +66,11 @@ def _draw_rssi(axes: Any, fit: RadioFit) -> None:
     axes.xaxis.set_minor_formatter("{x:g}" if distance_m.max() < 10.0 * distance_m.min() else "")
     axes.plot(distance_m[::every], rssi_dbm[::every], ".", ms=2.5, mew=0, color=SOFT, alpha=0.4, label="packets")
     if isinstance(fit.path_loss, PathLossFit):
-        ends_m = np.geomspace(distance_m.min(), distance_m.max(), 50)
+        ends_m = np.exp(np.linspace(math.log(distance_m.min()), math.log(distance_m.max()), 50))
         line = fit.path_loss.rssi_dbm(ends_m)
         band_db = _BAND * _deviation_db(fit, ends_m)
-        axes.fill_between(
-            ends_m, line - band_db, line + band_db, color=CURVE, alpha=0.15, lw=0, label="9 of 10 by the fit"
-        )
+        faint: Look = {"color": CURVE, "alpha": 0.15, "lw": 0}
+        axes.fill_between(ends_m, line - band_db, line + band_db, label="9 of 10 by the fit", **faint)
         axes.plot(ends_m, line, color=CURVE, lw=1.4, label=f"exponent {fit.path_loss.exponent.value:.2f}")
     axes.legend(fontsize=SMALL_PT, frameon=False, labelcolor=SOFT, loc="upper right")
 
@@ -94,17 +105,16 @@ def _draw_bursts(axes: Any, fit: RadioFit) -> None:
     counts = np.bincount(np.minimum(lengths, longest + 1), minlength=longest + 2)[1 : longest + 1]
     at = np.arange(1, longest + 1)
     axes.plot(at, np.where(counts > 0, counts, np.nan), "o", ms=3, color=SOFT, label="found")
-    _draw_expected_runs(axes, fit.losses, at, len(lengths))
+    single, bursts = fit.losses.loss.value, fit.losses.chosen.bursts
+    # Runs of single losses are geometric: what lies above their line is bursts.
+    axes.plot(at, len(lengths) * (1.0 - single) * single ** (at - 1.0), color=FAINT, lw=1.2, label="single losses")
+    if bursts is not None:
+        expected = len(lengths) * expected_runs(bursts, fit.sequences.interval_s, longest)
+        axes.plot(at, expected, color=CURVE, lw=1.4, label="the fitted bursts")
     axes.set_yscale("log")
     axes.set_ylim(0.5, None)
     axes.xaxis.get_major_locator().set_params(integer=True)
     axes.legend(fontsize=SMALL_PT, frameon=False, labelcolor=SOFT, loc="upper right")
-
-
-def _draw_expected_runs(axes: Any, losses: LossFit, at: Any, runs: int) -> None:
-    """Runs of single losses are geometric: what lies above their line is bursts."""
-    single = losses.loss.value
-    axes.plot(at, runs * (1.0 - single) * single ** (at - 1.0), color=FAINT, lw=1.2, label="single losses")
 
 
 def _say(axes: Any, text: str) -> None:

@@ -1,18 +1,17 @@
 """Products of residuals against what a shadowing field predicts for them: least squares over all pairs of places.
 
-A field with noise has the covariance sigma^2 C(delta) + noise^2 D, D = diag(1 / packets), of which a fitted line leaves
-P (...) P'. Products of residuals have that mean, whatever the field's distribution, so sigma^2 and noise^2 are linear for
-a given delta, and delta is searched over a grid and between its steps by a parabola.
+A field with noise has the covariance sigma^2 C(delta) + noise^2 D, D = diag(1 / packets), of which a fitted line
+leaves P (...) P'. Products of residuals have that mean, whatever the field's distribution, so sigma^2 and noise^2 are
+linear for a given delta, and delta is searched over a grid and between its steps by a parabola.
 
-All is first made white by a working covariance, as neighbouring places say nearly the same: any one leaves the mean as it
-is, and a poor one only costs precision. The fitted one itself (maximum likelihood) would trust fields to be Gaussian to
-the finest detail, which those made of a few hundred waves are not: it finds correlation distances half too long.
+All is first made white by a working covariance, as neighbouring places say nearly the same: any one leaves the mean as
+it is, and a poor one only costs precision. The fitted one itself (maximum likelihood) would trust fields to be Gaussian
+to the finest detail, which those made of a few hundred waves are not: it finds correlation distances half too long.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.metrics.radio_fit.link_field import link_covariance
@@ -41,7 +40,7 @@ class FieldMoments:
         ends_m, count = places.ends_m, len(places.packets)
         extent_m = float(np.ptp(ends_m.reshape(-1, 2), axis=0).max())
         working = link_covariance(ends_m, WORKING_SHARE * extent_m) + WORKING_NOISE**2 * np.eye(count)
-        white = np.linalg.inv(linalg.cholesky(working, lower=True))
+        white = np.linalg.inv(np.linalg.cholesky(working))
         line = white @ design(places.distance_m)
         self._project = white - line @ (np.linalg.pinv(line) @ white)
         self.tried_m: FloatArray = np.geomspace(FINEST_SHARE * extent_m, COARSEST_SHARE * extent_m, STEPS)
@@ -61,9 +60,7 @@ class FieldMoments:
         best: IntArray = explained.argmax(axis=0)
         place, inside = _peak(explained, best)
         steps = np.arange(STEPS)
-        sigma2, noise2 = (
-            np.array([np.interp(at, steps, variances[:, k, i]) for i, at in enumerate(place)]) for k in (0, 1)
-        )
+        sigma2, noise2 = (_between(place, variances[:, k]) for k in (0, 1))
         by_noise, all_squares = rd**2 / dd, (residuals**2).sum(axis=0) ** 2
         gain = (explained[best, np.arange(len(best))] - by_noise) / all_squares
         correlation_m = np.exp(np.interp(place, steps, np.log(self.tried_m)))
@@ -88,6 +85,12 @@ class FieldMoments:
 def _along(covariance: FloatArray, residuals: FloatArray) -> FloatArray:
     """The sum over all pairs of a covariance (n, n) times the products of each column's (n, b) residuals, (b,)."""
     return (residuals * (covariance @ residuals)).sum(axis=0)
+
+
+def _between(place: FloatArray, values: FloatArray) -> FloatArray:
+    """Each column's (steps, b) value at a place (b,) between steps."""
+    steps = np.arange(STEPS, dtype=np.float64)
+    return np.array([float(np.interp(at, steps, values[:, i])) for i, at in enumerate(place.tolist())])
 
 
 def _peak(height: FloatArray, best: IntArray) -> tuple[FloatArray, FloatArray]:

@@ -82,7 +82,7 @@ def _single_per_link(sequences: LossSequences) -> LossModel:
 
 
 def _fit_all_bursts(sequences: LossSequences) -> list[LossModel]:
-    """Bursts with two, three and four free parameters: the durations, then the loss in bursts, then that between them."""
+    """Bursts with two, three and four free parameters: the durations, the loss in bursts, that between them."""
     lost = float(sequences.lost.mean())
     bad_s = float(sequences.burst_lengths.mean()) * sequences.interval_s
     # Bursts as long as runs of losses are, and longer ones that lose half.

@@ -46,7 +46,7 @@ class RadioLog:
         # A link's rows with no far row between them stay together.
         spell = np.stack([self.link, far_since_start])[:, near]
         starts = np.any(np.diff(spell, axis=1, prepend=-1) != 0, axis=0)
-        first = self.link[near][starts]
+        first: list[int] = self.link[near][starts].tolist()
         return RadioLog(
             tuple(self.links[i] for i in first),
             np.cumsum(starts) - 1,

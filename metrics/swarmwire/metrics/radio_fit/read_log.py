@@ -18,7 +18,7 @@ def read_log(path: Path) -> RadioLog:
     """The log in a file, its links in the order of their names.
 
     Columns: t_s, tx, rx, seq, rssi_dbm (empty: the packet was lost), and tx_x_m, tx_y_m, rx_x_m, rx_y_m or distance_m
-    (may be empty where a packet was lost). The rows of a link stand in the order of time; those of several links in any.
+    (may be empty where a packet was lost). The rows of a link stand in the order of time, links in any.
     BadInput where they do not, for a sequence number that comes twice, and for values that cannot be.
     """
     table = MeasuredTable(path)

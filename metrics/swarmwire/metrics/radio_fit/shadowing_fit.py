@@ -13,7 +13,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import derive_key, normal, purpose
 from swarmwire.metrics.radio_fit.estimate import Estimate
 from swarmwire.metrics.radio_fit.field_moments import FieldFits, FieldMoments
-from swarmwire.metrics.radio_fit.link_field import link_features
+from swarmwire.metrics.radio_fit.link_field import WAVES, link_features
 from swarmwire.metrics.radio_fit.path_loss_fit import design
 from swarmwire.metrics.radio_fit.places import Places
 
@@ -56,7 +56,7 @@ def _with_errors(places: Places, moments: FieldMoments, found: FieldFits, noise:
         float(of[0]) for of in (found.deviation_db, found.correlation_m, found.noise_db)
     )
     features = link_features(places.ends_m, correlation_m)
-    waves = normal(KEY, np.arange(features.shape[1])[:, None], np.arange(DRAWN), 0, FIELD)
+    waves = normal(KEY, np.arange(2 * WAVES)[:, None], np.arange(DRAWN), 0, FIELD)
     drawn = deviation_db * (features @ waves) + noise_db * noise
     again = moments.fit(moments.residuals(drawn))
     root = np.sqrt(places.packets)[:, None]
