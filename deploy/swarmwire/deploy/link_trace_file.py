@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swarmwire.comms.air.trace.link_trace import POSSIBLE, LinkTrace, RefusedRow, link_trace
+from swarmwire.comms.air.trace.link_trace import POSSIBLE, LinkTrace, Quantity, RefusedRow, link_trace
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.metrics.measured_table import MeasuredTable
@@ -22,7 +22,7 @@ def read_link_trace(path: Path, robots: Sequence[str]) -> LinkTrace:
     """
     table = MeasuredTable(path)
     table.need(tuple(COLUMNS.values()))
-    measured = [name for name in POSSIBLE if name in table.columns]
+    measured: list[Quantity] = [name for name in POSSIBLE if name in table.columns]
     if len(measured) != 1:
         found = " and ".join(measured) or "none"
         raise table.refused("", f"expected one of the columns {', '.join(POSSIBLE)}, got {found}")

@@ -10,6 +10,7 @@ from swarmwire.comms.air.reception.burst_states import BurstStates
 from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key
+from swarmwire.metrics.radio_fit.loss_sequences import LossSequences
 
 EXPONENT, RSSI_AT_1_M_DBM = 2.7, -40.0
 NOISE_DB = 1.5
@@ -78,3 +79,10 @@ def _walks(draws: np.random.Generator, links: int, packets: int) -> np.ndarray:
     angle = draws.uniform(0.0, 2.0 * np.pi, links) + 0.1 * draws.standard_normal((packets, links)).cumsum(axis=0)
     length = np.exp(draws.uniform(np.log(1.0), np.log(40.0), (packets, links)))
     return np.concatenate([start, start + length[..., None] * np.stack([np.cos(angle), np.sin(angle)], -1)], axis=-1)
+
+
+def sequences(key: int, bursts: Bursts, links: int = 20, packets: int = 600) -> LossSequences:
+    """Losses of packets at uneven times around 0.1 s apart, all of them known."""
+    t_s = np.cumsum(0.1 * np.random.default_rng(key).uniform(0.5, 1.5, (packets, links)), axis=0)
+    since_s = np.diff(t_s.T, axis=1, prepend=-np.inf)
+    return LossSequences(np.repeat(np.arange(links), packets), since_s.ravel(), losses(key, bursts, t_s).T.ravel())

@@ -59,11 +59,10 @@ class FieldMoments:
         explained: FloatArray = variances[:, 2]
         best: IntArray = explained.argmax(axis=0)
         place, inside = _peak(explained, best)
-        steps = np.arange(STEPS)
         sigma2, noise2 = (_between(place, variances[:, k]) for k in (0, 1))
         by_noise, all_squares = rd**2 / dd, (residuals**2).sum(axis=0) ** 2
         gain = (explained[best, np.arange(len(best))] - by_noise) / all_squares
-        correlation_m = np.exp(np.interp(place, steps, np.log(self.tried_m)))
+        correlation_m = np.exp(np.interp(place, np.arange(STEPS), np.log(self.tried_m)))
         return FieldFits(np.sqrt(sigma2), correlation_m, np.sqrt(noise2), gain, inside)
 
     def _seen(self, covariance: FloatArray) -> FloatArray:
@@ -89,8 +88,9 @@ def _along(covariance: FloatArray, residuals: FloatArray) -> FloatArray:
 
 def _between(place: FloatArray, values: FloatArray) -> FloatArray:
     """Each column's (steps, b) value at a place (b,) between steps."""
-    steps = np.arange(STEPS, dtype=np.float64)
-    return np.array([float(np.interp(at, steps, values[:, i])) for i, at in enumerate(place.tolist())])
+    low = np.clip(np.floor(place).astype(np.int64), 0, STEPS - 2)
+    column = np.arange(len(place))
+    return values[low, column] + (place - low) * (values[low + 1, column] - values[low, column])
 
 
 def _peak(height: FloatArray, best: IntArray) -> tuple[FloatArray, FloatArray]:

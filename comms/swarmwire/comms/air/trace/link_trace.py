@@ -69,6 +69,7 @@ def link_trace(
     return LinkTrace(quantity, robots, links.astype(np.int64), start, time_ns[order], value[order])
 
 
+# What can be measured: which values are possible, and how to say so.
 Possible = Callable[[FloatArray], AnyArray]
 POSSIBLE: dict[Quantity, tuple[Possible, str]] = {
     "delivery_ratio": (lambda value: (value >= 0.0) & (value <= 1.0), "expected a ratio from 0 to 1"),

@@ -1,0 +1,164 @@
+"""Fits find again what logs were made with. Keys are fixed; tolerances are standard errors as the fit itself states
+them, at most four of them (false alarm 1 in 16 000 each), and those are held to what such a log can tell.
+"""
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.air.propagation.parameters import Antenna, Shadowing
+from swarmwire.comms.air.reception.parameters import Bursts
+from swarmwire.metrics.radio_fit.link_field import link_covariance
+from swarmwire.metrics.radio_fit.loss_fit import LossFit, fit_losses
+from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit
+from swarmwire.metrics.radio_fit.radio_fit import fit_radio
+from swarmwire.metrics.radio_fit.radio_table import radio_table
+from swarmwire.metrics.radio_fit.read_log import read_log
+from swarmwire.metrics.radio_fit.shadowing_fit import ShadowingFit
+from tests.metrics.radio_fit.synthetic import (
+    EXPONENT,
+    NOISE_DB,
+    RSSI_AT_1_M_DBM,
+    csv_of,
+    made,
+    sequences,
+)
+
+STANDARD_ERRORS = 4.0
+SHADOWING = Shadowing(4.0, 5.0)
+BURSTS = Bursts(0.5, 5.0, 0.8, 0.02)
+
+
+def is_found(estimate, true: float, surely: float) -> bool:
+    """Whether a value is right by its own standard error, which is at most such a share of it."""
+    value, error = estimate
+    return bool(abs(value - true) < STANDARD_ERRORS * error and error < surely * abs(true))
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    path = tmp_path_factory.mktemp("logs") / "log.csv"
+    path.write_text(csv_of(made(1, SHADOWING, BURSTS)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def fit(written):
+    return fit_radio(read_log(written))
+
+
+def test_path_loss_is_found_again(fit):
+    assert isinstance(fit.path_loss, PathLossFit)
+    assert is_found(fit.path_loss.exponent, EXPONENT, 0.05)
+    assert is_found(fit.path_loss.rssi_at_1_m_dbm, RSSI_AT_1_M_DBM, 0.02)
+
+
+def test_shadowing_and_noise_are_told_apart_and_found_again(fit):
+    assert isinstance(fit.shadowing, ShadowingFit)
+    assert is_found(fit.shadowing.deviation_db, SHADOWING.deviation_db, 0.25)
+    assert is_found(fit.shadowing.correlation_m, SHADOWING.correlation_m, 0.5)
+    assert is_found(fit.shadowing.noise_db, NOISE_DB, 0.2)
+
+
+def test_bursts_are_found_again_from_gaps(fit):
+    assert isinstance(fit.losses, LossFit)
+    chosen = fit.losses.chosen
+    assert chosen.name == "bursts, and single losses between"
+    for name, surely in (("bad_s", 0.2), ("good_s", 0.2), ("loss_bad", 0.1), ("loss_good", 0.2)):
+        assert is_found((getattr(chosen.bursts, name), chosen.errors[name]), getattr(BURSTS, name), surely)
+
+
+def test_residuals_are_those_of_the_line(fit):
+    rssi_dbm = fit.path_loss.rssi_dbm(fit.distance_m) + fit.residual_db
+    assert rssi_dbm == pytest.approx(fit.rssi_dbm)
+    assert abs(fit.residual_db.mean()) < 1e-9
+
+
+def test_the_table_has_the_scenarios_keys_and_what_the_antenna_took_part_in(fit):
+    table = radio_table(fit, Antenna(power_dbm=3.0, gain_dbi=2.0))["radio"]
+    assert table["model"] == "log-distance"
+    assert table["antenna"] == {"power_dbm": 3.0, "gain_dbi": 2.0}
+    told_dbm = 3.0 + 2 * 2.0 - table["log_distance"]["reference_loss_db"]
+    assert told_dbm == pytest.approx(fit.path_loss.rssi_at_1_m_dbm.value, abs=0.01)
+    assert Shadowing(**table["shadowing"]).correlation_m == pytest.approx(fit.shadowing.correlation_m.value, rel=1e-3)
+    assert Bursts(**table["bursts"]).bad_s == pytest.approx(fit.losses.chosen.bursts.bad_s, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("bursts", "name"),
+    [(Bursts(0.5, 5.0), "bursts that lose all"), (Bursts(0.5, 5.0, 0.6), "bursts that lose a share")],
+)
+def test_the_simplest_kind_of_bursts_that_tells_the_losses_is_chosen(bursts, name):
+    found = fit_losses(sequences(3, bursts))
+    assert isinstance(found, LossFit)
+    assert found.chosen.name == name
+    for key in found.chosen.errors:
+        assert is_found((getattr(found.chosen.bursts, key), found.chosen.errors[key]), getattr(bursts, key), 0.2)
+
+
+@pytest.mark.parametrize("key", range(4))
+def test_single_losses_are_recognised_as_such(key):
+    found = fit_losses(sequences(key, Bursts(1.0, 1.0, 0.1, 0.1)))
+    assert isinstance(found, LossFit)
+    assert found.chosen.name == "single losses"
+    assert is_found(found.loss, 0.1, 0.1)
+    assert abs(found.runs_z) < STANDARD_ERRORS
+
+
+def test_links_that_lose_different_shares_are_no_bursts():
+    """A chain with one loss for all would have it that links are in bursts for good."""
+    many, few = (sequences(5, Bursts(1.0, 1.0, loss, loss)) for loss in (0.4, 0.02))
+    apart = int(many.link.max()) + 1
+    both = type(many)(
+        np.append(many.link, few.link + apart), np.append(many.since_s, few.since_s), np.append(many.lost, few.lost)
+    )
+    found = fit_losses(both)
+    assert isinstance(found, LossFit)
+    assert found.chosen.bursts is None
+    assert min(found.models, key=lambda model: model.aic).name == "single losses, each link its own share"
+
+
+def test_residuals_that_only_vary_from_packet_to_packet_are_no_shadowing(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(csv_of(made(2, Shadowing(1e-9, 5.0), None)))
+    found = fit_radio(read_log(path))
+    assert found.shadowing == "links that are near each other are no more alike than by chance"
+    assert is_found(found.path_loss.exponent, EXPONENT, 0.05)
+
+
+def test_rows_without_rssi_and_gaps_say_the_same(tmp_path, fit):
+    path = tmp_path / "rows.csv"
+    path.write_text(csv_of(made(1, SHADOWING, BURSTS), gaps=False))
+    found = fit_radio(read_log(path))
+    assert found.path_loss.exponent.value == pytest.approx(fit.path_loss.exponent.value, rel=1e-9)
+    # Times of lost packets are known here, and so are losses at the ends of links.
+    assert found.losses.loss.value == pytest.approx(fit.losses.loss.value, rel=0.1)
+    assert found.losses.chosen.bursts.bad_s == pytest.approx(fit.losses.chosen.bursts.bad_s, rel=0.2)
+
+
+def test_what_a_log_is_too_small_for_is_left_out_and_named(tmp_path):
+    path = tmp_path / "few.csv"
+    path.write_text("t_s,tx,rx,seq,rssi_dbm,distance_m\n" + "".join(f"{i},a,b,{i},-50,{1 + i}\n" for i in range(20)))
+    found = fit_radio(read_log(path))
+    assert isinstance(found.path_loss, PathLossFit)
+    assert found.shadowing == "needs positions of sender and receiver, of which distance_m tells too little"
+    assert found.losses == "needs 100 packets, got 20"
+    assert sorted(radio_table(found, Antenna())["radio"]) == ["antenna", "log_distance", "model"]
+
+
+def test_covariance_of_links_is_that_of_the_emulators_field():
+    """On the diagonal 1 - delta/d (1 - exp(-d/delta)); beside it the definition's double integral."""
+    delta_m = 5.0
+    ends_m = np.array([(0.0, 0.0, 10.0, 0.0), (0.0, 5.0, 10.0, 5.0), (5.0, -5.0, 5.0, 5.0), (0.0, 0.0, 2.0, 0.0)])
+    share = (np.arange(400) + 0.5)[:, None] / 400
+    along = [row[:2] + share * (row[2:] - row[:2]) for row in ends_m]
+    length = [float(np.hypot(*(row[2:] - row[:2]))) for row in ends_m]
+    exact = [
+        [
+            np.sqrt(length[i] * length[j])
+            * np.exp(-np.hypot(*(p[:, None] - q[None]).transpose(2, 0, 1)) / delta_m).mean()
+            / (2.0 * delta_m)
+            for j, q in enumerate(along)
+        ]
+        for i, p in enumerate(along)
+    ]
+    assert link_covariance(ends_m, delta_m) == pytest.approx(np.array(exact), abs=0.02)
