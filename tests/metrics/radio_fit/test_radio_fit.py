@@ -9,6 +9,7 @@ from swarmwire.comms.air.propagation.parameters import Antenna, Shadowing
 from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.metrics.radio_fit.link_field import link_covariance
 from swarmwire.metrics.radio_fit.loss_fit import LossFit, fit_losses
+from swarmwire.metrics.radio_fit.loss_sequences import loss_sequences
 from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit
 from swarmwire.metrics.radio_fit.radio_fit import fit_radio
 from swarmwire.metrics.radio_fit.radio_table import radio_table
@@ -56,7 +57,7 @@ def test_shadowing_and_noise_are_told_apart_and_found_again(fit):
     assert isinstance(fit.shadowing, ShadowingFit)
     assert is_found(fit.shadowing.deviation_db, SHADOWING.deviation_db, 0.25)
     assert is_found(fit.shadowing.correlation_m, SHADOWING.correlation_m, 0.5)
-    assert is_found(fit.shadowing.noise_db, NOISE_DB, 0.2)
+    assert is_found(fit.shadowing.noise_db, NOISE_DB, 0.3)
 
 
 def test_bursts_are_found_again_from_gaps(fit):
@@ -119,20 +120,22 @@ def test_links_that_lose_different_shares_are_no_bursts():
 
 def test_residuals_that_only_vary_from_packet_to_packet_are_no_shadowing(tmp_path):
     path = tmp_path / "log.csv"
-    path.write_text(csv_of(made(2, Shadowing(1e-9, 5.0), None)))
+    path.write_text(csv_of(made(2, Shadowing(1e-9, 5.0), None, packets=6)))
     found = fit_radio(read_log(path))
     assert found.shadowing == "links that are near each other are no more alike than by chance"
     assert is_found(found.path_loss.exponent, EXPONENT, 0.05)
+    assert "shadowing" not in radio_table(found, Antenna())["radio"]
 
 
 def test_rows_without_rssi_and_gaps_say_the_same(tmp_path, fit):
     path = tmp_path / "rows.csv"
     path.write_text(csv_of(made(1, SHADOWING, BURSTS), gaps=False))
-    found = fit_radio(read_log(path))
-    assert found.path_loss.exponent.value == pytest.approx(fit.path_loss.exponent.value, rel=1e-9)
+    log = read_log(path)
+    assert log.rssi_dbm[log.received].tolist() == fit.rssi_dbm.tolist()
+    found = fit_losses(loss_sequences(log))
     # Times of lost packets are known here, and so are losses at the ends of links.
-    assert found.losses.loss.value == pytest.approx(fit.losses.loss.value, rel=0.1)
-    assert found.losses.chosen.bursts.bad_s == pytest.approx(fit.losses.chosen.bursts.bad_s, rel=0.2)
+    assert found.loss.value == pytest.approx(fit.losses.loss.value, rel=0.1)
+    assert found.chosen.bursts.bad_s == pytest.approx(fit.losses.chosen.bursts.bad_s, rel=0.2)
 
 
 def test_what_a_log_is_too_small_for_is_left_out_and_named(tmp_path):

@@ -44,6 +44,8 @@ def fit_command(
 
     if write is not None:
         check_path(write, (".toml",))
+    if to is not None:
+        check_path(to, (".png", ".svg", ".pdf"))
     fit = _fit(file, within)
     print_fit(fit, str(file), Console(highlight=False))
     if to is not None:
