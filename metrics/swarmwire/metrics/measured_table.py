@@ -71,10 +71,11 @@ def _read(path: Path) -> "pl.DataFrame":
     if path.suffix.lower() not in SUFFIXES:
         raise BadInput(str(path), "", f"expected a file name that ends in {' or '.join(SUFFIXES)}")
     try:
-        if path.suffix.lower() == ".parquet":
-            return pl.read_parquet(path)
-        return pl.read_csv(path, infer_schema_length=None, null_values=["", "nan", "NaN", "null"])
+        with path.open("rb") as file:
+            if path.suffix.lower() == ".parquet":
+                return pl.read_parquet(file)
+            return pl.read_csv(file, infer_schema_length=None, null_values=["", "nan", "NaN", "null"])
     except OSError as error:
-        raise BadInput(str(path), "", f"expected a readable file: {error.strerror or error}") from None
+        raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
     except pl.exceptions.PolarsError as error:
         raise BadInput(str(path), "", f"expected a table: {str(error).splitlines()[0]}") from None

@@ -96,6 +96,17 @@ def test_the_simplest_kind_of_bursts_that_tells_the_losses_is_chosen(bursts, nam
         assert is_found((getattr(found.chosen.bursts, key), found.chosen.errors[key]), getattr(bursts, key), 0.2)
 
 
+def test_of_too_many_packets_stretches_are_taken_that_say_the_same():
+    bursts = Bursts(0.5, 5.0, 0.7, 0.02)
+    whole = sequences(4, bursts, packets=3000)
+    some = whole.thinned(20_000)
+    assert len(some.lost) == 20_000
+    assert some.lost.tolist() == whole.lost.reshape(20, 3, 1000)[:, 0].ravel().tolist()
+    assert np.isinf(some.since_s[::1000]).all()
+    found = fit_losses(some)
+    assert is_found((found.chosen.bursts.bad_s, found.chosen.errors["bad_s"]), bursts.bad_s, 0.2)
+
+
 @pytest.mark.parametrize("key", range(4))
 def test_single_losses_are_recognised_as_such(key):
     found = fit_losses(sequences(key, Bursts(1.0, 1.0, 0.1, 0.1)))

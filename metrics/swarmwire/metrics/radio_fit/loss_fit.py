@@ -17,6 +17,7 @@ from swarmwire.metrics.radio_fit.runs_test import runs_z
 from swarmwire.metrics.radio_fit.two_states import log_likelihood
 
 LEAST_PACKETS, LEAST_LOST = 100, 10
+MOST_PACKETS = 200_000  # that the search for bursts goes through some hundred times: a few seconds
 BURSTY_Z = -3.0  # of the runs test: false alarm 1 in 700
 WIDEST, WIDEST_LOGIT = 8.0, 9.0  # how far logarithms of durations may go from the start, and logits from 0
 IMPOSSIBLE = 1e300  # the cost where the likelihood is 0
@@ -58,6 +59,8 @@ def fit_losses(sequences: LossSequences) -> LossFit | str:
         return f"needs {LEAST_PACKETS} packets, got {packets}"
     share = lost / packets
     loss = Estimate(share, math.sqrt(share * (1.0 - share) / packets))
+    sequences = sequences.thinned(MOST_PACKETS)
+    packets, lost = len(sequences.lost), int(sequences.lost.sum())
     single = LossModel("single losses", 1, _of_coin(lost, packets), None, {})
     if min(lost, packets - lost) < LEAST_LOST:
         return LossFit(loss, (single,), math.nan, single)

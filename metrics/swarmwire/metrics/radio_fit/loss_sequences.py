@@ -7,6 +7,8 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.metrics.radio_fit.radio_log import RadioLog
 
+STRETCH = 1000
+
 
 @dataclass(frozen=True)
 class LossSequences:
@@ -28,6 +30,16 @@ class LossSequences:
         begins = self.lost & ~(np.append(False, self.lost[:-1]) & np.isfinite(self.since_s))
         run = np.cumsum(begins)[self.lost]
         return np.bincount(run)[1:] if len(run) else np.zeros(0, np.int64)
+
+    def thinned(self, most: int) -> "LossSequences":
+        """So many packets or less: stretches of a thousand, evenly chosen, each of which starts without a past."""
+        every = -(-len(self.lost) // most)
+        if every <= 1:
+            return self
+        row = np.arange(len(self.lost))
+        kept = (row // STRETCH) % every == 0
+        since_s = np.where(row % STRETCH == 0, np.inf, self.since_s)
+        return LossSequences(self.link[kept], since_s[kept], self.lost[kept])
 
 
 def loss_sequences(log: RadioLog) -> LossSequences:

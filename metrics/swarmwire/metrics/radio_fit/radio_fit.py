@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.metrics.radio_fit.estimate import Estimate
-from swarmwire.metrics.radio_fit.loss_fit import LossFit, fit_losses
+from swarmwire.metrics.radio_fit.loss_fit import MOST_PACKETS, LossFit, fit_losses
 from swarmwire.metrics.radio_fit.loss_sequences import LossSequences, loss_sequences
 from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit, fit_path_loss, why_not
 from swarmwire.metrics.radio_fit.places import places_of
@@ -59,7 +59,8 @@ def fit_radio(log: RadioLog) -> RadioFit:
             Estimate(path_loss.exponent.value, exponent), Estimate(path_loss.rssi_at_1_m_dbm.value, at_1_m)
         )
     losses = fit_losses(sequences)
-    return RadioFit(log, path_loss, shadowing, losses, sequences, _notes(log, losses, shadowing))
+    notes = _notes(log, losses, shadowing, len(sequences.lost))
+    return RadioFit(log, path_loss, shadowing, losses, sequences, notes)
 
 
 def _shadowing(log: RadioLog, path_loss: PathLossFit | str) -> ShadowingFit | str:
@@ -76,7 +77,7 @@ def _pairs(log: RadioLog) -> IntArray:
     return np.array([pairs[tuple(sorted(link))] for link in log.links], np.int64)[log.link]
 
 
-def _notes(log: RadioLog, losses: LossFit | str, shadowing: ShadowingFit | str) -> tuple[str, ...]:
+def _notes(log: RadioLog, losses: LossFit | str, shadowing: ShadowingFit | str, packets: int) -> tuple[str, ...]:
     notes: list[str] = []
     share = _lost_far_out(log)
     if share > BIASED_BY_LOSS:
@@ -90,6 +91,8 @@ def _notes(log: RadioLog, losses: LossFit | str, shadowing: ShadowingFit | str) 
             "all losses count here, those of weak signals and of collisions too; a scenario whose reception or access "
             "makes such losses itself counts them twice"
         )
+    if packets > MOST_PACKETS:
+        notes.append(f"models of loss were fitted to {MOST_PACKETS} packets at most, in stretches chosen evenly")
     if log.ends_m is None and isinstance(shadowing, str):
         notes.append("without positions the residuals' deviation is shadowing, fading and measurement together")
     return tuple(notes)
