@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.air.propagation.parameters import Antenna, Shadowing
-from swarmwire.comms.air.reception.parameters import Bursts
+from swarmwire.comms.air.reception.parameters import Bursts, bursts_from_steps
+from swarmwire.metrics.radio_fit.expected_runs import expected_runs
 from swarmwire.metrics.radio_fit.link_field import link_covariance
 from swarmwire.metrics.radio_fit.loss_fit import LossFit, fit_losses
 from swarmwire.metrics.radio_fit.loss_sequences import loss_sequences
@@ -20,6 +21,7 @@ from tests.metrics.radio_fit.synthetic import (
     NOISE_DB,
     RSSI_AT_1_M_DBM,
     csv_of,
+    losses,
     made,
     sequences,
 )
@@ -104,6 +106,8 @@ def test_of_too_many_packets_stretches_are_taken_that_say_the_same():
     assert some.lost.tolist() == whole.lost.reshape(20, 3, 1000)[:, 0].ravel().tolist()
     assert np.isinf(some.since_s[::1000]).all()
     found = fit_losses(some)
+    assert isinstance(found, LossFit)
+    assert found.chosen.bursts is not None
     assert is_found((found.chosen.bursts.bad_s, found.chosen.errors["bad_s"]), bursts.bad_s, 0.2)
 
 
@@ -144,6 +148,8 @@ def test_rows_without_rssi_and_gaps_say_the_same(tmp_path, fit):
     log = read_log(path)
     assert log.rssi_dbm[log.received].tolist() == fit.rssi_dbm.tolist()
     found = fit_losses(loss_sequences(log))
+    assert isinstance(found, LossFit)
+    assert found.chosen.bursts is not None
     # Times of lost packets are known here, and so are losses at the ends of links.
     assert found.loss.value == pytest.approx(fit.losses.loss.value, rel=0.1)
     assert found.chosen.bursts.bad_s == pytest.approx(fit.losses.chosen.bursts.bad_s, rel=0.2)
@@ -176,3 +182,20 @@ def test_covariance_of_links_is_that_of_the_emulators_field():
         for i, p in enumerate(along)
     ]
     assert link_covariance(ends_m, delta_m) == pytest.approx(np.array(exact), abs=0.02)
+
+
+def test_runs_of_lost_packets_are_geometric_where_bursts_lose_all():
+    p, r = 0.02, 0.2
+    shares = expected_runs(bursts_from_steps(p, r, 1.0, 0.0, 0.1), 0.1, 30)
+    assert shares == pytest.approx(r * (1.0 - r) ** np.arange(30))
+
+
+def test_runs_of_lost_packets_are_as_long_as_those_that_the_emulator_makes():
+    """Their mean, over links, within four standard errors: false alarm 1 in 16 000."""
+    bursts = Bursts(0.5, 2.0, 0.7, 0.05)
+    t_s = np.repeat(0.1 * np.arange(2000.0)[:, None], 20, axis=1)
+    lost = losses(7, bursts, t_s)
+    runs = np.count_nonzero(lost[1:] & ~lost[:-1], axis=0)
+    means = lost.sum(axis=0) / runs
+    expected = float((expected_runs(bursts, 0.1, 200) * np.arange(1, 201)).sum())
+    assert abs(means.mean() - expected) < STANDARD_ERRORS * means.std() / np.sqrt(len(means))
