@@ -165,6 +165,23 @@ def test_what_a_log_is_too_small_for_is_left_out_and_named(tmp_path):
     assert sorted(radio_table(found, Antenna())["radio"]) == ["antenna", "log_distance", "model"]
 
 
+def test_weak_packets_that_are_missing_bias_the_line_which_is_said_and_near_ones_do_not(tmp_path):
+    draws = np.random.default_rng(8)
+    rows = ["t_s,tx,rx,seq,rssi_dbm,distance_m"]
+    for i in range(6000):
+        distance_m = float(np.exp(draws.uniform(0.0, np.log(60.0))))
+        rssi_dbm = -50.0 - 27.0 * np.log10(distance_m) + 4.0 * draws.standard_normal()
+        if rssi_dbm > -90.0:
+            rows.append(f"{i},a-{i % 15},b,{i // 15},{rssi_dbm:.3f},{distance_m:.4f}")
+    path = tmp_path / "weak.csv"
+    path.write_text("\n".join(rows) + "\n")
+    log = read_log(path)
+    far, near = fit_radio(log), fit_radio(log.within(12.0))
+    assert far.path_loss.exponent.value < 2.6
+    assert "exponent, sigma and the RSSI far out are biased" in far.notes[0]
+    assert is_found(near.path_loss.exponent, 2.7, 0.05)
+
+
 def test_covariance_of_links_is_that_of_the_emulators_field():
     """On the diagonal 1 - delta/d (1 - exp(-d/delta)); beside it the definition's double integral."""
     delta_m = 5.0

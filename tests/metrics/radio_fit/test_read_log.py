@@ -56,6 +56,13 @@ def test_near_packets_of_a_link_that_went_away_in_between_are_two_links(tmp_path
     assert not loss_sequences(near).lost.any()
 
 
+def test_packets_lost_at_an_unknown_distance_were_where_the_last_known_was(tmp_path):
+    rows = ["0,a,b,0,-50,1", "1,a,b,1,,", "2,a,b,2,-50,9", "3,a,b,3,,", "4,a,b,4,-50,1", "0,b,a,0,,", "1,b,a,1,-50,1"]
+    read = read_log(log(tmp_path, *rows))
+    assert read.last_distance_m == pytest.approx([1, 1, 9, 9, 1, np.nan, 1], nan_ok=True)
+    assert read.within(5.0).sequence.tolist() == [0, 1, 4, 1]
+
+
 @pytest.mark.parametrize(
     ("head", "rows", "told"),
     [

@@ -103,7 +103,7 @@ def _lost_far_out(log: RadioLog) -> float:
     distance_m = log.distance_m[log.received]
     if not len(distance_m):
         return 0.0
-    # A gap's packets were sent about where the row after it was; a lost row may have no distance of its own.
-    far = log.distance_m >= np.quantile(distance_m, 0.75)
+    # A gap's packets were sent about where the row after it was.
+    far = log.last_distance_m >= np.quantile(distance_m, 0.75)
     lost = float(log.gaps[far].sum() + (far & ~log.received).sum())
     return lost / (lost + float((far & log.received).sum()))

@@ -39,9 +39,17 @@ class RadioLog:
         missed = np.diff(self.sequence, prepend=0) - 1
         return np.where(self.opens, 0, missed)
 
+    @cached_property
+    def last_distance_m(self) -> FloatArray:
+        """Distances (n,), where a lost packet's is unknown the last known of its link; NaN before any."""
+        row = np.arange(len(self.link))
+        known: IntArray = np.maximum.accumulate(np.where(np.isfinite(self.distance_m), row, -1))
+        here = (known >= 0) & (self.link[known] == self.link)
+        return np.where(here, self.distance_m[known], np.nan)
+
     def within(self, distance_m: float) -> "RadioLog":
         """The rows at most so far apart; where a link comes back after a while beyond, it counts as another link."""
-        near = self.distance_m <= distance_m
+        near = self.last_distance_m <= distance_m
         far_since_start = np.cumsum(~near)
         # A link's rows with no far row between them stay together.
         spell = np.stack([self.link, far_since_start])[:, near]
