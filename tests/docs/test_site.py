@@ -116,10 +116,19 @@ def test_the_behaviours_page_names_every_behaviour_and_parameter(site):
         assert {f"swarmwire.agent.behaviours:{name}", *parameters_of(getattr(behaviours, name))} <= named
 
 
+def commands_within(group: Any, within: str = "") -> Iterator[tuple[str, Any]]:
+    """Every command by its whole name: "run", "radio fit"."""
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from commands_within(command, f"{within}{name} ")
+        else:
+            yield f"{within}{name}", command
+
+
 def test_the_command_line_page_names_every_command_and_option(site):
     named = code(site, "command-line")
     group: Any = get_command(app)
-    for name, command in group.commands.items():
+    for name, command in commands_within(group):
         assert name in named
         for option in (option for of in command.params for option in of.opts if option.startswith("--")):
             assert any(option in item for item in named), option

@@ -13,7 +13,7 @@ from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.commands.export import ExportCommand, export_command
 from swarmwire.deploy.commands.list_kinds import list_command
 from swarmwire.deploy.commands.new import new_command
-from swarmwire.deploy.commands.radio import radio_app
+from swarmwire.deploy.commands.radio.group import radio_app
 from swarmwire.deploy.commands.repeat import repeat_command
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
@@ -39,8 +39,8 @@ app.command("schema")(schema_command)
 app.command("list")(list_command)
 app.command("describe")(describe_command)
 app.command("new")(new_command)
-app.add_typer(radio_app, name="radio")
 app.command("verify")(verify_command)
+app.add_typer(radio_app, name="radio")
 
 
 def main() -> None:

@@ -1,5 +1,6 @@
 """The commands of `swarmwire`, from the command line itself."""
 
+from collections.abc import Iterator
 from typing import Any
 
 from typer.main import get_command
@@ -10,9 +11,8 @@ from swarmwire.deploy.cli import app
 
 def command_tables() -> str:
     """Every command: what it does, how it is called, and its options."""
-    group: Any = get_command(app)
     parts: list[str] = []
-    for name, command in group.commands.items():
+    for name, command in _commands(get_command(app)):
         arguments = [_name(of) for of in command.params if of.param_type_name == "argument"]
         options = ["[OPTIONS]"] if len(arguments) < len(command.params) else []
         call = " ".join(["swarmwire", name, *arguments, *options])
@@ -20,6 +20,15 @@ def command_tables() -> str:
         rows = [_row(of) for of in command.params]
         parts += [table(("argument or option", "default", "meaning"), rows)] if rows else []
     return "\n".join(parts)
+
+
+def _commands(group: Any, within: str = "") -> Iterator[tuple[str, Any]]:
+    """Every command with its name; those of a group within the group have its name in front."""
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from _commands(command, f"{within}{name} ")
+        else:
+            yield f"{within}{name}", command
 
 
 def _row(of: Any) -> tuple[str, str, str]:

@@ -1,4 +1,4 @@
-"""`swarmwire radio`: the radio by itself."""
+"""`swarmwire radio probe`."""
 
 import json
 from dataclasses import asdict
@@ -8,15 +8,7 @@ import typer
 
 from swarmwire.comms.errors import BadInput
 
-radio_app = typer.Typer(help="The radio by itself, without robots.", no_args_is_help=True)
 
-
-@radio_app.callback()
-def _radio() -> None:
-    """The radio by itself, without robots."""
-
-
-@radio_app.command("probe")
 def probe_command(
     preset: Annotated[str, typer.Argument(help="A radio that `swarmwire list presets` tells.")],
     contention: Annotated[

@@ -1,0 +1,1 @@
+"""Traces: links as they were measured, replayed."""

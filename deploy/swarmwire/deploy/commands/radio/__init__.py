@@ -1,0 +1,1 @@
+"""`swarmwire radio`: its commands, one a file."""

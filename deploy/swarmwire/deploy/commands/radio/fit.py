@@ -1,0 +1,89 @@
+"""`swarmwire radio fit`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarmwire.comms.errors import BadInput
+
+if TYPE_CHECKING:
+    from swarmwire.metrics.radio_fit.radio_fit import RadioFit
+
+USUAL_SIZE_PX = 1280
+
+
+def fit_command(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="CSV or Parquet with t_s, tx, rx, seq, rssi_dbm, and tx_x_m, tx_y_m, rx_x_m, rx_y_m or distance_m.",
+            metavar="FILE",
+        ),
+    ],
+    to: Annotated[Path | None, typer.Option(help="Draw the fit: .png, .svg or .pdf.")] = None,
+    write: Annotated[
+        Path | None, typer.Option(help="The .toml to write the table [radio] to. Default: print it.")
+    ] = None,
+    power_dbm: Annotated[float, typer.Option(help="Power that the robots sent with, in dBm.")] = 0.0,
+    gain_dbi: Annotated[float, typer.Option(help="Gain of their antennas, in dBi.")] = 0.0,
+    within: Annotated[
+        float | None, typer.Option(help="Use packets at most so many metres apart only.", metavar="M")
+    ] = None,
+    size: Annotated[int, typer.Option(help="Longer side of the picture in pixels.")] = USUAL_SIZE_PX,
+) -> None:
+    """Fit a radio's parameters to a log of real robots: path loss, shadowing, and losses, single or in bursts.
+
+    A packet is lost if its row has no rssi_dbm, or if its number is missing between two rows of a link. Numbers count
+    what was sent on a link (or by a robot to all). The table fits into a scenario as it stands.
+    """
+    from rich.console import Console
+
+    from swarmwire.deploy.radio_fit_report import print_fit
+    from swarmwire.metrics.drawing.whole_file import check_path
+
+    if write is not None:
+        check_path(write, (".toml",))
+    if to is not None:
+        check_path(to, (".png", ".svg", ".pdf"))
+    fit = _fit(file, within)
+    print_fit(fit, str(file), Console(highlight=False))
+    if to is not None:
+        from swarmwire.metrics.drawing.radio_fit_sheet import draw_radio_fit
+
+        draw_radio_fit(fit, file.name, to, size)
+        typer.echo(f"written: {to}")
+    _write(_toml(fit, power_dbm, gain_dbi, file), write)
+
+
+def _fit(file: Path, within_m: float | None) -> "RadioFit":
+    from swarmwire.metrics.radio_fit.radio_fit import fit_radio
+    from swarmwire.metrics.radio_fit.read_log import read_log
+
+    log = read_log(file)
+    if within_m is not None:
+        log = log.within(within_m)
+        if not len(log.link):
+            raise BadInput("--within", "", f"expected a distance within which there are packets, got {within_m:g} m")
+    return fit_radio(log)
+
+
+def _toml(fit: "RadioFit", power_dbm: float, gain_dbi: float, file: Path) -> str:
+    import tomli_w
+
+    from swarmwire.comms.air.propagation.parameters import Antenna
+    from swarmwire.metrics.radio_fit.radio_table import radio_table
+
+    table = radio_table(fit, Antenna(power_dbm, gain_dbi))
+    return f"# Fitted to {file.name} by swarmwire radio fit.\n{tomli_w.dumps(table)}"
+
+
+def _write(text: str, to: Path | None) -> None:
+    from swarmwire.metrics.drawing.whole_file import whole_file
+
+    if to is None:
+        typer.echo(text, nl=False)
+        return
+    with whole_file(to) as part:
+        part.write_text(text, encoding="utf-8")
+    typer.echo(f"written: {to}")

@@ -1,0 +1,71 @@
+"""A radio's fit as people read it in a terminal."""
+
+import math
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from swarmwire.metrics.radio_fit.fit_rows import Row, parameter_rows, residual_rows
+from swarmwire.metrics.radio_fit.loss_fit import LossFit
+from swarmwire.metrics.radio_fit.radio_fit import RadioFit
+
+
+def print_fit(fit: RadioFit, title: str, console: Console) -> None:
+    """Parameters with their standard errors, residuals, models of loss, and what may be biased."""
+    received, links = int(fit.log.received.sum()), len(fit.log.links)
+    console.print(f"{title}: {len(fit.sequences.lost)} packets on {links} links, {received} received", soft_wrap=True)
+    _print_parameters(fit, console)
+    residuals = list(residual_rows(fit))
+    if residuals:
+        table = _table("residuals of RSSI")
+        table.add_column(style="cyan")
+        table.add_column(justify="right")
+        for name, value in residuals:
+            table.add_row(name, value)
+        console.print(table)
+    if isinstance(fit.losses, LossFit):
+        _print_models(fit.losses, console)
+    for note in fit.notes:
+        console.print(f"note: {note}", soft_wrap=True)
+
+
+def _print_parameters(fit: RadioFit, console: Console) -> None:
+    table = _table("parameters", header=True)
+    for name in ("parameter", "value", "standard error", "unit"):
+        table.add_column(name, justify="right" if name in {"value", "standard error"} else "left")
+    rows = list(parameter_rows(fit))
+    for row in rows:
+        if row.estimate is not None:
+            table.add_row(row.parameter, *_figures(row), row.unit)
+    if table.row_count:
+        console.print(table)
+    for row in rows:
+        if row.estimate is None:
+            console.print(f"left out: {row.parameter}: {row.left_out}", soft_wrap=True)
+
+
+def _print_models(losses: LossFit, console: Console) -> None:
+    table = _table("models of loss (the least AIC fits best)", header=True)
+    for name in ("model", "parameters", "AIC", ""):
+        table.add_column(name, justify="right" if name in {"parameters", "AIC"} else "left")
+    for model in losses.models:
+        chosen = "chosen" if model is losses.chosen else ""
+        table.add_row(model.name, str(model.free), f"{model.aic:.1f}", chosen)
+    console.print(table)
+    if math.isfinite(losses.runs_z):
+        meaning = "0 if single, far below 0 if in bursts"
+        console.print(f"runs test within links: z = {losses.runs_z:.1f} ({meaning})", soft_wrap=True)
+
+
+def _figures(row: Row) -> tuple[str, str]:
+    assert row.estimate is not None
+    value, error = row.estimate
+    if not math.isfinite(error) or error <= 0.0:
+        return f"{value:.4g}", "-"
+    decimals = min(max(1 - math.floor(math.log10(error)), 0), 6)  # two digits of the standard error
+    return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
+
+
+def _table(title: str, header: bool = False) -> Table:
+    return Table(title=Text(title), show_header=header, title_justify="left", title_style="bold")

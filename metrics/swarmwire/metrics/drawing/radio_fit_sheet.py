@@ -1,0 +1,122 @@
+"""A radio's fit on one sheet: RSSI over distance, the residuals' correlogram, and how long bursts are."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.metrics.drawing.canvas import new_figure, save
+from swarmwire.metrics.drawing.looks import (
+    CURVE,
+    FAINT,
+    GRID,
+    INK,
+    LONG_SIDE_IN,
+    SMALL_PT,
+    SOFT,
+    TEXT_PT,
+    TITLE_PT,
+    Look,
+)
+from swarmwire.metrics.radio_fit.correlogram import correlogram
+from swarmwire.metrics.radio_fit.expected_runs import expected_runs
+from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit
+from swarmwire.metrics.radio_fit.places import places_of
+from swarmwire.metrics.radio_fit.radio_fit import RadioFit
+from swarmwire.metrics.radio_fit.shadowing_fit import ShadowingFit
+
+_HEIGHT_IN = 4.6
+_MOST_POINTS = 4000
+_LONGEST_SHARE = 0.999  # of bursts, that the axis reaches to
+_BAND = 1.645  # deviations: nine of ten packets
+
+
+def draw_radio_fit(fit: RadioFit, title: str, to: Path, size_px: int) -> None:
+    """Write the picture. BadInput for a path or a size that cannot be."""
+    figure = new_figure(LONG_SIDE_IN, _HEIGHT_IN, size_px)
+    figure.text(0.025, 0.955, title, fontsize=TITLE_PT, fontweight="bold", color=INK)
+    _draw_rssi(_axes(figure, (0.08, 0.54, 0.895, 0.34), "RSSI in dBm over distance in m"), fit)
+    _draw_correlogram(_axes(figure, (0.08, 0.08, 0.4, 0.34), "residuals' correlogram in dB² over distance in m"), fit)
+    _draw_bursts(_axes(figure, (0.575, 0.08, 0.4, 0.34), "runs of lost packets by length"), fit)
+    save(figure, to)
+
+
+def _axes(figure: Any, place: tuple[float, float, float, float], title: str) -> Any:
+    axes = figure.add_axes(place)
+    axes.set_facecolor("none")
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    axes.spines["bottom"].set(color=FAINT, linewidth=0.7)
+    axes.grid(axis="y", color=GRID, linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.tick_params(which="both", labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
+    axes.set_title(title, loc="left", fontsize=TEXT_PT, color=SOFT, pad=4)
+    return axes
+
+
+def _draw_rssi(axes: Any, fit: RadioFit) -> None:
+    distance_m, rssi_dbm = fit.distance_m, fit.rssi_dbm
+    if not len(distance_m):
+        _say(axes, "no packet was received")
+        return
+    every = max(1, len(distance_m) // _MOST_POINTS)
+    axes.set_xscale("log")
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("{x:g}" if distance_m.max() < 10.0 * distance_m.min() else "")
+    axes.plot(distance_m[::every], rssi_dbm[::every], ".", ms=2.5, mew=0, color=SOFT, alpha=0.4, label="packets")
+    if isinstance(fit.path_loss, PathLossFit):
+        ends_m = np.exp(np.linspace(math.log(distance_m.min()), math.log(distance_m.max()), 50))
+        line = fit.path_loss.rssi_dbm(ends_m)
+        band_db = _BAND * _deviation_db(fit, ends_m)
+        faint: Look = {"color": CURVE, "alpha": 0.15, "lw": 0}
+        axes.fill_between(ends_m, line - band_db, line + band_db, label="9 of 10 by the fit", **faint)
+        axes.plot(ends_m, line, color=CURVE, lw=1.4, label=f"exponent {fit.path_loss.exponent.value:.2f}")
+    axes.legend(fontsize=SMALL_PT, frameon=False, labelcolor=SOFT, loc="upper right")
+
+
+def _deviation_db(fit: RadioFit, distance_m: FloatArray) -> FloatArray:
+    """Standard deviation of single packets around the line: shadowing, which grows with distance, and noise."""
+    if not isinstance(fit.shadowing, ShadowingFit):
+        return np.full(len(distance_m), np.sqrt(np.mean(fit.residual_db**2)))
+    share = fit.shadowing.correlation_m.value / distance_m
+    field = fit.shadowing.deviation_db.value**2 * (1.0 - share * (1.0 - np.exp(-1.0 / share)))
+    return np.sqrt(field + fit.shadowing.noise_db.value**2)
+
+
+def _draw_correlogram(axes: Any, fit: RadioFit) -> None:
+    if isinstance(fit.shadowing, str) or isinstance(fit.path_loss, str):
+        _say(axes, "shadowing was left out")
+        return
+    found = correlogram(places_of(fit.log), fit.path_loss, fit.shadowing)
+    axes.axhline(0.0, color=FAINT, lw=0.7)
+    axes.plot(found.apart_m, found.found_db2, "o", ms=3, color=SOFT, label="found")
+    axes.plot(found.apart_m, found.fitted_db2, color=CURVE, lw=1.4, label="the fitted field")
+    axes.set_xlim(0.0, None)
+    axes.legend(fontsize=SMALL_PT, frameon=False, labelcolor=SOFT, loc="upper right")
+
+
+def _draw_bursts(axes: Any, fit: RadioFit) -> None:
+    lengths = fit.sequences.burst_lengths
+    if not len(lengths) or isinstance(fit.losses, str):
+        _say(axes, "too few packets were lost")
+        return
+    longest = max(int(np.quantile(lengths, _LONGEST_SHARE)), 5)
+    counts = np.bincount(np.minimum(lengths, longest + 1), minlength=longest + 2)[1 : longest + 1]
+    at = np.arange(1, longest + 1)
+    axes.plot(at, np.where(counts > 0, counts, np.nan), "o", ms=3, color=SOFT, label="found")
+    single, bursts = fit.losses.loss.value, fit.losses.chosen.bursts
+    # Runs of single losses are geometric: what lies above their line is bursts.
+    axes.plot(at, len(lengths) * (1.0 - single) * single ** (at - 1.0), color=FAINT, lw=1.2, label="single losses")
+    if bursts is not None:
+        expected = len(lengths) * expected_runs(bursts, fit.sequences.interval_s, longest)
+        axes.plot(at, expected, color=CURVE, lw=1.4, label="the fitted bursts")
+    axes.set_yscale("log")
+    axes.set_ylim(0.5, None)
+    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.legend(fontsize=SMALL_PT, frameon=False, labelcolor=SOFT, loc="upper right")
+
+
+def _say(axes: Any, text: str) -> None:
+    axes.set_axis_off()
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=TEXT_PT, color=SOFT)

@@ -1,0 +1,81 @@
+"""Measured tables, CSV or Parquet: read, and refused in one line that names file, row, column and what was expected."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.errors import BadInput
+
+if TYPE_CHECKING:
+    import polars as pl
+
+SUFFIXES = (".csv", ".parquet")
+
+
+class MeasuredTable:
+    """A table as it lies on disk. Rows count from 1; a CSV's line of names is none of them."""
+
+    def __init__(self, path: Path) -> None:
+        """Read the file; BadInput for one that is neither CSV nor Parquet, or without a row."""
+        self.where = str(path)
+        self._frame = _read(path)
+        if not len(self._frame):
+            raise self.refused("", "expected at least one row")
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of the columns."""
+        return tuple(self._frame.columns)
+
+    def need(self, columns: Sequence[str]) -> None:
+        """BadInput unless there are all these columns."""
+        for column in columns:
+            if column not in self._frame.columns:
+                raise self.refused(column, f"is missing; the file has {', '.join(self._frame.columns)}")
+
+    def numbers(self, column: str) -> FloatArray:
+        """A column (rows,), NaN where it is empty; BadInput for what is no finite number."""
+        import polars as pl
+
+        taken = self._frame[column]
+        cast = taken.cast(pl.Float64, strict=False)
+        known = taken.is_not_null().to_numpy()
+        values = cast.to_numpy().astype(np.float64)
+        self.refuse_where(known & ~np.isfinite(values), column, "expected a finite number, or nothing")
+        return values
+
+    def texts(self, column: str) -> list[str]:
+        """A column of names (rows,); BadInput where one is empty."""
+        import polars as pl
+
+        taken = self._frame[column].cast(pl.String)
+        self.refuse_where(taken.is_null().to_numpy(), column, "expected a name")
+        return taken.to_list()
+
+    def refuse_where(self, wrong: BoolArray, column: str, expected: str) -> None:
+        """BadInput that names the first row (rows,) that is wrong; else nothing."""
+        if wrong.any():
+            raise self.refused(f"row {int(np.argmax(wrong)) + 1}, {column}", expected)
+
+    def refused(self, key: str, expected: str) -> BadInput:
+        """What to raise about this file."""
+        return BadInput(self.where, key, expected)
+
+
+def _read(path: Path) -> "pl.DataFrame":
+    import polars as pl
+
+    if path.suffix.lower() not in SUFFIXES:
+        raise BadInput(str(path), "", f"expected a file name that ends in {' or '.join(SUFFIXES)}")
+    try:
+        with path.open("rb") as file:
+            if path.suffix.lower() == ".parquet":
+                return pl.read_parquet(file)
+            return pl.read_csv(file, infer_schema_length=None, null_values=["", "nan", "NaN", "null"])
+    except OSError as error:
+        raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
+    except pl.exceptions.PolarsError as error:
+        raise BadInput(str(path), "", f"expected a table: {str(error).splitlines()[0]}") from None

@@ -1,0 +1,59 @@
+"""Path loss by least squares: received power over the logarithm of distance is a straight line."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.metrics.radio_fit.estimate import Estimate
+
+LEAST_PACKETS = 10
+LEAST_SPAN = 1.5  # the farthest distance over the nearest: a slope over less would be that of the noise
+LEAST_CLUSTERS = 10
+
+
+@dataclass(frozen=True)
+class PathLossFit:
+    """RSSI(d) = rssi_at_1_m - 10 n log10 d."""
+
+    exponent: Estimate  # n
+    rssi_at_1_m_dbm: Estimate
+
+    def rssi_dbm(self, distance_m: FloatArray) -> FloatArray:
+        """The line at distances of any shape."""
+        return self.rssi_at_1_m_dbm.value - 10.0 * self.exponent.value * np.log10(distance_m)
+
+
+def design(distance_m: FloatArray) -> FloatArray:
+    """The columns (n, 2) that RSSI at 1 m and the exponent are multiplied by."""
+    return np.stack([np.ones_like(distance_m), -10.0 * np.log10(distance_m)], axis=1)
+
+
+def why_not(distance_m: FloatArray) -> str | None:
+    """What received packets at these distances lack for a fit; None if nothing."""
+    if len(distance_m) < LEAST_PACKETS:
+        return f"needs {LEAST_PACKETS} received packets, got {len(distance_m)}"
+    span = float(distance_m.max() / distance_m.min())
+    if span < LEAST_SPAN:
+        return f"needs distances that span a factor of {LEAST_SPAN:g}, got {span:.2f}"
+    return None
+
+
+def fit_path_loss(distance_m: FloatArray, rssi_dbm: FloatArray, cluster: IntArray) -> PathLossFit:
+    """Ordinary least squares over received packets (n,).
+
+    Packets of a cluster (n,), such as the two directions between two robots, share what stands around them. Standard
+    errors allow for it (the sandwich of Liang and Zeger, Biometrika 73, 1986) where there are enough clusters.
+    """
+    x = design(distance_m)
+    inverse = np.linalg.inv(x.T @ x)
+    beta = inverse @ (x.T @ rssi_dbm)
+    residual = rssi_dbm - x @ beta
+    variance = inverse * (residual @ residual) / max(len(rssi_dbm) - 2, 1)
+    clusters = np.unique(cluster, return_inverse=True)[1]
+    count = int(clusters.max()) + 1
+    if count >= LEAST_CLUSTERS:
+        score = np.stack([np.bincount(clusters, x[:, i] * residual) for i in range(2)], axis=1)
+        variance = inverse @ (score.T @ score) @ inverse * count / (count - 1)
+    errors = np.sqrt(np.diag(variance))
+    return PathLossFit(Estimate(float(beta[1]), float(errors[1])), Estimate(float(beta[0]), float(errors[0])))

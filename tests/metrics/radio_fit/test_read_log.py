@@ -1,0 +1,132 @@
+"""Logs are read whole or refused in one line; gaps in sequence numbers are lost packets."""
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.radio_fit.loss_sequences import loss_sequences
+from swarmwire.metrics.radio_fit.read_log import read_log
+
+HEAD = "t_s,tx,rx,seq,rssi_dbm,distance_m"
+POSITIONS = "t_s,tx,rx,seq,rssi_dbm,tx_x_m,tx_y_m,rx_x_m,rx_y_m"
+
+
+def log(path, *rows: str, head: str = HEAD):
+    file = path / "log.csv"
+    file.write_text("\n".join([head, *rows]) + "\n")
+    return file
+
+
+def test_gaps_are_packets_lost_at_even_times_and_links_are_apart(tmp_path):
+    read = read_log(log(tmp_path, "0,b,a,7,-50,1", "1.0,a,b,1,-50,1", "2.5,a,b,4,-60,2", "1,b,a,8,,"))
+    assert read.links == (("a", "b"), ("b", "a"))
+    sequences = loss_sequences(read)
+    assert sequences.link.tolist() == [0, 0, 0, 0, 1, 1]
+    assert sequences.lost.tolist() == [False, True, True, False, False, True]
+    assert sequences.since_s.tolist() == pytest.approx([np.inf, 0.5, 0.5, 0.5, np.inf, 1.0])
+    assert sequences.burst_lengths.tolist() == [2, 1]
+
+
+def test_runs_of_losses_do_not_go_on_from_link_to_link(tmp_path):
+    read = read_log(log(tmp_path, "0,a,b,1,-50,1", "1,a,b,2,,", "0,b,a,1,,", "1,b,a,2,,", "2,b,a,3,-50,1"))
+    assert loss_sequences(read).burst_lengths.tolist() == [1, 2]
+
+
+def test_distance_is_that_of_the_positions(tmp_path):
+    read = read_log(log(tmp_path, "0,a,b,1,-50,0,0,3,4", "1,a,b,2,,,,,", head=POSITIONS))
+    assert read.distance_m[0] == pytest.approx(5.0)
+    assert np.isnan(read.distance_m[1])
+
+
+def test_parquet_says_what_csv_says(tmp_path):
+    file = log(tmp_path, "0,a,b,1,-50.5,1", "1,a,b,4,,", "2,a,b,5,-60,2")
+    pl.read_csv(file).write_parquet(tmp_path / "log.parquet")
+    one, other = read_log(file), read_log(tmp_path / "log.parquet")
+    assert one.links == other.links
+    for name in ("time_s", "sequence", "rssi_dbm", "distance_m"):
+        assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
+
+
+def test_near_packets_of_a_link_that_went_away_in_between_are_two_links(tmp_path):
+    rows = [f"{i},a,b,{i},-50,{distance}" for i, distance in enumerate([1, 2, 9, 9, 2, 1])]
+    near = read_log(log(tmp_path, *rows, "0,b,a,1,-50,1")).within(5.0)
+    assert near.links == (("a", "b"), ("a", "b"), ("b", "a"))
+    assert near.sequence.tolist() == [0, 1, 4, 5, 1]
+    assert not loss_sequences(near).lost.any()
+
+
+def test_packets_lost_at_an_unknown_distance_were_where_the_last_known_was(tmp_path):
+    rows = ["0,a,b,0,-50,1", "1,a,b,1,,", "2,a,b,2,-50,9", "3,a,b,3,,", "4,a,b,4,-50,1", "0,b,a,0,,", "1,b,a,1,-50,1"]
+    read = read_log(log(tmp_path, *rows))
+    assert read.last_distance_m == pytest.approx([1, 1, 9, 9, 1, np.nan, 1], nan_ok=True)
+    assert read.within(5.0).sequence.tolist() == [0, 1, 4, 1]
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "told"),
+    [
+        ("t_s,tx,rx,seq", ["0,a,b,1"], "rssi_dbm: is missing; the file has t_s, tx, rx, seq"),
+        (
+            "t_s,tx,rx,seq,rssi_dbm",
+            ["0,a,b,1,-50"],
+            "distance_m: is missing, and so are the positions tx_x_m, tx_y_m, rx_x_m, rx_y_m; expected either",
+        ),
+        (HEAD + ",tx_x_m", ["0,a,b,1,-50,1,0"], f"tx_y_m: is missing; the file has {HEAD},tx_x_m".replace(",", ", ")),
+        (HEAD, [], "expected at least one row"),
+        (
+            HEAD,
+            ["1,a,b,1,-50,1", "0,a,b,2,-50,1"],
+            "row 2, t_s: does not rise on this link; expected its rows in the order of time",
+        ),
+        (
+            HEAD,
+            ["0,a,b,1,-50,1", "0,b,a,1,-50,1", "1,a,b,1,-50,1"],
+            "row 3, seq: comes twice on this link; expected each number once",
+        ),
+        (
+            HEAD,
+            ["0,a,b,2,-50,1", "1,a,b,1,-50,1"],
+            "row 2, seq: falls on this link; expected numbers that rise with time",
+        ),
+        (
+            HEAD,
+            ["0,a,b,1,-50,1", "1,a,b,90000000,-50,1"],
+            "row 2, seq: leaves 89999998 packets out; expected 10000000 lost in all at most",
+        ),
+        (HEAD, ["0,a,b,1.5,-50,1"], "row 1, seq: expected a whole number"),
+        (HEAD, ["0,a,b,,-50,1"], "row 1, seq: expected a whole number"),
+        (HEAD, [",a,b,1,-50,1"], "row 1, t_s: expected a time in s"),
+        (HEAD, ["0,a,,1,-50,1"], "row 1, rx: expected a name"),
+        (HEAD, ["0,a,a,1,-50,1"], "row 1, rx: expected another robot than tx"),
+        (HEAD, ["0,a,b,1,strong,1"], "row 1, rssi_dbm: expected a finite number, or nothing"),
+        (HEAD, ["0,a,b,1,inf,1"], "row 1, rssi_dbm: expected a finite number, or nothing"),
+        (HEAD, ["0,a,b,1,-50,0"], "row 1, distance_m: expected more than 0 m"),
+        (HEAD, ["0,a,b,1,-50,"], "row 1, distance_m: expected more than 0 m"),
+        (POSITIONS, ["0,a,b,1,-50,0,0,,1"], "row 1, rx_x_m: expected the position of a received packet"),
+        (POSITIONS, ["0,a,b,1,-50,2,3,2,3"], "row 1, rx_x_m: expected sender and receiver in different places"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_row_and_column(tmp_path, head, rows, told):
+    file = log(tmp_path, *rows, head=head)
+    with pytest.raises(BadInput) as error:
+        read_log(file)
+    assert str(error.value) == f"{file}: {told}"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "told"),
+    [
+        ("log.xls", "", "expected a file name that ends in .csv or .parquet"),
+        ("absent.csv", None, "expected a readable file: "),
+        ("empty.csv", "", "expected a table: "),
+        ("log.parquet", "no parquet", "expected a table: "),
+    ],
+)
+def test_what_is_no_table_is_refused(tmp_path, name, text, told):
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    with pytest.raises(BadInput) as error:
+        read_log(tmp_path / name)
+    assert str(error.value).startswith(f"{tmp_path / name}: {told}")
+    assert "\n" not in str(error.value)
