@@ -5,14 +5,13 @@ import typer
 from swarmwire.deploy.commands.radio.fit import fit_command
 from swarmwire.deploy.commands.radio.probe import probe_command
 
-radio_app = typer.Typer(
-    help="Radios by themselves: what an emulated one does, and what logs of real ones say.", no_args_is_help=True
-)
+HELP = "Radios by themselves: what an emulated one does, and what logs of real ones say."
+
+radio_app = typer.Typer(help=HELP, no_args_is_help=True)
 
 
-@radio_app.callback()
-def radio() -> None:
-    """Radios by themselves: what an emulated one does, and what logs of real ones say."""
+@radio_app.callback(help=HELP)
+def _radio() -> None: ...
 
 
 radio_app.command("fit")(fit_command)
