@@ -11,7 +11,14 @@ from numba import njit
 from swarmwire.comms.air.propagation.loss_curve import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.air.propagation.nakagami import nakagami_gain
 from swarmwire.comms.air.propagation.parameters import FADINGS, Fading
-from swarmwire.comms.air.propagation.scattering import WAVES, arriving, scatter_waves, scattered
+from swarmwire.comms.air.propagation.scattering import (
+    WAVES,
+    arriving,
+    own_number,
+    scatter_waves,
+    scattered,
+    signs_of,
+)
 from swarmwire.comms.air.propagation.waves import cosine, sine
 
 RAYLEIGH, RICIAN, NAKAGAMI = range(len(FADINGS))
@@ -44,9 +51,9 @@ def fading_gain(law, key, a, b, ax, ay, bx, by):
     waves = scatter_waves(key, law.wave_number)
     arriving(waves, ax, ay, at[0])
     arriving(waves, bx, by, at[1])
-    distance_m = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
-    parts = np.empty((2, WAVES), np.float32)
-    return gain_of(law, scattered(key, a, b, at, 0, 1, parts[0], parts[1]), distance_m)
+    parts, signs = np.empty((2, WAVES), np.float32), signs_of(own_number(key, a), own_number(key, b))
+    h = scattered(signs, at, 0, 1, parts[0], parts[1])
+    return gain_of(law, h, math.sqrt((bx - ax) ** 2 + (by - ay) ** 2))
 
 
 @njit(cache=True)

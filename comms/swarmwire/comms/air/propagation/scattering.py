@@ -10,8 +10,8 @@ depend on what was sent before, and while one end moves by s, h is correlated by
 while both move, by the product.
 
 The directions are a lattice of N points over both circles, which keyed amounts turn around either robot, and each wave
-has a keyed phase, all by the arena's key; on top of that the key and the unordered pair of indices in the arena give
-each wave a sign, which makes pairs independent. So the waves at a robot are worked out once for all its links.
+has a keyed phase, all by the arena's key; on top of that the unordered
+pair's own keyed numbers give each wave a sign, which makes pairs independent. So the waves at a robot are worked out once for all its links.
 |h|^2 is exponential but for O(1/N): E g^2 = 2 - 1/N, its distribution is within 0.004 of the exponential's, and it is
 never above N (15 dB).
 """
@@ -29,7 +29,8 @@ from swarmwire.comms.draws_compiled import uniform
 
 WAVES, GENERATOR = 32, 19  # v's index is GENERATOR x u's: near the golden section, and without common divisor
 FADING = purpose("fading")
-TURN_U, TURN_V, PHASE, SIGNS = range(4)  # what draws are for
+TURN_U, TURN_V, PHASE, OWN = range(4)  # what draws are for
+_MIX = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB), np.uint64(0x9E3779B97F4A7C15)
 
 
 @njit(cache=True)
@@ -58,16 +59,32 @@ def arriving(waves, x, y, out):
         out[2, n], out[3, n] = cosine(v), sine(v)
 
 
-@njit(cache=True, error_model="numpy")
-def scattered(key, a, b, at, row_a, row_b, real, imaginary):
-    """Real and imaginary part of h for robots a < b (indices in the arena with this key); 0.04 us.
+@njit(cache=True)
+def own_number(key, robot):
+    """A robot's keyed number, 53 random bits."""
+    return np.uint64(uniform(key, robot, 0, OWN, FADING) * 2.0**53)
 
-    `at` (rows, 4, WAVES) are the waves arriving at robots; `real` and `imaginary` (WAVES,) are for use in here.
+
+@njit(cache=True)
+def signs_of(number_a, number_b):
+    """64 random bits of a pair: its robots' numbers, mixed as SplitMix64 does (Steele et al., OOPSLA 2014)."""
+    z = number_a * _MIX[2] + number_b
+    z = (z ^ (z >> np.uint64(30))) * _MIX[0]
+    z = (z ^ (z >> np.uint64(27))) * _MIX[1]
+    return z ^ (z >> np.uint64(31))
+
+
+@njit(cache=True, error_model="numpy")
+def scattered(signs, at, a, b, real, imaginary):
+    """Real and imaginary part of h for robots a < b (indices in the arena); 0.02 us.
+
+    `signs` are the pair's, `at` (rows, 4, WAVES) the waves arriving at robots, of which a and b are rows; `real` and
+    `imaginary` (WAVES,) are for use in here.
     """
-    signs = np.int64(uniform(key, a, b, SIGNS, FADING) * 2.0**WAVES)
+    half = np.uint32(signs >> np.uint64(WAVES))
     for n in range(WAVES):
-        sign = np.float32(1 - 2 * ((signs >> n) & 1))
-        u_real, u_imaginary, v_real, v_imaginary = at[row_a, 0, n], at[row_a, 1, n], at[row_b, 2, n], at[row_b, 3, n]
+        sign = np.float32(1) - np.float32(2) * np.float32((half >> np.uint32(n)) & np.uint32(1))
+        u_real, u_imaginary, v_real, v_imaginary = at[a, 0, n], at[a, 1, n], at[b, 2, n], at[b, 3, n]
         real[n] = sign * (u_real * v_real - u_imaginary * v_imaginary)
         imaginary[n] = sign * (u_real * v_imaginary + u_imaginary * v_real)
     scale = 1.0 / math.sqrt(WAVES)

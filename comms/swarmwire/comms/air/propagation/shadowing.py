@@ -28,7 +28,7 @@ from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.draws import purpose, uniform
 
 WAVES = 128
-NEARLY_NO_TURN = 1e-30  # so that touching robots do not divide by 0
+NEARLY_NO_TURN = np.float32(1e-30)  # so that touching robots do not divide by 0
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 SHADOWING = purpose("shadowing")
 QUANTILE, PHASE, TURN = 0, 1, 2  # what the draws of an arena are for
@@ -57,7 +57,9 @@ def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
     height = np.empty((2, waves.shape[1]))
     heights(waves, ax, ay, height[0])
     heights(waves, bx, by, height[1])
-    return between_db(waves, amplitude_db, height, 0, 1, bx - ax, by - ay, np.empty(waves.shape[1]))
+    return between_db(
+        waves.reshape((1, 3, -1)), 0, amplitude_db, height, 0, 1, bx - ax, by - ay, np.empty(waves.shape[1])
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -68,13 +70,12 @@ def heights(waves, x, y, out):
 
 
 @njit(cache=True, error_model="numpy")
-def between_db(waves, amplitude_db, height, a, b, dx, dy, parts):
-    """X between robots a and b, rows of `height` (robots, WAVES), where b stands (dx, dy) m from a; 0.05 us.
+def between_db(field, arena, amplitude_db, height, a, b, dx, dy, parts):
+    """X between robots a and b, rows of `height` (robots, WAVES), where b stands (dx, dy) m from a.
 
-    A wave's mean along the link is the difference of its sines at both ends over that of its phases. `parts` (WAVES,)
-    is for use in here.
+    `field` (arenas, 3, WAVES) are the waves of all arenas. A wave's mean along the link is the difference of its sines at
+    both ends over that of its phases. `parts` (WAVES,) is for use in here. In single precision, if all arrays and distances have it: 0.03 us.
     """
     for n in range(len(parts)):
-        turns = waves[0, n] * dx + waves[1, n] * dy
-        parts[n] = (height[b, n] - height[a, n]) / (turns + NEARLY_NO_TURN)
+        parts[n] = (height[b, n] - height[a, n]) / (field[arena, 0, n] * dx + field[arena, 1, n] * dy + NEARLY_NO_TURN)
     return total(parts) * (amplitude_db / (2.0 * math.pi)) * math.sqrt(math.sqrt(dx * dx + dy * dy))

@@ -84,21 +84,22 @@ def pairs_of(pose: FloatArray, size_m: tuple[float, float], keys, obstacles: Obs
 def _near(x, y, robots, cells, reach_m, curve):
     """Pairs within reach, and their path loss in dB."""
     most = 0
-    for s in range(len(x)):
-        for j in range(-1, 2):
-            first, stop = _strip(x[s], y[s], s // robots, cells, j)
+    for at in range(len(x)):
+        for j in range(2):
+            first, stop = _ahead(x, y, robots, cells, at, j)
             most += stop - first
     a, b, metres2 = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
     found = 0
-    for s in range(len(x)):
-        for j in range(-1, 2):
-            first, stop = _strip(x[s], y[s], s // robots, cells, j)
-            for at in range(first, stop):
-                r = cells.order[at]
+    for at in range(len(x)):
+        s = cells.order[at]
+        for j in range(2):
+            first, stop = _ahead(x, y, robots, cells, at, j)
+            for k in range(first, stop):
+                r = cells.order[k]
                 dx, dy = x[r] - x[s], y[r] - y[s]
                 # Written first and kept if it counts: a branch would be guessed wrong too often.
-                a[found], b[found], metres2[found] = s, r, dx * dx + dy * dy
-                found += (r > s) & (metres2[found] <= reach_m * reach_m)
+                a[found], b[found], metres2[found] = min(s, r), max(s, r), dx * dx + dy * dy
+                found += metres2[found] <= reach_m * reach_m
     loss = np.empty(found)
     for i in range(found):
         loss[i] = loss_db(curve, math.sqrt(metres2[i]))
@@ -106,15 +107,25 @@ def _near(x, y, robots, cells, reach_m, curve):
 
 
 @njit(cache=True)
+def _ahead(x, y, robots, cells, at, j):
+    """Where in the grid's order those stand that the robot at `at` in it makes pairs with: what comes later in its row
+    of cells (j = 0), and the row above (j = 1).
+    """
+    s = cells.order[at]
+    first, stop = _strip(x[s], y[s], s // robots, cells, j)
+    return (at + 1, stop) if j == 0 else (first, stop)
+
+
+@njit(cache=True)
 def _add_shadows(loss, x, y, robots, field, amplitude_db, a, b):
-    waves = field.shape[2]
-    height, parts = np.empty((len(x), waves)), np.empty(waves)
+    waves, single = field.shape[2], np.float32
+    height, parts, coarse = np.empty((len(x), waves), single), np.empty(waves, single), field.astype(single)
     for r in range(len(x)):
         shadowing.heights(field[r // robots], x[r], y[r], height[r])
     for i in range(len(a)):
         s, r = a[i], b[i]
-        dx, dy = x[r] - x[s], y[r] - y[s]
-        loss[i] += shadowing.between_db(field[s // robots], amplitude_db, height, s, r, dx, dy, parts)
+        dx, dy = single(x[r] - x[s]), single(y[r] - y[s])
+        loss[i] += shadowing.between_db(coarse, s // robots, amplitude_db, height, s, r, dx, dy, parts)
 
 
 @njit(cache=True)
@@ -146,12 +157,13 @@ def _above(least_dbm, send_dbm, receive_dbi, a, b, loss):
 def _fade(gain, x, y, robots, keys, scatter, law, a, b):
     waves = scatter.shape[2]
     at, parts = np.empty((len(x), 4, waves), np.float32), np.empty((2, waves), np.float32)
-    real, imaginary = parts[0], parts[1]
+    real, imaginary, number = parts[0], parts[1], np.empty(len(x), np.uint64)
     for r in range(len(x)):
         scattering.arriving(scatter[r // robots], x[r], y[r], at[r])
+        number[r] = scattering.own_number(keys[r // robots], r % robots)
     for i in range(len(a)):
         s, r = a[i], b[i]
-        h = scattering.scattered(keys[s // robots], s % robots, r % robots, at, s, r, real, imaginary)
+        h = scattering.scattered(scattering.signs_of(number[s], number[r]), at, s, r, real, imaginary)
         dx, dy = x[r] - x[s], y[r] - y[s]
         gain[i] = gain_of(law, h, math.sqrt(dx * dx + dy * dy))
 

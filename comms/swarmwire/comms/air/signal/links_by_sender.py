@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.air.decibels import from_db
+from swarmwire.comms.air.decibels import NEPERS, from_db
 from swarmwire.comms.air.signal.link_table import Pairs
 from swarmwire.comms.air.signal.tables import LinkPlaces, LinkTable
 from swarmwire.comms.arrays import ByteArray, FloatArray
@@ -45,18 +45,19 @@ def _kinds(pairs, send_dbm, receive_dbi, fate, levels):
     """What each link is, whether it is listed (4), its power, and how many of each kind each robot has."""
     k = len(pairs.a)
     kind, power_mw, counts = np.empty((2, k), np.uint8), np.empty((2, k)), np.zeros((len(send_dbm), 3), np.int64)
+    send_mw, receive = np.exp(send_dbm * NEPERS), np.exp(receive_dbi * NEPERS)
+    for i in range(k):
+        power_mw[:, i] = from_db(-pairs.loss_db[i]) * pairs.gain[i]
     for way in range(2):
         sender, receiver = (pairs.a, pairs.b) if way == 0 else (pairs.b, pairs.a)
         for i in range(k):
-            s = sender[i]
-            mean_dbm = send_dbm[s] + receive_dbi[receiver[i]] - pairs.loss_db[i]
-            power_mw[way, i] = from_db(mean_dbm) * pairs.gain[i]
+            s, r = sender[i], receiver[i]
+            mean_dbm = send_dbm[s] + receive_dbi[r] - pairs.loss_db[i]
+            power_mw[way, i] *= send_mw[s] * receive[r]
             is_listed, is_open = mean_dbm >= levels.listed_dbm, fate[way, i] == HEARD
-            of_kind = LEFT_OUT
-            if is_listed or (is_open and power_mw[way, i] >= levels.heard_mw):
-                of_kind = STRONG
-            elif is_open and mean_dbm >= levels.least_dbm:
-                of_kind = WEAK
+            is_strong = is_listed | (is_open & (power_mw[way, i] >= levels.heard_mw))
+            is_weak = is_open & (mean_dbm >= levels.least_dbm) & (not is_strong)
+            of_kind = STRONG * is_strong + WEAK * is_weak
             counts[s, of_kind] += 1
             kind[way, i] = of_kind + 4 * is_listed
     counts[:, LEFT_OUT] = 0
