@@ -2,7 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from swarmwire.comms.air.signal import service
+from swarmwire.comms.air.signal import on_air, service
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import ENTER, LISTENED, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY, RECEIVING, SILENT
@@ -83,4 +83,4 @@ def cut_off(state, alive, radio_on):
             r = state.link.receiver[i]
             if state.link.now[i] == RECEIVING and not (alive[r] and radio_on[r]):
                 state.link.now[i] = BLACKOUT if alive[r] else RECEIVER_DEAD
-                state.reception[r].locked_to = NOBODY
+                on_air.let_go(state.reception[r])

@@ -7,13 +7,15 @@ disturb one another (access "none"), every receiver hears each of them on its ow
 
 # pyright: basic, reportUnknownMemberType=false
 
+import numpy as np
+
 from swarmwire.comms.air.signal import dcf
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import OFF_AIR, schedule
 from swarmwire.comms.air.signal.log_success import log_success
 from swarmwire.comms.air.signal.outcome import alone_log_success, outcome
 from swarmwire.comms.air.signal.parameters import METHODS
-from swarmwire.comms.air.signal.tables import NOBODY, RECEIVING, SILENT, TURNING
+from swarmwire.comms.air.signal.tables import DATA, NOBODY, RECEIVING, SILENT, TURNING
 from swarmwire.comms.fates import Fate
 
 HEARD, TOO_WEAK, COLLIDED = int(Fate.HEARD), int(Fate.TOO_WEAK), int(Fate.COLLIDED)
@@ -68,6 +70,7 @@ def take_off_air(rules, bursts, state, queue, s, now_ns):
         me.on_air = SILENT
         return
     is_dcf = rules.method == DCF
+    is_sure = rules.loss == 0.0 and not bursts.is_on and me.on_air == DATA  # nothing but noise could take a frame
     for i in range(me.first_link, me.weak_link):
         if fate[i] != HEARD:
             continue
@@ -75,8 +78,11 @@ def take_off_air(rules, bursts, state, queue, s, now_ns):
         _count_chunk(rules, robot, it, now_ns)
         _remove(it, power_mw[i])
         if it.locked_to == s and it.link == i:
-            it.locked_to = NOBODY
-            now[i] = outcome(rules, bursts, state, s, i, it.log_success)
+            let_go(it)
+            if is_sure and it.log_success == 0.0:
+                now[i] = HEARD
+            else:
+                now[i] = outcome(rules, bursts, state, s, i, it.log_success)
             robot[receiver[i]].trust_from_ns = 0 if now[i] == HEARD else now_ns + rules.distrust_ns
         if is_dcf and dcf.has_changed(rules, it):
             dcf.change(rules, state, queue, receiver[i], now_ns)
@@ -99,7 +105,13 @@ def turn_away(state, r):
     it.is_deaf = 1
     if it.locked_to != NOBODY:
         state.link.now[it.link] = COLLIDED
-        it.locked_to = NOBODY
+        let_go(it)
+
+
+@borrowing(inline="always")
+def let_go(it):
+    """A robot receives no frame any more."""
+    it.locked_to, it.signal_mw = NOBODY, np.inf
 
 
 @borrowing(inline="always")
@@ -133,7 +145,7 @@ def _arrive(rules, robot, it, now, s, i, power_mw, now_ns):
             does = does and (drowned or power_mw > it.signal_mw)
             if drowned or does:
                 now[it.link] = COLLIDED
-                it.locked_to = NOBODY
+                let_go(it)
     if does:
         now[i] = RECEIVING
         it.locked_to, it.link, it.since_ns, it.signal_mw, it.log_success = s, i, now_ns, power_mw, 0.0
@@ -142,12 +154,11 @@ def _arrive(rules, robot, it, now, s, i, power_mw, now_ns):
 @borrowing(inline="always")
 def _count_chunk(rules, robot, it, now_ns):
     """The interference at a robot is about to change: what it received so far counts."""
-    if it.locked_to != NOBODY and now_ns != it.since_ns:
-        noise_mw = rules.noise_mw + it.jam_mw
-        if it.signals > 1:
-            noise_mw += max(it.power_mw - it.signal_mw, 0.0)
-        if it.signal_mw < rules.sure_sinr * noise_mw and it.log_success > HOPELESS:
-            sender = robot[it.locked_to]
-            bits = sender.bits * ((now_ns - it.since_ns) / sender.airtime_ns)
-            it.log_success += log_success(rules.log_success, rules.receiver, it.signal_mw / noise_mw, bits)
-        it.since_ns = now_ns
+    # Without a branch for robots that receive nothing, which would be guessed wrong often: their signal is infinite.
+    others_mw = max(it.power_mw - it.signal_mw, 0.0) if it.signals > 1 else 0.0
+    noise_mw = rules.noise_mw + it.jam_mw + others_mw
+    if it.signal_mw < rules.sure_sinr * noise_mw and it.log_success > HOPELESS:
+        sender = robot[it.locked_to]
+        bits = sender.bits * ((now_ns - it.since_ns) / sender.airtime_ns)
+        it.log_success += log_success(rules.log_success, rules.receiver, it.signal_mw / noise_mw, bits)
+    it.since_ns = now_ns

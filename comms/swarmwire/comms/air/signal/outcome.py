@@ -31,8 +31,6 @@ def outcome(rules, bursts, state, s, i, log_right):
     it would have been right without interference.
     """
     me = state.robot[s]
-    if log_right == 0.0 and rules.loss == 0.0 and not bursts.is_on and me.on_air == DATA:
-        return HEARD  # most are: no draw could change it
     receiver = state.link.receiver[i]
     key, a, b = state.keys[s // rules.robots], s % rules.robots, receiver % rules.robots
     if me.on_air == ACKNOWLEDGEMENT:

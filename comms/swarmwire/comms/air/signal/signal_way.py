@@ -64,7 +64,7 @@ class SignalWay(Way):
         self._robot: Table = np.zeros(rows, ROBOT)
         self._robot["packet"] = self._robot["answers_to"] = NOBODY
         self._reception: Table = np.zeros(rows, RECEPTION)
-        self._reception["locked_to"] = NOBODY
+        self._reception["locked_to"], self._reception["signal_mw"] = NOBODY, np.inf
         self._robot["free_from_ns"] = LONG_AGO_NS
         self._queued, self._packet = Transmissions.none(), np.zeros(0, PACKET)
         self._hold, self._poses = 0, {0: np.zeros((rows, 3))}

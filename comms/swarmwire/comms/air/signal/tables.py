@@ -58,7 +58,7 @@ RECEPTION = np.dtype(
         ("power_mw", _F),  # all frames on air here
         ("jam_mw", _F),  # all that is no frame
         ("peak_mw", _F),  # CSMA: most of `power_mw` while it listens
-        ("signal_mw", _F),  # the frame being received
+        ("signal_mw", _F),  # the frame being received; inf if there is none
         ("log_success", _F),  # of its chunks so far
         ("since_ns", _I),  # start of the chunk that is not in `log_success` yet
         ("locked_to", np.int32),  # sender row of the frame being received, or NOBODY
