@@ -10,10 +10,10 @@ depend on what was sent before, and while one end moves by s, h is correlated by
 while both move, by the product.
 
 The directions are a lattice of N points over both circles, which keyed amounts turn around either robot, and each wave
-has a keyed phase, all by the arena's key; on top of that the unordered
-pair's own keyed numbers give each wave a sign, which makes pairs independent. So the waves at a robot are worked out once for all its links.
-|h|^2 is exponential but for O(1/N): E g^2 = 2 - 1/N, its distribution is within 0.004 of the exponential's, and it is
-never above N (15 dB).
+has a keyed phase, all by the arena's key. On top of that each unordered pair of robots gives each wave a sign, by keyed
+numbers of both, which makes pairs independent. So the waves at a robot are worked out once for all its links. |h|^2 is
+exponential but for O(1/N): E g^2 = 2 - 1/N, its distribution is within 0.004 of the exponential's, and it is never
+above N (15 dB).
 """
 
 # pyright: basic, reportUnknownMemberType=false

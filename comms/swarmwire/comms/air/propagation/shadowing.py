@@ -73,9 +73,11 @@ def heights(waves, x, y, out):
 def between_db(field, arena, amplitude_db, height, a, b, dx, dy, parts):
     """X between robots a and b, rows of `height` (robots, WAVES), where b stands (dx, dy) m from a.
 
-    `field` (arenas, 3, WAVES) are the waves of all arenas. A wave's mean along the link is the difference of its sines at
-    both ends over that of its phases. `parts` (WAVES,) is for use in here. In single precision, if all arrays and distances have it: 0.03 us.
+    `field` (arenas, 3, WAVES) are the waves of all arenas. A wave's mean along the link is the difference of its sines
+    at both ends over that of its phases. `parts` (WAVES,) is for use in here. In single precision, if all arrays and
+    distances have it: 0.03 us.
     """
     for n in range(len(parts)):
-        parts[n] = (height[b, n] - height[a, n]) / (field[arena, 0, n] * dx + field[arena, 1, n] * dy + NEARLY_NO_TURN)
+        turns = field[arena, 0, n] * dx + field[arena, 1, n] * dy
+        parts[n] = (height[b, n] - height[a, n]) * turns / (turns * turns + NEARLY_NO_TURN)
     return total(parts) * (amplitude_db / (2.0 * math.pi)) * math.sqrt(math.sqrt(dx * dx + dy * dy))

@@ -108,8 +108,9 @@ def _near(x, y, robots, cells, reach_m, curve):
 
 @njit(cache=True)
 def _ahead(x, y, robots, cells, at, j):
-    """Where in the grid's order those stand that the robot at `at` in it makes pairs with: what comes later in its row
-    of cells (j = 0), and the row above (j = 1).
+    """First and stop in the grid's order of those that the robot at `at` in it makes pairs with.
+
+    What comes later in its own row of cells (j = 0), and the row above (j = 1).
     """
     s = cells.order[at]
     first, stop = _strip(x[s], y[s], s // robots, cells, j)
