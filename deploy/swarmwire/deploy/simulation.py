@@ -20,10 +20,11 @@ from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.crews import Crews
 from swarmwire.deploy.endpoint import new_run_id
 from swarmwire.deploy.guarded import Guarded
-from swarmwire.deploy.inputs import RecordedInputs, ReplayedCrew
+from swarmwire.deploy.inputs import ReplayedCrew
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.recording import Recording
+from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.run_record import RunRecord
 from swarmwire.metrics.event_log import EventLog
@@ -50,7 +51,8 @@ class Simulation:
                 truth = simulation.step()
         print(simulation.result.metrics["order"].final)
 
-    The arguments are those of `swarmwire.deploy.run`, and so are the errors.
+    The arguments are those of `swarmwire.deploy.run`, and so are the errors. `replay` says what a run that is repeated
+    takes from its record.
 
     Attributes:
         scenario: as checked.
@@ -77,6 +79,7 @@ class Simulation:
         socket: Path | None = None,
         realtime: float | str | None = None,
         record: Recording | None = None,
+        replay: Replay | None = None,
     ) -> None:
         self._clock = WallClock()
         self._called_ns = self._clock.now_ns()
@@ -87,7 +90,8 @@ class Simulation:
         self.agents = agent_specs(self.scenario)
         needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
         self.world = World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
-        self.ticks = _ticks(self.scenario)
+        self.ticks = replay.ticks if replay else _ticks(self.scenario)
+        self.inputs = replay.inputs if replay else None
         self.runners = runner_count(runners, self.static.arenas * self.static.robots)
         self.run_id = new_run_id()
         self.interrupt = Interrupt()
@@ -115,7 +119,6 @@ class Simulation:
             lost=self._losses.append,
             say=self._record.say,
         )
-        self.inputs: RecordedInputs | None = None
         self._crew: Crew | None = None
         self._loop: Loop | None = None
         self._result: Result | None = None
