@@ -18,7 +18,7 @@ from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.arguments import Runners, choose_seeds, real_time_factor, runner_count
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.crews import Crews
-from swarmwire.deploy.endpoint import new_run_id
+from swarmwire.deploy.endpoint import check_socket, new_run_id
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.inputs import ReplayedCrew
 from swarmwire.deploy.interrupt import Interrupt
@@ -98,6 +98,8 @@ class Simulation:
         self.metrics = Metrics()
         what, may_drop = record or Recording(), factor is not None
         what.check(self.static)
+        if self.runners and socket is not None:
+            check_socket(socket)  # before there is a folder, which what is refused should not leave
         self._record = RunRecord(None if out is None else Path(out), self._clock)
         self._pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
         self.controls = Controls(self._clock, rate_hz, self._pace)
