@@ -8,7 +8,7 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import DIFFERENT, INTERRUPTED
-from swarmwire.deploy.commands.options import Packets
+from swarmwire.deploy.commands.options import Packets, Quiet, Runners
 
 if TYPE_CHECKING:
     from swarmwire.deploy.repetition import Repetition
@@ -16,14 +16,12 @@ if TYPE_CHECKING:
 
 def repeat_command(
     folder: Annotated[Path, typer.Argument(help="The run folder.", metavar="RUN")],
-    runners: Annotated[
-        str, typer.Option(help='Processes that run the agents: "none" (all in this one), a number, or "per-robot".')
-    ] = "none",
+    runners: Runners = "none",
     out: Annotated[
         Path | None, typer.Option(help="A run folder for the repetition, new or empty. Default: nothing is written.")
     ] = None,
     packets: Packets = "off",
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Run a run again from its folder alone, and tell whether it came out the same, bit for bit.
 
