@@ -62,7 +62,7 @@ class Simulation:
         runners: processes that run the agents; 0: none, they are in this one.
         agents: the spec of each group's agent.
         inputs: of a run that is repeated, what came into it from outside.
-        interrupt: entered, SIGINT ends `run` after the tick under way.
+        interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
         controls: pause, step, speed and end of `run`, for other threads.
     """
 

@@ -8,6 +8,7 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import DIFFERENT, INTERRUPTED
+from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
 from swarmwire.deploy.commands.options import Packets, Quiet, Runners
 
 if TYPE_CHECKING:
@@ -39,7 +40,8 @@ def repeat_command(
         raise BadInput("--packets", "", "expected --out with it: a folder in which to record them")
     repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
     repeated.simulation.watch(progress(repeated.simulation, console))
-    repetition = repeated.run()
+    with leaving_when_hung_up(repeated.simulation.interrupt):
+        repetition = repeated.run()
     _print(repetition, console)
     if out is not None:
         console.print(f"written: {out}")

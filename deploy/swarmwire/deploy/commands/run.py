@@ -9,6 +9,7 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
+from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
 from swarmwire.deploy.commands.options import Overrides, Packets, Quiet, Runners, ScenarioFile, Seed
 from swarmwire.deploy.folder import default_folder
 from swarmwire.deploy.report import print_result
@@ -92,7 +93,8 @@ def _shown(simulation: "Simulation", folder: Path, view: bool, console: Console)
     with LiveView(folder) as live:
         if view:
             simulation.watch(live)
-        result = finished(simulation)
+        with leaving_when_hung_up(simulation.interrupt):
+            result = finished(simulation)
         print_result(result, console)
         _say_where(result, folder, console)
         if live.pid is not None:
