@@ -96,7 +96,13 @@ PRESETS: dict[str, Preset] = {
             "bit_rate_bps": 1_000_000,
             "frame": "802.11b",
             "noise": {"bandwidth_hz": 22e6, "figure_db": 7.0},
-            "reception": {"model": "802.11b", "preamble_sinr_db": 4.0, "preamble_dbm": -94.0, "take_over_s": 4e-6},
+            "reception": {
+                "model": "802.11b",
+                "preamble_sinr_db": 4.0,
+                "preamble_dbm": -94.0,
+                "sensitivity_dbm": -94.0,  # its bits would need less, but without a preamble there are none
+                "take_over_s": 4e-6,
+            },
         },
     ),
     "wifi-a-6M": Preset(
@@ -108,7 +114,13 @@ PRESETS: dict[str, Preset] = {
             "bit_rate_bps": 6_000_000,
             "frame": "802.11a",
             "noise": {"bandwidth_hz": 20e6, "figure_db": 7.0},
-            "reception": {"model": "802.11ag", "preamble_sinr_db": 4.0, "preamble_dbm": -82.0, "take_over_s": 4e-6},
+            "reception": {
+                "model": "802.11ag",
+                "preamble_sinr_db": 4.0,
+                "preamble_dbm": -82.0,
+                "sensitivity_dbm": -82.0,
+                "take_over_s": 4e-6,
+            },
         },
     ),
 }
