@@ -14,3 +14,4 @@ swarmwire export "$runs/split" --png 35 --to docs/split.png
 swarmwire export "$runs/pso" --png 55 --to docs/pso.png
 swarmwire draw footbot --to docs/footbot.png
 .ci/uv run --no-sync python docs/pictures/panel.py
+.ci/uv run --no-sync python -m docs.pictures.radio
