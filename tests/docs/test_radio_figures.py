@@ -27,6 +27,14 @@ def test_a_figure_is_a_small_picture(name: str):
     assert len(content) < MOST_BYTES
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_figure_can_be_drawn(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(sheet, "FOLDER", tmp_path)
+    FIGURES[name]()
+    assert [path.name for path in tmp_path.iterdir()] == [f"{name}.svg"]
+
+
 def test_drawing_again_gives_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     drawn = []
     for place in (tmp_path / "one", tmp_path / "two"):
