@@ -74,7 +74,7 @@ def test_power_without_line_of_sight_is_exponential(rayleigh: np.ndarray):
 
 
 @pytest.mark.parametrize(
-    ("margin_db", "stated"), [(0, 0.63212), (3, 0.39419), (5, 0.27111), (10, 0.09516), (20, 0.00995)]
+    ("margin_db", "stated"), [(0, 0.63212), (3, 0.39419), (5, 0.27111), (10, 0.09516), (20, 0.00995), (30, 0.00100)]
 )
 def test_outage_by_margin_is_rayleighs(rayleigh: np.ndarray, margin_db: float, stated: float):
     assert is_mean((rayleigh < 10.0 ** (-margin_db / 10.0)).astype(float), stated)
