@@ -9,7 +9,7 @@ from docs.pictures.radio.sheet import legend, legend_below, line_color, panels, 
 from swarmwire.comms.air.decibels import to_db
 from swarmwire.comms.air.propagation.fading import fading_gain, fading_law
 from swarmwire.comms.air.propagation.parameters import Fading
-from swarmwire.comms.air.propagation.scattering import scattered
+from swarmwire.comms.air.propagation.scattering import scattered_between
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import derive_key, uniform
 from swarmwire.metrics.drawing.looks import INK
@@ -66,4 +66,4 @@ def correlation() -> list[float]:
 def amplitudes(per_m: float, moved_m: float) -> FloatArray:
     """The amplitude h of each pair, (LAG_PAIRS,) complex."""
     place = 1.0, 2.0, 30.0 + moved_m, -7.0
-    return np.array([complex(*scattered(KEY, 0, 1 + k, per_m, *place)) for k in range(LAG_PAIRS)])
+    return np.array([complex(*scattered_between(KEY, per_m, 0, 1 + k, *place)) for k in range(LAG_PAIRS)])

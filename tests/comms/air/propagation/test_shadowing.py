@@ -22,7 +22,7 @@ KEYS = np.array([derive_key("shadowing", arena) for arena in range(ARENAS)], np.
 WAVES = field_waves(KEYS, UNIT)
 AMPLITUDE_DB = amplitude_db(UNIT)
 STANDARD_ERRORS = 4.4
-SLOW = 120  # waves rise in wave number: up to here at most half a turn in a metre
+SLOW = 64  # a power of two, as sums go by halves
 PLACES = st.floats(-200.0, 200.0)
 
 
