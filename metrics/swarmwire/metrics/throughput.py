@@ -1,0 +1,38 @@
+"""Throughput: how much of what was sent arrives."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.moment import Moment
+
+BITS_PER_BYTE = 8
+
+
+@dataclass(frozen=True)
+class Throughput(Metric):
+    """Payload heard, over all receivers of the arena: sum of 8 x bytes heard since the last tick x tick rate, in bit/s.
+
+    A broadcast counts once for each robot that hears it; the message's tag counts, what the radio adds to it does not.
+    The mean over the ticks divided by the robots is that of a receiver. NaN without a radio.
+    """
+
+    name = "throughput"
+    help = "payload heard by all robots together, a broadcast once for each, in bit/s"
+    unit = "bit/s"
+    bounds = (0.0, None)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure; nothing is remembered."""
+        return _throughput_bps
+
+
+def _throughput_bps(moment: Moment) -> FloatArray:
+    static, heard = moment.static, moment.heard
+    if heard is None:
+        return np.full(static.arenas, np.nan)
+    heard_bytes = np.bincount(heard.arena, heard.size_bytes, static.arenas)
+    return heard_bytes * (BITS_PER_BYTE * static.rate_hz)
