@@ -6,6 +6,8 @@ from rich.text import Text
 
 from swarmwire.deploy.result import ArenaResult, Percentiles, Result
 
+WHOLE = 1000  # from here on numbers are shown without decimals, nor as powers of ten
+
 
 def print_result(result: Result, console: Console) -> None:
     """What came of a run: one table for the run, and its first arena's radio and metrics."""
@@ -73,4 +75,6 @@ def _percentiles(value: Percentiles) -> str:
 
 
 def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"
+    if value is None:
+        return "-"
+    return f"{value:.0f}" if abs(value) >= WHOLE else f"{value:.3g}"

@@ -22,3 +22,6 @@ Packets = Annotated[
         metavar="off|all|SHARE",
     ),
 ]
+Links = Annotated[
+    bool, typer.Option("--links", help="Record radio_links.parquet: packets by sender, receiver and fate.")
+]

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import DIFFERENT, INTERRUPTED
-from swarmwire.deploy.commands.options import Packets
+from swarmwire.deploy.commands.options import Links, Packets
 
 if TYPE_CHECKING:
     from swarmwire.deploy.repetition import Repetition
@@ -23,6 +23,7 @@ def repeat_command(
         Path | None, typer.Option(help="A run folder for the repetition, new or empty. Default: nothing is written.")
     ] = None,
     packets: Packets = "off",
+    links: Links = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Run a run again from its folder alone, and tell whether it came out the same, bit for bit.
@@ -36,9 +37,11 @@ def repeat_command(
     from swarmwire.deploy.shown import progress
 
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
-    record = Recording(packets=packet_share(packets))
+    record = Recording(packets=packet_share(packets), links=links)
     if record.packets and out is None:
         raise BadInput("--packets", "", "expected --out with it: a folder in which to record them")
+    if record.links and out is None:
+        raise BadInput("--links", "", "expected --out with it: a folder in which to record them")
     repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
     repeated.simulation.watch(progress(repeated.simulation, console))
     repetition = repeated.run()

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
-from swarmwire.deploy.commands.options import Overrides, Packets, ScenarioFile
+from swarmwire.deploy.commands.options import Links, Overrides, Packets, ScenarioFile
 from swarmwire.deploy.folder import default_folder
 from swarmwire.deploy.report import print_result
 from swarmwire.deploy.result import Result
@@ -39,6 +39,7 @@ def run_command(
         ),
     ] = None,
     packets: Packets = "off",
+    links: Links = False,
     rrd: Annotated[bool, typer.Option(help="Record run.rrd, for rerun's viewer.")] = True,
     select: Annotated[
         str | None,
@@ -73,7 +74,7 @@ def run_command(
         out=folder,
         socket=socket,
         realtime=realtime,
-        record=Recording(packets=packet_share(packets), rrd=rrd, select=select),
+        record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
     )
     simulation.watch(progress(simulation, console))
     with LiveView(folder) as live:

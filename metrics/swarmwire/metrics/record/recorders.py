@@ -29,10 +29,9 @@ def recorders(
     links: bool = False,
     may_drop: bool = False,
 ) -> list[Observer]:
-    """Observers for `static.json`, `ticks`, `events`, of a radio `radio_robots` and `radio_distances`, and what is asked.
+    """Observers for `static.json`, `ticks`, `events`, and where there is a radio `radio_robots` and `radio_distances`.
 
-    That may be `packets`, of a share above 0 (1: all), and `radio_links`.
-
+    If asked for also `packets`, of a share above 0 (1: all), and `radio_links`.
     They are apart so that one that fails leaves the others going. `metrics` must see each tick before them; `may_drop`
     is for real time, where a slow disk costs rows rather than ticks.
     """
