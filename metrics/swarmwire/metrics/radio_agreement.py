@@ -16,15 +16,18 @@ LINK_FATES = tuple(
     FATE_NAMES[fate]
     for fate in (Fate.HEARD, Fate.BLOCKED, Fate.LOST, Fate.TOO_WEAK, Fate.COLLIDED, Fate.BURST, Fate.PARTITIONED)
 )
-# A receiver's fate that is in the summary's count alone: of packets that were in flight when the run ended.
-NOT_FINAL = FATE_NAMES[Fate.IN_FLIGHT]
+NOT_FINAL = FATE_NAMES[Fate.IN_FLIGHT]  # the summary counts packets too that never left their sender's radio
 
 
 def robots_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
     """As many receivers of each fate, over all senders."""
     table = _counted(files)
     columns = {fate: f"as_sender_{fate}" for fate in FATE_NAMES if fate != NOT_FINAL}
-    totals = {(row["arena"], fate): row[name] for row in _sums(table, list(columns.values())) for fate, name in columns.items()}
+    totals = {
+        (row["arena"], fate): row[name]
+        for row in _sums(table, list(columns.values()))
+        for fate, name in columns.items()
+    }
     return _compared(totals, tuple(columns), summary)
 
 
@@ -58,14 +61,17 @@ def _sums(table: "pl.LazyFrame", columns: list[str]) -> list[dict[str, Any]]:
     return table.group_by("arena").agg(pl.col(columns).sum()).collect().to_dicts()
 
 
-def _compared(found: Mapping[tuple[int, str], int], fates: tuple[str, ...], summary: Mapping[str, Any] | None) -> Verdict:
+def _compared(
+    found: Mapping[tuple[int, str], int], fates: tuple[str, ...], summary: Mapping[str, Any] | None
+) -> Verdict:
     """A run that was interrupted may have broken off a tick, which its summary alone counts."""
     if summary is None or summary["ended"] == "interrupted":
         return None
-    radios: list[dict[str, Any] | None] = per_arena(summary, "radio") if "radio" in summary else []
+    radios: list[dict[str, Any] | None] = per_arena(summary, "radio")
     for arena, radio in enumerate(radios):
-        for fate in fates if radio else ():
-            expected, rows = radio["fates"][fate] if radio else 0, found.get((arena, fate), 0)
+        counted: dict[str, int] = radio["fates"] if radio else {}
+        for fate in fates:
+            expected, rows = counted.get(fate, 0), found.get((arena, fate), 0)
             if rows != expected:
                 return State.DIFFERS, f"{rows} {fate} (arena {arena}); the summary has {expected}"
     return None

@@ -50,7 +50,7 @@ def export_command(
     ] = False,
     to: Annotated[
         Path | None,
-        typer.Option(help="The file; a picture may be .png, .svg or .pdf. Default: picture.png, film.* or pdr.png in RUN."),
+        typer.Option(help="The file; pictures: .png, .svg or .pdf. Default: picture.png, film.*, pdr.png in RUN."),
     ] = None,
     from_s: Annotated[float | None, typer.Option("--from", help="Start of the film, in s.", metavar="S")] = None,
     until_s: Annotated[float | None, typer.Option("--until", help="End of the film, in s.", metavar="S")] = None,

@@ -10,8 +10,6 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.drawing.canvas import new_figure, save
 from swarmwire.metrics.drawing.looks import (
     CURVE,
-    FAINT,
-    GRID,
     INK,
     LINK,
     LONG_SIDE_IN,
@@ -19,7 +17,9 @@ from swarmwire.metrics.drawing.looks import (
     SOFT,
     TEXT_PT,
     TITLE_PT,
+    Look,
 )
+from swarmwire.metrics.drawing.plain_axes import plain_axes
 from swarmwire.metrics.run_folder import RunFolder
 
 if TYPE_CHECKING:
@@ -38,12 +38,13 @@ def draw_distances(run: RunFolder, arena: int, to: Path, size_px: int) -> None:
     figure = new_figure(LONG_SIDE_IN, _HEIGHT_IN, size_px)
     title = static.name if static.arenas == 1 else f"{static.name}, seed {static.seeds[arena]}"
     figure.text(0.025, 0.945, title, fontsize=TITLE_PT, fontweight="bold", color=INK)
-    upper = _axes(figure, (0.085, 0.41, 0.89, 0.44), "share of the receivers that heard, over distance in m")
-    lower = _axes(figure, (0.085, 0.09, 0.89, 0.2), "receivers that packets on air were meant for")
+    upper = plain_axes(figure, (0.085, 0.45, 0.885, 0.4), "share of the receivers that heard")
+    lower = plain_axes(figure, (0.085, 0.13, 0.885, 0.2), "receivers that packets on air were meant for")
     edges_m = np.append(table["from_m"].to_numpy(), table["to_m"][-1])
     _draw_ratio(upper, edges_m, table["pdr"].cast(float).to_numpy(), static.range_m)
     lower.stairs(table["intended"].to_numpy(), edges_m, fill=True, color=LINK, alpha=0.6)
     lower.locator_params(axis="y", nbins=3)
+    lower.set_xlabel("distance between sender and receiver in m", fontsize=SMALL_PT, color=SOFT, labelpad=2)
     for axes in (upper, lower):
         axes.set_xlim(0.0, float(edges_m[-1]))
     save(figure, to)
@@ -66,21 +67,9 @@ def _draw_ratio(axes: Any, edges_m: FloatArray, pdr: FloatArray, range_m: float 
     axes.plot(middle_m, pdr, color=CURVE, lw=1.4, marker="o", ms=3)
     axes.set_ylim(-0.03, 1.05)
     if np.isnan(pdr).all():
-        said = {"transform": axes.transAxes, "ha": "center", "va": "center", "fontsize": TEXT_PT, "color": SOFT}
+        said: Look = {"transform": axes.transAxes, "ha": "center", "va": "center", "fontsize": TEXT_PT, "color": SOFT}
         axes.text(0.5, 0.5, "packets were on their way for too long: the distance is not known", **said)
     if range_m is not None and range_m < edges_m[-1]:
         axes.axvline(range_m, color=SOFT, lw=0.7, alpha=0.7, ls="--")
-        look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "fontsize": SMALL_PT, "color": SOFT}
-        axes.annotate("range", (range_m, 1.0), (3, -7), **look)
-
-
-def _axes(figure: Any, place: tuple[float, float, float, float], title: str) -> Any:
-    axes = figure.add_axes(place)
-    axes.set_facecolor("none")
-    axes.spines[["top", "right", "left"]].set_visible(False)
-    axes.spines["bottom"].set(color=FAINT, linewidth=0.7)
-    axes.grid(axis="y", color=GRID, linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.tick_params(labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
-    axes.set_title(title, loc="left", fontsize=TEXT_PT, color=SOFT, pad=4)
-    return axes
+        at: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
+        axes.annotate("range", (range_m, 1.0), (3, -7), fontsize=SMALL_PT, color=SOFT, **at)

@@ -35,7 +35,11 @@ class DistanceTotals(TotalsRecorder):
 
         counts = self._counts
         bins = int(np.flatnonzero(counts.intended.any(axis=0)).max(initial=-1)) + 1
-        arenas, intended, heard = len(counts.intended), counts.intended[:, :bins].ravel(), counts.heard[:, :bins].ravel()
+        arenas, intended, heard = (
+            len(counts.intended),
+            counts.intended[:, :bins].ravel(),
+            counts.heard[:, :bins].ravel(),
+        )
         edges_m = counts.width_m * np.arange(bins + 1)
         known = (intended > 0) & (counts.unknown == 0)
         columns: dict[str, Any] = {
