@@ -34,5 +34,5 @@ def _throughput_bps(moment: Moment) -> FloatArray:
     static, heard = moment.static, moment.heard
     if heard is None:
         return np.full(static.arenas, np.nan)
-    heard_bytes: FloatArray = np.bincount(heard.arena, heard.size_bytes.astype(np.float64), static.arenas)
-    return heard_bytes * (BITS_PER_BYTE * static.rate_hz)
+    heard_bytes = np.bincount(heard.arena, heard.size_bytes, static.arenas)
+    return np.asarray(heard_bytes, np.float64) * (BITS_PER_BYTE * static.rate_hz)
