@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.signal.parameters import Access
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.truth import Static, Truth
 from tests.comms.air.runs import make_air, scattered
@@ -19,9 +20,9 @@ DISK = Radio(range_m=2.0, loss=0.2, latency_s=0.15, jitter_s=0.1, bit_rate_bps=2
 RADIOS = (
     DISK,
     replace(DISK, bit_rate_bps=2_000, latency_s=0.0),  # packets outlast ticks
-    replace(with_access("csma-802154"), bit_rate_bps=20_000, jitter_s=0.1),
+    replace(with_access("none"), bit_rate_bps=20_000, jitter_s=0.1),
     replace(with_access("aloha"), bit_rate_bps=2_000),
-    with_access("dcf"),
+    replace(with_access("dcf"), access=Access("dcf", acknowledged=False)),
 )
 
 

@@ -48,35 +48,41 @@ def test_it_is_the_mean_over_pairs_of_the_time_since_the_newest_heard_was_sent()
 def test_what_was_overtaken_or_lost_changes_nothing_and_several_at_once_count_once():
     of = static(2)
     told = [
-        heard([0, 0, 0], [1, 1, 1], [-60, -20, -50]),
-        heard([0, 0], [1, 1], [-40, 50], fate=[Fate.HEARD, Fate.LOST]),
+        heard([0, 0, 0], [1, 1, 1], [40, 80, 50]),
+        heard([0, 0], [1, 1], [60, 150], fate=[Fate.HEARD, Fate.LOST]),
     ]
-    found = ages(of, [truth(of, tick, finished=one) for tick, one in enumerate(told)])
+    found = ages(of, [truth(of, tick, finished=one) for tick, one in enumerate(told, 1)])
     assert found.ravel().tolist() == [pytest.approx(0.02), pytest.approx(0.12)]
 
 
 def test_pairs_with_a_dead_robot_do_not_count_until_it_lives_again():
-    of = static(3)
-    told = heard([0, 1], [1, 2], [-100, -20])
+    of, nothing = static(3), heard([], [], [])
     dead = np.array([False, True, True])
-    seen = [truth(of, 0, finished=told)] + [truth(of, tick, finished=heard([], [], [])) for tick in (1, 2)]
-    seen[1] = truth(of, 1, finished=heard([], [], []), alive=dead)
-    assert ages(of, seen).ravel().tolist() == [pytest.approx(0.06), pytest.approx(0.12), pytest.approx(0.26)]
+    seen = [
+        truth(of, 1, finished=heard([0, 1], [1, 2], [10, 80])),  # ages of 90 and 20 ms
+        truth(of, 2, finished=nothing, alive=dead),
+        truth(of, 3, finished=heard([0], [2], [250]), alive=dead),  # still on its way when its sender died
+        truth(of, 4, finished=nothing),  # 390, 320 and 150 ms
+    ]
+    assert ages(of, seen).ravel().tolist() == [pytest.approx(value) for value in (0.055, 0.12, 0.22, 0.86 / 3)]
 
 
 def test_of_many_robots_every_nth_counts_as_a_receiver(monkeypatch):
     monkeypatch.setattr(age_of_information, "MOST_PAIRS", 20)  # 6 x 6 / 20: every second
     of = static(6)
-    told = heard([0, 0, 0], [1, 2, 4], [-10, -20, -40])
-    assert ages(of, [truth(of, finished=told)]).ravel().tolist() == [pytest.approx(0.03)]
+    told = heard([0, 0, 0], [1, 2, 4], [90, 80, 60])
+    assert ages(of, [truth(of, 1, finished=told)]).ravel().tolist() == [pytest.approx(0.03)]
 
 
-def test_a_run_so_long_that_ages_add_up_beyond_64_bits_has_its_mean():
-    of, day_ns = static(4), 10**18
-    late = truth(of, 1, time_ns=day_ns * 4, finished=heard([], [], []))
+def test_a_run_so_long_that_times_add_up_beyond_64_bits_has_its_mean():
+    of, long_ns = static(4), 10**18
     pairs = [(a, b) for a in range(4) for b in range(4) if a != b]
-    first = heard([a for a, _ in pairs], [b for _, b in pairs], [day_ns // MS] * 12)
-    assert ages(of, [truth(of, time_ns=day_ns, finished=first), late])[1, 0] == pytest.approx(3 * day_ns / NS_PER_S)
+    told = [heard(*np.transpose(some), [long_ns // MS] * 6) for some in (pairs[:6], pairs[6:])]
+    seen = [truth(of, tick, time_ns=(tick + 2) * long_ns, finished=one) for tick, one in enumerate(told)]
+    assert ages(of, seen).ravel().tolist() == [pytest.approx(1e9), pytest.approx(2e9)]
+    dead = np.array([False, True, True, True])
+    seen.append(truth(of, 2, time_ns=4 * long_ns, finished=heard([], [], []), alive=dead))
+    assert ages(of, seen)[2, 0] == pytest.approx(3e9)
 
 
 @settings(max_examples=25)

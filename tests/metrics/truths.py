@@ -102,4 +102,4 @@ def departed(
 ) -> Departed:
     """A packet of each of these senders."""
     columns = (arena, sender, to, sequence, intended, out_of_range, int(fate), on_air_at_ns, off_air_at_ns)
-    return Departed(*(np.array(column) for column in np.broadcast_arrays(*columns)))
+    return Departed(*(np.array(column, np.int64) for column in np.broadcast_arrays(*columns)))
