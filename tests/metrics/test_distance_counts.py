@@ -74,13 +74,16 @@ def test_it_is_that_of_a_loop_over_packets_and_robots(pairs_per_tick, run):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(distance_counts, "PAIRS_PER_TICK", pairs_per_tick)
         counts = DistanceCounts(of)
-    assert counts.every % 2 == 1
+    spread = int(distance_counts.SPREAD_SEQUENCE), int(distance_counts.SPREAD_SENDER)
     intended, heard = Counter(), Counter()
 
     def place(arena, a, b, on_air_at_ns):
         tick = max(one.tick for one in seen if one.time_ns <= on_air_at_ns)
         pose = seen[tick].pose.reshape(of.arenas, of.robots, 3)[arena]
         return arena, int(math.dist(pose[a, :2], pose[b, :2]) / counts.width_m)
+
+    def taken(sender, sequence):
+        return (sequence * spread[0] + sender * spread[1]) % 2**64 * counts.every < 2**64
 
     for one in seen:
         counts.see(one)
@@ -91,12 +94,12 @@ def test_it_is_that_of_a_loop_over_packets_and_robots(pairs_per_tick, run):
             alive = seen[tick].alive.reshape(of.arenas, of.robots)[arena]
             for robot in range(of.robots):
                 meant = alive[robot] if to == BROADCAST else robot == to
-                if meant and robot != sender and fate == Fate.HEARD and (sender + sequence) % counts.every == 0:
+                if meant and robot != sender and fate == Fate.HEARD and taken(sender, sequence):
                     intended[place(arena, sender, robot, on_air)] += 1
         for arena, sender, receiver, sequence, fate, on_air in rows_of(
             one.finished, "arena", "sender", "receiver", "sequence", "fate", "on_air_at_ns"
         ):
-            if fate == Fate.HEARD and (sender + sequence) % counts.every == 0:
+            if fate == Fate.HEARD and taken(sender, sequence):
                 heard[place(arena, sender, receiver, on_air)] += 1
     last = counts.intended.shape[1] - 1  # beyond the arena's corners, where these robots may walk
     for table, expected in ((counts.intended, intended), (counts.heard, heard)):
@@ -105,3 +108,17 @@ def test_it_is_that_of_a_loop_over_packets_and_robots(pairs_per_tick, run):
             within[arena, min(b, last)] += packets
         assert {(a, b): int(table[a, b]) for a, b in zip(*np.nonzero(table), strict=True)} == dict(within)
     assert counts.unknown == 0
+
+
+def test_of_many_robots_about_as_many_packets_are_counted_as_said_whatever_their_turn():
+    of = static(1000)
+    counts = DistanceCounts(of)
+    assert counts.every == 256
+    sender, sequence = (one.ravel() for one in np.meshgrid(np.arange(1000), np.arange(600)))
+    taken = counts._taken(sender, sequence)
+    assert taken.mean() == pytest.approx(1 / 256, rel=0.02)
+    for period in (2, 3, 4, 16):
+        turns = np.bincount(sequence[taken] % period)
+        assert turns.min() > 0.9 * turns.max()
+    in_tick = np.bincount(sequence[taken], minlength=600)
+    assert (in_tick.min() >= 1, in_tick.max() <= 9) == (True, True)

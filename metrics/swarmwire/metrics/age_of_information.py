@@ -52,6 +52,7 @@ class Newest:
         arenas, robots = static.arenas, static.robots
         self._every = -(-robots * robots // MOST_PAIRS)  # robots from one receiver to the next
         self._receivers, self._robots = -(-robots // self._every), robots
+        self._counts: BoolArray = np.arange(robots) % self._every == 0  # as a receiver
         self._sent_at_ns: IntArray = np.full((arenas, self._receivers, robots), NEVER, np.int64)
         self._alive: BoolArray = np.ones((arenas, robots), np.bool_)
         self._pairs: IntArray = np.zeros(arenas, np.int64)
@@ -83,7 +84,7 @@ class Newest:
 
     def _take(self, heard: HeardLinks) -> tuple[IntArray, IntArray, IntArray]:
         """Put in what was heard: a row of `heard` for each pair that did, its time before and its time now."""
-        rows = np.flatnonzero(heard.receiver % self._every == 0) if self._every > 1 else np.arange(len(heard.arena))
+        rows = np.flatnonzero(self._counts[heard.receiver])
         place = heard.arena[rows] * self._receivers + heard.receiver[rows] // self._every
         place = place * self._robots + heard.sender[rows]
         table = self._sent_at_ns.reshape(-1)

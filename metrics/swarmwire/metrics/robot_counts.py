@@ -35,11 +35,16 @@ class RobotCounts:
         self._add_departed(departed)
         sender = finished.arena * self._robots + finished.sender
         _add(self.as_sender, sender * FATES + finished.fate, finished.receivers)
-        linked = np.flatnonzero(finished.receiver != NOBODY)
-        receiver = (finished.arena * self._robots + finished.receiver)[linked]
-        _add(self.as_receiver, receiver * FATES + finished.fate[linked])
-        heard = finished.fate[linked] == Fate.HEARD
-        _add(self.heard_bytes, receiver[heard], finished.size_bytes[linked[heard]])
+        receiver, fate, size_bytes = (
+            finished.arena * self._robots + finished.receiver,
+            finished.fate,
+            finished.size_bytes,
+        )
+        linked = finished.receiver != NOBODY
+        if not linked.all():
+            receiver, fate, size_bytes = receiver[linked], fate[linked], size_bytes[linked]
+        _add(self.as_receiver, receiver * FATES + fate)
+        _add(self.heard_bytes, receiver, np.where(fate == Fate.HEARD, size_bytes, 0))
 
     @property
     def in_flight(self) -> IntArray:
