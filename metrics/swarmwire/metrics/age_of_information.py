@@ -6,9 +6,10 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.truth import Static
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.truth import Finished, Static
 from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.moment import HeardLinks, Moment
+from swarmwire.metrics.moment import Moment
 
 MOST_PAIRS = 2**18  # of an arena: 2 MB
 NEVER = -1
@@ -37,9 +38,9 @@ class AgeOfInformation(Metric):
         newest = Newest(static)
 
         def measure(moment: Moment) -> FloatArray:
-            if moment.heard is None:
+            if moment.truth.finished is None:
                 return np.full(static.arenas, np.nan)
-            newest.see(moment.heard, moment.alive)
+            newest.see(moment.truth.finished, moment.alive)
             return newest.mean_age_s(moment.truth.time_ns)
 
         return measure
@@ -58,19 +59,19 @@ class Newest:
         self._pairs: IntArray = np.zeros(arenas, np.int64)
         self._total_ns = [0] * arenas  # Python's whole numbers: a day of a million pairs is beyond 64 bits
 
-    def see(self, heard: HeardLinks, alive: BoolArray) -> None:
+    def see(self, ended: Finished, alive: BoolArray) -> None:
         """Take in what was heard; `alive` (arenas, robots) are the robots that count from now on."""
         if not np.array_equal(alive, self._alive):
             self._alive = alive.copy()
-            self._take(heard)
+            self._take(ended)
             self._count_again()
             return
-        rows, before_ns, after_ns = self._take(heard)
-        arena, receiver, sender = heard.arena[rows], heard.receiver[rows], heard.sender[rows]
-        counts = alive[arena, receiver] & alive[arena, sender]
+        rows, before_ns, after_ns = self._take(ended)
+        arena = ended.arena[rows]
+        counts = alive[arena, ended.receiver[rows]] & alive[arena, ended.sender[rows]]
         first = before_ns == NEVER
         gained_ns = np.zeros(len(self._pairs), np.int64)
-        np.add.at(gained_ns, arena[counts], (after_ns - np.where(first, 0, before_ns))[counts])
+        np.add.at(gained_ns, arena, np.where(counts, after_ns - np.where(first, 0, before_ns), 0))
         self._pairs += np.bincount(arena[counts & first], minlength=len(self._pairs))
         self._total_ns = [total + gain for total, gain in zip(self._total_ns, gained_ns.tolist(), strict=True)]
 
@@ -82,14 +83,14 @@ class Newest:
         ]
         return np.array(ages_s, np.float64)
 
-    def _take(self, heard: HeardLinks) -> tuple[IntArray, IntArray, IntArray]:
-        """Put in what was heard: a row of `heard` for each pair that did, its time before and its time now."""
-        rows = np.flatnonzero(self._counts[heard.receiver])
-        place = heard.arena[rows] * self._receivers + heard.receiver[rows] // self._every
-        place = place * self._robots + heard.sender[rows]
-        table = self._sent_at_ns.reshape(-1)
+    def _take(self, ended: Finished) -> tuple[IntArray, IntArray, IntArray]:
+        """Put in what was heard: a row of `ended` for each pair that did, its time before and its time now."""
+        rows = np.flatnonzero((ended.fate == Fate.HEARD) & self._counts[ended.receiver])
+        place = ended.arena[rows] * self._receivers + ended.receiver[rows] // self._every
+        place = place * self._robots + ended.sender[rows]
+        table, sent_at_ns = self._sent_at_ns.reshape(-1), ended.sent_at_ns[rows]
         before_ns = table[place]
-        np.maximum.at(table, place, heard.sent_at_ns[rows])
+        np.maximum.at(table, place, sent_at_ns)
         after_ns = table[place]
         # A pair that heard several packets counts once: the row whose number stays when all are written to its place.
         number = np.arange(len(place))

@@ -9,7 +9,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components  # pyright: ignore[reportUnknownVariableType] - it brings no types
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.truth import Static, Truth
 
 
@@ -19,17 +18,6 @@ class Components:
 
     arena: IntArray  # (c,) a component never spans two arenas, since no edge does
     size: IntArray  # (c,) robots alive
-
-
-@dataclass(frozen=True)
-class HeardLinks:
-    """The packets heard since the last tick, a row per receiver."""
-
-    arena: IntArray  # (k,)
-    receiver: IntArray  # (k,) index in the arena
-    sender: IntArray  # (k,) index in the arena
-    sent_at_ns: IntArray  # (k,)
-    size_bytes: IntArray  # (k,) payload with its tag
 
 
 @dataclass(frozen=True)
@@ -78,16 +66,6 @@ class Moment:
         arena[label] = np.arange(rows) // self.static.robots
         held = size > 0  # a dead robot is a component of its own, of nobody
         return Components(arena[held], size[held])
-
-    @cached_property
-    def heard(self) -> HeardLinks | None:
-        """What was heard since the last tick; None without a radio."""
-        ended = self.truth.finished
-        if ended is None:
-            return None
-        rows = np.flatnonzero(ended.fate == Fate.HEARD)
-        columns = (ended.arena, ended.receiver, ended.sender, ended.sent_at_ns, ended.size_bytes)
-        return HeardLinks(*(column[rows] for column in columns))
 
     @property
     def _shape(self) -> tuple[int, int]:

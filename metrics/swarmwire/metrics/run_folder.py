@@ -130,8 +130,8 @@ class RunFolder:
 
         Columns: arena, from_m, to_m (centre to centre, when the packet went on air), intended (receivers of packets
         that went on air: all robots alive then, however far, or the one addressed), heard (of these), pdr (heard /
-        intended; null if nobody was meant). Of more than 70 robots some packets are counted: one of every
-        `record.radio_distances.every` (in the summary) of each robot. Should packets have been on their way for more
+        intended; null if nobody was meant). Of more than 70 robots one of so many packets is counted
+        as `record.radio_distances.every` says in the summary. Should packets have been on their way for more
         than 5 s, as `unknown` beside it tells, pdr is null. BadInput without a radio, or of a killed run.
         """
         return self._read("radio_distances", arena)

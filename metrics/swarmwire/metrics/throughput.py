@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.fates import Fate
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -31,8 +32,8 @@ class Throughput(Metric):
 
 
 def _throughput_bps(moment: Moment) -> FloatArray:
-    static, heard = moment.static, moment.heard
-    if heard is None:
+    static, ended = moment.static, moment.truth.finished
+    if ended is None:
         return np.full(static.arenas, np.nan)
-    heard_bytes = np.bincount(heard.arena, heard.size_bytes, static.arenas)
+    heard_bytes = np.bincount(ended.arena, np.where(ended.fate == Fate.HEARD, ended.size_bytes, 0), static.arenas)
     return np.asarray(heard_bytes, np.float64) * (BITS_PER_BYTE * static.rate_hz)

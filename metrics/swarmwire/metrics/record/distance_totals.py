@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 class DistanceTotals(TotalsRecorder):
     """Observer that writes `radio_distances.parquet`. `RunFolder.radio_distances` says what its columns are.
 
-    The summary says besides: `every` (one of so many packets of each robot was counted) and `unknown` (receivers that
+    The summary says besides: `every` (one of so many packets was counted) and `unknown` (receivers that
     heard, at a distance that was not known any more).
     """
 
