@@ -28,7 +28,8 @@ def print_result(result: Result, console: Console) -> None:
     _add_radio(table, arena)
     for name, value in arena.metrics.items():
         if value.mean is not None:
-            table.add_row(name, f"final {_number(value.final)}, mean {_number(value.mean)}, min {_number(value.min)}")
+            numbers = f"final {_number(value.final)}, mean {_number(value.mean)}, min {_number(value.min)}"
+            table.add_row(name, f"{numbers}{_unit(name)}")
     for body, senses in result.global_senses.items():
         table.add_row("global senses", f"{body}: {', '.join(senses)}")
     counts = [f"{name} {count}" for name, count in result.counts.items() if count]
@@ -66,6 +67,15 @@ def _add_radio(table: Table, arena: ArenaResult) -> None:
     table.add_row(
         "latency", f"on air {_percentiles(radio.latency_air_s)}; to the agent {_percentiles(radio.latency_agent_s)}"
     )
+
+
+def _unit(metric: str) -> str:
+    """The unit of a metric that has one and is known by name."""
+    # Imported here: metrics bring scipy, which --help should not wait for.
+    from swarmwire.metrics.registry import METRICS
+
+    kind = METRICS.get(metric)
+    return f" ({kind.unit})" if kind is not None and kind.unit else ""
 
 
 def _percentiles(value: Percentiles) -> str:
