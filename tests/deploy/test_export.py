@@ -90,8 +90,8 @@ def test_a_run_that_was_killed_is_exported_up_to_its_last_part(run):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--gif", "--mp4"], "export: expected one of --png, --gif and --mp4 at a time"),
-        (["--png", "3", "--gif"], "export: expected one of --png, --gif and --mp4 at a time"),
+        (["--gif", "--mp4"], "export: expected one of --png, --gif, --mp4 and --pdr at a time"),
+        (["--png", "3", "--gif"], "export: expected one of --png, --gif, --mp4 and --pdr at a time"),
         (["--png", "7"], "--png: expected a time that was recorded, 0 to 2.9 s, or end; got 7"),
         (["--png", "nan"], "--png: expected a time that was recorded, 0 to 2.9 s, or end; got nan"),
         (["--fps", "5"], "--fps: expected --gif or --mp4 with it; a picture is of one moment, --png T"),

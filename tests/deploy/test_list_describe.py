@@ -298,7 +298,7 @@ def test_the_list_command_names_kinds_and_things(monkeypatch, capsys):
     assert (code, errors) == (0, "")
     for kind in KINDS:
         assert f"{kind.name} " in out
-    assert "min_gap            smallest distance" in called(monkeypatch, capsys, "list", "metrics")[1]
+    assert "min_gap             smallest distance" in called(monkeypatch, capsys, "list", "metrics")[1]
     assert list(json.loads(called(monkeypatch, capsys, "list", "--json")[1])) == [kind.name for kind in KINDS]
 
 

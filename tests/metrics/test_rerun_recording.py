@@ -242,7 +242,7 @@ def test_it_opens_with_named_views_of_all_that_was_recorded(tmp_path, radio, siz
     record(tmp_path / "run.rrd", of, moving(of, 1))
     views = {"Robots", "Robot flock-0", "About", "Arena", "Events", "Distances in m", "Counts"}
     views.add("Order and connectivity, as shares")
-    with_radio = {"Receivers per second, by a packet's fate", "Times in s"}
+    with_radio = {"Receivers per second, by a packet's fate", "Times in s", "Rates in bit/s"}
     assert view_names(tmp_path / "run.rrd") == (views | with_radio if radio else views)
 
 

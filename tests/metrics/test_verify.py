@@ -79,6 +79,9 @@ def test_a_whole_folder_has_nothing_wrong_and_is_left_as_it_is(tmp_path):
         "ticks": State.WHOLE,
         "packets": State.WHOLE,
         "events": State.WHOLE,
+        "radio_robots": State.NOT_RECORDED,
+        "radio_distances": State.NOT_RECORDED,
+        "radio_links": State.NOT_RECORDED,
     }
     assert "20 rows" in text_of(tmp_path, "ticks")
     assert "up to tick 9 (0.9 s)" in text_of(tmp_path, "ticks")

@@ -7,7 +7,8 @@ import numpy as np
 
 from swarmwire.comms.body import load_body
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.truth import Finished, Group, Light, Obstacle, Static, Tally, Truth
+from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.truth import Departed, Finished, Group, Light, Obstacle, Static, Tally, Truth
 from swarmwire.metrics.metrics import Metrics
 
 
@@ -86,3 +87,19 @@ def measured(name: str, of: Static, seen: Truth) -> list[float]:
     metrics.begin(of)
     metrics.see(seen)
     return metrics.latest[name].tolist()
+
+
+def departed(
+    sender: Sequence[int],
+    intended: int = 3,
+    out_of_range: int = 0,
+    fate: Fate = Fate.HEARD,
+    on_air_at_ns: int = 0,
+    off_air_at_ns: int = 0,
+    to: int = BROADCAST,
+    sequence: int = 0,
+    arena: int = 0,
+) -> Departed:
+    """A packet of each of these senders."""
+    columns = (arena, sender, to, sequence, intended, out_of_range, int(fate), on_air_at_ns, off_air_at_ns)
+    return Departed(*(np.array(column, np.int64) for column in np.broadcast_arrays(*columns)))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.senses import GroupSenses, Senses
-from swarmwire.comms.truth import Finished, Static, Tally, Truth
+from swarmwire.comms.truth import Departed, Finished, Static, Tally, Truth
 
 
 def static_of(static: Static, arena: int) -> Static:
@@ -22,7 +22,7 @@ def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
     rows = slice(arena * static.robots, (arena + 1) * static.robots)
     within = senses_within(truth.senses, rows)
     senses = {name: GroupSenses(group.rows - rows.start, group.fields) for name, group in within.items()}
-    edges, tally, finished = truth.edges, truth.tally, truth.finished
+    edges, tally, finished, departed = truth.edges, truth.tally, truth.finished, truth.departed
     if edges is not None:
         edges = edges[(edges[:, 0] >= rows.start) & (edges[:, 0] < rows.stop)] - rows.start
     return replace(
@@ -38,6 +38,7 @@ def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
         tally=None if tally is None else _tally_of(tally, arena),
         finished=None if finished is None else _finished_of(finished, arena),
         events=tuple(replace(event, changed=event.changed[rows]) for event in truth.events),
+        departed=None if departed is None else _departed_of(departed, arena),
     )
 
 
@@ -62,3 +63,9 @@ def _finished_of(finished: Finished, arena: int) -> Finished:
     columns: dict[str, Any] = {field.name: getattr(finished, field.name) for field in fields(Finished)}
     kept: dict[str, Any] = {name: None if column is None else column[own] for name, column in columns.items()}
     return Finished(**{**kept, "arena": np.zeros_like(kept["arena"])})
+
+
+def _departed_of(departed: Departed, arena: int) -> Departed:
+    own = departed.arena == arena
+    kept: dict[str, Any] = {field.name: getattr(departed, field.name)[own] for field in fields(Departed)}
+    return Departed(**{**kept, "arena": np.zeros_like(kept["arena"])})

@@ -106,6 +106,24 @@ class Finished:
 
 
 @dataclass(frozen=True, slots=True)
+class Departed:
+    """Packets that left their sender's radio since the last tick, a row each: they came off air, or never went on.
+
+    Of a packet that was sent again for want of an acknowledgement, the times are those of one try.
+    """
+
+    arena: IntArray  # (k,)
+    sender: IntArray  # (k,) index in the arena
+    to: IntArray  # (k,) index of the one receiver, or BROADCAST
+    sequence: IntArray  # (k,)
+    intended: IntArray  # (k,) receivers that it was meant for
+    out_of_range: IntArray  # (k,) of these, receivers out of range; 0 if it never was on air
+    fate: IntArray  # (k,) a Fate; HEARD: it was on air, else why not
+    on_air_at_ns: IntArray  # (k,)
+    off_air_at_ns: IntArray  # (k,) the same if it never was on air
+
+
+@dataclass(frozen=True, slots=True)
 class Tally:
     """Packets counted since the last tick, a row per arena. Over a run the fates add up to the intended receivers."""
 
@@ -153,3 +171,4 @@ class Truth:
     tally: Tally | None  # None without a radio
     finished: Finished | None  # None without a radio
     events: tuple[Happened, ...] = ()  # at the tick's start, in order
+    departed: Departed | None = None  # None without a radio; views of a run elsewhere do not get it

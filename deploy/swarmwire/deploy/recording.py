@@ -12,7 +12,8 @@ class Recording:
     """What to record. A run can be repeated (`swarmwire repeat`), with more recorded than the first time."""
 
     packets: float = 0.0  # share of the packets that go into `packets.parquet`, drawn by key; 1: all
-    tables: bool = True  # `ticks.parquet`, `events.parquet`
+    links: bool = False  # `radio_links.parquet`
+    tables: bool = True  # `ticks.parquet`, `events.parquet`, `radio_robots.parquet`, `radio_distances.parquet`
     rrd: bool = True  # `run.rrd`, for rerun's viewer
     select: str | None = None  # the robot that views show in detail; None: the first that has rays or photocells
 
@@ -21,6 +22,8 @@ class Recording:
             raise BadInput("--packets", "", f'expected "off", "all" or a share from 0 to 1, got {self.packets!r}')
         if self.packets and not self.tables:
             raise BadInput("--packets", "", "expected no packets without tables")
+        if self.links and not self.tables:
+            raise BadInput("--links", "", "expected no links without tables")
 
     def check(self, static: Static) -> None:
         """BadInput unless the selected robot is one of the run's."""

@@ -6,6 +6,8 @@ from rich.text import Text
 
 from swarmwire.deploy.result import ArenaResult, Percentiles, Result
 
+WHOLE = 1000  # from here on numbers are shown without decimals, nor as powers of ten
+
 
 def print_result(result: Result, console: Console) -> None:
     """What came of a run: one table for the run, and its first arena's radio and metrics."""
@@ -26,7 +28,8 @@ def print_result(result: Result, console: Console) -> None:
     _add_radio(table, arena)
     for name, value in arena.metrics.items():
         if value.mean is not None:
-            table.add_row(name, f"final {_number(value.final)}, mean {_number(value.mean)}, min {_number(value.min)}")
+            numbers = f"final {_number(value.final)}, mean {_number(value.mean)}, min {_number(value.min)}"
+            table.add_row(name, f"{numbers}{_unit(name)}")
     for body, senses in result.global_senses.items():
         table.add_row("global senses", f"{body}: {', '.join(senses)}")
     counts = [f"{name} {count}" for name, count in result.counts.items() if count]
@@ -66,6 +69,15 @@ def _add_radio(table: Table, arena: ArenaResult) -> None:
     )
 
 
+def _unit(metric: str) -> str:
+    """The unit of a metric that has one and is known by name."""
+    # Imported here: metrics bring scipy, which --help should not wait for.
+    from swarmwire.metrics.registry import METRICS
+
+    kind = METRICS.get(metric)
+    return f" ({kind.unit})" if kind is not None and kind.unit else ""
+
+
 def _percentiles(value: Percentiles) -> str:
     if value.p50 is None or value.p99 is None:
         return "-"
@@ -73,4 +85,6 @@ def _percentiles(value: Percentiles) -> str:
 
 
 def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"
+    if value is None:
+        return "-"
+    return f"{value:.0f}" if abs(value) >= WHOLE else f"{value:.3g}"

@@ -48,7 +48,15 @@ class RunRecord:
         found: list[Observer] = [TrajectoryLog(folder, hashes)]
         if what.tables:
             topics = _topics(Message)
-            found += recorders(folder, metrics, clock, packets=what.packets, topics=topics, may_drop=may_drop)
+            found += recorders(
+                folder,
+                metrics,
+                clock,
+                packets=what.packets,
+                topics=topics,
+                links=what.links,
+                may_drop=may_drop,
+            )
         if what.rrd:
             found.append(RerunRecording(folder / RECORDING, metrics, selected=what.select))
         return (*found, Published(folder, run_id, metrics, clock, selected=what.select))

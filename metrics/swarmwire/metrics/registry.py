@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.age_of_information import AgeOfInformation
+from swarmwire.metrics.airtime import Airtime
 from swarmwire.metrics.components import ComponentCount
 from swarmwire.metrics.contacts import Collisions, WallContacts
 from swarmwire.metrics.fragmentations import Fragmentations
@@ -14,6 +16,7 @@ from swarmwire.metrics.order_velocity import OrderVelocity
 from swarmwire.metrics.rejoin import RejoinMedian, RejoinWorst
 from swarmwire.metrics.target_best import TargetBest
 from swarmwire.metrics.target_mean import TargetMean
+from swarmwire.metrics.throughput import Throughput
 from swarmwire.metrics.unrejoined import Unrejoined
 
 METRICS: dict[str, type[Metric]] = {
@@ -27,6 +30,9 @@ METRICS: dict[str, type[Metric]] = {
         RejoinMedian,
         RejoinWorst,
         Unrejoined,
+        AgeOfInformation,
+        Throughput,
+        Airtime,
         Collisions,
         WallContacts,
         MinGap,

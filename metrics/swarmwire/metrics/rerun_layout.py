@@ -104,9 +104,9 @@ def _plots(static: Static) -> list[Any]:
     if static.range_m is None:
         return [shares, distances, numbers]
     packets = _plot("packets", "Receivers per second, by a packet's fate")
-    times = _plot("times", "Times in s")
+    times, rates = _plot("times", "Times in s"), _plot("rates", "Rates in bit/s")
     first, second = (distances, numbers) if any(static.lights) else (numbers, distances)
-    return [shares, packets, rrb.Tabs(first, second, times, active_tab=0)]
+    return [shares, packets, rrb.Tabs(first, second, times, rates, active_tab=0)]
 
 
 def _last(duration_s: float, rate_hz: int) -> Any:

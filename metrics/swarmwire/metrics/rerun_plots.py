@@ -17,15 +17,15 @@ from swarmwire.metrics.rerun_series import RerunSeries
 SEND_EVERY_S = 5.0  # of the run; each time costs half a kilobyte and more per entity, whatever it holds
 _EVENT_MARK = 1.04  # where the mark of an event stands among the shares: above them all
 _FATES = {fate: FATE_NAMES[fate].replace("_", " ") for fate in FATES}
-_PLOTS = {"m": "distances", "s": "times"}  # by a metric's unit; the others are shares or numbers
+_PLOTS = {"m": "distances", "s": "times", "bit/s": "rates"}  # by a metric's unit; the others are shares or numbers
 
 
 class RerunPlots:
     """Plots of one arena, each with the series that have had a value.
 
     shares: the metrics within 0 and 1, and `delivery` (heard / in range, over the last second), with a mark where an
-    event took effect; distances and times: those in m and in s; numbers: the other metrics; packets: receivers per
-    second by fate, once one has had it. Those out of range are left out: they would dwarf the others.
+    event took effect; distances, times and rates: those in m, in s and in bit/s; numbers: the other metrics; packets:
+    receivers per second by fate, once one has had it. Those out of range are left out: they would dwarf the others.
     """
 
     def __init__(self, static: Static, metrics: Sequence[Plotted], arena: int) -> None:

@@ -8,17 +8,27 @@ from typing import TYPE_CHECKING, Any, cast
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
+from swarmwire.metrics.record.distance_totals import distance_totals_schema
 from swarmwire.metrics.record.event_recorder import event_schema
+from swarmwire.metrics.record.link_totals import link_totals_schema
 from swarmwire.metrics.record.names import STATIC, SUMMARY
 from swarmwire.metrics.record.packet_columns import packet_schema
 from swarmwire.metrics.record.part_files import parts_of, table_file
+from swarmwire.metrics.record.robot_totals import robot_totals_schema
 from swarmwire.metrics.record.static_file import read_static
 from swarmwire.metrics.record.tick_columns import ROBOT_COLUMNS
 
 if TYPE_CHECKING:
     import polars as pl
 
-SCHEMAS = {"packets": packet_schema, "events": event_schema}  # which may well have no rows
+# Which may well have no rows.
+SCHEMAS = {
+    "packets": packet_schema,
+    "events": event_schema,
+    "radio_robots": robot_totals_schema,
+    "radio_distances": distance_totals_schema,
+    "radio_links": link_totals_schema,
+}
 CHANGES_UNDERFOOT = 3  # times that the files of a running run may be joined while they are read
 
 
@@ -101,6 +111,38 @@ class RunFolder:
     def events(self, arena: int | None = None) -> "pl.DataFrame":
         """A row per event and arena: at_s, tick, time_s, do, ended, arena, robots (names of those it changed)."""
         return self._read("events", arena)
+
+    def radio_robots(self, arena: int | None = None) -> "pl.DataFrame":
+        """A row per robot, of one arena or of all, over the whole run; BadInput without a radio, or of a killed run.
+
+        Columns: arena, robot (name); of its own packets: packets (that left its radio, refused ones too),
+        packets_on_air, airtime_s, airtime (share of the run), intended (receivers), as_sender_FATE for every fate
+        (receivers, which add up to intended); of those of others: as_receiver_FATE (packets that might have reached it;
+        out of range is not counted), heard_bytes (payload with tags), throughput_bps (over the run).
+
+        A packet that never left the sender's radio until the run ended is not counted. Of a packet sent again for want
+        of an acknowledgement the airtime of one try is; that of acknowledgements is not.
+        """
+        return self._read("radio_robots", arena)
+
+    def radio_distances(self, arena: int | None = None) -> "pl.DataFrame":
+        """A row per bin of the distance between sender and receiver, of one arena or of all.
+
+        Columns: arena, from_m, to_m (centre to centre, when the packet went on air), intended (receivers of packets
+        that went on air: all robots alive then, however far, or the one addressed), heard (of these), pdr (heard /
+        intended; null if nobody was meant). Of more than 70 robots one of so many packets is counted
+        as `record.radio_distances.every` says in the summary. Should packets have been on their way for more
+        than 5 s, as `unknown` beside it tells, pdr is null. BadInput without a radio, or of a killed run.
+        """
+        return self._read("radio_distances", arena)
+
+    def radio_links(self, arena: int | None = None) -> "pl.DataFrame":
+        """A row per link and fate that occurred on it, of one arena or of all; BadInput if not recorded (`--links`).
+
+        Columns: arena, sender and receiver (indices), fate, packets. Receivers out of range have no rows, nor has a
+        packet that never went on air.
+        """
+        return self._read("radio_links", arena)
 
     def files(self, name: str) -> list[Path]:
         """The files of a table: the whole of it, else the parts that are there, else none."""

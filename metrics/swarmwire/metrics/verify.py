@@ -9,6 +9,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.agreement import Verdict, events_agree, packets_agree, ticks_agree
 from swarmwire.metrics.finding import Finding, State
 from swarmwire.metrics.origin_check import check_digests, check_inputs, check_run_json
+from swarmwire.metrics.radio_agreement import distances_agree, links_agree, robots_agree
 from swarmwire.metrics.record.names import LOG, RECORDING, RUN_JSON, STATIC, SUMMARY
 from swarmwire.metrics.record.tick_columns import ROBOT_COLUMNS
 from swarmwire.metrics.recording_check import check_recording
@@ -16,7 +17,14 @@ from swarmwire.metrics.run_folder import SCHEMAS, RunFolder
 from swarmwire.metrics.table_check import check_table
 
 Agreement = Callable[[list[Path], Mapping[str, Any] | None], Verdict]
-TABLES: dict[str, Agreement] = {"ticks": ticks_agree, "packets": packets_agree, "events": events_agree}
+TABLES: dict[str, Agreement] = {
+    "ticks": ticks_agree,
+    "packets": packets_agree,
+    "events": events_agree,
+    "radio_robots": robots_agree,
+    "radio_distances": distances_agree,
+    "radio_links": links_agree,
+}
 ALWAYS = ("ticks", "events")  # recorded unless the summary says otherwise
 
 

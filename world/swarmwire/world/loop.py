@@ -82,6 +82,7 @@ class Loop:
             tally=tally,
             finished=finished,
             events=events,
+            departed=news.departed if news else None,
         )
         for observer in self.observers:
             observer.see(truth)

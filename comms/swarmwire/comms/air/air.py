@@ -20,7 +20,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry import Obstacles
 from swarmwire.comms.packets import BROADCAST, Heard, Sent
-from swarmwire.comms.truth import Finished, Tally
+from swarmwire.comms.truth import Departed, Finished, Tally
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +29,7 @@ class News:
 
     heard: Heard
     finished: Finished
+    departed: Departed
     tally: Tally
 
 
@@ -129,6 +130,7 @@ class Air:
         told = News(
             news.heard(ended, self._on_air, self._radio.gives.columns, self._robots, len(self._others_alive)),
             news.finished(ended, self._on_air, self._robots, self._radio.is_signal),
+            news.departed(ended, self._on_air, self._robots),
             self._accounts.close(),
         )
         self._keep(np.flatnonzero(~final))

@@ -8,7 +8,7 @@ from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import Heard
-from swarmwire.comms.truth import Finished
+from swarmwire.comms.truth import Departed, Finished
 
 
 def heard(ended: Links, packets: Transmissions, gives: tuple[str, ...], robots: int, rows: int) -> Heard:
@@ -54,6 +54,23 @@ def finished(ended: Links, packets: Transmissions, robots: int, has_strength: bo
 def in_arena(row: IntArray, robots: int) -> IntArray:
     """Indices within their arena of robot rows; numpy divides several at a time, but finds remainders one by one."""
     return row - row // robots * robots
+
+
+def departed(ended: Links, packets: Transmissions, robots: int) -> Departed:
+    """The packets that left their sender's radio: each has one row for the rest of its receivers."""
+    index = np.flatnonzero(ended.receiver == THE_REST)
+    packet, sender = ended.packet[index], ended.sender[index]
+    return Departed(
+        arena=sender // robots,
+        sender=in_arena(sender, robots),
+        to=packets.to[packet],
+        sequence=ended.sequence[index],
+        intended=packets.intended[packet],
+        out_of_range=np.where(ended.fate[index] == Fate.OUT_OF_RANGE, ended.receivers[index], 0),
+        fate=packets.fate[packet],
+        on_air_at_ns=packets.on_air_at_ns[packet],
+        off_air_at_ns=packets.off_air_at_ns[packet],
+    )
 
 
 def compacted(index: IntArray, rows: int) -> tuple[IntArray, IntArray]:

@@ -116,7 +116,7 @@ class Radio:
     )
     cut_off_db: float = parameter(
         10.0,
-        help="of signals: a robot whose mean strength is so far below noise and sensitivity neither hears nor disturbs; "
+        help="of signals: a robot with a mean strength so far below noise and sensitivity neither hears nor disturbs; "
         "less is faster",
         unit="dB",
         at_least=0,

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from swarmwire.metrics.film import Film
     from swarmwire.metrics.footage import Footage
 
-Kind = Literal["png", "gif", "mp4"]
+Kind = Literal["png", "gif", "mp4", "pdr"]
 END = "end"
-USUAL_NAME = {"png": "picture.png", "gif": "film.gif", "mp4": "film.mp4"}
-USUAL_SIZE_PX = {"png": 1280, "gif": 480, "mp4": 960}
+USUAL_NAME = {"png": "picture.png", "gif": "film.gif", "mp4": "film.mp4", "pdr": "pdr.png"}
+USUAL_SIZE_PX = {"png": 1280, "gif": 480, "mp4": 960, "pdr": 1280}
 USUAL_FRAMES_PER_S = {"gif": 10.0, "mp4": 25.0}
-SUFFIXES = {"png": (".png", ".svg", ".pdf"), "gif": (".gif",), "mp4": (".mp4",)}
+SUFFIXES = {"png": (".png", ".svg", ".pdf"), "gif": (".gif",), "mp4": (".mp4",), "pdr": (".png", ".svg", ".pdf")}
 PALETTE_SAMPLES = 8
 
 
@@ -45,9 +45,12 @@ def export_command(
     ] = None,
     gif: Annotated[bool, typer.Option("--gif", help="A film as GIF.")] = False,
     mp4: Annotated[bool, typer.Option("--mp4", help="A film as MP4 (H.264).")] = False,
+    pdr: Annotated[
+        bool, typer.Option("--pdr", help="A picture of the radio: the share of receivers that heard, over distance.")
+    ] = False,
     to: Annotated[
         Path | None,
-        typer.Option(help="The file; a picture may be .png, .svg or .pdf. Default: picture.png or film.* in RUN."),
+        typer.Option(help="The file; pictures: .png, .svg or .pdf. Default: picture.png, film.*, pdr.png in RUN."),
     ] = None,
     from_s: Annotated[float | None, typer.Option("--from", help="Start of the film, in s.", metavar="S")] = None,
     until_s: Annotated[float | None, typer.Option("--until", help="End of the film, in s.", metavar="S")] = None,
@@ -64,7 +67,7 @@ def export_command(
         list[str] | None, typer.Option(help="A metric to plot beside the arena. Repeatable. Default: the usual three.")
     ] = None,
     size: Annotated[
-        int | None, typer.Option(help="Longer side in pixels. Default: 1280 (picture), 480 (GIF), 960 (MP4).")
+        int | None, typer.Option(help="Longer side in pixels. Default: 1280 (pictures), 480 (GIF), 960 (MP4).")
     ] = None,
 ) -> None:
     """Draw a run as a picture or a film, without a screen: the arena, and metrics beside it.
@@ -75,18 +78,28 @@ def export_command(
     from swarmwire.metrics.drawing.whole_file import check_path
 
     console = Console(highlight=False)
-    kind = _kind(png, gif, mp4)
-    target = to or run / USUAL_NAME[kind]
-    if kind == "png":
+    kind = _kind(png, gif, mp4, pdr)
+    target, size_px = to or run / USUAL_NAME[kind], USUAL_SIZE_PX[kind] if size is None else size
+    if kind in ("png", "pdr"):
         _refuse_film_options({"--from": from_s, "--until": until_s, "--fps": fps, "--speed": speed})
-    film = _film(run, arena)
-    check_path(target, SUFFIXES[kind])
-    figure = FilmFigure(film, USUAL_SIZE_PX[kind] if size is None else size, metric)
-    if kind == "png":
-        figure.save(film.index_at(_time_s(png or END, film)), target)
+    if kind == "pdr":
+        _draw_pdr(run, arena, target, size_px)
     else:
-        _write_film(figure, _footage(film, kind, from_s, until_s, fps, speed), kind, target, console)
+        film = _film(run, arena)
+        check_path(target, SUFFIXES[kind])
+        figure = FilmFigure(film, size_px, metric)
+        if kind == "png":
+            figure.save(film.index_at(_time_s(png or END, film)), target)
+        else:
+            _write_film(figure, _footage(film, kind, from_s, until_s, fps, speed), kind, target, console)
     console.print(f"written: {target} ({target.stat().st_size / 1e6:.2g} MB)", soft_wrap=True)
+
+
+def _draw_pdr(run: Path, arena: int, to: Path, size_px: int) -> None:
+    from swarmwire.metrics.drawing.distance_sheet import draw_distances
+    from swarmwire.metrics.run_folder import RunFolder
+
+    draw_distances(RunFolder(run), arena, to, size_px)
 
 
 def _film(run: Path, arena: int) -> "Film":
@@ -121,11 +134,11 @@ def _footage(
     return footage(film.time_s, film.static.rate_hz, from_s, until_s, fps, speed, USUAL_FRAMES_PER_S[kind])
 
 
-def _kind(png: str | None, gif: bool, mp4: bool) -> Kind:
+def _kind(png: str | None, gif: bool, mp4: bool, pdr: bool) -> Kind:
     """What was asked for; a picture if nothing was."""
-    if (png is not None) + gif + mp4 > 1:
-        raise BadInput("export", "", "expected one of --png, --gif and --mp4 at a time")
-    return "gif" if gif else "mp4" if mp4 else "png"
+    if (png is not None) + gif + mp4 + pdr > 1:
+        raise BadInput("export", "", "expected one of --png, --gif, --mp4 and --pdr at a time")
+    return "gif" if gif else "mp4" if mp4 else "pdr" if pdr else "png"
 
 
 def _refuse_film_options(given: dict[str, float | None]) -> None:

@@ -27,3 +27,6 @@ Runners = Annotated[
 ]
 Seed = Annotated[int | None, typer.Option(help="Seed instead of the scenario's.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Links = Annotated[
+    bool, typer.Option("--links", help="Record radio_links.parquet: packets by sender, receiver and fate.")
+]

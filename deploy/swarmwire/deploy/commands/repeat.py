@@ -9,7 +9,7 @@ from rich.console import Console
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import DIFFERENT, INTERRUPTED
 from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
-from swarmwire.deploy.commands.options import Packets, Quiet, Runners
+from swarmwire.deploy.commands.options import Links, Packets, Quiet, Runners
 
 if TYPE_CHECKING:
     from swarmwire.deploy.repetition import Repetition
@@ -22,6 +22,7 @@ def repeat_command(
         Path | None, typer.Option(help="A run folder for the repetition, new or empty. Default: nothing is written.")
     ] = None,
     packets: Packets = "off",
+    links: Links = False,
     quiet: Quiet = False,
 ) -> None:
     """Run a run again from its folder alone, and tell whether it came out the same, bit for bit.
@@ -35,9 +36,11 @@ def repeat_command(
     from swarmwire.deploy.shown import progress
 
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
-    record = Recording(packets=packet_share(packets))
+    record = Recording(packets=packet_share(packets), links=links)
     if record.packets and out is None:
         raise BadInput("--packets", "", "expected --out with it: a folder in which to record them")
+    if record.links and out is None:
+        raise BadInput("--links", "", "expected --out with it: a folder in which to record them")
     repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
     repeated.simulation.watch(progress(repeated.simulation, console))
     with leaving_when_hung_up(repeated.simulation.interrupt):

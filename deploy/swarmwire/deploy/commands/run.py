@@ -10,7 +10,7 @@ from rich.console import Console
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
 from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
-from swarmwire.deploy.commands.options import Overrides, Packets, Quiet, Runners, ScenarioFile, Seed
+from swarmwire.deploy.commands.options import Links, Overrides, Packets, Quiet, Runners, ScenarioFile, Seed
 from swarmwire.deploy.folder import default_folder
 from swarmwire.deploy.report import print_result
 from swarmwire.deploy.result import Result
@@ -51,6 +51,7 @@ def run_command(
     socket: Socket = None,
     realtime: RealTime = None,
     packets: Packets = "off",
+    links: Links = False,
     rrd: Rrd = True,
     select: Select = None,
     view: View = False,
@@ -76,7 +77,7 @@ def run_command(
         out=folder,
         socket=socket,
         realtime=realtime,
-        record=Recording(packets=packet_share(packets), rrd=rrd, select=select),
+        record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
     )
     result = _shown(simulation, folder, view, Console(quiet=quiet, highlight=False))
     if result.ended == "interrupted":

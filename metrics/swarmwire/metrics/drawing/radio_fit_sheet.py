@@ -11,7 +11,6 @@ from swarmwire.metrics.drawing.canvas import new_figure, save
 from swarmwire.metrics.drawing.looks import (
     CURVE,
     FAINT,
-    GRID,
     INK,
     LONG_SIDE_IN,
     SMALL_PT,
@@ -20,6 +19,7 @@ from swarmwire.metrics.drawing.looks import (
     TITLE_PT,
     Look,
 )
+from swarmwire.metrics.drawing.plain_axes import plain_axes
 from swarmwire.metrics.radio_fit.correlogram import correlogram
 from swarmwire.metrics.radio_fit.expected_runs import expected_runs
 from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit
@@ -37,22 +37,12 @@ def draw_radio_fit(fit: RadioFit, title: str, to: Path, size_px: int) -> None:
     """Write the picture. BadInput for a path or a size that cannot be."""
     figure = new_figure(LONG_SIDE_IN, _HEIGHT_IN, size_px)
     figure.text(0.025, 0.955, title, fontsize=TITLE_PT, fontweight="bold", color=INK)
-    _draw_rssi(_axes(figure, (0.08, 0.54, 0.895, 0.34), "RSSI in dBm over distance in m"), fit)
-    _draw_correlogram(_axes(figure, (0.08, 0.08, 0.4, 0.34), "residuals' correlogram in dB² over distance in m"), fit)
-    _draw_bursts(_axes(figure, (0.575, 0.08, 0.4, 0.34), "runs of lost packets by length"), fit)
+    _draw_rssi(plain_axes(figure, (0.08, 0.54, 0.895, 0.34), "RSSI in dBm over distance in m"), fit)
+    _draw_correlogram(
+        plain_axes(figure, (0.08, 0.08, 0.4, 0.34), "residuals' correlogram in dB² over distance in m"), fit
+    )
+    _draw_bursts(plain_axes(figure, (0.575, 0.08, 0.4, 0.34), "runs of lost packets by length"), fit)
     save(figure, to)
-
-
-def _axes(figure: Any, place: tuple[float, float, float, float], title: str) -> Any:
-    axes = figure.add_axes(place)
-    axes.set_facecolor("none")
-    axes.spines[["top", "right", "left"]].set_visible(False)
-    axes.spines["bottom"].set(color=FAINT, linewidth=0.7)
-    axes.grid(axis="y", color=GRID, linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.tick_params(which="both", labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
-    axes.set_title(title, loc="left", fontsize=TEXT_PT, color=SOFT, pad=4)
-    return axes
 
 
 def _draw_rssi(axes: Any, fit: RadioFit) -> None:

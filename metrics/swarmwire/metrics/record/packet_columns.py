@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import LOW32, derive_key, purpose, uniform
 from swarmwire.comms.fates import FATE_NAMES
 from swarmwire.comms.truth import Finished, Static
+from swarmwire.metrics.geometry_tick import geometry_tick
 
 if TYPE_CHECKING:
     import polars as pl
@@ -106,8 +106,7 @@ class PacketColumns:
 
     def _distance_m(self, links: Mapping[str, IntArray]) -> FloatArray:
         """Between sender and receiver when the packet went on air, (k,); NaN without a receiver or the tick's poses."""
-        # The last tick that starts no later than on_air_at: the air takes geometry from its poses.
-        tick = ((links["on_air_at_ns"] + 1) * self.static.rate_hz - 1) // NS_PER_S - self.first_tick
+        tick = geometry_tick(links["on_air_at_ns"], self.static.rate_hz) - self.first_tick
         known = np.flatnonzero((links["receiver"] != NOBODY) & (tick >= 0) & (tick < len(self.poses)))
         distance_m = np.full(len(tick), np.nan)
         if len(known):

@@ -7,12 +7,16 @@ from typing import Any
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.protocols import Observer
 from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.record.distance_totals import DistanceTotals
 from swarmwire.metrics.record.event_recorder import EventRecorder
+from swarmwire.metrics.record.link_totals import LinkTotals
 from swarmwire.metrics.record.packet_recorder import PacketRecorder
+from swarmwire.metrics.record.robot_totals import RobotTotals
 from swarmwire.metrics.record.static_recorder import StaticRecorder
 from swarmwire.metrics.record.tick_recorder import TickRecorder
 
-TABLES = ("ticks", "packets", "events", "rrd")  # the last is the recording for the viewer
+# The last is the recording for the viewer.
+TABLES = ("ticks", "packets", "events", "radio_robots", "radio_distances", "radio_links", "rrd")
 
 
 def recorders(
@@ -22,10 +26,12 @@ def recorders(
     *,
     packets: float = 0.0,
     topics: Mapping[int, str] | None = None,
+    links: bool = False,
     may_drop: bool = False,
 ) -> list[Observer]:
-    """Observers for `static.json`, `ticks`, `events` and, of a share above 0 (1: all), `packets`.
+    """Observers for `static.json`, `ticks`, `events`, and where there is a radio `radio_robots` and `radio_distances`.
 
+    If asked for also `packets`, of a share above 0 (1: all), and `radio_links`.
     They are apart so that one that fails leaves the others going. `metrics` must see each tick before them; `may_drop`
     is for real time, where a slow disk costs rows rather than ticks.
     """
@@ -33,8 +39,12 @@ def recorders(
         StaticRecorder(folder),
         TickRecorder(folder, metrics, clock, may_drop),
         EventRecorder(folder, may_drop),
+        RobotTotals(folder),
+        DistanceTotals(folder),
     ]
-    return [*found, PacketRecorder(folder, clock, packets, topics, may_drop)] if packets else found
+    if packets:
+        found.append(PacketRecorder(folder, clock, packets, topics, may_drop))
+    return [*found, LinkTotals(folder)] if links else found
 
 
 def record_summary(parts: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

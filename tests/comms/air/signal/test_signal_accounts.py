@@ -14,7 +14,7 @@ from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST
 from tests.comms.air.runs import Run, at, everybody, make_air, packets, run, scattered
-from tests.comms.air.signal.radios import METHODS, with_access
+from tests.comms.air.signal.radios import ALL_GIVEN, METHODS, with_access
 from tests.comms.air.test_accounts import OBSTACLES, random_traffic
 
 
@@ -127,3 +127,13 @@ def test_an_obstacle_blocks_only_where_a_line_of_sight_is_asked_for():
         radio = replace(with_access("none"), line_of_sight=asked)
         told = run(make_air(radio, 3, [1], [OBSTACLES]), pose, everybody(3), 1)
         assert told.fates() == fates
+
+
+def test_a_packet_given_up_in_a_later_tick_than_its_last_attempt_still_has_its_place():
+    """Every packet is lost, and waits for its acknowledgement across the ends of ticks."""
+    radio = replace(
+        with_access("csma-802154"), bit_rate_bps=20_000, loss=1.0, jitter_s=0.1, gives=ALL_GIVEN, send_offset="uniform"
+    )
+    to = (np.arange(6) + 1) % 6
+    told = run(make_air(radio, 6), scattered(6), lambda _: packets(np.arange(6), to), 60, 1)
+    assert told.fates()["LOST"] > 100

@@ -19,6 +19,7 @@ from swarmwire.comms.air.signal.links_held import LinksHeld, open_ways
 from swarmwire.comms.air.signal.numbers import edge_dbm, levels_of, rules_of, surroundings_of
 from swarmwire.comms.air.signal.tables import (
     NOBODY,
+    NOTHING,
     PACKET,
     RECEPTION,
     ROBOT,
@@ -78,8 +79,10 @@ class SignalWay(Way):
     def hold(self, pose: FloatArray) -> None:
         """Robots stand at `pose` (rows, 3) from now on."""
         self._hold += 1
-        on_air = {int(hold) for hold in self._robot["hold"][self._robot["on_air"] != SILENT]}
-        self._poses = {hold: at for hold, at in self._poses.items() if hold in on_air} | {self._hold: pose}
+        # Of frames on air, and of packets that may yet be given up: their last attempt may be long ago.
+        needed = (self._robot["on_air"] != SILENT) | (self._robot["stage"] != NOTHING)
+        holds = set(self._robot["hold"][needed].tolist())
+        self._poses = {hold: at for hold, at in self._poses.items() if hold in holds} | {self._hold: pose}
         self._links.move(pose, self._robot, self._reception)
 
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:

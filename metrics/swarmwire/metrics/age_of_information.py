@@ -1,0 +1,107 @@
+"""Age of information: how old the newest is that robots know of one another."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.truth import Finished, Static
+from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.moment import Moment
+
+MOST_PAIRS = 2**18  # of an arena: 2 MB
+NEVER = -1
+
+
+@dataclass(frozen=True)
+class AgeOfInformation(Metric):
+    """Mean over pairs (receiver, sender) of t - u: t the tick's start, u when the newest packet heard was sent, in s.
+
+    The pairs are those of robots alive of which the receiver has ever heard the sender, in range now or not; who never
+    heard of a robot knows nothing of it that could be old, and is left out. NaN while there is no such pair. A packet
+    that a newer one overtook changes nothing. 8 bytes are kept for each pair of an arena; of more than 512 robots only
+    every n-th counts as a receiver, n = ceil(robots^2 / 2^18), so that these are 2 MB at most.
+
+    Source: S. Kaul, R. Yates, M. Gruteser, Real-time status: how often should one update?, IEEE INFOCOM 2012, section
+    II.
+    """
+
+    name = "age_of_information"
+    help = "age of the newest packet that a robot has heard from another, mean over pairs that ever heard, in s"
+    unit = "s"
+    bounds = (0.0, None)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure, which keeps when the newest packet of each pair was sent."""
+        newest = Newest(static)
+
+        def measure(moment: Moment) -> FloatArray:
+            if moment.truth.finished is None:
+                return np.full(static.arenas, np.nan)
+            newest.see(moment.truth.finished, moment.alive)
+            return newest.mean_age_s(moment.truth.time_ns)
+
+        return measure
+
+
+class Newest:
+    """When the newest packet of each pair was sent, with its sum over pairs of robots alive, in ns."""
+
+    def __init__(self, static: Static) -> None:
+        arenas, robots = static.arenas, static.robots
+        self._every = -(-robots * robots // MOST_PAIRS)  # robots from one receiver to the next
+        self._receivers, self._robots = -(-robots // self._every), robots
+        self._counts: BoolArray = np.arange(robots) % self._every == 0  # as a receiver
+        self._sent_at_ns: IntArray = np.full((arenas, self._receivers, robots), NEVER, np.int64)
+        self._alive: BoolArray = np.ones((arenas, robots), np.bool_)
+        self._pairs: IntArray = np.zeros(arenas, np.int64)
+        self._total_ns = [0] * arenas  # Python's whole numbers: a day of a million pairs is beyond 64 bits
+
+    def see(self, ended: Finished, alive: BoolArray) -> None:
+        """Take in what was heard; `alive` (arenas, robots) are the robots that count from now on."""
+        if not np.array_equal(alive, self._alive):
+            self._alive = alive.copy()
+            self._take(ended)
+            self._count_again()
+            return
+        rows, before_ns, after_ns = self._take(ended)
+        arena = ended.arena[rows]
+        counts = alive[arena, ended.receiver[rows]] & alive[arena, ended.sender[rows]]
+        first = before_ns == NEVER
+        gained_ns = np.zeros(len(self._pairs), np.int64)
+        np.add.at(gained_ns, arena, np.where(counts, after_ns - np.where(first, 0, before_ns), 0))
+        self._pairs += np.bincount(arena[counts & first], minlength=len(self._pairs))
+        self._total_ns = [total + gain for total, gain in zip(self._total_ns, gained_ns.tolist(), strict=True)]
+
+    def mean_age_s(self, now_ns: int) -> FloatArray:
+        """The mean over the pairs that count, (arenas,); NaN where there are none."""
+        ages_s = [
+            (now_ns * pairs - total) / (pairs * NS_PER_S) if pairs else np.nan
+            for pairs, total in zip(self._pairs.tolist(), self._total_ns, strict=True)
+        ]
+        return np.array(ages_s, np.float64)
+
+    def _take(self, ended: Finished) -> tuple[IntArray, IntArray, IntArray]:
+        """Put in what was heard: a row of `ended` for each pair that did, its time before and its time now."""
+        rows = np.flatnonzero((ended.fate == Fate.HEARD) & self._counts[ended.receiver])
+        place = ended.arena[rows] * self._receivers + ended.receiver[rows] // self._every
+        place = place * self._robots + ended.sender[rows]
+        table, sent_at_ns = self._sent_at_ns.reshape(-1), ended.sent_at_ns[rows]
+        before_ns = table[place]
+        np.maximum.at(table, place, sent_at_ns)
+        after_ns = table[place]
+        # A pair that heard several packets counts once: the row whose number stays when all are written to its place.
+        number = np.arange(len(place))
+        table[place] = number
+        counted = table[place] == number
+        table[place] = after_ns
+        return rows[counted], before_ns[counted], after_ns[counted]
+
+    def _count_again(self) -> None:
+        counts = self._sent_at_ns != NEVER
+        counts &= self._alive[:, :: self._every, None] & self._alive[:, None, :]
+        self._pairs = np.count_nonzero(counts, axis=(1, 2))
+        by_receiver_ns = np.sum(self._sent_at_ns, axis=2, where=counts)
+        self._total_ns = [sum(own) for own in by_receiver_ns.tolist()]

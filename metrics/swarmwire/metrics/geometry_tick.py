@@ -1,0 +1,9 @@
+"""The tick whose poses decide about a packet."""
+
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.clock import NS_PER_S
+
+
+def geometry_tick(on_air_at_ns: IntArray, rate_hz: int) -> IntArray:
+    """The last tick that starts no later than the packet goes on air, (k,): the air takes geometry from its poses."""
+    return ((on_air_at_ns + 1) * rate_hz - 1) // NS_PER_S
