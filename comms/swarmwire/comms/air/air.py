@@ -8,6 +8,7 @@ from swarmwire.comms.air import news
 from swarmwire.comms.air.accounts import Accounts
 from swarmwire.comms.air.disk_way import DiskWay
 from swarmwire.comms.air.disruption import Disruption
+from swarmwire.comms.air.kept_order import wait_for_earlier
 from swarmwire.comms.air.links import HEARD, THE_REST, Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.radio import Radio
@@ -165,8 +166,11 @@ class Air:
     def _take(self, packets: Transmissions, links: Links) -> None:
         """Keep links until they are final, and their packets."""
         if packets:
+            coming, rows = len(self._links.packet), len(self._others_alive)
             self._links = self._links.followed_by(links._replace(packet=links.packet + len(self._on_air.sender)))
             self._on_air = self._on_air.followed_by(packets)
+            if self._radio.delays is not None and self._radio.delays.keep_order:
+                wait_for_earlier(self._links, coming, rows)
 
     def _keep(self, index: IntArray) -> None:
         """Keep these links and their packets only."""
