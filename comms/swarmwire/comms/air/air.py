@@ -15,6 +15,7 @@ from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.send_times import SendTimes
 from swarmwire.comms.air.signal.signal_way import SignalWay
 from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.air.traces.link_traces import LinkTraces
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
@@ -58,18 +59,22 @@ class Air:
         rate_hz: int,
         act_every_ticks: IntArray | None = None,
         radius_m: FloatArray | None = None,
+        traces: LinkTraces | None = None,
     ) -> None:
         """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out.
 
-        `radius_m` (robots,) are their radii, which count for bodies between two robots; 0 each if left out. ValueError
-        for a disk without `range_m`.
+        `radius_m` (robots,) are their radii, which count for bodies between two robots; 0 each if left out. `traces`
+        are what the file of the radio's trace holds. ValueError for a disk without `range_m`, or a trace without its
+        file or the other way round.
         """
         if not radio.is_signal and radio.range_m is None:
             raise ValueError("range_m: expected a range, as a disk has one")
+        if (radio.trace is None) != (traces is None):
+            raise ValueError("traces: expected what the file of the radio's trace holds, and nothing without one")
         rows = len(keys) * robots
         self._radio, self._robots = radio, robots
         self._held, self._coming = Disruption.none(rows), Disruption.none(rows)
-        medium = Medium(radio, keys, robots, obstacles, self._held)
+        medium = Medium(radio, keys, robots, obstacles, self._held, traces)
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
         self._way: Way

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.traces.link_traces import LinkTraces
 from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.geometry import Obstacles
 
@@ -19,6 +20,7 @@ class Medium:
     robots: int  # in each arena
     obstacles: Obstacles
     disruption: Disruption  # kept up to date by the air
+    traces: LinkTraces | None = None  # of the radio's trace, where it has one
 
 
 class Stage(ABC):
@@ -35,5 +37,8 @@ class Stage(ABC):
         """
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
-        """With which probability lone packets pass, fast fading apart, (k,) or one for all: for the radio graph."""
+        """With which probability lone packets pass, fast fading apart, (k,) or one for all: for the radio graph.
+
+        The worse direction counts. `final_at_ns` is the time for which the graph is.
+        """
         return 1.0
