@@ -18,8 +18,8 @@ from swarmwire.comms.air.propagation.path_loss import loss_db
 from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves, shadowing_db
 from swarmwire.comms.air.propagation.walls import wall_loss_db
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.signal.numbers import rules_of, sensitivity_of
-from swarmwire.comms.air.signal.outcome import lone_delivery
+from swarmwire.comms.air.signal.numbers import passes_besides, rules_of, sensitivity_of
+from swarmwire.comms.air.signal.outcome import lone_deliveries
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.geometry import Obstacles, is_blocked
 
@@ -38,7 +38,7 @@ class Coverage:
     def __init__(self, radio: Radio, key: np.uint64, obstacles: Obstacles, payload_bytes: int) -> None:
         """`key` is that of the arena, `obstacles` are those of this arena alone; packets have so many bytes."""
         self._radio, self._obstacles = radio, obstacles
-        self._passes = (1.0 - radio.loss) * (1.0 - (radio.bursts.loss if radio.bursts else 0.0))
+        self._passes = passes_besides(radio)
         self._range_m = math.inf if radio.range_m is None else radio.range_m
         self.sensitivity_dbm = sensitivity_of(radio) if radio.is_signal else None
         if radio.is_signal:
@@ -96,9 +96,9 @@ class Coverage:
         least, most = min(middle_dbm, self.sensitivity_dbm) - DEEP_DB, max(middle_dbm, self.sensitivity_dbm) + DEEP_DB
         mean_dbm = np.arange(least, most, STEP_DB)
         if self._radio.fading is None:
-            return mean_dbm, _lone_deliveries(rules, mean_dbm, bits)
+            return mean_dbm, lone_deliveries(rules, mean_dbm, bits)
         gain_db = _gains_db(fading_law(self._radio.fading, self._radio.frequency_hz), key)
-        return mean_dbm, np.array([_lone_deliveries(rules, one_dbm + gain_db, bits).mean() for one_dbm in mean_dbm])
+        return mean_dbm, np.array([lone_deliveries(rules, one_dbm + gain_db, bits).mean() for one_dbm in mean_dbm])
 
 
 @njit(cache=True)
@@ -121,14 +121,6 @@ def _blocked(obstacles, start, end):
     found = np.zeros(len(start), np.bool_)
     for i in range(len(start)):
         found[i] = is_blocked(obstacles, 0, start[i, 0], start[i, 1], end[i, 0], end[i, 1])
-    return found
-
-
-@njit(cache=True)
-def _lone_deliveries(rules, power_dbm, bits):
-    found = np.empty(len(power_dbm))
-    for i in range(len(found)):
-        found[i] = lone_delivery(rules, power_dbm[i], bits)
     return found
 
 

@@ -159,6 +159,16 @@ class LinkPlaces(NamedTuple):
     stop: IntArray
 
 
+class Traced(NamedTuple):
+    """Links whose delivery ratio was measured, in every arena alike."""
+
+    link: IntArray  # (links,) sender x robots + receiver, as indices in the arena; rising
+    ratio: FloatArray  # (links,)
+
+
+NOT_TRACED = Traced(np.empty(0, np.int64), np.empty(0))
+
+
 class Told(NamedTuple):
     """What the run of events tells, (capacity,) each: a row per packet and receiver, or per packet never on air."""
 
@@ -185,6 +195,7 @@ class State(NamedTuple):
     packet: Table
     order: IntArray  # packets by sender, in the order of sending
     off: IntArray  # (rows,) HEARD: the radio is on; else the fate of what it should send
+    traced: Traced
 
 
 def told(capacity: int) -> Told:

@@ -16,10 +16,15 @@ class LinkTraces:
     rssi_dbm: LinkTrace | None = None
     delay_s: LinkTrace | None = None
 
+    @property
+    def all(self) -> tuple[LinkTrace, ...]:
+        """Those that were measured."""
+        traces = self.delivery_ratio, self.rssi_dbm, self.delay_s
+        return tuple(trace for trace in traces if trace is not None)
+
     def known(self, sender: IntArray, receiver: IntArray, at_ns: IntArray) -> BoolArray:
         """Which links (k,), indices in the arena, have a value of any quantity at a time."""
         found = np.zeros(len(sender), np.bool_)
-        for trace in (self.delivery_ratio, self.rssi_dbm, self.delay_s):
-            if trace is not None:
-                found |= ~np.isnan(trace.at(sender, receiver, at_ns))
+        for trace in self.all:
+            found |= ~np.isnan(trace.at(sender, receiver, at_ns))
         return found
