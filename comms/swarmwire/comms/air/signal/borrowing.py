@@ -13,4 +13,5 @@ from numba import njit
 
 def borrowing(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """`numba.njit` for kernels that allocate nothing."""
-    return njit(cache=True, _nrt=False, **options)
+    uncounted: dict[str, Any] = {"cache": True, "_nrt": False}
+    return njit(**uncounted, **options)

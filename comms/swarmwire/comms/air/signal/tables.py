@@ -200,4 +200,5 @@ class State(NamedTuple):
 
 def told(capacity: int) -> Told:
     """Room for so many rows."""
-    return Told(*(np.empty(capacity, np.int64) for _ in range(7)), np.empty(capacity), np.zeros(1, np.int64))
+    columns = (np.empty(capacity, np.int64) for _ in range(7))
+    return Told._make([*columns, np.empty(capacity), np.zeros(1, np.int64)])
