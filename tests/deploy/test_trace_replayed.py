@@ -5,6 +5,7 @@ import json
 import shutil
 from pathlib import Path
 
+import polars as pl
 import pytest
 
 from swarmwire.comms.clock import NS_PER_S
@@ -14,6 +15,7 @@ from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.world.scenario_file import load_scenario
 from tests.deploy.commands import LOSSY, ROOT
 
+WALLED = ROOT / "scenarios" / "flocking-802154.toml"
 REPLAYED = ROOT / "scenarios" / "replayed-links.toml"
 
 
@@ -63,6 +65,25 @@ def test_a_run_is_repeated_from_its_folder_alone(tmp_path: Path):
     repetition = repeat(moved)
     assert repetition.same is False
     assert repetition.changes == ("files/replayed-links.csv is not as the run left it: its sha256 differs",)
+
+
+def test_signals_have_the_strengths_of_the_file(tmp_path: Path):
+    """Of one link; the others are out of range, although the robots stand side by side."""
+    pl.DataFrame(
+        {"t_s": [0.0, 1.0], "tx": ["flock-1"] * 2, "rx": ["flock-4"] * 2, "rssi_dbm": [-70, -80]}
+    ).write_parquet(tmp_path / "links.parquet")
+    shutil.copy(WALLED, tmp_path / "walled.toml")
+    radio = ["radio.trace.file='links.parquet'", "radio.fading={distribution='rician', k=1e6}"]
+    strengths: dict[bool, set[int]] = {False: set(), True: set()}
+    with Simulation(tmp_path / "walled.toml", overrides=radio) as simulation:
+        while simulation.tick < 25:
+            finished = simulation.step().finished
+            assert finished is not None
+            assert finished.rssi_dbm is not None
+            assert set(zip(finished.sender.tolist(), finished.receiver.tolist(), strict=True)) <= {(1, 4)}
+            for on_air_ns, rssi_dbm in zip(finished.on_air_at_ns, finished.rssi_dbm, strict=True):
+                strengths[bool(on_air_ns >= NS_PER_S)].add(round(float(rssi_dbm)))
+    assert strengths == {False: {-70}, True: {-80}}
 
 
 def test_a_scenario_made_in_python_brings_its_links_too(tmp_path: Path):
