@@ -124,7 +124,7 @@ class BurstsTable:
 class Bursts:
     """How long bad and good spells last, and what they lose."""
 
-    written_as: ClassVar = BurstsTable
+    written_as: ClassVar[type[BurstsTable]] = BurstsTable
 
     bad_s: float = parameter(0.5, help="mean duration of a burst: 1 / b", unit="s", above=0, at_most=1e6)
     good_s: float = parameter(10.0, help="mean time between bursts: 1 / a", unit="s", above=0, at_most=1e6)
