@@ -74,12 +74,12 @@ class Air:
         rows = len(keys) * robots
         self._radio, self._robots = radio, robots
         self._held, self._coming = Disruption.none(rows), Disruption.none(rows)
-        medium = Medium(radio, keys, robots, obstacles, self._held, traces)
+        radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
+        medium = Medium(radio, keys, robots, obstacles, size_m, radii_m, self._held, traces)
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
         self._way: Way
         if radio.is_signal:
-            radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
             self._way = SignalWay(medium, size_m, send_times, radii_m)
         else:
             self._way = DiskWay(medium, size_m, send_times)

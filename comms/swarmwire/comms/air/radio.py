@@ -80,6 +80,7 @@ class Radio:
     line_of_sight: bool | None = parameter(
         None, help="obstacles block the signal; without it true for the disk, false for signals"
     )
+    bodies_block: bool = parameter(False, help="of the disk: robots in between block the signal, as obstacles do")
     loss: float = parameter(
         0.0, help="probability that a packet within reach is lost, for each receiver", at_least=0, at_most=1
     )
