@@ -66,7 +66,6 @@ def test_a_hundred_octets_over_udp_take_the_stated_time():
 def test_airtimes_are_whole_bits_and_symbols_rounded_up(octets: int, bit_rate_bps: int):
     """By exact fractions."""
     assert at_bit_rate_ns(octets, bit_rate_bps) == math.ceil(Fraction(8 * octets * 10**9, bit_rate_bps))
-    assert ieee802154_ns(octets) == at_bit_rate_ns(octets + 6, 250_000)
     for rate_bps in DSSS_RATES_BPS:
         payload_us = math.ceil(Fraction(8 * octets * 10**6, rate_bps))
         assert ieee80211b_ns(octets, rate_bps, short_preamble=False) == (192 + payload_us) * US
