@@ -115,6 +115,14 @@ class Radio:
         at_least=0,
         at_most=1,
     )
+    cut_off_db: float = parameter(
+        10.0,
+        help="of signals: a robot whose mean strength is so far below noise and sensitivity neither hears nor disturbs; "
+        "less is faster",
+        unit="dB",
+        at_least=0,
+        at_most=60,
+    )
     frequency_hz: float = parameter(2.44e9, help="of signals: the carrier", unit="Hz", at_least=1e6, at_most=1e12)
     log_distance: LogDistance | None = parameter(None, help="of the model log-distance")
     two_ray: TwoRay | None = parameter(None, help="of the model two-ray")
