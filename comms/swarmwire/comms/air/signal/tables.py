@@ -127,6 +127,16 @@ class Rules(NamedTuple):
     log_success: FloatArray  # by SINR, as `log_success_table` has it
 
 
+class Traced(NamedTuple):
+    """Links whose delivery ratio was measured, in every arena alike."""
+
+    link: IntArray  # (links,) sender x robots + receiver, as indices in the arena; rising
+    ratio: FloatArray  # (links,)
+
+
+NOT_TRACED = Traced(np.empty(0, np.int64), np.empty(0))
+
+
 class Bursting(NamedTuple):
     """Which links were good or bad, as `BurstStates` keeps them."""
 
@@ -139,6 +149,7 @@ class Bursting(NamedTuple):
     b: float
     loss_bad: float
     loss_good: float
+    traced: Traced  # beside them, as it is asked for in the same place alone
 
 
 class LinkTable(NamedTuple):
@@ -157,16 +168,6 @@ class LinkPlaces(NamedTuple):
     first: IntArray
     weak: IntArray  # the first that it only disturbs
     stop: IntArray
-
-
-class Traced(NamedTuple):
-    """Links whose delivery ratio was measured, in every arena alike."""
-
-    link: IntArray  # (links,) sender x robots + receiver, as indices in the arena; rising
-    ratio: FloatArray  # (links,)
-
-
-NOT_TRACED = Traced(np.empty(0, np.int64), np.empty(0))
 
 
 class Told(NamedTuple):
@@ -195,7 +196,6 @@ class State(NamedTuple):
     packet: Table
     order: IntArray  # packets by sender, in the order of sending
     off: IntArray  # (rows,) HEARD: the radio is on; else the fate of what it should send
-    traced: Traced
 
 
 def told(capacity: int) -> Told:
