@@ -12,6 +12,7 @@ from swarmwire.comms.air.coverage import Coverage
 from swarmwire.comms.air.propagation.parameters import Antenna, Fading, Shadowing, Walls
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.parameters import Bursts
+from swarmwire.comms.air.signal.numbers import cut_off_dbm
 from swarmwire.comms.air.signal.parameters import Access
 from swarmwire.comms.air.survey import by_distance, coverage_map
 from swarmwire.comms.draws import derive_key
@@ -77,6 +78,18 @@ def test_delivery_is_the_share_of_lone_packets_that_are_heard(fading: Fading | N
     assert 0.3 < expected < 0.7
     # The coverage's own sample of gains, twice as many, has an error, too.
     assert abs(share - expected) < 4.4 * np.sqrt(1.5 * expected * (1.0 - expected) / 1000)
+
+
+def test_nothing_is_delivered_below_the_cut_off():
+    """Fading lifts some packets above the noise from just below it; the air leaves such links out if it is told to."""
+    near, far = (replace(WEAK, fading=Fading("rayleigh"), cut_off_db=below_db) for below_db in (0.0, 10.0))
+    end = np.stack([np.linspace(1.0, 20.0, 500), np.zeros(500)], axis=1)
+    mean_dbm = coverage_of(near).mean_dbm(np.zeros_like(end), end)
+    assert mean_dbm is not None
+    below = np.flatnonzero(mean_dbm < cut_off_dbm(near))[:1]
+    found = [coverage_of(radio).delivery(np.zeros((1, 2)), end[below])[0] for radio in (near, far)]
+    assert found[0] == 0.0
+    assert found[1] > 0.01
 
 
 def test_a_map_shows_reach_shade_and_what_obstacles_cover():

@@ -18,7 +18,7 @@ from swarmwire.comms.air.propagation.path_loss import loss_db
 from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves, shadowing_db
 from swarmwire.comms.air.propagation.walls import wall_loss_db
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.signal.numbers import passes_besides, rules_of, sensitivity_of
+from swarmwire.comms.air.signal.numbers import cut_off_dbm, passes_besides, rules_of, sensitivity_of
 from swarmwire.comms.air.signal.outcome import lone_deliveries
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.geometry import Obstacles, is_blocked
@@ -76,7 +76,9 @@ class Coverage:
     def delivery(self, start: FloatArray, end: FloatArray) -> FloatArray:
         """The probability that a lone packet gets through, over all fading and bursts, (k,)."""
         mean_dbm, passes = self.mean_dbm(start, end), np.where(self._open(start, end), self._passes, 0.0)
-        return passes if mean_dbm is None else passes * np.interp(mean_dbm, *self._by_power)
+        if mean_dbm is None:
+            return passes
+        return np.where(mean_dbm < cut_off_dbm(self._radio), 0.0, passes * np.interp(mean_dbm, *self._by_power))
 
     def is_free(self, place: FloatArray) -> BoolArray:
         """Whether no obstacle covers each of the places (k, 2) in m."""
