@@ -26,6 +26,7 @@ from swarmwire.deploy.catalogue_text import print_entry, print_list
 from swarmwire.metrics.order import Order
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.scenario_file import scenario_schema
+from swarmwire.world.schema import written_form
 from tests.deploy.commands import called
 
 ACTION_OF = {next(of.default for of in fields(kind) if of.name == "do"): kind for kind in ACTIONS}
@@ -63,6 +64,7 @@ def printed(entry: Entry, width: int | None = None) -> str:
 def lines_of(kind) -> list[tuple[str, ...]]:
     """By line of a description: what it must hold of each parameter of a dataclass."""
     wanted = []
+    kind = written_form(kind)
     hints = get_type_hints(kind)
     for of in fields(kind):
         limits, inner = (

@@ -6,8 +6,10 @@ import pytest
 
 from swarmwire.comms.air.presets import PRESETS
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.reception.parameters import Bursts, bursts_from_steps
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.scenario_file import scenario_from
+from swarmwire.world.scenario_mapping import mapping_of
 from tests.world.samples import SAMPLE
 
 
@@ -33,6 +35,22 @@ def test_what_a_scenario_says_wins_over_its_preset_key_by_key() -> None:
     assert radio.access_or_default.method == "csma-802154"
 
 
+def test_bursts_may_be_given_by_steps_from_packet_to_packet() -> None:
+    """As netem's gemodel 2% 20% 80% 1% for packets every 100 ms."""
+    steps = {"p": 0.02, "r": 0.2, "loss_bad": 0.8, "loss_good": 0.01, "interval_s": 0.1}
+    scenario = scenario_from({**SAMPLE, "radio": {"range_m": 2.0, "bursts": steps}}, "f")
+    assert scenario.radio is not None
+    bursts = scenario.radio.bursts
+    assert bursts == bursts_from_steps(0.02, 0.2, 0.8, 0.01, 0.1)
+    assert mapping_of(scenario)["radio"]["bursts"] == steps
+    in_python = scenario.model_copy(update={"name": "another"})
+    assert scenario_from(mapping_of(in_python), "g").radio == scenario.radio
+
+
+def test_spells_left_out_have_their_usual_length() -> None:
+    assert radio_of({"range_m": 2.0, "bursts": {"good_s": 3.0}}).bursts == Bursts(good_s=3.0)
+
+
 SIGNAL = {"model": "log-distance"}
 FAULTS: list[tuple[dict[str, Any], str]] = [
     ({}, "radio.range_m: is missing"),
@@ -50,6 +68,15 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({**SIGNAL, "reception": {"model": "table"}}, "radio.reception.table: is missing"),
     ({**SIGNAL, "delays": {"distribution": "uniform", "deviation_s": 1.0}}, "radio.delays.deviation_s"),
     ({"preset": "ieee802154", "model": "disk", "range_m": 1.0}, "radio.log_distance: expected model"),
+    (
+        {**SIGNAL, "bursts": {"p": 0.1, "r": 0.5, "interval_s": 0.1, "bad_s": 1.0}},
+        "radio.bursts.p: expected either bad_s and good_s, or p, r and interval_s; got bad_s and p and r",
+    ),
+    ({"preset": "gilbert", "bursts": {"r": 0.5}}, "radio.bursts.r: expected either bad_s and good_s, or p"),
+    ({**SIGNAL, "bursts": {"p": 0.1, "r": 0.5}}, "radio.bursts.interval_s: is missing; expected p, r and"),
+    ({**SIGNAL, "bursts": {"interval_s": 0.1}}, "radio.bursts.p: is missing; expected p, r and"),
+    ({**SIGNAL, "bursts": {"p": 0.5, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.r: expected less than 1 - p"),
+    ({**SIGNAL, "bursts": {"p": 1.0, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.p: expected a number above 0 and"),
 ]
 
 

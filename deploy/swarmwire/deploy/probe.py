@@ -22,4 +22,6 @@ def radio_of(preset: str, settings: Sequence[str]) -> Radio:
     }
     radio = scenario_from(with_settings(scenario, settings), "radio").radio
     assert radio is not None
+    if radio.trace is not None:
+        raise BadInput("radio", "radio.trace", "expected none: links are measured between robots of a scenario")
     return radio

@@ -22,6 +22,7 @@ from swarmwire.deploy.endpoint import check_socket, new_run_id
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.inputs import ReplayedCrew
 from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.link_trace_file import scenario_traces
 from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.recording import Recording
 from swarmwire.deploy.replay import Replay
@@ -90,6 +91,7 @@ class Simulation:
         self.agents = agent_specs(self.scenario)
         needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
         self.world = World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
+        self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else _ticks(self.scenario)
         self.inputs = replay.inputs if replay else None
         self.runners = runner_count(runners, self.static.arenas * self.static.robots)
@@ -229,7 +231,17 @@ class Simulation:
         obstacles = obstacle_arrays(static.obstacles)
         size_m, every = static.arena_size_m, static.act_every_ticks
         radius_m = np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for group in static.groups])
-        return Air(radio, self.world.keys, static.robots, size_m, obstacles, static.rate_hz, every, radius_m)
+        return Air(
+            radio,
+            self.world.keys,
+            static.robots,
+            size_m,
+            obstacles,
+            static.rate_hz,
+            every,
+            radius_m,
+            self._traces,
+        )
 
     def _from_outside(self, tick: int) -> bool:
         """Whether the actions of this tick need not follow from scenario and seed."""

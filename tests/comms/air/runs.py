@@ -7,6 +7,7 @@ import numpy as np
 
 from swarmwire.comms.air.air import Air, News
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.traces.link_traces import LinkTraces
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
@@ -56,12 +57,16 @@ class Run:
 
 
 def make_air(
-    radio: Radio, robots: int, seeds: Sequence[int] = (1,), obstacles: Sequence[Sequence[Obstacle]] | None = None
+    radio: Radio,
+    robots: int,
+    seeds: Sequence[int] = (1,),
+    obstacles: Sequence[Sequence[Obstacle]] | None = None,
+    traces: LinkTraces | None = None,
 ) -> Air:
     """An air over arenas of SIZE_M at RATE_HZ, an arena per seed."""
     keys = np.array([derive_key(seed, "air") for seed in seeds], np.uint64)
     placed = obstacle_arrays(tuple(map(tuple, obstacles or [()] * len(seeds))))
-    return Air(radio, keys, robots, SIZE_M, placed, RATE_HZ)
+    return Air(radio, keys, robots, SIZE_M, placed, RATE_HZ, traces=traces)
 
 
 def run(air: Air, pose: FloatArray, sent_in: Callable[[int], Sent], ticks: int, quiet_ticks: int = 0) -> Run:

@@ -23,6 +23,7 @@ MODULES = [
         "signal.parameters",
         "presets",
         "radio_checks",
+        "traces.parameters",
         "traffic.parameters",
         "traffic.access_timing",
         "traffic.airtime",

@@ -6,6 +6,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.world.schema import UNFIT
 from swarmwire.world.schema_words import Node, plain, words
 
 
@@ -33,6 +34,8 @@ def _explained(error: ErrorDetails, schema: Node) -> tuple[str, str]:
         return f"{key}.{tag}", f"{choices}; got {_shown(given[tag])}" if tag in given else f"is missing; {choices}"
     if error["loc"][-1] == "[key]":
         return key, f"expected a name of at most 40 letters, digits and _ that starts with a letter, got {got}"
+    if kind == UNFIT:
+        return f"{key}.{error.get('ctx', {})['key']}", error["msg"]
     if kind in ("place", "poses", "points"):  # worded by the scenario's own validators
         return key, error["msg"]
     return key, f"expected {words(node, schema)}, got {got}"

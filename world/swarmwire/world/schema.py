@@ -7,11 +7,13 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import pydantic
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
-from pydantic_core import CoreSchema, core_schema
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import limits_of
 
 TABLE = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True)
+UNFIT = "unfit"  # the type of a fault that a table's form finds, whose context names the key
 
 
 @dataclass(frozen=True)
@@ -20,9 +22,16 @@ class AsTable:
 
     def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
         """The schema of `source`'s table, followed by building `source`."""
+        form = written_form(source)
 
         def build(table: BaseModel) -> object:
-            return source(**{name: getattr(table, name) for name in type(table).model_fields})
+            written = form(**{name: getattr(table, name) for name in type(table).model_fields})
+            if form is source:
+                return written
+            try:
+                return written.made()
+            except BadInput as error:
+                raise PydanticCustomError(UNFIT, "{expected}", {"key": error.key, "expected": error.expected}) from None
 
         return core_schema.no_info_after_validator_function(build, handler.generate_schema(table_of(source)))
 
@@ -40,9 +49,18 @@ class OneOf:
         return handler.generate_schema(Annotated[tables, pydantic.Field(discriminator=self.tag)])
 
 
+def written_form(kind: type[Any]) -> type[Any]:
+    """The dataclass whose fields are the keys of `kind`'s table: `kind` itself, or what its `written_as` names.
+
+    Such a form has a method `made`, which returns the `kind`, or raises BadInput with a key of the table.
+    """
+    return getattr(kind, "written_as", kind)
+
+
 @cache
 def table_of(kind: type[Any]) -> type[BaseModel]:
     """The pydantic model of a dataclass made with `parameter`: same names, bounds, choices, units and help."""
+    kind = written_form(kind)
     hints = get_type_hints(kind)
     columns: dict[str, Any] = {of.name: (_hint(hints[of.name], of), _field(of)) for of in fields(kind)}
     return pydantic.create_model(kind.__name__, __config__=TABLE, __doc__=kind.__doc__, **columns)

@@ -8,12 +8,14 @@ from swarmwire.comms.air import news
 from swarmwire.comms.air.accounts import Accounts
 from swarmwire.comms.air.disk_way import DiskWay
 from swarmwire.comms.air.disruption import Disruption
+from swarmwire.comms.air.kept_order import wait_for_earlier
 from swarmwire.comms.air.links import HEARD, THE_REST, Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.send_times import SendTimes
 from swarmwire.comms.air.signal.signal_way import SignalWay
 from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.air.traces.link_traces import LinkTraces
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
@@ -58,19 +60,23 @@ class Air:
         rate_hz: int,
         act_every_ticks: IntArray | None = None,
         radius_m: FloatArray | None = None,
+        traces: LinkTraces | None = None,
     ) -> None:
         """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out.
 
-        `radius_m` (robots,) are their radii, which count for bodies between two robots; 0 each if left out. ValueError
-        for a disk without `range_m`.
+        `radius_m` (robots,) are their radii, which count for bodies between two robots; 0 each if left out. `traces`
+        are what the file of the radio's trace holds. ValueError for a disk without `range_m`, or a trace without its
+        file or the other way round.
         """
         if not radio.is_signal and radio.range_m is None:
             raise ValueError("range_m: expected a range, as a disk has one")
+        if (radio.trace is None) != (traces is None):
+            raise ValueError("traces: expected what the file of the radio's trace holds, and nothing without one")
         rows = len(keys) * robots
         self._radio, self._robots = radio, robots
         self._held, self._coming = Disruption.none(rows), Disruption.none(rows)
         radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
-        medium = Medium(radio, keys, robots, obstacles, size_m, radii_m, self._held)
+        medium = Medium(radio, keys, robots, obstacles, size_m, radii_m, self._held, traces)
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
         self._way: Way
@@ -167,8 +173,11 @@ class Air:
     def _take(self, packets: Transmissions, links: Links) -> None:
         """Keep links until they are final, and their packets."""
         if packets:
+            coming, rows = len(self._links.packet), len(self._others_alive)
             self._links = self._links.followed_by(links._replace(packet=links.packet + len(self._on_air.sender)))
             self._on_air = self._on_air.followed_by(packets)
+            if self._radio.delays is not None and self._radio.delays.keep_order:
+                wait_for_earlier(self._links, coming, rows)
 
     def _keep(self, index: IntArray) -> None:
         """Keep these links and their packets only."""

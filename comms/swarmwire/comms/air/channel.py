@@ -55,14 +55,14 @@ class Channel:
         np.add.at(found, links.packet, links.in_range)
         return found
 
-    def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
-        """Pairs of robot rows a < b joined in the radio graph, sorted, (e, 2)."""
+    def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
+        """Pairs of robot rows a < b joined in the radio graph at a time, sorted, (e, 2)."""
         senders = np.flatnonzero(alive)
         found, b = self._reach(pose, alive, senders, np.full(len(senders), BROADCAST))
         rising = senders[found] < b
         a, b = senders[found][rising], b[rising]
         zero = np.zeros(len(a), np.int64)
-        links = Links.under_way(zero, a, b, zero, zero, 0)
+        links = Links.under_way(zero, a, b, zero, np.full(len(a), at_ns), 0)
         probability = np.ones(len(a))
         for stage in self._stages:
             probability *= stage.delivery(links, pose)

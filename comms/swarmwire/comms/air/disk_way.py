@@ -25,6 +25,7 @@ class DiskWay(Way):
         self._channel = Channel(medium, size_m)
         self._pose = np.zeros((len(medium.keys) * medium.robots, 3))
         self._held, self._columns = medium.disruption, len(medium.radio.gives.columns)
+        self._now_ns = 0
 
     @property
     def queued(self) -> Transmissions:
@@ -41,6 +42,7 @@ class DiskWay(Way):
 
     def pass_time(self, until_ns: int, lives: Lives) -> Decided:
         """What goes on air, or is refused, before `until_ns`."""
+        self._now_ns = until_ns
         return self._decided(self._senders.leave(until_ns, self._held), lives)
 
     def disrupt(self, at_ns: int, coming: Disruption, lives: Lives) -> Decided:
@@ -53,7 +55,7 @@ class DiskWay(Way):
 
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
         """Pairs of robot rows a < b joined in the radio graph, sorted, (e, 2)."""
-        return self._channel.edges(pose, alive)
+        return self._channel.edges(pose, alive, self._now_ns)
 
     def _decided(self, packets: Transmissions, lives: Lives) -> Decided:
         if not packets:

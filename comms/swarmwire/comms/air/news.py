@@ -32,13 +32,12 @@ def heard(ended: Links, packets: Transmissions, gives: tuple[str, ...], robots: 
 
 def finished(ended: Links, packets: Transmissions, robots: int, has_strength: bool) -> Finished:
     """The links whose fate is final, and packets that never went on air; not receivers out of range."""
-    the_rest = ended.receiver == THE_REST
-    index = np.flatnonzero(~the_rest | (ended.fate != Fate.OUT_OF_RANGE))
-    packet, sender = ended.packet[index], ended.sender[index]
+    index = np.flatnonzero(ended.fate != Fate.OUT_OF_RANGE)
+    packet, sender, the_rest = ended.packet[index], ended.sender[index], ended.receiver[index] == THE_REST
     return Finished(
         arena=sender // robots,
         sender=in_arena(sender, robots),
-        receiver=np.where(the_rest[index], THE_REST, in_arena(ended.receiver[index], robots)),
+        receiver=np.where(the_rest, THE_REST, in_arena(ended.receiver[index], robots)),
         receivers=ended.receivers[index],
         sequence=ended.sequence[index],
         sent_at_ns=packets.sent_at_ns[packet],

@@ -11,6 +11,7 @@ from swarmwire.comms.air.propagation.two_ray import TwoRay
 from swarmwire.comms.air.reception.noise import Noise
 from swarmwire.comms.air.reception.parameters import Bursts, Reception
 from swarmwire.comms.air.signal.parameters import Access
+from swarmwire.comms.air.traces.parameters import Trace
 from swarmwire.comms.air.traffic.parameters import Delays
 from swarmwire.comms.parameters import parameter
 
@@ -135,6 +136,7 @@ class Radio:
     reception: Reception | None = parameter(None, help="of signals: when a frame is right")
     access: Access | None = parameter(None, help="of signals: who may send when, and whether frames collide")
     bursts: Bursts | None = parameter(None, help="links are bad for a while, and good again")
+    trace: Trace | None = parameter(None, help="measured links are replayed")
     delays: Delays | None = parameter(None, help="a further delay, for each receiver")
     gives: Gives = field(default_factory=Gives)
 

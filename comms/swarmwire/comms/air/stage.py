@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.traces.link_traces import LinkTraces
 from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.geometry import Obstacles
 
@@ -21,6 +22,7 @@ class Medium:
     size_m: tuple[float, float]  # of each arena
     radius_m: FloatArray  # (rows,) of the robots
     disruption: Disruption  # kept up to date by the air
+    traces: LinkTraces | None = None  # of the radio's trace, where it has one
 
 
 class Stage(ABC):
@@ -37,5 +39,8 @@ class Stage(ABC):
         """
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
-        """With which probability lone packets pass, fast fading apart, (k,) or one for all: for the radio graph."""
+        """With which probability lone packets pass, fast fading apart, (k,) or one for all: for the radio graph.
+
+        The worse direction counts. `final_at_ns` is the time for which the graph is.
+        """
         return 1.0

@@ -10,7 +10,7 @@ To add a stage:
    `[radio.<name>]` follows from it. A new way to end a packet is a new `Fate`; a column that later stages read, a new
    field of `Links`.
 3. List the module below, where it belongs: propagation, disruption (what it ends does not interfere either),
-   interference, reception, bursts, what the receiver learns, delay.
+   interference, reception, bursts, trace, what the receiver learns, delay.
 """
 
 from swarmwire.comms.air import (
@@ -24,10 +24,11 @@ from swarmwire.comms.air import (
     given_range,
     given_rssi,
     line_of_sight,
+    trace,
 )
 from swarmwire.comms.air.stage import Medium, Stage
 
-AFTER_RECEPTION = (given_range, given_bearing, given_rssi, delay, delays)
+AFTER_RECEPTION = (trace, given_range, given_bearing, given_rssi, delay, delays)
 ORDER = (line_of_sight, bodies_block, disrupted, fixed_loss, bursts, *AFTER_RECEPTION)
 
 

@@ -17,7 +17,6 @@ from swarmwire.comms.air.traffic.airtime import (
     ieee80211a_ns,
     ieee80211b_ns,
     ieee80211g_ns,
-    ieee802154_ns,
 )
 
 OCTETS = st.integers(0, 2304)
@@ -27,7 +26,7 @@ OCTETS = st.integers(0, 2304)
     ("psdu_octets", "stated_us"), [(5, 352), (11, 544), (20, 832), (31, 1184), (60, 2112), (100, 3392), (127, 4256)]
 )
 def test_802_15_4_takes_the_stated_time(psdu_octets: int, stated_us: int):
-    assert ieee802154_ns(psdu_octets) == stated_us * US
+    assert at_bit_rate_ns(6 + psdu_octets, 250_000) == stated_us * US
 
 
 @pytest.mark.parametrize(
@@ -67,7 +66,6 @@ def test_a_hundred_octets_over_udp_take_the_stated_time():
 def test_airtimes_are_whole_bits_and_symbols_rounded_up(octets: int, bit_rate_bps: int):
     """By exact fractions."""
     assert at_bit_rate_ns(octets, bit_rate_bps) == math.ceil(Fraction(8 * octets * 10**9, bit_rate_bps))
-    assert ieee802154_ns(octets) == at_bit_rate_ns(octets + 6, 250_000)
     for rate_bps in DSSS_RATES_BPS:
         payload_us = math.ceil(Fraction(8 * octets * 10**6, rate_bps))
         assert ieee80211b_ns(octets, rate_bps, short_preamble=False) == (192 + payload_us) * US
@@ -86,7 +84,6 @@ def test_a_plain_bit_rate_rounds_up():
 @given(OCTETS, OCTETS)
 def test_more_octets_never_take_less_time(one: int, other: int):
     few, many = sorted((one, other))
-    assert ieee802154_ns(few) <= ieee802154_ns(many)
     assert at_bit_rate_ns(few, 250_000) <= at_bit_rate_ns(many, 250_000)
     for rate_bps in (1_000_000, 2_000_000, 5_500_000, 11_000_000):
         short, long = (ieee80211b_ns(many, rate_bps, short_preamble=short) for short in (True, False))
@@ -104,7 +101,6 @@ def test_ofdm_carries_its_rate_in_symbols_of_four_microseconds(rate_bps: int):
 def test_arrays_take_the_time_of_their_elements():
     octets = np.array([0, 14, 76, 1536])
     for airtime_ns in (
-        ieee802154_ns,
         lambda n: at_bit_rate_ns(n, 9600),
         lambda n: ieee80211b_ns(n, 5_500_000, short_preamble=True),
         lambda n: ieee80211g_ns(n, 54_000_000),

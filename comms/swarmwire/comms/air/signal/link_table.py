@@ -21,6 +21,7 @@ from swarmwire.comms.air.propagation.loss_curve import LossCurve
 from swarmwire.comms.air.propagation.path_loss import loss_db
 from swarmwire.comms.air.propagation.walls import wall_loss_db
 from swarmwire.comms.air.reach import CELL_SLACK, _strip
+from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.geometry import Obstacles, is_blocked
 
@@ -54,13 +55,21 @@ class Pairs(NamedTuple):
 
     a: IntArray  # (k,)
     b: IntArray  # (k,)
-    loss_db: FloatArray  # (k,) without antennas and fading
+    loss_db: FloatArray  # (k,) from a to b, without antennas and fading
+    back_db: FloatArray  # (k,) from b to a: the same array, unless links were measured
     gain: FloatArray  # (k,) of fading, a ratio
     blocked: IntArray  # (k,) 1 where an obstacle stands in a needed line of sight
 
 
-def pairs_of(pose: FloatArray, size_m: tuple[float, float], keys, obstacles: Obstacles, around: Surroundings) -> Pairs:
-    """All pairs above the cut-off of robots that stand at `pose` (rows, 3)."""
+def pairs_of(
+    pose: FloatArray,
+    size_m: tuple[float, float],
+    keys,
+    obstacles: Obstacles,
+    around: Surroundings,
+    measured: MeasuredLinks | None = None,
+) -> Pairs:
+    """All pairs above the cut-off of robots that stand at `pose` (rows, 3), and those of measured strength."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     robots = len(x) // len(keys)
     cells = grid.build(x, y, len(keys), size_m, around.reach_m * CELL_SLACK)
@@ -72,12 +81,26 @@ def pairs_of(pose: FloatArray, size_m: tuple[float, float], keys, obstacles: Obs
     if around.bodies:
         _add_bodies(loss, x, y, robots, cells, around.radius_m, around.most_radius_m, around.body_db, a, b)
     a, b, loss = _above(around.least_dbm, around.send_dbm, around.receive_dbi, a, b, loss)
+    if measured is not None:
+        a, b, loss = measured.with_unlisted(a, b, loss)
     gain, blocked = np.ones(len(a)), np.zeros(len(a), np.int64)
     if around.fades:
         _fade(gain, x, y, robots, keys, around.scatter, around.law, a, b)
     if around.line_of_sight:
         _find_blocked(blocked, x, y, robots, obstacles, a, b)
-    return Pairs(a, b, loss, gain, blocked)
+    pairs = Pairs(a, b, loss, loss, gain, blocked)
+    return pairs if measured is None else _measured(pairs, measured, around.send_dbm, around.receive_dbi)
+
+
+def _measured(pairs: Pairs, measured: MeasuredLinks, send_dbm: FloatArray, receive_dbi: FloatArray) -> Pairs:
+    """The pairs with what was measured in place of the model, each way; what blocked them was measured, too."""
+    a, b, blocked = pairs.a, pairs.b, pairs.blocked > 0
+    there_db, is_there = measured.loss_db(a, b, pairs.loss_db, send_dbm[a] + receive_dbi[b])
+    back_db, is_back = measured.loss_db(b, a, pairs.loss_db, send_dbm[b] + receive_dbi[a])
+    there_db[blocked & is_back & ~is_there] = np.inf
+    back_db[blocked & is_there & ~is_back] = np.inf
+    still_blocked = np.where(is_there | is_back, 0, pairs.blocked)
+    return pairs._replace(loss_db=there_db, back_db=back_db, blocked=still_blocked)
 
 
 @njit(cache=True)

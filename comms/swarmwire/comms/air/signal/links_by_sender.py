@@ -33,7 +33,8 @@ def links_by_sender(
     `send_dbm` and `receive_dbi` (rows,) hold under events, too; `fate` (2, k) are HEARD where nothing closes the link
     of pair i from a to b, and back.
     """
-    kind, power_mw, counts = _kinds(pairs, send_dbm, receive_dbi, fate, levels)
+    both_alike = pairs.back_db is pairs.loss_db
+    kind, power_mw, counts = _kinds(pairs, both_alike, send_dbm, receive_dbi, fate, levels)
     stop = np.cumsum(counts.sum(axis=1))
     first = stop - counts.sum(axis=1)
     places = LinkPlaces(first, first + counts[:, STRONG], stop)
@@ -41,18 +42,21 @@ def links_by_sender(
 
 
 @njit(cache=True)
-def _kinds(pairs, send_dbm, receive_dbi, fate, levels):
+def _kinds(pairs, both_alike, send_dbm, receive_dbi, fate, levels):
     """What each link is, whether it is listed (4), its power, and how many of each kind each robot has."""
     k = len(pairs.a)
     kind, power_mw, counts = np.empty((2, k), np.uint8), np.empty((2, k)), np.zeros((len(send_dbm), 3), np.int64)
     send_mw, receive = np.exp(send_dbm * NEPERS), np.exp(receive_dbi * NEPERS)
     for i in range(k):
         power_mw[:, i] = from_db(-pairs.loss_db[i]) * pairs.gain[i]
+        if not both_alike:
+            power_mw[1, i] = from_db(-pairs.back_db[i]) * pairs.gain[i]
     for way in range(2):
         sender, receiver = (pairs.a, pairs.b) if way == 0 else (pairs.b, pairs.a)
+        loss_db = pairs.loss_db if way == 0 else pairs.back_db
         for i in range(k):
             s, r = sender[i], receiver[i]
-            mean_dbm = send_dbm[s] + receive_dbi[r] - pairs.loss_db[i]
+            mean_dbm = send_dbm[s] + receive_dbi[r] - loss_db[i]
             power_mw[way, i] *= send_mw[s] * receive[r]
             is_listed, is_open = mean_dbm >= levels.listed_dbm, fate[way, i] == HEARD
             is_strong = is_listed | (is_open & (power_mw[way, i] >= levels.heard_mw))

@@ -7,6 +7,7 @@ import numpy as np
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.signal.link_table import Pairs, Surroundings, pairs_of
 from swarmwire.comms.air.signal.links_by_sender import Levels, links_by_sender
+from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.air.signal.tables import NOBODY, SILENT, LinkPlaces, LinkTable, Table
 from swarmwire.comms.air.stage import Medium
 from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray
@@ -22,8 +23,22 @@ class LinksHeld:
         pairs: the pairs of robots that these links join.
     """
 
-    def __init__(self, medium: Medium, size_m: tuple[float, float], around: Surroundings, levels: Levels) -> None:
-        self._medium, self._size_m, self._around, self._levels = medium, size_m, around, levels
+    def __init__(
+        self,
+        medium: Medium,
+        size_m: tuple[float, float],
+        around: Surroundings,
+        levels: Levels,
+        measured: MeasuredLinks | None,
+    ) -> None:
+        """`measured` are the links of the radio's trace, kept up to date by others."""
+        self._measured, self._medium, self._size_m, self._around, self._levels = (
+            measured,
+            medium,
+            size_m,
+            around,
+            levels,
+        )
         rows = len(medium.keys) * medium.robots
         self.pose = np.zeros((rows, 3))
         self.pairs = self.pairs_at(self.pose)
@@ -31,13 +46,14 @@ class LinksHeld:
 
     def pairs_at(self, pose: FloatArray) -> Pairs:
         """The pairs of robots that stand at `pose` (rows, 3)."""
-        return pairs_of(pose, self._size_m, self._medium.keys, self._medium.obstacles, self._around)
+        medium = self._medium
+        return pairs_of(pose, self._size_m, medium.keys, medium.obstacles, self._around, self._measured)
 
-    def worse_dbm(self, pairs: Pairs) -> FloatArray:
-        """The mean power of each pair in the direction that has less, (k,)."""
+    def mean_dbm(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
+        """The mean power of each pair from a to b, and back, (k,) each."""
         send_dbm, receive_dbi = self._around.send_dbm, self._around.receive_dbi
         there, back = send_dbm[pairs.a] + receive_dbi[pairs.b], send_dbm[pairs.b] + receive_dbi[pairs.a]
-        return np.minimum(there, back) - pairs.loss_db
+        return there - pairs.loss_db, back - pairs.back_db
 
     def move(self, pose: FloatArray, robot: Table, reception: Table) -> None:
         """Robots stand at `pose` from now on; tables of dtype ROBOT and RECEPTION are told where their links are."""

@@ -111,8 +111,13 @@ def rules_of(radio: Radio, robots: int) -> Rules:
 def edge_dbm(radio: Radio, rules: Rules) -> float:
     """The least mean power with which a lone packet gets through with `min_delivery`; inf if none does."""
     bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
-    others = (1.0 - radio.loss) * (1.0 - (radio.bursts.loss if radio.bursts else 0.0))
+    others = passes_besides(radio)
     return least_where(lambda dbm: lone_delivery(rules, dbm, bits) * others >= radio.min_delivery - ROUNDING)
+
+
+def passes_besides(radio: Radio) -> float:
+    """The share of packets that neither fixed loss nor bursts take."""
+    return (1.0 - radio.loss) * (1.0 - (radio.bursts.loss if radio.bursts else 0.0))
 
 
 def least_where(is_enough: Callable[[float], bool]) -> float:

@@ -70,7 +70,8 @@ def take_off_air(rules, bursts, state, queue, s, now_ns):
         me.on_air = SILENT
         return
     is_dcf = rules.method == DCF
-    is_sure = rules.loss == 0.0 and not bursts.is_on and me.on_air == DATA  # nothing but noise could take a frame
+    # Nothing but noise could take a frame.
+    is_sure = rules.loss == 0.0 and not bursts.is_on and me.on_air == DATA and len(bursts.traced.link) == 0
     for i in range(me.first_link, me.weak_link):
         if fate[i] != HEARD:
             continue

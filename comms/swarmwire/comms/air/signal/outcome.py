@@ -5,6 +5,7 @@
 import math
 
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.fixed_loss import LOSS
@@ -12,12 +13,14 @@ from swarmwire.comms.air.reception.burst_states import takes
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.log_success import NEVER, log_success
 from swarmwire.comms.air.signal.tables import ACKNOWLEDGEMENT, DATA, NOBODY
+from swarmwire.comms.air.trace import TRACE
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.fates import Fate
 
 RECEPTION, ACKNOWLEDGED = purpose("reception"), purpose("reception of an acknowledgement")
 ACKNOWLEDGED_LOSS = purpose("fixed loss of an acknowledgement")
+ACKNOWLEDGED_TRACE = purpose("trace of an acknowledgement")
 HEARD, LOST, TOO_WEAK = int(Fate.HEARD), int(Fate.LOST), int(Fate.TOO_WEAK)
 COLLIDED, BURST = int(Fate.COLLIDED), int(Fate.BURST)
 ONE_BIT = 1.0
@@ -38,16 +41,20 @@ def outcome(rules, bursts, state, s, i, log_right):
             return HEARD  # it is nothing to others
         it = state.robot[receiver]
         sequence, attempt = state.packet[it.packet].sequence, it.attempt
-        reception, fixed_loss = ACKNOWLEDGED, ACKNOWLEDGED_LOSS
+        reception, fixed_loss, trace = ACKNOWLEDGED, ACKNOWLEDGED_LOSS, ACKNOWLEDGED_TRACE
     else:
         sequence, attempt = state.packet[me.packet].sequence, me.attempt
-        reception, fixed_loss = RECEPTION, LOSS
+        reception, fixed_loss, trace = RECEPTION, LOSS, TRACE
     u = uniform(key, a, b, sequence, reception + attempt)
     if u >= math.exp(log_right):
         alone = math.exp(alone_log_success(rules, state.link.power_mw[i], me.bits))
         return COLLIDED if u < alone else TOO_WEAK
     if rules.loss > 0.0 and uniform(key, a, b, sequence, fixed_loss + attempt) < rules.loss:
         return LOST
+    if len(bursts.traced.link) > 0:
+        ratio = _ratio(bursts.traced, a * rules.robots + b)
+        if ratio < 1.0 and uniform(key, a, b, sequence, trace + attempt) >= ratio:
+            return LOST
     if bursts.is_on and me.on_air == DATA:
         index = s * np.int64(len(state.robot)) + receiver
         burst, added = takes(
@@ -86,6 +93,28 @@ def alone_log_success(rules, power_mw, bits):
 def lone_delivery(rules, mean_dbm, bits):
     """The probability that a lone frame of so many bits is right at this power."""
     return math.exp(alone_log_success(rules, from_db(mean_dbm), bits))
+
+
+@njit(cache=True)
+def lone_deliveries(rules, mean_dbm, bits):
+    """The same at several powers, (k,)."""
+    found = np.empty(len(mean_dbm))
+    for i in range(len(found)):
+        found[i] = lone_delivery(rules, mean_dbm[i], bits)
+    return found
+
+
+@borrowing()
+def _ratio(traced, link):
+    """The delivery ratio of a link (indices in the arena: sender x robots + receiver); 1 where none was measured."""
+    low, high = 0, len(traced.link)
+    while low < high:
+        middle = (low + high) // 2
+        if traced.link[middle] < link:
+            low = middle + 1
+        else:
+            high = middle
+    return traced.ratio[low] if low < len(traced.link) and traced.link[low] == link else 1.0
 
 
 @borrowing()

@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from swarmwire.comms.air.channel import with_the_rest
+from swarmwire.comms.air.channel import ROUNDING, with_the_rest
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.frames import airtime_ns
 from swarmwire.comms.air.intake import Intake
@@ -15,10 +15,14 @@ from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.air.send_times import SendTimes
 from swarmwire.comms.air.signal import events
 from swarmwire.comms.air.signal.event_queue import event_queue
+from swarmwire.comms.air.signal.link_table import Pairs
 from swarmwire.comms.air.signal.links_held import LinksHeld, open_ways
-from swarmwire.comms.air.signal.numbers import edge_dbm, levels_of, rules_of, surroundings_of
+from swarmwire.comms.air.signal.measured_links import MeasuredLinks
+from swarmwire.comms.air.signal.numbers import edge_dbm, levels_of, passes_besides, rules_of, surroundings_of
+from swarmwire.comms.air.signal.outcome import lone_deliveries
 from swarmwire.comms.air.signal.tables import (
     NOBODY,
+    NOT_TRACED,
     NOTHING,
     PACKET,
     RECEPTION,
@@ -55,7 +59,9 @@ class SignalWay(Way):
         rows = len(medium.keys) * medium.robots
         self._rules = rules_of(medium.radio, medium.robots)
         around = surroundings_of(medium.radio, medium.keys, radius_m)
-        self._links = LinksHeld(medium, size_m, around, levels_of(medium.radio, self._rules))
+        self._measured = MeasuredLinks.of(medium)
+        levels = levels_of(medium.radio, self._rules)
+        self._links = LinksHeld(medium, size_m, around, levels, self._measured)
         self._edge_dbm = edge_dbm(medium.radio, self._rules)
         self._intake = Intake(rows)
         self._stages = chain_after_reception(medium)
@@ -83,6 +89,8 @@ class SignalWay(Way):
         needed = (self._robot["on_air"] != SILENT) | (self._robot["stage"] != NOTHING)
         holds = set(self._robot["hold"][needed].tolist())
         self._poses = {hold: at for hold, at in self._poses.items() if hold in holds} | {self._hold: pose}
+        if self._measured is not None:
+            self._measured.move_to(self._now_ns)
         self._links.move(pose, self._robot, self._reception)
 
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
@@ -132,8 +140,19 @@ class SignalWay(Way):
         pairs = links.pairs if np.array_equal(pose, links.pose) else links.pairs_at(pose)
         is_open = alive[pairs.a] & alive[pairs.b] & (pairs.blocked == 0)
         is_open &= open_ways(self._medium.disruption, pairs.a, pairs.b)
-        joined = is_open & (links.worse_dbm(pairs) >= self._edge_dbm)
+        joined = is_open & (np.minimum(*links.mean_dbm(pairs)) >= self._edge_dbm)
+        if self._measured is not None:
+            joined &= self._passes_as_measured(pairs)
         return np.stack(np.divmod(np.sort((pairs.a * len(pose) + pairs.b)[joined]), len(pose)), axis=1)
+
+    def _passes_as_measured(self, pairs: Pairs) -> BoolArray:
+        """Whether lone packets get through both ways with `min_delivery` by what was measured, too, (k,)."""
+        assert self._measured is not None
+        radio, ends = self._radio, (pairs.a, pairs.b)
+        bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
+        there, back = (lone_deliveries(self._rules, dbm, bits) for dbm in self._links.mean_dbm(pairs))
+        worse = np.minimum(there * self._measured.ratio(*ends), back * self._measured.ratio(*ends[::-1]))
+        return worse * passes_besides(radio) >= radio.min_delivery - ROUNDING
 
     def _as_packets(self, taken: Transmissions) -> Table:
         radio, robots = self._radio, self._medium.robots
@@ -177,7 +196,8 @@ class SignalWay(Way):
             self._bursts.make_room(self._now_ns, len(self._links.link.receiver))
         link, at_ns, bad = self._bursts.table
         a, b, added = 1.0 / bursts.good_s, 1.0 / bursts.bad_s, np.zeros(1, np.int64)
-        return Bursting(given is not None, link, at_ns, bad, added, a, b, bursts.loss_bad, bursts.loss_good)
+        traced = NOT_TRACED if self._measured is None else self._measured.traced
+        return Bursting(given is not None, link, at_ns, bad, added, a, b, bursts.loss_bad, bursts.loss_good, traced)
 
     def _decided(self, parts: list[Told], lives: Lives) -> Decided:
         """What was told, as packets and links; packets that are done leave the queue."""

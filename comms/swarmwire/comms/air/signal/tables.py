@@ -127,6 +127,16 @@ class Rules(NamedTuple):
     log_success: FloatArray  # by SINR, as `log_success_table` has it
 
 
+class Traced(NamedTuple):
+    """Links whose delivery ratio was measured, in every arena alike."""
+
+    link: IntArray  # (links,) sender x robots + receiver, as indices in the arena; rising
+    ratio: FloatArray  # (links,)
+
+
+NOT_TRACED = Traced(np.empty(0, np.int64), np.empty(0))
+
+
 class Bursting(NamedTuple):
     """Which links were good or bad, as `BurstStates` keeps them."""
 
@@ -139,6 +149,7 @@ class Bursting(NamedTuple):
     b: float
     loss_bad: float
     loss_good: float
+    traced: Traced  # beside them, as it is asked for in the same place alone
 
 
 class LinkTable(NamedTuple):

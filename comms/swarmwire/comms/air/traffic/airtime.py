@@ -25,13 +25,12 @@ OFDM_BITS_PER_SYMBOL = {
 
 
 def at_bit_rate_ns(octets: Octets, bit_rate_bps: int) -> Octets:
-    """8 x octets / bit rate, rounded up: a radio without further structure."""
+    """8 x octets / bit rate, rounded up: a radio without further structure.
+
+    So is IEEE 802.15.4 at 2.4 GHz: 250 kbit/s, and 6 octets of preamble, delimiter and length before a PSDU of at most
+    127.
+    """
     return -(-octets * 8 * NS_PER_S // bit_rate_bps)
-
-
-def ieee802154_ns(psdu_octets: Octets) -> Octets:
-    """IEEE 802.15.4 at 2.4 GHz: 32 us x (6 + PSDU); 6 octets of preamble, delimiter and length, PSDU at most 127."""
-    return 32 * US * (6 + psdu_octets)
 
 
 def ieee80211b_ns(psdu_octets: Octets, rate_bps: int, *, short_preamble: bool) -> Octets:

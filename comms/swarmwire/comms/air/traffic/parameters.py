@@ -16,6 +16,9 @@ class Delays:
     distribution: str = parameter("lognormal", help="how delays are spread", choices=DISTRIBUTIONS)
     mean_s: float = parameter(0.01, help="mean delay", unit="s", above=0, at_most=3600)
     deviation_s: float = parameter(0.005, help="standard deviation of the delay", unit="s", above=0, at_most=3600)
+    keep_order: bool = parameter(
+        False, help="a packet waits for those that its sender had on air before and that its receiver still has to hear"
+    )
 
 
 def refuse_negative(delays: Delays, where: str, key: str) -> None:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.trace.link_trace import RefusedRow, link_trace
+from swarmwire.comms.air.traces.link_trace import RefusedRow, link_trace
 
 ROBOTS = 3
 ROWS = [(20, 2, 0, 0.3), (0, 0, 1, 1.0), (10, 0, 1, 0.5), (5, 1, 0, 0.0), (30, 0, 1, 0.25)]
