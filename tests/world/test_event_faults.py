@@ -55,6 +55,23 @@ FAULTS: list[tuple[Any, str]] = [
         partition(["flock"], ["flock-3", "big"]),
         "events.0.between.1: expected sets that do not overlap; 'flock-3'",
     ),
+    (
+        event("partition"),
+        "events.0: expected one of between, region, halves, isolate, bridge, or halves and bridge; got",
+    ),
+    (event("partition", halves="x", isolate=["big"]), "events.0: expected one of between, region, halves, isolate,"),
+    (event("partition", halves="z"), "events.0.halves: expected one of x, y, got 'z'"),
+    (event("partition", isolate=[]), "events.0.isolate: expected a list that is not empty, got []"),
+    (event("partition", bridge=["tall"]), f"events.0.bridge: {GROUPS} 'tall'"),
+    (event("partition", region={}), "events.0.region: expected either radius_m or size_m"),
+    (event("partition", region={"radius_m": 1.0, "size_m": [1.0, 1.0]}), "events.0.region: expected either radius_m"),
+    (
+        event("partition", region={"size_m": [1.0, 0.0]}),
+        "events.0.region.size_m: expected two numbers above 0 (m), got",
+    ),
+    (event("partition", region={"radius_m": -1.0}), "events.0.region.radius_m: expected a number above 0 and at most"),
+    (event("partition", isolate=["big"], one_way=True), "events.0.one_way: expected two sets with it"),
+    (event("partition", between=[["flock-0"], ["flock-1"], ["big"]], one_way=True), "events.0.one_way: expected two"),
     (event("blackout", robots={"group": "x"}), "events.0.robots.group: expected one of flock, big; got 'x'"),
 ]
 

@@ -163,7 +163,8 @@ def test_the_radio_graph_leaves_out_the_dead_radios_that_are_off_and_pairs_that_
 
 
 def swarm(*keys: int, robots: int = 10) -> Swarm:
-    return Swarm({"a": range(4), "b": range(4, robots)}, robots, np.array(keys, np.uint64))
+    pose = np.zeros((robots * len(keys), 3))
+    return Swarm({"a": range(4), "b": range(4, robots)}, robots, np.array(keys, np.uint64), pose)
 
 
 def chosen(of: Swarm, serial: int = 0, eligible: Any = None, **keys: Any) -> list[list[int]]:

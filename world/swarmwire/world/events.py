@@ -2,6 +2,9 @@
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.arrays import KeyArray
@@ -19,7 +22,8 @@ class Events:
     def __init__(self, events: Sequence[Event], static: Static, keys: KeyArray) -> None:
         self._events = tuple(events)
         groups = {group.name: range(group.start, group.stop) for group in static.groups}
-        self._swarm = Swarm(groups, static.robots, keys)
+        rows = len(keys) * static.robots
+        self._swarm = Swarm(groups, static.robots, keys, np.zeros((rows, 3)))
         self._conditions = Conditions(self._swarm.rows)
         due = [(to_ns(event.at_s), True, serial) for serial, event in enumerate(events)]
         for (at_ns, _, serial), event in zip(tuple(due), events, strict=True):
@@ -30,6 +34,7 @@ class Events:
     def apply(self, start_ns: int, world: World, air: Air | None) -> tuple[Happened, ...]:
         """Let happen what is due by the start of a tick, in ns; world and air go on under what holds after that."""
         happened: list[Happened] = []
+        self._swarm = replace(self._swarm, pose=world.pose)
         while self._coming and self._coming[0][0] <= start_ns:
             _, begins, serial = self._coming.popleft()
             happened.append(self._happen(serial, begins))

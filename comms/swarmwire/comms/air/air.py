@@ -88,7 +88,8 @@ class Air:
         """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive."""
         self._lives.now(alive)
         self._held.alive = alive.copy()
-        self._held.radio_on, self._held.sides = self._coming.radio_on, self._coming.sides
+        self._held.radio_on = self._coming.radio_on
+        self._held.sides, self._held.one_way = self._coming.sides, self._coming.one_way
         self._way.hold(pose.copy())
         in_arena = alive.reshape(-1, self._robots).sum(axis=1)
         self._others_alive = np.repeat(in_arena, self._robots) - alive

@@ -12,7 +12,7 @@ class Conditions:
     """Each event holds what it holds until it ends, so those that overlap do not undo one another.
 
     A robot is dead while any kill holds it; a radio is off while any blackout does; two robots are apart while any
-    partition has them in different sets.
+    partition has them in different sets; a one-way partition keeps only what the first sends from the second.
     """
 
     def __init__(self, rows: int) -> None:
@@ -20,6 +20,7 @@ class Conditions:
         self.kills: dict[int, BoolArray] = {}  # by event: (rows,) robots that it holds dead
         self.blackouts: dict[int, BoolArray] = {}  # by event: (rows,) robots whose radios it holds off
         self.partitions: dict[int, IntArray] = {}  # by event: (rows,) the set of each robot, from 1; 0: in none
+        self.one_way: dict[int, IntArray] = {}  # by event: (rows,) the same, where the second does not hear the first
 
     @property
     def alive(self) -> BoolArray:
@@ -33,8 +34,10 @@ class Conditions:
 
     def disruption(self) -> Disruption:
         """All that matters to the air, as it is now."""
-        sides = np.array(list(self.partitions.values()), np.int64).reshape(-1, self._rows)
-        return Disruption(self.alive, self.radio_on, sides)
+        return Disruption(self.alive, self.radio_on, self._sides(self.partitions), self._sides(self.one_way))
+
+    def _sides(self, of: dict[int, IntArray]) -> IntArray:
+        return np.array(list(of.values()), np.int64).reshape(-1, self._rows)
 
     def _any(self, masks: Iterable[BoolArray]) -> BoolArray:
         found = np.zeros(self._rows, np.bool_)

@@ -1,10 +1,13 @@
 """What an event is: a frozen dataclass of parameters that knows how to begin, and how to end if it lasts."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import ClassVar
 
 from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.swarm import Groups, Swarm
 from swarmwire.comms.parameters import parameter
@@ -50,3 +53,12 @@ class LastingEvent(Event):
     def lasts_s(self) -> float | None:
         """`for_s`."""
         return self.for_s
+
+
+@contextmanager
+def within(key: str) -> Generator[None]:
+    """A fault that is found inside names its key within the table `key`."""
+    try:
+        yield
+    except BadInput as error:
+        raise BadInput("", ".".join(part for part in (key, error.key) if part), error.expected) from None

@@ -98,7 +98,8 @@ def test_fates_add_up_when_robots_die_and_are_revived(radio: Radio, robots: int,
 def random_disruption(robots: int, rng: np.random.Generator) -> Disruption:
     """Some are dead, some have their radio off, some are kept apart."""
     sides = rng.integers(0, 3, (1, robots))
-    return Disruption(rng.random(robots) < 0.7, rng.random(robots) < 0.8, sides)
+    one_way = rng.integers(0, 3, (int(rng.integers(0, 2)), robots))
+    return Disruption(rng.random(robots) < 0.7, rng.random(robots) < 0.8, sides, one_way)
 
 
 @pytest.mark.parametrize("method", METHODS)
