@@ -121,7 +121,8 @@ def test_fates_add_up_whatever_happens(radio: Radio, arenas: int, robots: int, s
     for tick in range(ticks):
         sides = rng.integers(0, 3, (int(rng.integers(0, 3)), rows))
         one_way = rng.integers(0, 3, (int(rng.integers(0, 2)), rows))
-        now[tick] = Disruption(rng.random(rows) < 0.7, rng.random(rows) < 0.8, sides, one_way)
+        backlog = rng.integers(0, 3, rows)
+        now[tick] = Disruption(rng.random(rows) < 0.7, rng.random(rows) < 0.8, backlog, sides, one_way)
     sent: dict[int, Sent] = {}
     for tick in range(ticks):
         drawn = random_traffic(rng, arenas, robots)

@@ -44,7 +44,8 @@ class Air:
 
     Events change who is alive and what is off or apart at the start of a tick (`disrupt`, before `advance`). What went
     on air before stays on air, but the dead hear nothing any more and their queues end; a radio that is off loses what
-    it was receiving. A robot revived hears only what is sent from then on.
+    it was receiving, and what it should send ends or waits as its `backlog` says. A robot revived hears only what is
+    sent from then on.
     """
 
     def __init__(
@@ -87,9 +88,8 @@ class Air:
     def hold(self, pose: FloatArray, alive: BoolArray) -> None:
         """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive."""
         self._lives.now(alive)
+        self._held.become(self._coming)
         self._held.alive = alive.copy()
-        self._held.radio_on = self._coming.radio_on
-        self._held.sides, self._held.one_way = self._coming.sides, self._coming.one_way
         self._way.hold(pose.copy())
         in_arena = alive.reshape(-1, self._robots).sum(axis=1)
         self._others_alive = np.repeat(in_arena, self._robots) - alive
@@ -120,7 +120,7 @@ class Air:
             raise ValueError(f"until_ns: expected at least {self._now_ns}, got {until_ns}")
         self._now_ns = until_ns
         self._take(*self._way.pass_time(until_ns, self._lives))
-        if not (self._coming.alive.all() and self._coming.radio_on.all()):
+        if self._coming.anyone_out or self._held.anyone_out:
             self._take(*self._way.disrupt(until_ns, self._coming, self._lives))
             self._cut_off(until_ns)
         self._lives.forget(self._way.queued.epoch)

@@ -44,8 +44,10 @@ class DiskWay(Way):
         return self._decided(self._senders.leave(until_ns, self._held), lives)
 
     def disrupt(self, at_ns: int, coming: Disruption, lives: Lives) -> Decided:
-        """The queues of the dead end; what is on air has its fates already."""
-        return self._decided(self._senders.die(at_ns, coming.alive), lives)
+        """The queues of the dead end, those of radios that are off may wait; what is on air has its fates already."""
+        decided = self._decided(self._senders.die(at_ns, coming.alive), lives)
+        self._senders.switch(at_ns, coming)
+        return decided
 
     def drain(self) -> Transmissions:
         """Take out all that is queued."""

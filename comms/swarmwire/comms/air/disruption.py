@@ -1,10 +1,15 @@
 """What keeps robots from sending and hearing, whatever the medium would do."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
+
+# What becomes of the packets that a radio should send while it is off: DROP, they end at the usual pace; NEWEST, the
+# newest waits until it is on again; ALL, they wait in its queue.
+BACKLOGS = ("drop", "newest", "all")
+DROP, NEWEST, ALL = range(3)
 
 
 @dataclass(slots=True)
@@ -13,6 +18,7 @@ class Disruption:
 
     alive: BoolArray  # (rows,)
     radio_on: BoolArray  # (rows,)
+    backlog: IntArray  # (rows,) DROP, NEWEST or ALL, where a radio is off
     sides: IntArray  # (partitions, rows) each robot's set in each partition, from 1; 0: in none
     one_way: IntArray  # (partitions, rows) the same, of those in which only the second does not hear the first
 
@@ -20,12 +26,27 @@ class Disruption:
     def none(cls, rows: int) -> "Disruption":
         """All are alive, with radios on, and no one is kept from anyone."""
         nobody = np.empty((0, rows), np.int64)
-        return cls(np.ones(rows, np.bool_), np.ones(rows, np.bool_), nobody, nobody.copy())
+        return cls(np.ones(rows, np.bool_), np.ones(rows, np.bool_), np.full(rows, DROP), nobody, nobody.copy())
+
+    def become(self, other: "Disruption") -> None:
+        """Take over all that holds in another; the arrays are shared."""
+        for of in fields(self):
+            setattr(self, of.name, getattr(other, of.name))
 
     @property
     def anything(self) -> bool:
         """Whether anybody is kept from anything."""
-        return len(self.sides) + len(self.one_way) > 0 or not (self.alive.all() and self.radio_on.all())
+        return len(self.sides) + len(self.one_way) > 0 or self.anyone_out
+
+    @property
+    def anyone_out(self) -> bool:
+        """Whether anybody is dead, or a radio off."""
+        return not (self.alive.all() and self.radio_on.all())
+
+    @property
+    def kept_back(self) -> IntArray:
+        """What waits at each radio until it is on again, (rows,): NEWEST or ALL; DROP where nothing does."""
+        return np.where(self.radio_on | ~self.alive, DROP, self.backlog)
 
     def apart(self, sender: IntArray, receiver: IntArray) -> BoolArray:
         """From which senders some partition keeps which receivers, pairs of robot rows, (k,)."""

@@ -38,7 +38,10 @@ class Way(ABC):
 
     @abstractmethod
     def disrupt(self, at_ns: int, coming: Disruption, lives: Lives) -> Decided:
-        """Robots that are dead from now on lose their queues, radios that are off what they receive."""
+        """Robots that are dead from now on lose their queues, radios that are off what they receive.
+
+        Called while anybody is dead or off, and once when nobody is any more: queues that waited go on air.
+        """
 
     @abstractmethod
     def drain(self) -> Transmissions:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from swarmwire.comms.air.disruption import Disruption
+from swarmwire.comms.air.disruption import ALL, DROP, Disruption
 from swarmwire.comms.arrays import BoolArray, IntArray
 
 
@@ -19,6 +19,7 @@ class Conditions:
         self._rows = rows
         self.kills: dict[int, BoolArray] = {}  # by event: (rows,) robots that it holds dead
         self.blackouts: dict[int, BoolArray] = {}  # by event: (rows,) robots whose radios it holds off
+        self.backlogs: dict[int, int] = {}  # by blackout: DROP, NEWEST or ALL
         self.partitions: dict[int, IntArray] = {}  # by event: (rows,) the set of each robot, from 1; 0: in none
         self.one_way: dict[int, IntArray] = {}  # by event: (rows,) the same, where the second does not hear the first
 
@@ -32,9 +33,18 @@ class Conditions:
         """Which robots' radios are on, (rows,)."""
         return ~self._any(self.blackouts.values())
 
+    @property
+    def backlog(self) -> IntArray:
+        """What becomes of the packets of radios that are off, (rows,): by the strictest of the blackouts."""
+        least = np.full(self._rows, ALL)
+        for serial, mask in self.blackouts.items():
+            least[mask] = np.minimum(least[mask], self.backlogs[serial])
+        return np.where(self.radio_on, DROP, least)
+
     def disruption(self) -> Disruption:
         """All that matters to the air, as it is now."""
-        return Disruption(self.alive, self.radio_on, self._sides(self.partitions), self._sides(self.one_way))
+        sides, one_way = self._sides(self.partitions), self._sides(self.one_way)
+        return Disruption(self.alive, self.radio_on, self.backlog, sides, one_way)
 
     def _sides(self, of: dict[int, IntArray]) -> IntArray:
         return np.array(list(of.values()), np.int64).reshape(-1, self._rows)

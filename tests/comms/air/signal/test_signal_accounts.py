@@ -99,7 +99,8 @@ def random_disruption(robots: int, rng: np.random.Generator) -> Disruption:
     """Some are dead, some have their radio off, some are kept apart."""
     sides = rng.integers(0, 3, (1, robots))
     one_way = rng.integers(0, 3, (int(rng.integers(0, 2)), robots))
-    return Disruption(rng.random(robots) < 0.7, rng.random(robots) < 0.8, sides, one_way)
+    backlog = rng.integers(0, 3, robots)
+    return Disruption(rng.random(robots) < 0.7, rng.random(robots) < 0.8, backlog, sides, one_way)
 
 
 @pytest.mark.parametrize("method", METHODS)
