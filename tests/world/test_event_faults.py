@@ -30,8 +30,8 @@ def partition(*between: list[str]) -> dict[str, Any]:
 
 FAULTS: list[tuple[Any, str]] = [
     (3, "events.0: expected a table, got 3"),
-    ({"at_s": 1.0}, "events.0.do: is missing; expected one of blackout, kill, partition, revive"),
-    (event("burn"), "events.0.do: expected one of blackout, kill, partition, revive; got 'burn'"),
+    ({"at_s": 1.0}, "events.0.do: is missing; expected one of blackout, kill, partition, ramp, revive"),
+    (event("burn"), "events.0.do: expected one of blackout, kill, partition, ramp, revive; got 'burn'"),
     ({"do": "revive", "robots": FLOCK}, "events.0.at_s: is missing; expected a number of at least 0 and at most 10"),
     (event(at_s=-1.0, robots=FLOCK), "events.0.at_s: expected a number of at least 0 and at most 1000000000 (s), got"),
     (event(robots=FLOCK, for_s=-1.0), "events.0.for_s: expected a number above 0 (s), got -1.0"),
@@ -76,6 +76,33 @@ FAULTS: list[tuple[Any, str]] = [
 ]
 
 
+def ramp(what: str, to: float = 0.5, **keys: Any) -> dict[str, Any]:
+    return event("ramp", what=what, to=to, **keys)
+
+
+FAULTS += [
+    (event("ramp", to=0.5), "events.0.what: is missing; expected a text"),
+    (ramp("loss"), "events.0.what: expected a key of [radio], such as radio.loss; got 'loss'"),
+    (ramp("radio.lose"), "events.0.what: unknown key radio.lose; expected one of range_m, model, preset, "),
+    (ramp("radio.loss.x"), "events.0.what: expected a key of [radio]; radio.loss holds no keys"),
+    (ramp("radio.frame"), "events.0.what: expected a number; radio.frame is a text"),
+    (ramp("radio.gives"), "events.0.what: expected a number; radio.gives is a table"),
+    (
+        ramp("radio.line_of_sight"),
+        "events.0.what: expected a number that the scenario gives; radio.line_of_sight is left",
+    ),
+    (ramp("radio.bursts.bad_s"), "events.0.what: expected a table that the scenario gives; [radio.bursts] is left out"),
+    (
+        ramp("radio.send_offset"),
+        "events.0.what: expected a number that may change; radio.send_offset holds for the whole",
+    ),
+    (ramp("radio.loss", 1.5), "events.0.to: expected at most 1, got 1.5 for radio.loss"),
+    (ramp("radio.latency_s", -1.0), "events.0.to: expected at least 0 s, got -1.0 for radio.latency_s"),
+    (ramp("radio.queue_limit", 2.5), "events.0.to: expected a whole number for radio.queue_limit, got 2.5"),
+    (ramp("radio.loss", over_s=-1.0), "events.0.over_s: expected a number of at least 0 and at most"),
+]
+
+
 @pytest.mark.parametrize(("table", "text"), FAULTS)
 def test_a_fault_is_one_line_with_file_key_and_what_was_expected(table: Any, text: str):
     with pytest.raises(BadInput) as caught:
@@ -84,7 +111,7 @@ def test_a_fault_is_one_line_with_file_key_and_what_was_expected(table: Any, tex
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("table", [event("blackout", robots=FLOCK), partition(["flock"], ["big"])])
+@pytest.mark.parametrize("table", [event("blackout", robots=FLOCK), partition(["flock"], ["big"]), ramp("radio.loss")])
 def test_without_a_radio_there_is_nothing_to_disturb(table: Any):
     mute = {**{key: value for key, value in SAMPLE.items() if key != "radio"}, "events": [table]}
     with pytest.raises(BadInput, match=r"^f: events\.0\.do: expected a scenario with a \[radio\] for"):

@@ -66,10 +66,12 @@ def _check_send_offset(scenario: Scenario, where: str) -> None:
 
 
 def _check_event(scenario: Scenario, event: Event, key: str, where: str) -> None:
-    """An event names robots that there are, and radios only where there is a radio."""
+    """An event names robots that there are, and fits the radio, if it needs one."""
     if event.needs_radio and scenario.radio is None:
         raise BadInput(where, f"{key}.do", f"expected a scenario with a [radio] for {event.do!r}")
     try:
         event.check(scenario.groups())
+        if event.needs_radio and scenario.radio is not None:
+            event.check_radio(scenario.radio)
     except BadInput as error:
         raise BadInput(where, ".".join(part for part in (key, error.key) if part), error.expected) from None

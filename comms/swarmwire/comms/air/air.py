@@ -35,6 +35,8 @@ class News:
 class Air:
     """The emulated medium of every arena of a world; robot row r is robot r % robots of arena r // robots.
 
+    `radio` is what it goes by at the moment.
+
     A packet waits in its sender's queue, goes on air, and ends at each intended receiver in one fate. Tick k starts
     with `advance(its start)`; then come `hold` with the poses of tick k and `send`. So a packet sent in a tick is heard
     in the next at the earliest, and geometry is that of the tick in which the packet goes on air.
@@ -67,7 +69,8 @@ class Air:
         if not radio.is_signal and radio.range_m is None:
             raise ValueError("range_m: expected a range, as a disk has one")
         rows = len(keys) * robots
-        self._radio, self._robots = radio, robots
+        self.radio = self._coming_radio = radio
+        self._robots = robots
         self._held, self._coming = Disruption.none(rows), Disruption.none(rows)
         medium = Medium(radio, keys, robots, obstacles, self._held)
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
@@ -90,6 +93,9 @@ class Air:
         self._lives.now(alive)
         self._held.become(self._coming)
         self._held.alive = alive.copy()
+        if self._coming_radio is not self.radio:
+            self.radio = self._coming_radio
+            self._way.tune(self._now_ns, self.radio)
         self._way.hold(pose.copy())
         in_arena = alive.reshape(-1, self._robots).sum(axis=1)
         self._others_alive = np.repeat(in_arena, self._robots) - alive
@@ -97,6 +103,13 @@ class Air:
     def disrupt(self, coming: Disruption) -> None:
         """This holds from the end of the next `advance` on, until told otherwise."""
         self._coming = coming
+
+    def tune(self, radio: Radio) -> None:
+        """The radio has these numbers from the end of the next `advance` on; all but numbers is as it was.
+
+        What waits or is on air stays so.
+        """
+        self._coming_radio = radio
 
     def send(self, at_ns: int, tick: int, sent: Sent) -> None:
         """Queue the packets that agents sent in the tick that started at `at_ns`; `hold` has told the tick's poses.
@@ -128,8 +141,8 @@ class Air:
         ended = self._links.select(np.flatnonzero(final))
         self._accounts.settle(ended)
         told = News(
-            news.heard(ended, self._on_air, self._radio.gives.columns, self._robots, len(self._others_alive)),
-            news.finished(ended, self._on_air, self._robots, self._radio.is_signal),
+            news.heard(ended, self._on_air, self.radio.gives.columns, self._robots, len(self._others_alive)),
+            news.finished(ended, self._on_air, self._robots, self.radio.is_signal),
             self._accounts.close(),
         )
         self._keep(np.flatnonzero(~final))

@@ -27,6 +27,10 @@ class Senders:
         self._kept_back = np.full(rows, DROP)
         self.queued = Transmissions.none()
 
+    def tune(self, radio: Radio) -> None:
+        """The radio has other numbers for packets to come."""
+        self._radio = radio
+
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """The packets as the radios take them up, sorted by sender; also kept in `queued`.
 

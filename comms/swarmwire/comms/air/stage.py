@@ -34,6 +34,9 @@ class Stage(ABC):
         A stage before reception that ends a link also sets its `in_range` to 0.
         """
 
+    def go_on_from(self, before: "Stage", at_ns: int) -> None:  # noqa: B027 - most stages remember nothing
+        """Remember what a stage of the same kind did, whose radio had other numbers until `at_ns`."""
+
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
         """With which probability lone packets pass, fast fading apart, (k,) or one for all: for the radio graph."""
         return 1.0

@@ -5,6 +5,7 @@ from abc import ABC, abstractmethod
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.lives import Lives
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.packets import Sent
@@ -27,6 +28,10 @@ class Way(ABC):
     @abstractmethod
     def hold(self, pose: FloatArray) -> None:
         """Robots stand at `pose` (rows, 3) from now on, under the disruption that holds; the array stays as it is."""
+
+    def tune(self, at_ns: int, radio: Radio) -> None:
+        """The radio has other numbers from `at_ns` on; what waits or is on air stays so."""
+        raise NotImplementedError
 
     @abstractmethod
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:

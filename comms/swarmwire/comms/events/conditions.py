@@ -5,6 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from swarmwire.comms.air.disruption import ALL, DROP, Disruption
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.tuning import Slope, radio_at
 from swarmwire.comms.arrays import BoolArray, IntArray
 
 
@@ -16,10 +18,11 @@ class Conditions:
     """
 
     def __init__(self, rows: int) -> None:
-        self._rows = rows
+        self.rows = rows
         self.kills: dict[int, BoolArray] = {}  # by event: (rows,) robots that it holds dead
         self.blackouts: dict[int, BoolArray] = {}  # by event: (rows,) robots whose radios it holds off
         self.backlogs: dict[int, int] = {}  # by blackout: DROP, NEWEST or ALL
+        self.slopes: dict[int, Slope] = {}  # by ramp, in the order in which they began
         self.partitions: dict[int, IntArray] = {}  # by event: (rows,) the set of each robot, from 1; 0: in none
         self.one_way: dict[int, IntArray] = {}  # by event: (rows,) the same, where the second does not hear the first
 
@@ -36,10 +39,14 @@ class Conditions:
     @property
     def backlog(self) -> IntArray:
         """What becomes of the packets of radios that are off, (rows,): by the strictest of the blackouts."""
-        least = np.full(self._rows, ALL)
+        least = np.full(self.rows, ALL)
         for serial, mask in self.blackouts.items():
             least[mask] = np.minimum(least[mask], self.backlogs[serial])
         return np.where(self.radio_on, DROP, least)
+
+    def radio_at(self, radio: Radio, at_ns: int) -> Radio:
+        """What ramps have made of the scenario's radio by a time."""
+        return radio_at(radio, self.slopes.values(), at_ns) if self.slopes else radio
 
     def disruption(self) -> Disruption:
         """All that matters to the air, as it is now."""
@@ -47,10 +54,10 @@ class Conditions:
         return Disruption(self.alive, self.radio_on, self.backlog, sides, one_way)
 
     def _sides(self, of: dict[int, IntArray]) -> IntArray:
-        return np.array(list(of.values()), np.int64).reshape(-1, self._rows)
+        return np.array(list(of.values()), np.int64).reshape(-1, self.rows)
 
     def _any(self, masks: Iterable[BoolArray]) -> BoolArray:
-        found = np.zeros(self._rows, np.bool_)
+        found = np.zeros(self.rows, np.bool_)
         for mask in masks:
             found |= mask
         return found

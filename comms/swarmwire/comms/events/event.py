@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import ClassVar
 
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
@@ -33,6 +34,9 @@ class Event(ABC):
     @abstractmethod
     def check(self, groups: Groups) -> None:
         """Raise BadInput, with a key within the event's table, for what does not fit these groups of robots."""
+
+    def check_radio(self, radio: Radio) -> None:  # noqa: B027 - most events fit any radio
+        """Raise BadInput, with a key within the event's table, for what does not fit this radio; it needs one."""
 
     @abstractmethod
     def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:

@@ -7,6 +7,7 @@ from swarmwire.comms.events.blackout import Blackout
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.kill import Kill
 from swarmwire.comms.events.partition import Partition
+from swarmwire.comms.events.ramp import Ramp
 from swarmwire.comms.events.revive import Revive
 
-ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Blackout, Partition)
+ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Blackout, Partition, Ramp)
