@@ -122,7 +122,8 @@ def test_fates_add_up_whatever_happens(radio: Radio, arenas: int, robots: int, s
         sides = rng.integers(0, 3, (int(rng.integers(0, 3)), rows))
         one_way = rng.integers(0, 3, (int(rng.integers(0, 2)), rows))
         backlog = rng.integers(0, 3, rows)
-        now[tick] = Disruption(rng.random(rows) < 0.7, rng.random(rows) < 0.8, backlog, sides, one_way)
+        gain_db = rng.normal(0.0, 3.0, (2, rows))
+        now[tick] = Disruption(rng.random(rows) < 0.7, rng.random(rows) < 0.8, backlog, sides, one_way, *gain_db)
     sent: dict[int, Sent] = {}
     for tick in range(ticks):
         drawn = random_traffic(rng, arenas, robots)

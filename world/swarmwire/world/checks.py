@@ -23,6 +23,7 @@ def check(scenario: Scenario, where: str) -> None:
     _check_send_offset(scenario, where)
     if scenario.radio is not None:
         check_radio(scenario.radio, where)
+    _check_antennas(scenario, where)
     for i, event in enumerate(scenario.events):
         _check_event(scenario, event, f"events.{i}", where)
 
@@ -63,6 +64,13 @@ def _check_send_offset(scenario: Scenario, where: str) -> None:
     if not known:
         expected = "expected uniform, tick, or an offset in s from 0 to below the period of a tick"
         raise BadInput(where, "radio.send_offset", f"{expected}; got {offset!r}")
+
+
+def _check_antennas(scenario: Scenario, where: str) -> None:
+    for group, table in scenario.robots.items():
+        if table.radio is not None and (scenario.radio is None or not scenario.radio.is_signal):
+            why = "a disk knows no strength" if scenario.radio else "there is no [radio]"
+            raise BadInput(where, f"robots.{group}.radio", f"expected a radio with signals: {why}")
 
 
 def _check_event(scenario: Scenario, event: Event, key: str, where: str) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from swarmwire.comms.air import news
 from swarmwire.comms.air.accounts import Accounts
+from swarmwire.comms.air.antennas import Antennas
 from swarmwire.comms.air.disk_way import DiskWay
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.links import HEARD, THE_REST, Links
@@ -60,11 +61,12 @@ class Air:
         rate_hz: int,
         act_every_ticks: IntArray | None = None,
         radius_m: FloatArray | None = None,
+        antennas: Antennas | None = None,
     ) -> None:
         """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out.
 
-        `radius_m` (robots,) are their radii, which count for bodies between two robots; 0 each if left out. ValueError
-        for a disk without `range_m`.
+        `radius_m` (robots,) are their radii, which count for bodies between two robots; 0 each if left out. `antennas`
+        are those of a radio with signals. ValueError for a disk without `range_m`.
         """
         if not radio.is_signal and radio.range_m is None:
             raise ValueError("range_m: expected a range, as a disk has one")
@@ -72,7 +74,7 @@ class Air:
         self.radio = self._coming_radio = radio
         self._robots = robots
         self._held, self._coming = Disruption.none(rows), Disruption.none(rows)
-        medium = Medium(radio, keys, robots, obstacles, self._held)
+        medium = Medium(radio, keys, robots, obstacles, self._held, antennas or Antennas.alike(robots))
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
         self._way: Way

@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
 # What becomes of the packets that a radio should send while it is off: DROP, they end at the usual pace; NEWEST, the
 # newest waits until it is on again; ALL, they wait in its queue.
@@ -21,12 +21,22 @@ class Disruption:
     backlog: IntArray  # (rows,) DROP, NEWEST or ALL, where a radio is off
     sides: IntArray  # (partitions, rows) each robot's set in each partition, from 1; 0: in none
     one_way: IntArray  # (partitions, rows) the same, of those in which only the second does not hear the first
+    send_gain_db: FloatArray  # (rows,) added to the strength of all that a robot sends
+    receive_gain_db: FloatArray  # (rows,) added to the strength of all that a robot hears
 
     @classmethod
     def none(cls, rows: int) -> "Disruption":
         """All are alive, with radios on, and no one is kept from anyone."""
         nobody = np.empty((0, rows), np.int64)
-        return cls(np.ones(rows, np.bool_), np.ones(rows, np.bool_), np.full(rows, DROP), nobody, nobody.copy())
+        return cls(
+            alive=np.ones(rows, np.bool_),
+            radio_on=np.ones(rows, np.bool_),
+            backlog=np.full(rows, DROP),
+            sides=nobody,
+            one_way=nobody,
+            send_gain_db=np.zeros(rows),
+            receive_gain_db=np.zeros(rows),
+        )
 
     def become(self, other: "Disruption") -> None:
         """Take over all that holds in another; the arrays are shared."""

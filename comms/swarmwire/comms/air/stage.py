@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+from swarmwire.comms.air.antennas import Antennas
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.radio import Radio
@@ -19,6 +20,7 @@ class Medium:
     robots: int  # in each arena
     obstacles: Obstacles
     disruption: Disruption  # kept up to date by the air
+    antennas: Antennas  # of robots
 
 
 class Stage(ABC):

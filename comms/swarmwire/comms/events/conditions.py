@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.comms.air.disruption import ALL, DROP, Disruption
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.tuning import Slope, radio_at
-from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
 
 class Conditions:
@@ -22,6 +22,9 @@ class Conditions:
         self.kills: dict[int, BoolArray] = {}  # by event: (rows,) robots that it holds dead
         self.blackouts: dict[int, BoolArray] = {}  # by event: (rows,) robots whose radios it holds off
         self.backlogs: dict[int, int] = {}  # by blackout: DROP, NEWEST or ALL
+        self.gains: dict[
+            int, FloatArray
+        ] = {}  # by event: (2, rows) dB added to what robots send, and to what they hear
         self.slopes: dict[int, Slope] = {}  # by ramp, in the order in which they began
         self.partitions: dict[int, IntArray] = {}  # by event: (rows,) the set of each robot, from 1; 0: in none
         self.one_way: dict[int, IntArray] = {}  # by event: (rows,) the same, where the second does not hear the first
@@ -50,8 +53,16 @@ class Conditions:
 
     def disruption(self) -> Disruption:
         """All that matters to the air, as it is now."""
-        sides, one_way = self._sides(self.partitions), self._sides(self.one_way)
-        return Disruption(self.alive, self.radio_on, self.backlog, sides, one_way)
+        gain_db = sum(self.gains.values(), np.zeros((2, self.rows)))
+        return Disruption(
+            alive=self.alive,
+            radio_on=self.radio_on,
+            backlog=self.backlog,
+            sides=self._sides(self.partitions),
+            one_way=self._sides(self.one_way),
+            send_gain_db=gain_db[0],
+            receive_gain_db=gain_db[1],
+        )
 
     def _sides(self, of: dict[int, IntArray]) -> IntArray:
         return np.array(list(of.values()), np.int64).reshape(-1, self.rows)

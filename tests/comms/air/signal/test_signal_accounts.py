@@ -100,7 +100,8 @@ def random_disruption(robots: int, rng: np.random.Generator) -> Disruption:
     sides = rng.integers(0, 3, (1, robots))
     one_way = rng.integers(0, 3, (int(rng.integers(0, 2)), robots))
     backlog = rng.integers(0, 3, robots)
-    return Disruption(rng.random(robots) < 0.7, rng.random(robots) < 0.8, backlog, sides, one_way)
+    gain_db = rng.normal(0.0, 3.0, (2, robots))
+    return Disruption(rng.random(robots) < 0.7, rng.random(robots) < 0.8, backlog, sides, one_way, *gain_db)
 
 
 @pytest.mark.parametrize("method", METHODS)
