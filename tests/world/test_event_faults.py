@@ -30,8 +30,8 @@ def partition(*between: list[str]) -> dict[str, Any]:
 
 FAULTS: list[tuple[Any, str]] = [
     (3, "events.0: expected a table, got 3"),
-    ({"at_s": 1.0}, "events.0.do: is missing; expected one of blackout, gain, kill, partition, ramp, revive"),
-    (event("burn"), "events.0.do: expected one of blackout, gain, kill, partition, ramp, revive; got 'burn'"),
+    ({"at_s": 1.0}, "events.0.do: is missing; expected one of blackout, gain, jammer, kill, partition, ramp, revive"),
+    (event("burn"), "events.0.do: expected one of blackout, gain, jammer, kill, partition, ramp, revive; got 'burn'"),
     ({"do": "revive", "robots": FLOCK}, "events.0.at_s: is missing; expected a number of at least 0 and at most 10"),
     (event(at_s=-1.0, robots=FLOCK), "events.0.at_s: expected a number of at least 0 and at most 1000000000 (s), got"),
     (event(robots=FLOCK, for_s=-1.0), "events.0.for_s: expected a number above 0 (s), got -1.0"),
@@ -87,6 +87,15 @@ FAULTS += [
         "events.0.do: expected a radio with signals for 'gain': a disk knows no",
     ),
     (event("gain", robots=FLOCK, send_db=1e3), "events.0.send_db: expected a number of at least -200 and at most 100"),
+    (event("jammer", at=[0.0, 0.0]), "events.0.power_dbm: is missing; expected a number of at least -100"),
+    (event("jammer", power_dbm=0.0), "events.0: expected either at = [x, y] or robots"),
+    (event("jammer", at=[0.0, 0.0], robots=FLOCK, power_dbm=0.0), "events.0: expected either at = [x, y] or robots"),
+    (event("jammer", at=[0.0, 0.0], power_dbm=0.0, duty=0.0), "events.0.duty: expected a number above 0 and at most 1"),
+    (event("jammer", at=[0.0], power_dbm=0.0), "events.0.at"),
+    (
+        event("jammer", at=[0.0, 0.0], power_dbm=0.0),
+        "events.0.do: expected a radio with signals for 'jammer': a disk knows no strength",
+    ),
     (event("ramp", to=0.5), "events.0.what: is missing; expected a text"),
     (ramp("loss"), "events.0.what: expected a key of [radio], such as radio.loss; got 'loss'"),
     (ramp("radio.lose"), "events.0.what: unknown key radio.lose; expected one of range_m, model, preset, "),

@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from swarmwire.comms.air.jammers import Jammers
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
 # What becomes of the packets that a radio should send while it is off: DROP, they end at the usual pace; NEWEST, the
@@ -23,6 +24,7 @@ class Disruption:
     one_way: IntArray  # (partitions, rows) the same, of those in which only the second does not hear the first
     send_gain_db: FloatArray  # (rows,) added to the strength of all that a robot sends
     receive_gain_db: FloatArray  # (rows,) added to the strength of all that a robot hears
+    jammers: Jammers
 
     @classmethod
     def none(cls, rows: int) -> "Disruption":
@@ -36,6 +38,7 @@ class Disruption:
             one_way=nobody,
             send_gain_db=np.zeros(rows),
             receive_gain_db=np.zeros(rows),
+            jammers=Jammers.none(),
         )
 
     def become(self, other: "Disruption") -> None:

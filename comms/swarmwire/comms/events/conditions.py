@@ -1,10 +1,12 @@
 """What events hold over robots and radios now, by the event that does."""
 
 from collections.abc import Iterable
+from functools import reduce
 
 import numpy as np
 
 from swarmwire.comms.air.disruption import ALL, DROP, Disruption
+from swarmwire.comms.air.jammers import Jammers
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.tuning import Slope, radio_at
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
@@ -25,6 +27,7 @@ class Conditions:
         self.gains: dict[
             int, FloatArray
         ] = {}  # by event: (2, rows) dB added to what robots send, and to what they hear
+        self.jammers: dict[int, Jammers] = {}  # by event
         self.slopes: dict[int, Slope] = {}  # by ramp, in the order in which they began
         self.partitions: dict[int, IntArray] = {}  # by event: (rows,) the set of each robot, from 1; 0: in none
         self.one_way: dict[int, IntArray] = {}  # by event: (rows,) the same, where the second does not hear the first
@@ -62,6 +65,7 @@ class Conditions:
             one_way=self._sides(self.one_way),
             send_gain_db=gain_db[0],
             receive_gain_db=gain_db[1],
+            jammers=reduce(Jammers.followed_by, self.jammers.values(), Jammers.none()),
         )
 
     def _sides(self, of: dict[int, IntArray]) -> IntArray:

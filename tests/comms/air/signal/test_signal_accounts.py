@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.air.disruption import Disruption
+from swarmwire.comms.air.jammers import Jammers
 from swarmwire.comms.air.propagation.parameters import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.parameters import Bursts
@@ -101,7 +102,9 @@ def random_disruption(robots: int, rng: np.random.Generator) -> Disruption:
     one_way = rng.integers(0, 3, (int(rng.integers(0, 2)), robots))
     backlog = rng.integers(0, 3, robots)
     gain_db = rng.normal(0.0, 3.0, (2, robots))
-    return Disruption(rng.random(robots) < 0.7, rng.random(robots) < 0.8, backlog, sides, one_way, *gain_db)
+    return Disruption(
+        rng.random(robots) < 0.7, rng.random(robots) < 0.8, backlog, sides, one_way, *gain_db, Jammers.none()
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
