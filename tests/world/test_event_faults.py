@@ -91,6 +91,10 @@ FAULTS += [
     (event("jammer", power_dbm=0.0), "events.0: expected either at = [x, y] or robots"),
     (event("jammer", at=[0.0, 0.0], robots=FLOCK, power_dbm=0.0), "events.0: expected either at = [x, y] or robots"),
     (event("jammer", at=[0.0, 0.0], power_dbm=0.0, duty=0.0), "events.0.duty: expected a number above 0 and at most 1"),
+    (
+        event("jammer", at=[0.0, 0.0], power_dbm=0.0, period_s=1e-6),
+        "events.0.period_s: expected at least 0.000010 s, got 1e-06",
+    ),
     (event("jammer", at=[0.0], power_dbm=0.0), "events.0.at"),
     (
         event("jammer", at=[0.0, 0.0], power_dbm=0.0),

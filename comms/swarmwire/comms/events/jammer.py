@@ -19,6 +19,7 @@ from swarmwire.comms.events.swarm import Groups, Swarm
 from swarmwire.comms.parameters import parameter
 
 PHASE = purpose("jammer phase")
+LEAST_PERIOD_S = 10e-6  # less than a symbol of any radio here: noise that comes and goes so fast is constant noise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,9 +38,7 @@ class Jammer(LastingEvent):
         help="what it radiates, alike in all directions", unit="dBm", at_least=-100, at_most=100
     )
     duty: float = parameter(1.0, help="the share of time for which it is on", above=0, at_most=1)
-    period_s: float = parameter(
-        0.01, help="from one time that it goes on to the next", unit="s", at_least=1e-6, at_most=1e6
-    )
+    period_s: float = parameter(0.01, help="from one time that it goes on to the next", unit="s", above=0, at_most=1e6)
     needs_radio = True
 
     def check(self, groups: Groups) -> None:
@@ -48,6 +47,8 @@ class Jammer(LastingEvent):
             raise BadInput("", "", "expected either at = [x, y] or robots")
         if self.robots is not None:
             check_robots(self.robots, groups)
+        if self.period_s < LEAST_PERIOD_S:
+            raise BadInput("", "period_s", f"expected at least {LEAST_PERIOD_S:f} s, got {self.period_s!r}")
 
     def check_radio(self, radio: Radio) -> None:
         """Raise BadInput for a disk, or where nothing on air disturbs anything."""
