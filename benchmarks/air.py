@@ -1,73 +1,121 @@
-"""What the air costs per tick: everybody broadcasts 10 bytes, 1 robot per square metre, about 9 neighbours."""
+"""The air alone, in times real time: everybody broadcasts in each tick of 0.1 s, moves a little, and hears.
 
-import sys
+What is timed is all that a run asks of the air in a tick: time passes, poses are held, packets are sent, and the radio
+graph is drawn. One thread.
+"""
+
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.radio import BearingGiven, Gives, Radio, RangeGiven
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.signal.numbers import range_of
+from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import WallClock, tick_start_ns
+from swarmwire.comms.draws import derive_key
+from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
-from swarmwire.comms.truth import Obstacle
+from swarmwire.deploy.probe import radio_of
 
-RATE_HZ, TICKS, WARM_UP = 10, 200, 20
+RATE_HZ, TICKS, WARM_UP = 10, 60, 10
+STEP_M = 0.05  # deviation of each robot's move in a tick, along each axis
+PLACES_KEY = 1
+SHADOWED = ("radio.shadowing.deviation_db=4", "radio.shadowing.correlation_m=5", "radio.fading.distribution=rayleigh")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A swarm, spread at random over a square, and its radio."""
+
+    preset: str
+    robots: int
+    in_range: float  # other robots within the nominal reach of one far from the border
+    payload_bytes: int
+    keys: tuple[str, ...] = ()
+
+
+    @property
+    def radio(self) -> Radio:
+        """The preset with the keys."""
+        return radio_of(self.preset, list(self.keys))
+
+
 CASES = {
-    "disk": Radio(1.7),
-    "disk, loss, latency, jitter": Radio(1.7, loss=0.3, latency_s=0.1, jitter_s=0.02),
-    "the same with range and bearing, noisy": Radio(
-        1.7, loss=0.3, latency_s=0.1, jitter_s=0.02, gives=Gives(RangeGiven(0.02), BearingGiven(0.05))
-    ),
+    # Shadowing brings more into range than path loss alone would: 25 by path loss are 30 on average, border included.
+    "air-802154-1000": Case("ieee802154", 1000, 25, 20, ("radio.antenna.power_dbm=-20", *SHADOWED)),
+    "air-disk-1000": Case("disk", 1000, 9.5, 20, ("radio.range_m=1.7",)),
+    "air-wifi-80": Case("wifi-a-6M", 80, 600, 128),
 }
+SCALING = Case("ieee802154", 1000, 12, 20, ("radio.antenna.power_dbm=-20", *SHADOWED))
+SIZES = (100, 1000, 10_000)
 
 
-def cost_ms(radio: Radio, arenas: int, robots: int, obstacles: int) -> tuple[float, float, float, float]:
-    """Median milliseconds per tick of send, advance and edges, and packets heard per robot and tick."""
-    clock = WallClock()
-    rng = np.random.default_rng(1)
-    side = robots**0.5
-    rows = arenas * robots
-    placed = tuple(
-        tuple(Obstacle("cylinder", *rng.uniform(-side / 2, side / 2, 2), radius_m=0.1) for _ in range(obstacles))
-        for _ in range(arenas)
+@dataclass(frozen=True)
+class Cost:
+    """What a tick takes, and what happened in it."""
+
+    tick_s: float
+    told: dict[str, Any]
+
+    @property
+    def realtime_factor(self) -> float:
+        """Simulated over elapsed time."""
+        return 1.0 / RATE_HZ / self.tick_s
+
+
+def cost(case: Case, ticks: int = TICKS) -> Cost:
+    """The mean over ticks."""
+    clock, rng, radio, robots = WallClock(), np.random.default_rng(PLACES_KEY), case.radio, case.robots
+    reach_m = range_of(radio)
+    assert reach_m is not None
+    side_m = float(np.sqrt(robots * np.pi * reach_m**2 / case.in_range))
+    keys = np.array([derive_key("arena", 1)], np.uint64)
+    air = Air(radio, keys, robots, (side_m, side_m), obstacle_arrays(((),)), RATE_HZ)
+    pose: FloatArray = np.column_stack(
+        [rng.uniform(-side_m / 2, side_m / 2, (robots, 2)), rng.uniform(-3, 3, (robots, 1))]
     )
-    air = Air(radio, np.arange(arenas, dtype=np.uint64), robots, (side, side), obstacle_arrays(placed), RATE_HZ)
-    pose = np.column_stack([rng.uniform(-side / 2, side / 2, (rows, 2)), rng.uniform(-3, 3, rows)])
-    alive = np.ones(rows, np.bool_)
-    sent = Sent(np.arange(rows), np.full(rows, BROADCAST), Payloads.of([b"0123456789"] * rows))
-    spent = np.zeros((TICKS, 3))
-    heard = 0
-    for tick in range(TICKS):
+    alive = np.ones(robots, np.bool_)
+    sent = Sent(np.arange(robots), np.full(robots, BROADCAST), Payloads.of([bytes(case.payload_bytes)] * robots))
+    spent_ns, in_range, fates = 0, 0, np.zeros(len(Fate), np.int64)
+    for tick in range(WARM_UP + ticks):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        t0 = clock.now_ns()
+        start_ns = clock.now_ns()
         news = air.advance(at_ns)
-        t1 = clock.now_ns()
-        air.edges(pose, alive)
-        t2 = clock.now_ns()
         air.hold(pose, alive)
         air.send(at_ns, tick, sent)
-        spent[tick] = clock.now_ns() - t2, t1 - t0, t2 - t1
-        heard += len(news.heard)
-        pose[:, :2] += rng.normal(0.0, 0.01, (rows, 2))
-    return *(1e-6 * np.median(spent[WARM_UP:], axis=0)), heard / (TICKS * rows)
+        air.edges(pose, alive)
+        if tick >= WARM_UP:
+            spent_ns += clock.now_ns() - start_ns
+            in_range += int(news.tally.in_range.sum())
+            fates += news.tally.fates.sum(axis=0)
+        pose[:, :2] += rng.normal(0.0, STEP_M, (robots, 2))
+    packets = ticks * robots
+    told = {
+        "robots": robots,
+        "rate_hz": RATE_HZ,
+        "payload_bytes": case.payload_bytes,
+        "preset": case.preset,
+        "keys": list(case.keys),
+        "side_m": round(side_m, 1),
+        "in_range": round(in_range / packets, 1),
+        "heard": round(float(fates[Fate.HEARD]) / packets, 1),
+        "collided": round(float(fates[Fate.COLLIDED]) / packets, 1),
+        "ticks": ticks,
+    }
+    return Cost(spent_ns * 1e-9 / ticks, told)
 
 
-def main() -> None:
-    """Print a table; the argument `profile` profiles the largest case instead."""
-    if "profile" in sys.argv:
-        import cProfile
-
-        cost_ms(CASES["disk"], 1, 1000, 0)
-        cProfile.runctx("[cost_ms(radio, 1, 1000, 0) for radio in CASES.values()]", globals(), {}, sort="tottime")
-        return
-    for arenas, robots, obstacles in ((1, 1000, 0), (1, 1000, 10), (8, 20, 0), (8, 20, 10), (1, 10000, 0)):
-        for name, radio in CASES.items():
-            send, advance, edges, heard = cost_ms(radio, arenas, robots, obstacles)
-            print(
-                f"{arenas} x {robots:5} robots, {obstacles:2} obstacles: send {send:6.3f}  advance {advance:6.3f}  "
-                f"edges {edges:6.3f}  sum {send + advance + edges:6.3f} ms, {heard:.1f} heard   {name}"
-            )
+def scaling() -> tuple[float, dict[str, Any]]:
+    """The cost of a link among the most robots over that among the fewest, whichever is dearer on top."""
+    costs = [cost(case_of(robots), ticks=max(10, 20_000 // robots)) for robots in SIZES]
+    links_us = [1e6 * each.tick_s / each.told["robots"] / each.told["in_range"] for each in costs]
+    told = {f"us_per_link_{robots}": round(us, 3) for robots, us in zip(SIZES, links_us, strict=True)}
+    return max(links_us) / min(links_us), {**costs[-1].told, **told}
 
 
-if __name__ == "__main__":
-    main()
+def case_of(robots: int) -> Case:
+    """The scaling case with so many robots."""
+    return Case(SCALING.preset, robots, SCALING.in_range, SCALING.payload_bytes, SCALING.keys)

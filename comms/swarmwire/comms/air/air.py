@@ -140,7 +140,7 @@ class Air:
             self._cut_off(until_ns)
         self._lives.forget(self._way.queued.epoch)
         final = self._links.final_at_ns <= until_ns
-        ended = self._links.select(np.flatnonzero(final))
+        ended = self._links if final.all() else self._links.select(np.flatnonzero(final))
         self._accounts.settle(ended)
         told = News(
             news.heard(ended, self._on_air, self.radio.gives.columns, self._robots, len(self._others_alive)),

@@ -6,6 +6,8 @@ import math
 
 from numba import njit
 
+NEPERS = math.log(10.0) / 10.0  # in a decibel, of power
+
 
 @njit(cache=True)
 def to_db(ratio):
@@ -16,4 +18,4 @@ def to_db(ratio):
 @njit(cache=True)
 def from_db(db):
     """The ratio of powers of a figure in dB: 10^(x / 10); from dBm, the power in mW."""
-    return 10.0 ** (db / 10.0)
+    return math.exp(db * NEPERS)

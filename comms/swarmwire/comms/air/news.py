@@ -21,7 +21,7 @@ def heard(ended: Links, packets: Transmissions, gives: tuple[str, ...], robots: 
     given = ended.given[index]
     return Heard(
         receiver=ended.receiver[index],
-        sender=ended.sender[index] % robots,
+        sender=in_arena(ended.sender[index], robots),
         sequence=ended.sequence[index],
         heard_at_ns=ended.final_at_ns[index],
         given={name: np.ascontiguousarray(given[:, column]) for column, name in enumerate(gives)},
@@ -37,8 +37,8 @@ def finished(ended: Links, packets: Transmissions, robots: int, has_strength: bo
     packet, sender = ended.packet[index], ended.sender[index]
     return Finished(
         arena=sender // robots,
-        sender=sender % robots,
-        receiver=np.where(the_rest[index], THE_REST, ended.receiver[index] % robots),
+        sender=in_arena(sender, robots),
+        receiver=np.where(the_rest[index], THE_REST, in_arena(ended.receiver[index], robots)),
         receivers=ended.receivers[index],
         sequence=ended.sequence[index],
         sent_at_ns=packets.sent_at_ns[packet],
@@ -49,6 +49,11 @@ def finished(ended: Links, packets: Transmissions, robots: int, has_strength: bo
         tag=packets.tag[packet],
         rssi_dbm=ended.rssi_dbm[index] if has_strength else None,
     )
+
+
+def in_arena(row: IntArray, robots: int) -> IntArray:
+    """Indices within their arena of robot rows; numpy divides several at a time, but finds remainders one by one."""
+    return row - row // robots * robots
 
 
 def compacted(index: IntArray, rows: int) -> tuple[IntArray, IntArray]:

@@ -7,20 +7,33 @@ from numba import njit
 
 from swarmwire.comms.arrays import IntArray
 
+MANY = 40  # for sorting by insertion
+
 
 @njit(cache=True)
 def by_receiver(receiver: IntArray, heard_at_ns: IntArray, sender: IntArray, rows: int) -> IntArray:
     """The order by (receiver, heard_at, sender) that keeps ties as they stand, (k,); robots are rows."""
-    # Counting sorts by robot leave only the few packets of one receiver to compare.
+    # Counting sorts by robot leave only the packets of one receiver to compare.
     order, _ = _counting_sort(np.arange(len(sender)), sender, rows)
     order, start = _counting_sort(order, receiver, rows)
     for row in range(rows):
         own = order[start[row] : start[row + 1]]
-        for k in range(1, len(own)):
-            if heard_at_ns[own[k - 1]] > heard_at_ns[own[k]]:
-                own[:] = own[np.argsort(heard_at_ns[own], kind="mergesort")]
-                break
+        if len(own) > MANY:
+            own[:] = own[np.argsort(heard_at_ns[own], kind="mergesort")]
+        else:
+            _insertion_sort(own, heard_at_ns)
     return order
+
+
+@njit(cache=True)
+def _insertion_sort(order, at_ns):
+    """Sort a few indices by time, in place; ties stay as they stand."""
+    for k in range(1, len(order)):
+        moved, place = order[k], k
+        while place > 0 and at_ns[order[place - 1]] > at_ns[moved]:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = moved
 
 
 @njit(cache=True)

@@ -11,20 +11,37 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import special, stats
 
-from swarmwire.comms.air.propagation.fading import fading_gain, fading_law, rayleigh_gain, rician_gain
+from swarmwire.comms.air.propagation.fading import fading_gain, fading_law
 from swarmwire.comms.air.propagation.nakagami import nakagami_gain
 from swarmwire.comms.air.propagation.parameters import Fading
-from swarmwire.comms.air.propagation.scattering import WAVES, scattered
+from swarmwire.comms.air.propagation.scattering import (
+    WAVES,
+    arriving,
+    own_number,
+    scatter_waves,
+    scattered,
+    signs_of,
+)
 from swarmwire.comms.draws import derive_key
 
 KEY = np.uint64(derive_key("fading"))
 PER_M = 2.44e9 / 299_792_458.0
+ARENA, RAYLEIGH = scatter_waves(KEY, PER_M), fading_law(Fading(), 2.44e9)
 PAIRS = 15_000
 STANDARD_ERRORS = 4.4
 PLACES = np.random.default_rng(5).uniform(-50.0, 50.0, (PAIRS, 4))
 ROBOTS = [(pair % 150, 150 + pair // 150) for pair in range(PAIRS)]
 METRES = st.floats(-100.0, 100.0)
 INDICES = st.integers(0, 999)
+
+
+def rayleigh_gain(key: np.uint64, a: int, b: int, per_m: float, *place: float) -> float:
+    return float(fading_gain(RAYLEIGH._replace(wave_number=per_m), key, a, b, *place))
+
+
+def rician_gain(key: np.uint64, a: int, b: int, per_m: float, ax: float, ay: float, bx: float, by: float, k: float):
+    law = fading_law(Fading("rician", k=k), 2.44e9)._replace(wave_number=per_m)
+    return float(fading_gain(law, key, a, b, ax, ay, bx, by))
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +57,14 @@ def is_mean(values: np.ndarray, expected: float) -> bool:
 
 def waves(place: np.ndarray, pairs: int) -> np.ndarray:
     """h of the first pairs with its ends at `place`, complex."""
-    return np.array([complex(*scattered(KEY, a, b, PER_M, *place)) for a, b in ROBOTS[:pairs]])
+    return np.array([h_of(a, b, place) for a, b in ROBOTS[:pairs]])
+
+
+def h_of(a: int, b: int, place: np.ndarray) -> complex:
+    at, parts = np.empty((2, 4, WAVES), np.float32), np.empty((2, WAVES), np.float32)
+    for robot in range(2):
+        arriving(ARENA, *place[2 * robot : 2 * robot + 2], at[robot])
+    return complex(*scattered(signs_of(own_number(KEY, a), own_number(KEY, b)), at, 0, 1, *parts))
 
 
 def test_power_without_line_of_sight_is_exponential(rayleigh: np.ndarray):
@@ -111,9 +135,7 @@ def test_a_single_link_decorrelates_as_all_do_while_both_robots_move():
     step = np.array([0.25, 0.0, 0.0, 0.25]) / PER_M
     expected = special.j0(0.5 * np.pi) ** 2
     for a, b in ROBOTS[::2500]:
-        here, there = (
-            np.array([complex(*scattered(KEY, a, b, PER_M, *at)) for at in xs]) for xs in (places, places + step)
-        )
+        here, there = (np.array([h_of(a, b, at) for at in xs]) for xs in (places, places + step))
         assert np.mean((there * here.conj()).real) == pytest.approx(expected, abs=0.08)
 
 

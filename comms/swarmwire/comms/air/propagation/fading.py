@@ -5,15 +5,23 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.propagation.loss_curve import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.air.propagation.nakagami import nakagami_gain
 from swarmwire.comms.air.propagation.parameters import FADINGS, Fading
-from swarmwire.comms.air.propagation.scattering import scattered
+from swarmwire.comms.air.propagation.scattering import (
+    WAVES,
+    arriving,
+    own_number,
+    scatter_waves,
+    scattered,
+    signs_of,
+)
 from swarmwire.comms.air.propagation.waves import cosine, sine
 
-_, RICIAN, NAKAGAMI = range(len(FADINGS))
+RAYLEIGH, RICIAN, NAKAGAMI = range(len(FADINGS))
 
 
 class FadingLaw(NamedTuple):
@@ -35,34 +43,36 @@ def fading_law(fading: Fading, frequency_hz: float) -> FadingLaw:
 def fading_gain(law, key, a, b, ax, ay, bx, by):
     """Power gain between robots a and b, indices in the arena with this key, at (ax, ay) and (bx, by) in m.
 
-    A ratio, mean 1; equal both ways to the last bit.
+    A ratio, mean 1; equal both ways to the last bit. For many links between few robots see `gain_of`.
     """
+    if b < a:
+        a, ax, ay, b, bx, by = b, bx, by, a, ax, ay
+    at = np.empty((2, 4, WAVES), np.float32)
+    waves = scatter_waves(key, law.wave_number)
+    arriving(waves, ax, ay, at[0])
+    arriving(waves, bx, by, at[1])
+    parts, signs = np.empty((2, WAVES), np.float32), signs_of(own_number(key, a), own_number(key, b))
+    h = scattered(signs, at, 0, 1, parts[0], parts[1])
+    return gain_of(law, h, math.sqrt((bx - ax) ** 2 + (by - ay) ** 2))
+
+
+@njit(cache=True)
+def gain_of(law, h, distance_m):
+    """The gain by the law, of `scattered`'s h between robots so many m apart; a ratio, mean 1."""
+    real, imaginary = h
     if law.distribution == RICIAN:
-        return rician_gain(key, a, b, law.wave_number, ax, ay, bx, by, law.k)
-    gain = rayleigh_gain(key, a, b, law.wave_number, ax, ay, bx, by)
+        return rician_gain(real, imaginary, law.k, law.wave_number * distance_m)
+    gain = real * real + imaginary * imaginary
     return nakagami_gain(gain, law.m) if law.distribution == NAKAGAMI else gain
 
 
 @njit(cache=True)
-def rayleigh_gain(key, a, b, wave_number, ax, ay, bx, by):
-    """Power gain without line of sight: exponential, mean 1. Robots a and b in either order, equal to the last bit."""
-    if b < a:
-        a, ax, ay, b, bx, by = b, bx, by, a, ax, ay
-    real, imaginary = scattered(key, a, b, wave_number, ax, ay, bx, by)
-    return real * real + imaginary * imaginary
+def rician_gain(real, imaginary, k, path):
+    """Rice's gain: beside the scattered waves a direct one, with k >= 0 times their power.
 
-
-@njit(cache=True)
-def rician_gain(key, a, b, wave_number, ax, ay, bx, by, k):
-    """Power gain with a direct wave that carries k >= 0 times the power of all others: Rice's, mean 1.
-
-    The direct wave's phase is its path's length in wavelengths. k = 0 is Rayleigh.
+    Its phase is its path's length in wavelengths. k = 0 is Rayleigh.
     """
-    if b < a:
-        a, ax, ay, b, bx, by = b, bx, by, a, ax, ay
-    real, imaginary = scattered(key, a, b, wave_number, ax, ay, bx, by)
     direct, others = math.sqrt(k / (k + 1.0)), math.sqrt(1.0 / (k + 1.0))
-    path = wave_number * math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
     real = direct * cosine(path) + others * real
     imaginary = direct * sine(path) + others * imaginary
     return real * real + imaginary * imaginary

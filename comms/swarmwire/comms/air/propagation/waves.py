@@ -37,11 +37,10 @@ def cosine(turns):
 
 @njit(cache=True, error_model="numpy")
 def total(parts):
-    """The sum of an array whose length is a multiple of four; in four strands, as one would wait for each addition."""
-    a, b, c, d = 0.0, 0.0, 0.0, 0.0
-    for n in range(0, len(parts), 4):
-        a += parts[n]
-        b += parts[n + 1]
-        c += parts[n + 2]
-        d += parts[n + 3]
-    return (a + b) + (c + d)
+    """The sum of an array whose length is a power of two, by halves, in an order of its own; the array is used up."""
+    width = len(parts) // 2
+    while width >= 1:
+        for n in range(width):
+            parts[n] += parts[n + width]
+        width //= 2
+    return parts[0]

@@ -8,62 +8,68 @@ was not understood the air counts as free only EIFS later (IEEE 802.11-2007, 9.2
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
+from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import SEND, cancel, due_ns, schedule
-from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY, SILENT
+from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 
 SLOTS, SLOTS_BEFORE = purpose("dcf slots"), purpose("dcf slots before sending")
 
 
-@njit(cache=True)
+@borrowing()
 def want(rules, state, queue, r, now_ns):
     """The robot wants to send the packet that it serves."""
     me = state.robot[r]
     me.stage = BACKING_OFF
-    if me.is_busy:
+    if state.reception[r].is_busy:
         _wait_if_none_left(rules, state, r)
         return
     counted_ns = me.free_from_ns + me.slots * rules.slot_ns
     schedule(queue, SEND, r, max(now_ns, counted_ns) + rules.difs_ns)
 
 
-@njit(cache=True)
-def sense(rules, state, queue, r, now_ns):
-    """What is on air at the robot may have changed."""
-    me = state.robot[r]
-    busy = me.on_air != SILENT or me.locked_to != NOBODY or me.power_mw >= rules.busy_mw
-    if busy and not me.is_busy:
-        me.is_busy = 1
+@borrowing(inline="always")
+def has_changed(rules, reception):
+    """Whether the air at a robot has become busy, or free, since `change` was last called."""
+    is_busy = reception.is_deaf or reception.locked_to != NOBODY
+    is_busy = is_busy or reception.power_mw + reception.jam_mw >= rules.busy_mw
+    return is_busy != (reception.is_busy != 0)
+
+
+@borrowing()
+def change(rules, state, queue, r, now_ns):
+    """The air at the robot has become busy, or free."""
+    me, reception = state.robot[r], state.reception[r]
+    reception.is_busy = not reception.is_busy
+    if reception.is_busy:
         counted = (now_ns - me.free_from_ns - rules.difs_ns) // rules.slot_ns
         me.slots = max(me.slots - max(counted, 0), 0)
         # Who sends at this very moment cannot have heard the other.
         if me.stage == BACKING_OFF and due_ns(queue, SEND, r) > now_ns:
             cancel(queue, SEND, r)
-    elif me.is_busy and not busy:
-        me.is_busy = 0
+    else:
         me.free_from_ns = max(now_ns, me.trust_from_ns)
         if me.stage == BACKING_OFF:
             schedule(queue, SEND, r, me.free_from_ns + rules.difs_ns + me.slots * rules.slot_ns)
 
 
-@njit(cache=True)
+@borrowing()
 def wait_after(rules, state, r):
     """The robot's frame is off air: new slots, keyed by (robot, sequence, attempt)."""
     me = state.robot[r]
     me.slots = _slots(rules, state, r, SLOTS)
 
 
-@njit(cache=True)
+@borrowing()
 def _wait_if_none_left(rules, state, r):
     me = state.robot[r]
     if me.slots == 0:
         me.slots = _slots(rules, state, r, SLOTS_BEFORE)
 
 
-@njit(cache=True)
+@borrowing()
 def _slots(rules, state, r, what_for):
     me = state.robot[r]
     packet = state.packet[me.packet]

@@ -2,9 +2,8 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from numba import njit
-
-from swarmwire.comms.air.signal import service
+from swarmwire.comms.air.signal import on_air, service
+from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import ENTER, LISTENED, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY, RECEIVING, SILENT
 from swarmwire.comms.fates import Fate
@@ -13,7 +12,7 @@ SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_
 FEW = 64  # rows that any one event tells beyond a frame's links
 
 
-@njit(cache=True)
+@borrowing()
 def line_up(state, queue, start):
     """Before events run: the packets of robot r are order[start[r]:start[r + 1]], those done taken out."""
     for r in range(len(state.robot)):
@@ -33,12 +32,11 @@ def line_up(state, queue, start):
             schedule(queue, ENTER, r, state.packet[state.order[at]].sent_at_ns)
 
 
-@njit(cache=True)
-def run_until(rules, bursts, state, queue, told, first, stop, hold, most_links, until_ns):
+@borrowing()
+def run_until(rules, bursts, state, queue, told, most_links, until_ns):
     """Let happen what is due before `until_ns`; False if `told` has no more room: then take it out and call again.
 
-    `first` and `stop` (rows,) are the links of each robot under the poses held, which are those of `hold`; no robot has
-    more than `most_links`.
+    No robot has more than `most_links`.
     """
     rows = len(state.robot)
     while queue.size[0] > 0:
@@ -48,7 +46,7 @@ def run_until(rules, bursts, state, queue, told, first, stop, hold, most_links, 
             break
         kind, r = event // rows, event % rows
         queued = state.robot[r].stop - state.robot[r].next
-        if told.count[0] + most_links + queued + FEW > len(told.power_mw):
+        if told.count[0] + most_links + queued + FEW > len(told.packet):
             return False
         cancel(queue, kind, r)
         if kind == OFF_AIR:
@@ -58,15 +56,15 @@ def run_until(rules, bursts, state, queue, told, first, stop, hold, most_links, 
         elif kind == TIMER:
             service.timer(rules, state, queue, told, r, now_ns)
         elif kind == SEND:
-            service.send(rules, state, queue, r, now_ns, first[r], stop[r], hold)
+            service.send(rules, state, queue, r, now_ns)
         elif kind == ENTER:
             service.enter(rules, state, queue, told, r, now_ns)
         else:
-            service.answer(rules, state, queue, r, now_ns, first[r], stop[r], hold)
+            service.answer(rules, state, queue, r, now_ns)
     return True
 
 
-@njit(cache=True)
+@borrowing()
 def stop_the_dead(state, queue, told, alive, now_ns):
     """The queues of robots that are not alive (rows,) end; after `line_up`."""
     for r in range(len(state.robot)):
@@ -74,16 +72,15 @@ def stop_the_dead(state, queue, told, alive, now_ns):
             service.stop(state, queue, told, r, now_ns, SENDER_DEAD)
 
 
-@njit(cache=True)
+@borrowing()
 def cut_off(state, alive, radio_on):
     """Robots that are dead (rows,), or whose radio is off, do not hear the frames on air to their end."""
     for s in range(len(state.robot)):
         me = state.robot[s]
         if me.on_air == SILENT:
             continue
-        for i in range(me.first_link, me.stop_link):
-            link = state.link[i]
-            r = link.receiver
-            if link.now == RECEIVING and not (alive[r] and radio_on[r]):
-                link.now = BLACKOUT if alive[r] else RECEIVER_DEAD
-                state.robot[r].locked_to = NOBODY
+        for i in range(me.first_link, me.weak_link):
+            r = state.link.receiver[i]
+            if state.link.now[i] == RECEIVING and not (alive[r] and radio_on[r]):
+                state.link.now[i] = BLACKOUT if alive[r] else RECEIVER_DEAD
+                on_air.let_go(state.reception[r])

@@ -1,8 +1,8 @@
 """The table of links: who is near enough to whom to hear or to disturb, and how strong.
 
-Power = transmit power + both antennas - path loss - shadowing - walls - bodies, and fading on top. All of it is the
-same both ways and depends on poses alone, so that each pair is computed once. A pair is left out if path loss alone, or
-all but fading, leaves it below the cut-off: it neither hears nor disturbs.
+Power = transmit power + both antennas - path loss - shadowing - walls - bodies, and fading on top. All but the sender's
+power and event-made differences is the same both ways and depends on poses alone, so that each pair is computed once.
+A pair is left out if path loss alone, or all but fading, leaves it below the cut-off: it neither hears nor disturbs.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -14,13 +14,11 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms import grid
-from swarmwire.comms.air.decibels import from_db
+from swarmwire.comms.air.propagation import scattering, shadowing
 from swarmwire.comms.air.propagation.bodies_between import bodies_between
-from swarmwire.comms.air.propagation.fading import FadingLaw, fading_gain
-from swarmwire.comms.air.propagation.link_budget import rssi_dbm
+from swarmwire.comms.air.propagation.fading import FadingLaw, gain_of
 from swarmwire.comms.air.propagation.loss_curve import LossCurve
 from swarmwire.comms.air.propagation.path_loss import loss_db
-from swarmwire.comms.air.propagation.shadowing import shadowing_db
 from swarmwire.comms.air.propagation.walls import wall_loss_db
 from swarmwire.comms.air.reach import CELL_SLACK, _strip
 from swarmwire.comms.arrays import FloatArray, IntArray
@@ -30,14 +28,14 @@ from swarmwire.comms.geometry import Obstacles, is_blocked
 class Surroundings(NamedTuple):
     """Propagation in numbers."""
 
-    power_dbm: float
-    gain_dbi: float
+    send_dbm: FloatArray  # (rows,) transmit power and antenna gain
+    receive_dbi: FloatArray  # (rows,) antenna gain
     curve: LossCurve
     reach_m: float  # no link is longer
     least_dbm: float  # no link is weaker, fading apart
     shadows: bool
     amplitude_db: float
-    waves: FloatArray  # (arenas, 3, n), as `field_waves` has them
+    field: FloatArray  # (arenas, 3, n), as `field_waves` has them
     walls: bool
     crossing_db: float
     inside_db_per_m: float
@@ -48,6 +46,7 @@ class Surroundings(NamedTuple):
     most_radius_m: float
     fades: bool
     law: FadingLaw
+    scatter: FloatArray  # (arenas, 5, n), as `scatter_waves` has them
 
 
 class Pairs(NamedTuple):
@@ -55,87 +54,123 @@ class Pairs(NamedTuple):
 
     a: IntArray  # (k,)
     b: IntArray  # (k,)
-    mean_dbm: FloatArray  # (k,) without fading
-    power_mw: FloatArray  # (k,) with fading
+    loss_db: FloatArray  # (k,) without antennas and fading
+    gain: FloatArray  # (k,) of fading, a ratio
     blocked: IntArray  # (k,) 1 where an obstacle stands in a needed line of sight
 
 
 def pairs_of(pose: FloatArray, size_m: tuple[float, float], keys, obstacles: Obstacles, around: Surroundings) -> Pairs:
     """All pairs above the cut-off of robots that stand at `pose` (rows, 3)."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-    arenas = len(keys)
-    cells = grid.build(x, y, arenas, size_m, around.reach_m * CELL_SLACK)
-    robots = len(x) // arenas
-    a, b = _near(x, y, robots, cells, around.reach_m)
-    kept, mean_dbm, power_mw, blocked = _strengths(x, y, robots, keys, obstacles, cells, around, a, b)
-    return Pairs(a[kept], b[kept], mean_dbm[kept], power_mw[kept], blocked[kept])
+    robots = len(x) // len(keys)
+    cells = grid.build(x, y, len(keys), size_m, around.reach_m * CELL_SLACK)
+    a, b, loss = _near(x, y, robots, cells, around.reach_m, around.curve)
+    if around.shadows:
+        _add_shadows(loss, x, y, robots, around.field, around.amplitude_db, a, b)
+    if around.walls:
+        _add_walls(loss, x, y, robots, obstacles, around.crossing_db, around.inside_db_per_m, a, b)
+    if around.bodies:
+        _add_bodies(loss, x, y, robots, cells, around.radius_m, around.most_radius_m, around.body_db, a, b)
+    a, b, loss = _above(around.least_dbm, around.send_dbm, around.receive_dbi, a, b, loss)
+    gain, blocked = np.ones(len(a)), np.zeros(len(a), np.int64)
+    if around.fades:
+        _fade(gain, x, y, robots, keys, around.scatter, around.law, a, b)
+    if around.line_of_sight:
+        _find_blocked(blocked, x, y, robots, obstacles, a, b)
+    return Pairs(a, b, loss, gain, blocked)
 
 
 @njit(cache=True)
-def both_ways(rows, a, b):
-    """Links by sender: order (2k,) of directed links (k of a to b, then k of b to a), and start (rows + 1,)."""
-    k = len(a)
-    start = np.zeros(rows + 1, np.int64)
-    for i in range(k):
-        start[a[i] + 1] += 1
-        start[b[i] + 1] += 1
-    for r in range(rows):
-        start[r + 1] += start[r]
-    filled = start[:-1].copy()
-    order = np.empty(2 * k, np.int64)
-    for i in range(k):
-        order[filled[a[i]]] = i
-        filled[a[i]] += 1
-        order[filled[b[i]]] = k + i
-        filled[b[i]] += 1
-    return order, start
-
-
-@njit(cache=True)
-def _near(x, y, robots, cells, reach_m):
+def _near(x, y, robots, cells, reach_m, curve):
+    """Pairs within reach, and their path loss in dB."""
     most = 0
-    for s in range(len(x)):
-        for j in range(-1, 2):
-            first, stop = _strip(x[s], y[s], s // robots, cells, j)
+    for at in range(len(x)):
+        for j in range(2):
+            first, stop = _ahead(x, y, robots, cells, at, j)
             most += stop - first
-    a, b = np.empty(most, np.int64), np.empty(most, np.int64)
+    a, b, metres2 = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
     found = 0
-    for s in range(len(x)):
-        for j in range(-1, 2):
-            first, stop = _strip(x[s], y[s], s // robots, cells, j)
-            for at in range(first, stop):
-                r = cells.order[at]
+    for at in range(len(x)):
+        s = cells.order[at]
+        for j in range(2):
+            first, stop = _ahead(x, y, robots, cells, at, j)
+            for k in range(first, stop):
+                r = cells.order[k]
                 dx, dy = x[r] - x[s], y[r] - y[s]
-                a[found], b[found] = s, r
-                found += (r > s) & (dx * dx + dy * dy <= reach_m * reach_m)
-    return a[:found].copy(), b[:found].copy()
+                # Written first and kept if it counts: a branch would be guessed wrong too often.
+                a[found], b[found], metres2[found] = min(s, r), max(s, r), dx * dx + dy * dy
+                found += metres2[found] <= reach_m * reach_m
+    loss = np.empty(found)
+    for i in range(found):
+        loss[i] = loss_db(curve, math.sqrt(metres2[i]))
+    return a[:found].copy(), b[:found].copy(), loss
 
 
 @njit(cache=True)
-def _strengths(x, y, robots, keys, obstacles, cells, around, a, b):
-    kept = np.zeros(len(a), np.bool_)
-    mean_dbm, power_mw, blocked = np.zeros(len(a)), np.zeros(len(a)), np.zeros(len(a), np.int64)
+def _ahead(x, y, robots, cells, at, j):
+    """First and stop in the grid's order of those that the robot at `at` in it makes pairs with.
+
+    What comes later in its own row of cells (j = 0), and the row above (j = 1).
+    """
+    s = cells.order[at]
+    first, stop = _strip(x[s], y[s], s // robots, cells, j)
+    return (at + 1, stop) if j == 0 else (first, stop)
+
+
+@njit(cache=True)
+def _add_shadows(loss, x, y, robots, field, amplitude_db, a, b):
+    waves, single = field.shape[2], np.float32
+    height, parts, coarse = np.empty((len(x), waves), single), np.empty(waves, single), field.astype(single)
+    for r in range(len(x)):
+        shadowing.heights(field[r // robots], x[r], y[r], height[r])
     for i in range(len(a)):
         s, r = a[i], b[i]
-        arena = s // robots
+        dx, dy = single(x[r] - x[s]), single(y[r] - y[s])
+        loss[i] += shadowing.between_db(coarse, s // robots, amplitude_db, height, s, r, dx, dy, parts)
+
+
+@njit(cache=True)
+def _add_walls(loss, x, y, robots, obstacles, crossing_db, inside_db_per_m, a, b):
+    for i in range(len(a)):
+        s, r = a[i], b[i]
+        loss[i] += wall_loss_db(obstacles, s // robots, crossing_db, inside_db_per_m, x[s], y[s], x[r], y[r])
+
+
+@njit(cache=True)
+def _add_bodies(loss, x, y, robots, cells, radius_m, most_radius_m, body_db, a, b):
+    for i in range(len(a)):
+        loss[i] += body_db * bodies_between(x, y, radius_m, most_radius_m, cells, robots, a[i], b[i])
+
+
+@njit(cache=True)
+def _above(least_dbm, send_dbm, receive_dbi, a, b, loss):
+    """Pairs in which either hears the other with so much power."""
+    kept = 0
+    for i in range(len(a)):
+        s, r = a[i], b[i]
+        best_dbm = max(send_dbm[s] + receive_dbi[r], send_dbm[r] + receive_dbi[s]) - loss[i]
+        a[kept], b[kept], loss[kept] = s, r, loss[i]
+        kept += best_dbm >= least_dbm
+    return a[:kept].copy(), b[:kept].copy(), loss[:kept].copy()
+
+
+@njit(cache=True)
+def _fade(gain, x, y, robots, keys, scatter, law, a, b):
+    waves = scatter.shape[2]
+    at, parts = np.empty((len(x), 4, waves), np.float32), np.empty((2, waves), np.float32)
+    real, imaginary, number = parts[0], parts[1], np.empty(len(x), np.uint64)
+    for r in range(len(x)):
+        scattering.arriving(scatter[r // robots], x[r], y[r], at[r])
+        number[r] = scattering.own_number(keys[r // robots], r % robots)
+    for i in range(len(a)):
+        s, r = a[i], b[i]
+        h = scattering.scattered(scattering.signs_of(number[s], number[r]), at, s, r, real, imaginary)
         dx, dy = x[r] - x[s], y[r] - y[s]
-        loss = loss_db(around.curve, math.sqrt(dx * dx + dy * dy))
-        if around.shadows:
-            loss += shadowing_db(around.waves[arena], around.amplitude_db, x[s], y[s], x[r], y[r])
-        if around.walls:
-            crossing_db, inside_db_per_m = around.crossing_db, around.inside_db_per_m
-            loss += wall_loss_db(obstacles, arena, crossing_db, inside_db_per_m, x[s], y[s], x[r], y[r])
-        if around.bodies:
-            between = bodies_between(x, y, around.radius_m, around.most_radius_m, cells, robots, s, r)
-            loss += between * around.body_db
-        mean_dbm[i] = rssi_dbm(around.power_dbm, around.gain_dbi, around.gain_dbi, loss)
-        kept[i] = mean_dbm[i] >= around.least_dbm
-        if not kept[i]:
-            continue
-        power_mw[i] = from_db(mean_dbm[i])
-        if around.fades:
-            key = keys[arena]
-            power_mw[i] *= fading_gain(around.law, key, s % robots, r % robots, x[s], y[s], x[r], y[r])
-        if around.line_of_sight:
-            blocked[i] = is_blocked(obstacles, arena, x[s], y[s], x[r], y[r])
-    return kept, mean_dbm, power_mw, blocked
+        gain[i] = gain_of(law, h, math.sqrt(dx * dx + dy * dy))
+
+
+@njit(cache=True)
+def _find_blocked(blocked, x, y, robots, obstacles, a, b):
+    for i in range(len(a)):
+        s, r = a[i], b[i]
+        blocked[i] = is_blocked(obstacles, s // robots, x[s], y[s], x[r], y[r])

@@ -5,10 +5,11 @@
 import numpy as np
 
 from swarmwire.comms.air.disruption import Disruption
-from swarmwire.comms.air.signal.link_table import Pairs, Surroundings, both_ways, pairs_of
-from swarmwire.comms.air.signal.tables import LINK, NOBODY, SILENT, Table
+from swarmwire.comms.air.signal.link_table import Pairs, Surroundings, pairs_of
+from swarmwire.comms.air.signal.links_by_sender import Levels, links_by_sender
+from swarmwire.comms.air.signal.tables import NOBODY, SILENT, LinkPlaces, LinkTable, Table
 from swarmwire.comms.air.stage import Medium
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from swarmwire.comms.fates import Fate
 
 
@@ -16,60 +17,63 @@ class LinksHeld:
     """A table of links that frames on air keep theirs in while robots move.
 
     Attributes:
-        link: (links,) of dtype LINK.
-        first, stop: (rows,) the links of each robot under the poses held.
+        link: the links.
+        places: those of each robot under the poses held.
         pairs: the pairs of robots that these links join.
     """
 
-    def __init__(self, medium: Medium, size_m: tuple[float, float], around: Surroundings, listed_dbm: float) -> None:
-        self._medium, self._size_m, self._around, self._listed_dbm = medium, size_m, around, listed_dbm
-        self._rows = len(medium.keys) * medium.robots
-        self.link: Table = np.zeros(0, LINK)
-        self.first, self.stop = np.zeros(self._rows, np.int64), np.zeros(self._rows, np.int64)
-        self.pose = np.zeros((self._rows, 3))
+    def __init__(self, medium: Medium, size_m: tuple[float, float], around: Surroundings, levels: Levels) -> None:
+        self._medium, self._size_m, self._around, self._levels = medium, size_m, around, levels
+        rows = len(medium.keys) * medium.robots
+        self.pose = np.zeros((rows, 3))
         self.pairs = self.pairs_at(self.pose)
+        self.link, self.places = self._links()
 
     def pairs_at(self, pose: FloatArray) -> Pairs:
         """The pairs of robots that stand at `pose` (rows, 3)."""
         return pairs_of(pose, self._size_m, self._medium.keys, self._medium.obstacles, self._around)
 
-    def move(self, pose: FloatArray, robot: Table) -> None:
-        """Robots stand at `pose` from now on; `robot` (rows,) of dtype ROBOT is told where its links are."""
-        kept = self._keep_on_air(robot)
+    def worse_dbm(self, pairs: Pairs) -> FloatArray:
+        """The mean power of each pair in the direction that has less, (k,)."""
+        send_dbm, receive_dbi = self._around.send_dbm, self._around.receive_dbi
+        there, back = send_dbm[pairs.a] + receive_dbi[pairs.b], send_dbm[pairs.b] + receive_dbi[pairs.a]
+        return np.minimum(there, back) - pairs.loss_db
+
+    def move(self, pose: FloatArray, robot: Table, reception: Table) -> None:
+        """Robots stand at `pose` from now on; tables of dtype ROBOT and RECEPTION are told where their links are."""
+        kept = self._keep_on_air(robot, reception)
         self.pose, self.pairs = pose, self.pairs_at(pose)
-        pairs = self.pairs
-        order, start = both_ways(self._rows, pairs.a, pairs.b)
-        pair = order % max(len(pairs.a), 1)
-        sender = np.concatenate([pairs.a, pairs.b])[order]
-        link: Table = np.zeros(len(order), LINK)
-        link["receiver"] = np.concatenate([pairs.b, pairs.a])[order]
-        link["power_mw"] = pairs.power_mw[pair]
-        link["is_listed"] = pairs.mean_dbm[pair] >= self._listed_dbm
-        link["fate"] = _fates(self._medium.disruption, sender, link["receiver"], pairs.blocked[pair])
-        self.link = np.concatenate([kept, link])
-        self.first, self.stop = start[:-1] + len(kept), start[1:] + len(kept)
+        link, places = self._links()
+        before = len(kept.receiver)
+        self.link = LinkTable._make(np.concatenate(columns) for columns in zip(kept, link, strict=True))
+        self.places = LinkPlaces._make(place + before for place in places)
 
     def reached(self, sender: IntArray) -> tuple[IntArray, IntArray]:
         """The place of each sender and the receivers in range of it, which nothing blocks, under the poses held."""
-        counts = self.stop[sender] - self.first[sender]
-        at = np.repeat(np.arange(len(sender)), counts)
-        link = self.link[_ranges(self.first[sender], counts)]
-        counts_as = (link["is_listed"] > 0) & (link["fate"] != Fate.BLOCKED)
-        return at[counts_as], link["receiver"][counts_as]
+        first = self.places.first[sender]
+        counts = self.places.weak[sender] - first
+        at, link = np.repeat(np.arange(len(sender)), counts), _ranges(first, counts)
+        counts_as = self.link.is_listed[link] & (self.link.fate[link] != Fate.BLOCKED)
+        return at[counts_as], self.link.receiver[link[counts_as]].astype(np.int64)
 
-    def _keep_on_air(self, robot: Table) -> Table:
+    def _links(self) -> tuple[LinkTable, LinkPlaces]:
+        pairs, now = self.pairs, self._medium.disruption
+        fate = np.stack([_fates(now, *ends, pairs.blocked) for ends in ((pairs.a, pairs.b), (pairs.b, pairs.a))])
+        return links_by_sender(pairs, self._around.send_dbm, self._around.receive_dbi, fate, self._levels)
+
+    def _keep_on_air(self, robot: Table, reception: Table) -> LinkTable:
         """The links of frames on air, and where they are from now on."""
         on_air = np.flatnonzero(robot["on_air"] != SILENT)
         first = robot["first_link"][on_air]
         counts = robot["stop_link"][on_air] - first
-        kept = self.link[_ranges(first, counts)]
-        moved = np.zeros(self._rows, np.int64)
+        index = _ranges(first, counts)
+        moved = np.zeros(len(robot), np.int64)
         moved[on_air] = np.cumsum(counts) - counts - first
-        robot["first_link"] += moved
-        robot["stop_link"] += moved
-        locked = np.flatnonzero(robot["locked_to"] != NOBODY)
-        robot["link"][locked] += moved[robot["locked_to"][locked]]
-        return kept
+        for place in ("first_link", "weak_link", "stop_link"):
+            robot[place] += moved
+        locked = np.flatnonzero(reception["locked_to"] != NOBODY)
+        reception["link"][locked] += moved[reception["locked_to"][locked]].astype(np.int32)
+        return LinkTable._make(column[index] for column in self.link)
 
 
 def _ranges(first: IntArray, counts: IntArray) -> IntArray:
@@ -78,9 +82,9 @@ def _ranges(first: IntArray, counts: IntArray) -> IntArray:
     return np.repeat(first - before, counts) + np.arange(counts.sum())
 
 
-def _fates(now: Disruption, sender: IntArray, receiver: IntArray, blocked: IntArray) -> IntArray:
+def _fates(now: Disruption, sender: IntArray, receiver: IntArray, blocked: IntArray) -> ByteArray:
     """HEARD for links that are open, else what ends each packet on them, (k,)."""
-    fate = np.full(len(sender), int(Fate.HEARD))
+    fate = np.full(len(sender), int(Fate.HEARD), np.uint8)
     if now.anything:
         fate[now.apart(sender, receiver)] = Fate.PARTITIONED
         fate[~now.radio_on[receiver]] = Fate.BLACKOUT

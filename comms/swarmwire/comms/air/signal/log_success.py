@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.reception.reception import Model, Receiver, chunk_success
+from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray
 
 LEAST_OCTAVE, MOST_OCTAVE, ROWS = -10, 12, 256
@@ -31,7 +32,7 @@ def log_success_table(receiver: Receiver) -> FloatArray:
     return _table(receiver, sinr)
 
 
-@njit(cache=True)
+@borrowing()
 def log_success(table, receiver, sinr, bits):
     """The logarithm of the probability that so many bits are right at this SINR, a ratio."""
     if receiver.model == THRESHOLD:

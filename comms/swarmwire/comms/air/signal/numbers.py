@@ -2,19 +2,26 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+import math
+from collections.abc import Callable
+
 import numpy as np
 
+from swarmwire.comms.air.channel import ROUNDING
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.frames import acknowledgement_bytes, airtime_ns
 from swarmwire.comms.air.propagation.fading import fading_law
 from swarmwire.comms.air.propagation.parameters import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.air.propagation.path_loss import reach_m
+from swarmwire.comms.air.propagation.scattering import scatter_waves
 from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.reception import Receiver, receiver_of
 from swarmwire.comms.air.reception.sensitivity import sensitivity_dbm, sinr_for_db
 from swarmwire.comms.air.signal.link_table import Surroundings
+from swarmwire.comms.air.signal.links_by_sender import Levels
 from swarmwire.comms.air.signal.log_success import log_success_table
+from swarmwire.comms.air.signal.outcome import lone_delivery
 from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import Rules
 from swarmwire.comms.air.traffic.access_timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G, IEEE_802_15_4
@@ -102,24 +109,52 @@ def rules_of(radio: Radio, robots: int) -> Rules:
     )
 
 
+def edge_dbm(radio: Radio, rules: Rules) -> float:
+    """The least mean power with which a lone packet gets through with `min_delivery`; inf if none does."""
+    bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
+    others = (1.0 - radio.loss) * (1.0 - (radio.bursts.loss if radio.bursts else 0.0))
+    return least_where(lambda dbm: lone_delivery(rules, dbm, bits) * others >= radio.min_delivery - ROUNDING)
+
+
+def least_where(is_enough: Callable[[float], bool]) -> float:
+    """The least power in dBm, to the last bit, that is enough, if more is never worse; inf if none is."""
+    low_dbm, high_dbm = -300.0, 300.0
+    if is_enough(low_dbm) or not is_enough(high_dbm):
+        return -math.inf if is_enough(low_dbm) else math.inf
+    while low_dbm < (middle_dbm := 0.5 * (low_dbm + high_dbm)) < high_dbm:
+        low_dbm, high_dbm = (low_dbm, middle_dbm) if is_enough(middle_dbm) else (middle_dbm, high_dbm)
+    return high_dbm
+
+
+def levels_of(radio: Radio, rules: Rules) -> Levels:
+    """What power makes of a link."""
+    heard_mw = max(rules.least_mw, rules.least_sinr * rules.noise_mw)
+    disturbs = radio.access_or_default.method != "none"
+    return Levels(sensitivity_of(radio), heard_mw, cut_off_dbm(radio) if disturbs else np.inf)
+
+
+def cut_off_dbm(radio: Radio) -> float:
+    """The mean power below which a robot neither hears nor is disturbed."""
+    return min(radio.noise_or_default.power_dbm, sensitivity_of(radio)) - CUT_OFF_DB
+
+
 def surroundings_of(radio: Radio, keys: KeyArray, radius_m: FloatArray) -> Surroundings:
     """What links go by; `radius_m` (rows,) are the robots' radii."""
-    antenna, noise_dbm = radio.antenna_or_default, radio.noise_or_default.power_dbm
+    antenna = radio.antenna_or_default
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
-    curve = radio.loss_model.curve(radio.frequency_hz)
-    floor_dbm = min(noise_dbm, sensitivity_of(radio))
-    spread_db = SHADOWS_CUT_OFF * shadowing.deviation_db if shadowing else 0.0
+    curve, law = radio.loss_model.curve(radio.frequency_hz), fading_law(fading or Fading(), radio.frequency_hz)
+    spread_db = max(SHADOWS_CUT_OFF * shadowing.deviation_db - CUT_OFF_DB, 0.0) if shadowing else 0.0
     budget_dbm = antenna.power_dbm + 2.0 * antenna.gain_dbi
-    far_m = float(reach_m(curve, budget_dbm - floor_dbm + max(CUT_OFF_DB, spread_db)))
+    far_m = float(reach_m(curve, budget_dbm - cut_off_dbm(radio) + spread_db))
     return Surroundings(
-        power_dbm=antenna.power_dbm,
-        gain_dbi=antenna.gain_dbi,
+        send_dbm=np.full(len(radius_m), antenna.power_dbm + antenna.gain_dbi),
+        receive_dbi=np.full(len(radius_m), antenna.gain_dbi),
         curve=curve,
         reach_m=far_m if radio.range_m is None else min(far_m, radio.range_m),
-        least_dbm=floor_dbm - CUT_OFF_DB,
+        least_dbm=cut_off_dbm(radio),
         shadows=shadowing is not None,
         amplitude_db=amplitude_db(shadowing or Shadowing()),
-        waves=field_waves(keys, shadowing or Shadowing()),
+        field=field_waves(keys, shadowing or Shadowing()),
         walls=walls is not None,
         crossing_db=(walls or Walls()).crossing_db,
         inside_db_per_m=(walls or Walls()).inside_db_per_m,
@@ -129,5 +164,6 @@ def surroundings_of(radio: Radio, keys: KeyArray, radius_m: FloatArray) -> Surro
         radius_m=radius_m,
         most_radius_m=float(radius_m.max()),
         fades=fading is not None,
-        law=fading_law(fading or Fading(), radio.frequency_hz),
+        law=law,
+        scatter=np.array([scatter_waves(key, law.wave_number) for key in keys]),
     )

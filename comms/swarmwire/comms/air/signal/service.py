@@ -1,11 +1,11 @@
-"""Serving packets: from the sender's queue through the access method on air, and what is told of them."""
+"""Serving packets: from the sender's queue through the access method on air."""
 
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
-from swarmwire.comms.air.signal import dcf, on_air
+from swarmwire.comms.air.signal import dcf, on_air, telling
+from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import ANSWER, ENTER, LISTENED, SEND, TIMER, cancel, schedule
 from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import (
@@ -26,12 +26,11 @@ from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.fates import Fate
 
 BACKOFF = purpose("csma backoff")
-HEARD, BLOCKED = int(Fate.HEARD), int(Fate.BLOCKED)
-QUEUE_FULL, CHANNEL_BUSY = int(Fate.QUEUE_FULL), int(Fate.CHANNEL_BUSY)
+HEARD, QUEUE_FULL, CHANNEL_BUSY = int(Fate.HEARD), int(Fate.QUEUE_FULL), int(Fate.CHANNEL_BUSY)
 CSMA, DCF = METHODS.index("csma-802154"), METHODS.index("dcf")
 
 
-@njit(cache=True)
+@borrowing()
 def enter(rules, state, queue, told, r, now_ns):
     """The robot's radio is handed what was sent by now: it waits, or is refused."""
     me = state.robot[r]
@@ -41,9 +40,9 @@ def enter(rules, state, queue, told, r, now_ns):
         packet.is_entered = 1
         me.entry += 1
         if packet.refused:
-            refuse(state, told, index, packet.refused, now_ns)
+            telling.refuse(state, told, index, packet.refused, now_ns)
         elif me.stage != NOTHING and me.waiting >= rules.queue_limit:
-            refuse(state, told, index, QUEUE_FULL, now_ns)
+            telling.refuse(state, told, index, QUEUE_FULL, now_ns)
         else:
             me.waiting += 1
             if me.stage == NOTHING:
@@ -52,15 +51,7 @@ def enter(rules, state, queue, told, r, now_ns):
         schedule(queue, ENTER, r, state.packet[state.order[me.entry]].sent_at_ns)
 
 
-@njit(cache=True)
-def refuse(state, told, index, fate, now_ns):
-    """A packet ends at its sender's radio."""
-    packet = state.packet[index]
-    packet.is_done, packet.fate, packet.on_air_at_ns = 1, fate, now_ns
-    _tell(state, told, index, NOBODY, fate, 0, now_ns, 0, 0.0)
-
-
-@njit(cache=True)
+@borrowing()
 def serve(rules, state, queue, r, now_ns):
     """The robot's radio is free: it takes up the next packet, if one waits."""
     me = state.robot[r]
@@ -77,7 +68,7 @@ def serve(rules, state, queue, r, now_ns):
     begin(rules, state, queue, r, now_ns)
 
 
-@njit(cache=True)
+@borrowing()
 def begin(rules, state, queue, r, now_ns):
     """An attempt at the packet being served."""
     me = state.robot[r]
@@ -91,7 +82,7 @@ def begin(rules, state, queue, r, now_ns):
         schedule(queue, SEND, r, now_ns)
 
 
-@njit(cache=True)
+@borrowing()
 def back_off(rules, state, queue, r, now_ns):
     """CSMA: wait U{0 .. 2^BE - 1} backoff periods, keyed by (robot, sequence, attempt and busy times)."""
     me = state.robot[r]
@@ -101,12 +92,13 @@ def back_off(rules, state, queue, r, now_ns):
     schedule(queue, TIMER, r, now_ns + np.int64(u * 2**me.exponent) * rules.backoff_ns)
 
 
-@njit(cache=True)
+@borrowing()
 def timer(rules, state, queue, told, r, now_ns):
     """What the robot waited for has passed."""
     me = state.robot[r]
     if me.stage == BACKING_OFF:
-        me.stage, me.peak_mw = LISTENING, 0.0
+        me.stage = LISTENING
+        state.reception[r].peak_mw = 0.0
         schedule(queue, LISTENED, r, now_ns + rules.listen_ns)
     elif me.stage == AWAITING:
         fail(rules, state, queue, told, r, now_ns)
@@ -114,14 +106,14 @@ def timer(rules, state, queue, told, r, now_ns):
         serve(rules, state, queue, r, now_ns)
 
 
-@njit(cache=True)
+@borrowing()
 def listened(rules, state, queue, told, r, now_ns):
     """CSMA: the radio has listened whether the air is free.
 
     As in ns-3, it is busy if a frame began meanwhile or is on air at the end; one that ended meanwhile does not count.
     """
-    me = state.robot[r]
-    if max(me.peak_mw, me.power_mw) < rules.busy_mw and me.on_air == SILENT:
+    me, it = state.robot[r], state.reception[r]
+    if max(it.peak_mw, it.power_mw) + it.jam_mw < rules.busy_mw and me.on_air == SILENT:
         me.stage = TURNING
         on_air.turn_away(state, r)
         schedule(queue, SEND, r, now_ns + rules.turnaround_ns)
@@ -132,30 +124,31 @@ def listened(rules, state, queue, told, r, now_ns):
         back_off(rules, state, queue, r, now_ns)
         return
     if me.last_fate == NOBODY:
-        refuse(state, told, me.packet, CHANNEL_BUSY, now_ns)
+        telling.refuse(state, told, me.packet, CHANNEL_BUSY, now_ns)
     else:
-        _settle(state, told, r, now_ns)
+        telling.settle(state, told, r, now_ns)
     serve(rules, state, queue, r, now_ns)
 
 
-@njit(cache=True)
-def send(rules, state, queue, r, now_ns, first_link, stop_link, hold):
-    """The packet being served goes on air; links are those of the robot under the poses held."""
+@borrowing()
+def send(rules, state, queue, r, now_ns):
+    """The packet being served goes on air."""
     me = state.robot[r]
     if me.on_air != SILENT:  # an acknowledgement of its own is still on air
         begin(rules, state, queue, r, now_ns)
         return
     packet = state.packet[me.packet]
     packet.on_air_at_ns = now_ns
-    me.stage, me.hold = SENDING, hold
-    me.first_link = me.stop_link = 0
+    me.stage = SENDING
     packet.fate = state.off[r]
     if packet.fate == HEARD:
-        me.first_link, me.stop_link = first_link, stop_link
+        _take_links(state, r)
+    else:
+        me.first_link = me.weak_link = me.stop_link = 0
     on_air.put_on_air(rules, state, queue, r, DATA, now_ns, packet.airtime_ns, packet.bits)
 
 
-@njit(cache=True)
+@borrowing()
 def sent(rules, bursts, state, queue, told, r, now_ns):
     """What the robot had on air ends."""
     me = state.robot[r]
@@ -168,21 +161,21 @@ def sent(rules, bursts, state, queue, told, r, now_ns):
         return  # it died meanwhile, and what it sent has been told
     packet = state.packet[me.packet]
     if packet.fate != HEARD:
-        refuse(state, told, me.packet, packet.fate, packet.on_air_at_ns)
+        telling.refuse(state, told, me.packet, packet.fate, packet.on_air_at_ns)
         pause(rules, state, queue, r, packet.pause_ns, now_ns)
         return
-    _report(rules, state, queue, told, r, now_ns)
+    telling.report(rules, state, queue, told, r, now_ns)
     if packet.to != NOBODY and rules.acknowledged:
         me.stage = AWAITING
         schedule(queue, TIMER, r, now_ns + rules.patience_ns)
         return
     if packet.to != NOBODY and not packet.is_settled:
-        _settle(state, told, r, now_ns)
+        telling.settle(state, told, r, now_ns)
     packet.is_done = 1
     pause(rules, state, queue, r, packet.pause_ns, now_ns)
 
 
-@njit(cache=True)
+@borrowing()
 def pause(rules, state, queue, r, pause_ns, now_ns):
     """A packet is over: silence, or new slots, then the next one."""
     me = state.robot[r]
@@ -196,13 +189,13 @@ def pause(rules, state, queue, r, pause_ns, now_ns):
     schedule(queue, TIMER, r, now_ns + pause_ns)
 
 
-@njit(cache=True)
+@borrowing()
 def fail(rules, state, queue, told, r, now_ns):
     """No acknowledgement came: once more, or the last attempt's fate is the packet's."""
     me = state.robot[r]
     packet = state.packet[me.packet]
     if me.attempt >= rules.retries:
-        _settle(state, told, r, now_ns)
+        telling.settle(state, told, r, now_ns)
         pause(rules, state, queue, r, packet.pause_ns, now_ns)
         return
     me.attempt += 1
@@ -212,19 +205,19 @@ def fail(rules, state, queue, told, r, now_ns):
     begin(rules, state, queue, r, now_ns)
 
 
-@njit(cache=True)
-def answer(rules, state, queue, r, now_ns, first_link, stop_link, hold):
+@borrowing()
+def answer(rules, state, queue, r, now_ns):
     """The robot acknowledges what it heard, unless it is about to send."""
     me = state.robot[r]
     if me.on_air != SILENT or me.stage == TURNING or state.off[r] != HEARD:
         return
-    me.first_link, me.stop_link, me.hold = first_link, stop_link, hold
+    _take_links(state, r)
     on_air.put_on_air(
         rules, state, queue, r, ACKNOWLEDGEMENT, now_ns, rules.acknowledgement_ns, rules.acknowledgement_bits
     )
 
 
-@njit(cache=True)
+@borrowing()
 def stop(state, queue, told, r, now_ns, fate):
     """The robot died: its queue ends; what it has on air stays there."""
     me = state.robot[r]
@@ -232,76 +225,38 @@ def stop(state, queue, told, r, now_ns, fate):
         cancel(queue, kind, r)
     sending = me.stage == SENDING
     if me.stage == AWAITING:
-        _settle(state, told, r, now_ns)
+        telling.settle(state, told, r, now_ns)
     first = me.next - (me.stage >= BACKING_OFF)
     for at in range(first, me.stop):
         index = state.order[at]
         packet = state.packet[index]
         if not packet.is_done and not (sending and index == me.packet):
-            refuse(state, told, index, packet.refused if packet.refused else fate, now_ns)
+            telling.refuse(state, told, index, packet.refused if packet.refused else fate, now_ns)
     me.next = me.entry = me.stop
     me.waiting = 0
     if not sending:
         me.stage, me.packet = NOTHING, NOBODY
+        state.reception[r].is_deaf = me.on_air != SILENT
 
 
-@njit(cache=True)
-def _report(rules, state, queue, told, r, now_ns):
-    """Tell what became of a frame: at each robot in range, and at those out of range that heard it."""
-    me = state.robot[r]
-    packet = state.packet[me.packet]
-    me.last_fate, me.last_in_range, me.last_mw = NOBODY, 0, 0.0
-    for i in range(me.first_link, me.stop_link):
-        link = state.link[i]
-        is_meant = packet.to == NOBODY or packet.to == link.receiver  # noqa: PLR1714 - `in` would make a tuple
-        if not (is_meant and (link.is_listed or link.now == HEARD)):
-            continue
-        in_range = 0 if link.now == BLOCKED else 1
-        if packet.to == NOBODY:
-            _tell(state, told, me.packet, link.receiver, link.now, in_range, now_ns, me.hold, link.power_mw)
-            continue
-        me.last_fate, me.last_in_range, me.last_mw = link.now, in_range, link.power_mw
-        if link.now == HEARD:
-            if not packet.is_settled:
-                packet.is_settled = 1
-                _tell(state, told, me.packet, link.receiver, HEARD, 1, now_ns, me.hold, link.power_mw)
-            if rules.acknowledged:
-                state.robot[link.receiver].answers_to = r
-                schedule(queue, ANSWER, link.receiver, now_ns + rules.short_space_ns)
+@borrowing()
+def _take_links(state, r):
+    """What the robot puts on air goes over its links under the poses held."""
+    me, places = state.robot[r], state.places
+    me.first_link, me.weak_link, me.stop_link, me.hold = places.first[r], places.weak[r], places.stop[r], state.hold
 
 
-@njit(cache=True)
-def _settle(state, told, r, now_ns):
-    """An addressed packet is given up: its fate is that of the last attempt, if nothing else was told."""
-    me = state.robot[r]
-    packet = state.packet[me.packet]
-    packet.is_done = 1
-    if not packet.is_settled and me.last_fate != NOBODY:
-        packet.is_settled = 1
-        _tell(state, told, me.packet, packet.to, me.last_fate, me.last_in_range, now_ns, me.hold, me.last_mw)
-
-
-@njit(cache=True)
+@borrowing()
 def _acknowledged(rules, state, queue, told, r, now_ns):
     """An acknowledgement ends: its sender's packet is over, if it was heard there."""
     me = state.robot[r]
-    for i in range(me.first_link, me.stop_link):
-        link = state.link[i]
-        if link.receiver != me.answers_to or link.now != HEARD:
+    for i in range(me.first_link, me.weak_link):
+        receiver = state.link.receiver[i]
+        if receiver != me.answers_to or state.link.now[i] != HEARD:
             continue
-        it = state.robot[link.receiver]
+        it = state.robot[receiver]
         if it.stage == AWAITING and state.packet[it.packet].to == r:
-            cancel(queue, TIMER, link.receiver)
-            _settle(state, told, link.receiver, now_ns)
-            pause(rules, state, queue, link.receiver, state.packet[it.packet].pause_ns, now_ns)
+            cancel(queue, TIMER, receiver)
+            telling.settle(state, told, receiver, now_ns)
+            pause(rules, state, queue, receiver, state.packet[it.packet].pause_ns, now_ns)
     me.answers_to = NOBODY
-
-
-@njit(cache=True)
-def _tell(state, told, packet, receiver, fate, in_range, final_at_ns, hold, power_mw):
-    at = told.count[0]
-    row = told.row[at]
-    row[0], row[1], row[2], row[3], row[4], row[5] = packet, receiver, fate, in_range, final_at_ns, hold
-    row[6] = state.packet[packet].on_air_at_ns  # of this attempt: more may follow
-    told.power_mw[at] = power_mw
-    told.count[0] += 1

@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from swarmwire.comms.air.channel import ROUNDING, with_the_rest
+from swarmwire.comms.air.channel import with_the_rest
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.frames import airtime_ns
 from swarmwire.comms.air.intake import Intake
@@ -16,9 +16,19 @@ from swarmwire.comms.air.send_times import SendTimes
 from swarmwire.comms.air.signal import events
 from swarmwire.comms.air.signal.event_queue import event_queue
 from swarmwire.comms.air.signal.links_held import LinksHeld, open_ways
-from swarmwire.comms.air.signal.numbers import rules_of, sensitivity_of, surroundings_of
-from swarmwire.comms.air.signal.on_air import delivery_of
-from swarmwire.comms.air.signal.tables import NOBODY, PACKET, ROBOT, SILENT, Bursting, State, Table, told
+from swarmwire.comms.air.signal.numbers import edge_dbm, levels_of, rules_of, surroundings_of
+from swarmwire.comms.air.signal.tables import (
+    NOBODY,
+    PACKET,
+    RECEPTION,
+    ROBOT,
+    SILENT,
+    Bursting,
+    State,
+    Table,
+    Told,
+    told,
+)
 from swarmwire.comms.air.stage import Medium
 from swarmwire.comms.air.stages import chain_after_reception
 from swarmwire.comms.air.traffic.access_timing import IEEE_802_15_4
@@ -44,19 +54,21 @@ class SignalWay(Way):
         rows = len(medium.keys) * medium.robots
         self._rules = rules_of(medium.radio, medium.robots)
         around = surroundings_of(medium.radio, medium.keys, radius_m)
-        self._links = LinksHeld(medium, size_m, around, sensitivity_of(medium.radio))
+        self._links = LinksHeld(medium, size_m, around, levels_of(medium.radio, self._rules))
+        self._edge_dbm = edge_dbm(medium.radio, self._rules)
         self._intake = Intake(rows)
         self._stages = chain_after_reception(medium)
         self._columns = len(medium.radio.gives.columns)
         self._bursts = BurstStates(medium.radio.bursts or Bursts(), medium.keys, medium.robots)
         self._events = event_queue(rows)
         self._robot: Table = np.zeros(rows, ROBOT)
-        for name in ("packet", "locked_to", "answers_to"):
-            self._robot[name] = NOBODY
+        self._robot["packet"] = self._robot["answers_to"] = NOBODY
+        self._reception: Table = np.zeros(rows, RECEPTION)
+        self._reception["locked_to"], self._reception["signal_mw"] = NOBODY, np.inf
         self._robot["free_from_ns"] = LONG_AGO_NS
         self._queued, self._packet = Transmissions.none(), np.zeros(0, PACKET)
         self._hold, self._poses = 0, {0: np.zeros((rows, 3))}
-        self._now_ns = 0
+        self._now_ns = self._told = 0
 
     @property
     def queued(self) -> Transmissions:
@@ -68,7 +80,7 @@ class SignalWay(Way):
         self._hold += 1
         on_air = {int(hold) for hold in self._robot["hold"][self._robot["on_air"] != SILENT]}
         self._poses = {hold: at for hold, at in self._poses.items() if hold in on_air} | {self._hold: pose}
-        self._links.move(pose, self._robot)
+        self._links.move(pose, self._robot, self._reception)
 
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets; when they go on air will turn out."""
@@ -79,29 +91,18 @@ class SignalWay(Way):
 
     def pass_time(self, until_ns: int, lives: Lives) -> Decided:
         """Let happen what is due before `until_ns`."""
-        parts: list[tuple[IntArray, FloatArray]] = []
+        parts: list[Told] = []
         if len(self._packet) or self._events.size[0]:
             state, start = self._state()
             bursts = self._bursting()
             events.line_up(state, self._events, start)
-            most = int(max((self._links.stop - self._links.first).max(), _lengths(self._robot).max()))
-            room = told(max(LEAST_ROOM, 2 * (most + events.FEW + len(self._packet))))
+            most = int(max((state.places.stop - state.places.first).max(), _lengths(self._robot).max()))
+            room = told(max(LEAST_ROOM, 2 * (most + events.FEW + len(self._packet)), 2 * self._told))
             done = False
             while not done:
-                done = events.run_until(
-                    self._rules,
-                    bursts,
-                    state,
-                    self._events,
-                    room,
-                    self._links.first,
-                    self._links.stop,
-                    self._hold,
-                    most,
-                    until_ns,
-                )
-                parts.append((room.row[: room.count[0]].copy(), room.power_mw[: room.count[0]].copy()))
-                room.count[0] = 0
+                done = events.run_until(self._rules, bursts, state, self._events, room, most, until_ns)
+                parts.append(_taken_out(room))
+            self._told = sum(len(part.packet) for part in parts)
             self._bursts.added(int(bursts.added[0]))
         self._now_ns = until_ns
         return self._decided(parts, lives)
@@ -113,7 +114,7 @@ class SignalWay(Way):
         room = told(len(self._packet) + 1)
         events.stop_the_dead(state, self._events, room, coming.alive, at_ns)
         events.cut_off(state, coming.alive, coming.radio_on)
-        return self._decided([(room.row[: room.count[0]], room.power_mw[: room.count[0]])], lives)
+        return self._decided([_taken_out(room)], lives)
 
     def drain(self) -> Transmissions:
         """Take out all that is queued or under way."""
@@ -124,15 +125,11 @@ class SignalWay(Way):
 
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
         """Pairs of robot rows a < b joined in the radio graph, sorted, (e, 2)."""
-        links, radio = self._links, self._radio
+        links = self._links
         pairs = links.pairs if np.array_equal(pose, links.pose) else links.pairs_at(pose)
-        bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
-        probability = delivery_of(self._rules, pairs.mean_dbm, bits) * (1.0 - radio.loss)
-        if radio.bursts is not None:
-            probability *= 1.0 - radio.bursts.loss
         is_open = alive[pairs.a] & alive[pairs.b] & (pairs.blocked == 0)
         is_open &= open_ways(self._medium.disruption, pairs.a, pairs.b)
-        joined = is_open & (probability >= radio.min_delivery - ROUNDING)
+        joined = is_open & (links.worse_dbm(pairs) >= self._edge_dbm)
         return np.stack(np.divmod(np.sort((pairs.a * len(pose) + pairs.b)[joined]), len(pose)), axis=1)
 
     def _as_packets(self, taken: Transmissions) -> Table:
@@ -157,50 +154,68 @@ class SignalWay(Way):
         start = np.searchsorted(sender[order], np.arange(len(self._robot) + 1))
         held = self._medium.disruption
         off = np.where(held.alive, np.where(held.radio_on, int(Fate.HEARD), int(Fate.BLACKOUT)), int(Fate.SENDER_DEAD))
-        return State(self._medium.keys, self._robot, self._links.link, self._packet, order, off), start
+        state = State(
+            self._medium.keys,
+            self._robot,
+            self._reception,
+            self._links.link,
+            self._links.places,
+            self._hold,
+            self._packet,
+            order,
+            off,
+        )
+        return state, start
 
     def _bursting(self) -> Bursting:
         given = self._radio.bursts
         bursts = given or Bursts()
         if given is not None:
-            self._bursts.make_room(self._now_ns, len(self._links.link))
+            self._bursts.make_room(self._now_ns, len(self._links.link.receiver))
         link, at_ns, bad = self._bursts.table
         a, b, added = 1.0 / bursts.good_s, 1.0 / bursts.bad_s, np.zeros(1, np.int64)
         return Bursting(given is not None, link, at_ns, bad, added, a, b, bursts.loss_bad, bursts.loss_good)
 
-    def _decided(self, parts: list[tuple[IntArray, FloatArray]], lives: Lives) -> Decided:
+    def _decided(self, parts: list[Told], lives: Lives) -> Decided:
         """What was told, as packets and links; packets that are done leave the queue."""
         if not parts:
             return Transmissions.none(), Links.none(self._columns)
-        row, power_mw = (np.concatenate(column) for column in zip(*parts, strict=True))
+        row = (
+            parts[0] if len(parts) == 1 else Told._make(np.concatenate(columns) for columns in zip(*parts, strict=True))
+        )
         packet = self._packet
         # An addressed packet may have been heard in an earlier call, and only now be done at its sender.
         used = (packet["is_done"] > 0) & (self._queued.intended > 0)
-        used[row[:, 0]] = True
+        used[row.packet] = True
         index, local = np.flatnonzero(used), np.cumsum(used) - 1
         was_on_air, on_air_at_ns = packet["fate"] == HEARD, packet["on_air_at_ns"].copy()
-        on_air_at_ns[row[:, 0]] = row[:, 6]
+        on_air_at_ns[row.packet] = row.on_air_at_ns
         packets = self._queued.select(index)._replace(
             on_air_at_ns=on_air_at_ns[index],
             off_air_at_ns=(on_air_at_ns + np.where(was_on_air, packet["airtime_ns"], 0))[index],
             fate=packet["fate"][index],
         )
-        kept = row[:, 1] != NOBODY
-        kept[kept] = _meant(self._queued, row[kept], lives)
-        links = self._as_links(row[kept], power_mw[kept], local)
+        kept = row.receiver != NOBODY
+        if lives.any_dead:
+            kept &= _meant(self._queued, row, lives)
+        if not kept.all():
+            row = Told._make([*(column[kept] for column in row[:-1]), row.count])
+        links = self._as_links(row, local)
         decided = with_the_rest(links, packets, self._would_reach(packets, lives), self._columns)
         self._forget_done()
         return packets, decided
 
-    def _as_links(self, row: IntArray, power_mw: FloatArray, local: IntArray) -> Links:
+    def _as_links(self, row: Told, local: IntArray) -> Links:
         """Links from rows that were told, after the stages that follow reception."""
-        sender, sequence = self._packet["sender"][row[:, 0]], self._packet["sequence"][row[:, 0]]
-        links = Links.under_way(local[row[:, 0]], sender, row[:, 1], sequence, row[:, 4].copy(), self._columns)
+        sender, sequence = self._packet["sender"][row.packet], self._packet["sequence"][row.packet]
+        links = Links.under_way(local[row.packet], sender, row.receiver, sequence, row.final_at_ns, self._columns)
         with np.errstate(divide="ignore"):
-            rssi_dbm = 10.0 * np.log10(power_mw)
-        links = links._replace(in_range=row[:, 3], fate=row[:, 2], rssi_dbm=rssi_dbm)
-        for hold in np.unique(row[:, 5]).tolist():
-            index = np.flatnonzero(row[:, 5] == hold)
+            rssi_dbm = 10.0 * np.log10(row.power_mw)
+        links = links._replace(in_range=row.in_range, fate=row.fate, rssi_dbm=rssi_dbm)
+        if not self._stages:
+            return links
+        for hold in np.unique(row.hold).tolist():
+            index = np.flatnonzero(row.hold == hold)
             of_hold = links.select(index)
             for stage in self._stages:
                 stage.decide(of_hold, self._poses[hold])
@@ -230,8 +245,14 @@ def _lengths(robot: Table) -> IntArray:
     return robot["stop_link"] - robot["first_link"]
 
 
-def _meant(queued: Transmissions, row: IntArray, lives: Lives) -> BoolArray:
+def _taken_out(room: Told) -> Told:
+    """The rows that were told, out of `room`, which is empty again."""
+    count = int(room.count[0])
+    rows = Told._make([*(column[:count].copy() for column in room[:-1]), room.count.copy()])
+    room.count[0] = 0
+    return rows
+
+
+def _meant(queued: Transmissions, row: Told, lives: Lives) -> BoolArray:
     """Which rows are for receivers that were alive when the packet was sent, or that it was addressed to, (k,)."""
-    if not lives.any_dead:
-        return np.ones(len(row), np.bool_)
-    return lives.intended(queued.epoch[row[:, 0]], row[:, 1]) | (queued.to[row[:, 0]] != BROADCAST)
+    return lives.intended(queued.epoch[row.packet], row.receiver) | (queued.to[row.packet] != BROADCAST)

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.comms.air.reception.reception import Receiver
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, Int32Array, IntArray, KeyArray
 
 # What a robot's radio does with the packet at the head of its queue; from BACKING_OFF on there is one.
 NOTHING, PAUSING, BACKING_OFF, LISTENING, TURNING, SENDING, AWAITING = range(7)
 # What a robot has on air.
 SILENT, DATA, ACKNOWLEDGEMENT = range(3)
-RECEIVING = -1  # of a link, beside the fates: the frame on air may still be heard
+RECEIVING = 255  # of a link, beside the fates: the frame on air may still be heard
 NOBODY = -1
 
 _I, _F = np.int64, np.float64
@@ -35,24 +35,15 @@ ROBOT = np.dtype(
         ("slots", _I),  # DCF: left to wait, counted from `free_from_ns` + DIFS while the air is free
         ("free_from_ns", _I),  # DCF
         ("trust_from_ns", _I),  # DCF: after a frame that was not understood the air counts as free only from here
-        ("is_busy", _I),  # DCF
-        ("peak_mw", _F),  # CSMA: most power while it listens
         # The frame on air.
         ("on_air", _I),
         ("on_air_ns", _I),
         ("airtime_ns", _I),
         ("bits", _I),
-        ("first_link", _I),
+        ("first_link", _I),  # those that may be told of
+        ("weak_link", _I),  # and, from here on, those that only disturb
         ("stop_link", _I),
         ("hold", _I),  # of the poses held when it went on air
-        # Reception.
-        ("locked_to", _I),  # sender row of the frame being received, or NOBODY
-        ("link", _I),  # and its link
-        ("since_ns", _I),  # start of the chunk that is not in `log_success` yet
-        ("signal_mw", _F),
-        ("log_success", _F),  # of the chunks so far
-        ("power_mw", _F),  # all that is on air here
-        ("signals", _I),  # of which there are so many
         # Acknowledgements.
         ("answers_to", _I),  # sender row
         ("last_fate", _I),  # of the latest attempt at an addressed packet
@@ -61,13 +52,20 @@ ROBOT = np.dtype(
     ],
     align=True,
 )
-LINK = np.dtype(
+# What every frame on air changes at every robot near, and so in one line of the processor's cache.
+RECEPTION = np.dtype(
     [
-        ("receiver", _I),
-        ("power_mw", _F),  # with fading
-        ("fate", _I),  # HEARD: open; else what ends every packet here
-        ("is_listed", _I),  # mean power reaches the sensitivity
-        ("now", _I),  # of the frame on air: RECEIVING or a fate
+        ("power_mw", _F),  # all frames on air here
+        ("jam_mw", _F),  # all that is no frame
+        ("peak_mw", _F),  # CSMA: most of `power_mw` while it listens
+        ("signal_mw", _F),  # the frame being received; inf if there is none
+        ("log_success", _F),  # of its chunks so far
+        ("since_ns", _I),  # start of the chunk that is not in `log_success` yet
+        ("locked_to", np.int32),  # sender row of the frame being received, or NOBODY
+        ("link", np.int32),  # and its link
+        ("signals", np.int32),  # frames on air here
+        ("is_deaf", np.int8),  # it sends, or is about to
+        ("is_busy", np.int8),  # DCF: as it was when last looked at
     ],
     align=True,
 )
@@ -143,12 +141,36 @@ class Bursting(NamedTuple):
     loss_good: float
 
 
-class Told(NamedTuple):
-    """What the run of events tells: a row per packet and receiver, or per packet that never went on air."""
+class LinkTable(NamedTuple):
+    """Links by sender: to robots that may be told of a frame, and then to those that it only disturbs."""
 
-    row: IntArray  # (capacity, 7) packet, receiver row or NOBODY, fate, in range, final_at, hold, on_air_at
-    power_mw: FloatArray  # (capacity,) at the receiver
-    count: IntArray  # (1,)
+    receiver: Int32Array  # (links,) robot rows
+    power_mw: FloatArray  # (links,) at the receiver, with fading
+    is_listed: BoolArray  # (links,) mean power reaches the sensitivity
+    fate: ByteArray  # (links,) HEARD: open; else what ends every packet here
+    now: ByteArray  # (links,) of the frame on air: RECEIVING or a fate
+
+
+class LinkPlaces(NamedTuple):
+    """Where in a `LinkTable` each robot's links are, (rows,) each."""
+
+    first: IntArray
+    weak: IntArray  # the first that it only disturbs
+    stop: IntArray
+
+
+class Told(NamedTuple):
+    """What the run of events tells, (capacity,) each: a row per packet and receiver, or per packet never on air."""
+
+    packet: IntArray
+    receiver: IntArray  # robot row or NOBODY
+    fate: IntArray
+    in_range: IntArray
+    final_at_ns: IntArray
+    hold: IntArray
+    on_air_at_ns: IntArray
+    power_mw: FloatArray  # at the receiver
+    count: IntArray  # (1,) rows told
 
 
 class State(NamedTuple):
@@ -156,7 +178,10 @@ class State(NamedTuple):
 
     keys: KeyArray
     robot: Table
-    link: Table
+    reception: Table
+    link: LinkTable
+    places: LinkPlaces  # under the poses held
+    hold: int  # which poses these are
     packet: Table
     order: IntArray  # packets by sender, in the order of sending
     off: IntArray  # (rows,) HEARD: the radio is on; else the fate of what it should send
@@ -164,4 +189,5 @@ class State(NamedTuple):
 
 def told(capacity: int) -> Told:
     """Room for so many rows."""
-    return Told(np.empty((capacity, 7), np.int64), np.empty(capacity), np.zeros(1, np.int64))
+    columns = (np.empty(capacity, np.int64) for _ in range(7))
+    return Told._make([*columns, np.empty(capacity), np.zeros(1, np.int64)])

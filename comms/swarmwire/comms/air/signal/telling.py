@@ -1,0 +1,64 @@
+"""Telling: what became of a packet, at its sender's radio or at each receiver."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.comms.air.signal.event_queue import ANSWER, schedule
+from swarmwire.comms.air.signal.tables import NOBODY
+from swarmwire.comms.fates import Fate
+
+HEARD, BLOCKED = int(Fate.HEARD), int(Fate.BLOCKED)
+
+
+@borrowing()
+def refuse(state, told, index, fate, now_ns):
+    """A packet ends at its sender's radio."""
+    packet = state.packet[index]
+    packet.is_done, packet.fate, packet.on_air_at_ns = 1, fate, now_ns
+    _tell(state, told, index, NOBODY, fate, 0, now_ns, 0, 0.0)
+
+
+@borrowing()
+def report(rules, state, queue, told, r, now_ns):
+    """Tell what became of a frame: at each robot in range, and at those out of range that heard it."""
+    me = state.robot[r]
+    packet = state.packet[me.packet]
+    me.last_fate, me.last_in_range, me.last_mw = NOBODY, 0, 0.0
+    link, to, hold, index = state.link, packet.to, me.hold, me.packet
+    for i in range(me.first_link, me.weak_link):
+        receiver, fate, power_mw = link.receiver[i], link.now[i], link.power_mw[i]
+        is_meant = to == NOBODY or to == receiver  # noqa: PLR1714 - `in` would make a tuple
+        if not (is_meant and (link.is_listed[i] or fate == HEARD)):
+            continue
+        in_range = 0 if fate == BLOCKED else 1
+        if to == NOBODY:
+            _tell(state, told, index, receiver, fate, in_range, now_ns, hold, power_mw)
+            continue
+        me.last_fate, me.last_in_range, me.last_mw = fate, in_range, power_mw
+        if fate == HEARD:
+            if not packet.is_settled:
+                packet.is_settled = 1
+                _tell(state, told, index, receiver, HEARD, 1, now_ns, hold, power_mw)
+            if rules.acknowledged:
+                state.robot[receiver].answers_to = r
+                schedule(queue, ANSWER, receiver, now_ns + rules.short_space_ns)
+
+
+@borrowing()
+def settle(state, told, r, now_ns):
+    """An addressed packet is given up: its fate is that of the last attempt, if nothing else was told."""
+    me = state.robot[r]
+    packet = state.packet[me.packet]
+    packet.is_done = 1
+    if not packet.is_settled and me.last_fate != NOBODY:
+        packet.is_settled = 1
+        _tell(state, told, me.packet, packet.to, me.last_fate, me.last_in_range, now_ns, me.hold, me.last_mw)
+
+
+@borrowing()
+def _tell(state, told, packet, receiver, fate, in_range, final_at_ns, hold, power_mw):
+    at = told.count[0]
+    told.packet[at], told.receiver[at], told.fate[at], told.in_range[at] = packet, receiver, fate, in_range
+    told.final_at_ns[at], told.hold[at], told.power_mw[at] = final_at_ns, hold, power_mw
+    told.on_air_at_ns[at] = state.packet[packet].on_air_at_ns  # of this attempt: more may follow
+    told.count[0] += 1
