@@ -36,7 +36,6 @@ class Case:
     payload_bytes: int
     keys: tuple[str, ...] = ()
 
-
     @property
     def radio(self) -> Radio:
         """The preset with the keys."""

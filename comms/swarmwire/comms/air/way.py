@@ -29,9 +29,9 @@ class Way(ABC):
     def hold(self, pose: FloatArray) -> None:
         """Robots stand at `pose` (rows, 3) from now on, under the disruption that holds; the array stays as it is."""
 
+    @abstractmethod
     def tune(self, at_ns: int, radio: Radio) -> None:
         """The radio has other numbers from `at_ns` on; what waits or is on air stays so."""
-        raise NotImplementedError
 
     @abstractmethod
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:

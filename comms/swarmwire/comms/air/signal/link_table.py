@@ -33,6 +33,7 @@ class Surroundings(NamedTuple):
     curve: LossCurve
     reach_m: float  # no link is longer
     least_dbm: float  # no link is weaker, fading apart
+    spread_db: float  # by how much shadowing may make up for path loss
     shadows: bool
     amplitude_db: float
     field: FloatArray  # (arenas, 3, n), as `field_waves` has them
@@ -65,6 +66,8 @@ def pairs_of(pose: FloatArray, size_m: tuple[float, float], keys, obstacles: Obs
     robots = len(x) // len(keys)
     cells = grid.build(x, y, len(keys), size_m, around.reach_m * CELL_SLACK)
     a, b, loss = _near(x, y, robots, cells, around.reach_m, around.curve)
+    # Who is near enough must not depend on other robots' antennas, of which `reach_m` knows the best.
+    a, b, loss = _above(around.least_dbm - around.spread_db, around.send_dbm, around.receive_dbi, a, b, loss)
     if around.shadows:
         _add_shadows(loss, x, y, robots, around.field, around.amplitude_db, a, b)
     if around.walls:

@@ -111,9 +111,15 @@ def rules_of(radio: Radio, robots: int) -> Rules:
 
 def edge_dbm(radio: Radio, rules: Rules) -> float:
     """The least mean power with which a lone packet gets through with `min_delivery`; inf if none does."""
-    bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
+    bits, least = edge_delivery(radio)
+    return least_where(lambda dbm: lone_delivery(rules, dbm, bits) >= least - ROUNDING)
+
+
+def edge_delivery(radio: Radio) -> tuple[int, float]:
+    """The bits of a packet, and how often noise must spare it, so that it gets through with `min_delivery`."""
     others = (1.0 - radio.loss) * (1.0 - (radio.bursts.loss if radio.bursts else 0.0))
-    return least_where(lambda dbm: lone_delivery(rules, dbm, bits) * others >= radio.min_delivery - ROUNDING)
+    least = radio.min_delivery / others if others > 0.0 else math.inf if radio.min_delivery > 0.0 else 0.0
+    return 8 * (radio.max_payload_bytes + radio.overhead_bytes), least
 
 
 def least_where(is_enough: Callable[[float], bool]) -> float:
@@ -138,20 +144,22 @@ def cut_off_dbm(radio: Radio) -> float:
     return min(radio.noise_or_default.power_dbm, sensitivity_of(radio)) - CUT_OFF_DB
 
 
-def surroundings_of(radio: Radio, keys: KeyArray, radius_m: FloatArray) -> Surroundings:
-    """What links go by; `radius_m` (rows,) are the robots' radii."""
-    antenna = radio.antenna_or_default
+def surroundings_of(
+    radio: Radio, keys: KeyArray, radius_m: FloatArray, send_dbm: FloatArray, receive_dbi: FloatArray
+) -> Surroundings:
+    """What links go by; by robot row (rows,): radii, power and gain, and gain."""
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
     curve, law = radio.loss_model.curve(radio.frequency_hz), fading_law(fading or Fading(), radio.frequency_hz)
     spread_db = max(SHADOWS_CUT_OFF * shadowing.deviation_db - CUT_OFF_DB, 0.0) if shadowing else 0.0
-    budget_dbm = antenna.power_dbm + 2.0 * antenna.gain_dbi
-    far_m = float(reach_m(curve, budget_dbm - cut_off_dbm(radio) + spread_db))
+    best_dbm = float(send_dbm.max() + receive_dbi.max())
+    far_m = float(reach_m(curve, best_dbm - cut_off_dbm(radio) + spread_db))
     return Surroundings(
-        send_dbm=np.full(len(radius_m), antenna.power_dbm + antenna.gain_dbi),
-        receive_dbi=np.full(len(radius_m), antenna.gain_dbi),
+        send_dbm=send_dbm,
+        receive_dbi=receive_dbi,
         curve=curve,
         reach_m=far_m if radio.range_m is None else min(far_m, radio.range_m),
         least_dbm=cut_off_dbm(radio),
+        spread_db=spread_db,
         shadows=shadowing is not None,
         amplitude_db=amplitude_db(shadowing or Shadowing()),
         field=field_waves(keys, shadowing or Shadowing()),

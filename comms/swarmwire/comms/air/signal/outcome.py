@@ -5,8 +5,9 @@
 import math
 
 import numpy as np
+from numba import njit
 
-from swarmwire.comms.air.decibels import from_db
+from swarmwire.comms.air.decibels import from_db, to_db
 from swarmwire.comms.air.fixed_loss import LOSS
 from swarmwire.comms.air.reception.burst_states import takes
 from swarmwire.comms.air.signal.borrowing import borrowing
@@ -19,7 +20,7 @@ from swarmwire.comms.fates import Fate
 RECEPTION, ACKNOWLEDGED = purpose("reception"), purpose("reception of an acknowledgement")
 ACKNOWLEDGED_LOSS = purpose("fixed loss of an acknowledgement")
 HEARD, LOST, TOO_WEAK = int(Fate.HEARD), int(Fate.LOST), int(Fate.TOO_WEAK)
-COLLIDED, BURST = int(Fate.COLLIDED), int(Fate.BURST)
+COLLIDED, BURST, JAMMED = int(Fate.COLLIDED), int(Fate.BURST), int(Fate.JAMMED)
 ONE_BIT = 1.0
 
 
@@ -28,7 +29,7 @@ def outcome(rules, bursts, state, s, i, log_right):
     """What becomes of the frame that robot s has on air, on link i, if it is right with this probability's logarithm.
 
     By draws keyed by (sender, receiver, sequence), and attempt. The same draw tells why it was not right: COLLIDED if
-    it would have been right without interference.
+    it would have been right without interference, JAMMED if without jammers alone.
     """
     me = state.robot[s]
     receiver = state.link.receiver[i]
@@ -44,6 +45,8 @@ def outcome(rules, bursts, state, s, i, log_right):
         reception, fixed_loss = RECEPTION, LOSS
     u = uniform(key, a, b, sequence, reception + attempt)
     if u >= math.exp(log_right):
+        if u < math.exp(log_right + state.reception[receiver].jam_log):
+            return JAMMED
         alone = math.exp(alone_log_success(rules, state.link.power_mw[i], me.bits))
         return COLLIDED if u < alone else TOO_WEAK
     if rules.loss > 0.0 and uniform(key, a, b, sequence, fixed_loss + attempt) < rules.loss:
@@ -86,6 +89,16 @@ def alone_log_success(rules, power_mw, bits):
 def lone_delivery(rules, mean_dbm, bits):
     """The probability that a lone frame of so many bits is right at this power."""
     return math.exp(alone_log_success(rules, from_db(mean_dbm), bits))
+
+
+@njit(cache=True)
+def jammed_delivery(rules, mean_dbm, jam_mw, bits):
+    """The same for each of several powers, with so much power of jammers beside the noise, (k,)."""
+    out = np.empty(len(mean_dbm))
+    for i in range(len(out)):
+        weakened_db = to_db(rules.noise_mw / (rules.noise_mw + jam_mw[i]))
+        out[i] = lone_delivery(rules, mean_dbm[i] + weakened_db, bits)
+    return out
 
 
 @borrowing()

@@ -2,22 +2,30 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+from dataclasses import replace
+
 import numpy as np
 
 from swarmwire.comms.air.channel import with_the_rest
-from swarmwire.comms.air.disruption import Disruption
+from swarmwire.comms.air.disruption import ALL, NEWEST, Disruption
 from swarmwire.comms.air.frames import airtime_ns
 from swarmwire.comms.air.intake import Intake
 from swarmwire.comms.air.links import HEARD, Links
 from swarmwire.comms.air.lives import Lives
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.burst_states import BurstStates
 from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.air.send_times import SendTimes
-from swarmwire.comms.air.signal import events
+from swarmwire.comms.air.signal import events, jamming, kept_back
 from swarmwire.comms.air.signal.event_queue import event_queue
+from swarmwire.comms.air.signal.jam_held import JamHeld
+from swarmwire.comms.air.signal.jammed_pairs import joined_despite
+from swarmwire.comms.air.signal.link_table import Surroundings
 from swarmwire.comms.air.signal.links_held import LinksHeld, open_ways
 from swarmwire.comms.air.signal.numbers import edge_dbm, levels_of, rules_of, surroundings_of
 from swarmwire.comms.air.signal.tables import (
+    KEPT_ALL,
+    KEPT_NEWEST,
     NOBODY,
     PACKET,
     RECEPTION,
@@ -53,8 +61,10 @@ class SignalWay(Way):
         self._medium, self._radio, self._send_times = medium, medium.radio, send_times
         rows = len(medium.keys) * medium.robots
         self._rules = rules_of(medium.radio, medium.robots)
-        around = surroundings_of(medium.radio, medium.keys, radius_m)
-        self._links = LinksHeld(medium, size_m, around, levels_of(medium.radio, self._rules))
+        self._radius_m, self._antennas = radius_m, self._antennas_now()
+        levels = levels_of(medium.radio, self._rules)
+        self._links = LinksHeld(medium, size_m, self._around(), levels)
+        self._jam, self._was_jammed = JamHeld(medium), False
         self._edge_dbm = edge_dbm(medium.radio, self._rules)
         self._intake = Intake(rows)
         self._stages = chain_after_reception(medium)
@@ -80,7 +90,27 @@ class SignalWay(Way):
         self._hold += 1
         on_air = {int(hold) for hold in self._robot["hold"][self._robot["on_air"] != SILENT]}
         self._poses = {hold: at for hold, at in self._poses.items() if hold in on_air} | {self._hold: pose}
+        antennas = self._antennas_now()
+        if not np.array_equal(antennas, self._antennas):
+            self._antennas = antennas
+            self._links.tune(self._around(), levels_of(self._radio, self._rules))
         self._links.move(pose, self._robot, self._reception)
+        self._jam.move(pose, self._links.around)
+        if self._jam.anything or self._was_jammed:
+            self._refresh()
+        self._was_jammed = self._jam.anything
+
+    def tune(self, at_ns: int, radio: Radio) -> None:
+        """The radio has other numbers from `at_ns` on; what was received until then counts by the old ones."""
+        self._refresh()
+        if radio.bursts is not None:
+            self._bursts.change(radio.bursts, at_ns)
+        self._radio, self._rules = radio, rules_of(radio, self._medium.robots)
+        self._edge_dbm = edge_dbm(radio, self._rules)
+        self._stages = chain_after_reception(replace(self._medium, radio=radio))
+        self._antennas = self._antennas_now()
+        self._links.tune(self._around(), levels_of(radio, self._rules))
+        self._refresh()
 
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets; when they go on air will turn out."""
@@ -93,7 +123,7 @@ class SignalWay(Way):
         """Let happen what is due before `until_ns`."""
         parts: list[Told] = []
         if len(self._packet) or self._events.size[0]:
-            state, start = self._state()
+            state, start = self._state(self._medium.disruption, until_ns)
             bursts = self._bursting()
             events.line_up(state, self._events, start)
             most = int(max((state.places.stop - state.places.first).max(), _lengths(self._robot).max()))
@@ -108,12 +138,13 @@ class SignalWay(Way):
         return self._decided(parts, lives)
 
     def disrupt(self, at_ns: int, coming: Disruption, lives: Lives) -> Decided:
-        """The queues of the dead end, and what the dead and radios that are off were receiving."""
-        state, start = self._state()
+        """The queues of the dead end, those of radios that are off may wait; they hear nothing of what is on air."""
+        state, start = self._state(coming, at_ns)
         events.line_up(state, self._events, start)
         room = told(len(self._packet) + 1)
         events.stop_the_dead(state, self._events, room, coming.alive, at_ns)
         events.cut_off(state, coming.alive, coming.radio_on)
+        kept_back.switch(self._rules, state, self._events, room, at_ns)
         return self._decided([_taken_out(room)], lives)
 
     def drain(self) -> Transmissions:
@@ -129,7 +160,10 @@ class SignalWay(Way):
         pairs = links.pairs if np.array_equal(pose, links.pose) else links.pairs_at(pose)
         is_open = alive[pairs.a] & alive[pairs.b] & (pairs.blocked == 0)
         is_open &= open_ways(self._medium.disruption, pairs.a, pairs.b)
-        joined = is_open & (links.worse_dbm(pairs) >= self._edge_dbm)
+        if self._jam.anything:
+            joined = is_open & joined_despite(self._jam, links, pairs, self._radio, self._rules)
+        else:
+            joined = is_open & (np.minimum(*links.mean_dbm(pairs)) >= self._edge_dbm)
         return np.stack(np.divmod(np.sort((pairs.a * len(pose) + pairs.b)[joined]), len(pose)), axis=1)
 
     def _as_packets(self, taken: Transmissions) -> Table:
@@ -147,13 +181,25 @@ class SignalWay(Way):
             packet["pause_ns"] = np.where(short, csma.short_space_ns, csma.long_space_ns)
         return packet
 
-    def _state(self) -> tuple[State, IntArray]:
-        """What events work on, and where each robot's packets start in its order, (rows + 1,)."""
+    def _antennas_now(self) -> FloatArray:
+        """What each robot radiates in dBm, and the gain in dBi with which it hears, under events too, (2, rows)."""
+        antennas, antenna, now = self._medium.antennas, self._radio.antenna_or_default, self._medium.disruption
+        own = np.stack([antennas.send_dbm(antenna), antennas.receive_dbi(antenna)])
+        return np.tile(own, len(self._medium.keys)) + np.stack([now.send_gain_db, now.receive_gain_db])
+
+    def _around(self) -> Surroundings:
+        return surroundings_of(self._radio, self._medium.keys, self._radius_m, *self._antennas)
+
+    def _refresh(self) -> None:
+        """Noise, or what it is made of, has changed, or is about to."""
+        state, _ = self._state(self._medium.disruption, self._now_ns)
+        jamming.refresh(self._rules, state, self._events, self._now_ns)
+
+    def _state(self, held: Disruption, until_ns: int) -> tuple[State, IntArray]:
+        """What events work on until then, and where each robot's packets start in its order, (rows + 1,)."""
         sender = self._packet["sender"]
         order = np.argsort(sender, kind="stable")
         start = np.searchsorted(sender[order], np.arange(len(self._robot) + 1))
-        held = self._medium.disruption
-        off = np.where(held.alive, np.where(held.radio_on, int(Fate.HEARD), int(Fate.BLACKOUT)), int(Fate.SENDER_DEAD))
         state = State(
             self._medium.keys,
             self._robot,
@@ -163,7 +209,8 @@ class SignalWay(Way):
             self._hold,
             self._packet,
             order,
-            off,
+            _off(held),
+            self._jam.between(self._now_ns, until_ns),
         )
         return state, start
 
@@ -239,6 +286,12 @@ class SignalWay(Way):
         kept = np.flatnonzero(self._packet["is_done"] == 0)
         queued = self._queued._replace(intended=np.where(settled, 0, self._queued.intended))
         self._queued, self._packet = queued.select(kept), self._packet[kept]
+
+
+def _off(held: Disruption) -> IntArray:
+    """What becomes of what each robot should send, (rows,): HEARD if its radio is on."""
+    off = np.select([held.backlog == ALL, held.backlog == NEWEST], [KEPT_ALL, KEPT_NEWEST], int(Fate.BLACKOUT))
+    return np.where(held.alive, np.where(held.radio_on, int(Fate.HEARD), off), int(Fate.SENDER_DEAD))
 
 
 def _lengths(robot: Table) -> IntArray:
