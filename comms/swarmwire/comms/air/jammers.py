@@ -48,12 +48,12 @@ class Jammers(NamedTuple):
         return self.on_ns / self.period_ns
 
     def toggles(self, from_ns: int, until_ns: int) -> tuple[IntArray, IntArray]:
-        """When jammers go on or off after `from_ns` and before `until_ns`, and which, in the order (time, row)."""
+        """When jammers go on or off from `from_ns` on and before `until_ns`, and which, in the order (time, row)."""
         at_ns, which = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
         for row in np.flatnonzero(self.on_ns < self.period_ns).tolist():
             period_ns = self.period_ns[row]
             for first_ns in (self.phase_ns[row], self.phase_ns[row] + self.on_ns[row]):
-                start_ns = from_ns + 1 + (first_ns - from_ns - 1) % period_ns
+                start_ns = from_ns + (first_ns - from_ns) % period_ns
                 times_ns = np.arange(start_ns, until_ns, period_ns, dtype=np.int64)
                 at_ns.append(times_ns)
                 which.append(np.full(len(times_ns), row))

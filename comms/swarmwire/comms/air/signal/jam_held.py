@@ -30,9 +30,9 @@ class JamHeld:
         self._power_mw = powers_of(self._jammers, pose, self._medium.robots, self._medium.obstacles, around)
 
     def between(self, from_ns: int, until_ns: int) -> Jam:
-        """The jammers as they are at `from_ns`, and when they go on or off before `until_ns`."""
+        """The jammers as they are just before `from_ns`, and when they go on or off from then to before `until_ns`."""
         at_ns, which = self._jammers.toggles(from_ns, until_ns)
-        is_on = self._jammers.is_on(from_ns)
+        is_on = self._jammers.is_on(from_ns - 1)
         return Jam(self._jammers.arena, self._power_mw, is_on, at_ns, which, np.zeros(1, np.int64))
 
     def at_worst(self) -> tuple[FloatArray, FloatArray]:

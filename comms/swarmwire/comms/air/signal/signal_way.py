@@ -122,7 +122,7 @@ class SignalWay(Way):
     def pass_time(self, until_ns: int, lives: Lives) -> Decided:
         """Let happen what is due before `until_ns`."""
         parts: list[Told] = []
-        if len(self._packet) or self._events.size[0]:
+        if len(self._packet) or self._events.size[0] or self._jam.anything:
             state, start = self._state(self._medium.disruption, until_ns)
             bursts = self._bursting()
             events.line_up(state, self._events, start)
