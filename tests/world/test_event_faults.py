@@ -80,7 +80,7 @@ def ramp(what: str, to: float = 0.5, **keys: Any) -> dict[str, Any]:
     return event("ramp", what=what, to=to, **keys)
 
 
-FAULTS += [
+OF_RADIOS: list[tuple[Any, str]] = [
     (event("gain", robots=FLOCK), "events.0: expected send_db or receive_db"),
     (
         event("gain", robots=FLOCK, send_db=-3.0),
@@ -122,7 +122,7 @@ FAULTS += [
 ]
 
 
-@pytest.mark.parametrize(("table", "text"), FAULTS)
+@pytest.mark.parametrize(("table", "text"), FAULTS + OF_RADIOS)
 def test_a_fault_is_one_line_with_file_key_and_what_was_expected(table: Any, text: str):
     with pytest.raises(BadInput) as caught:
         scenario_from(changed("events", [table]), "f.toml")
