@@ -14,7 +14,7 @@ from typing import Any
 
 import psutil
 
-from benchmarks import scenes
+from benchmarks import air, scenes
 from benchmarks.record_cost import compared
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.truth import Static, Tally, Truth
@@ -147,13 +147,23 @@ def view_cost(name: str, *, robots: int, ticks: int, radio: bool) -> None:
     report(f"{name}-size", size_mb, "MB", results[0], config)
 
 
+def air_cost(name: str) -> None:
+    """Real-time factor of the air alone, without robots to act."""
+    costs = [air.cost(air.CASES[name]) for _ in range(REPEATS)]
+    factors = [each.realtime_factor for each in costs]
+    print_line(name, statistics.median(factors), "x real time", {**costs[0].told, **spread(factors)})
+
+
+def air_scaling(name: str) -> None:
+    """How much dearer a link is in one swarm than in another of the same density."""
+    ratio, told = air.scaling()
+    print_line(name, ratio, "dearest over cheapest", told)
+
+
 def report(name: str, value: float, unit: str, result: Result, config: dict[str, Any]) -> None:
     """Print one line."""
     radio = result.radio
-    line = {
-        "name": name,
-        "value": round(value, 3),
-        "unit": unit,
+    told = {
         "robots": result.robots,
         "runners": result.runners,
         "ticks": result.ticks,
@@ -161,8 +171,13 @@ def report(name: str, value: float, unit: str, result: Result, config: dict[str,
         **config,
         "packets_heard_per_robot_tick": round(radio.fates["heard"] / result.robots / result.ticks, 2) if radio else 0,
         "collisions": result.metrics["collisions"].final,
-        "cpu": cpu(),
     }
+    print_line(name, value, unit, told)
+
+
+def print_line(name: str, value: float, unit: str, told: dict[str, Any]) -> None:
+    """Print a value with all that it was measured under."""
+    line = {"name": name, "value": round(value, 3), "unit": unit, **told, "cpu": cpu()}
     print(json.dumps(line), flush=True)
 
 
@@ -179,6 +194,8 @@ BENCHMARKS: dict[str, Callable[[str], None]] = {
     "record-cost": lambda name: record_cost(name, robots=1000, ticks=600),
     "view-cost": lambda name: view_cost(name, robots=1000, ticks=600, radio=False),
     "view-cost-radio": lambda name: view_cost(name, robots=1000, ticks=600, radio=True),
+    **dict.fromkeys(air.CASES, air_cost),
+    "air-scaling": air_scaling,
     "processes-100": lambda name: processes(name, robots=100, ticks=300),
 }
 

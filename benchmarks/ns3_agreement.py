@@ -1,39 +1,37 @@
-"""Contention as ns-3 has it and as the air has it, side by side: a Markdown table for the docs.
+"""What ns-3 has and what the air has, side by side: Markdown tables for the docs.
 
-`python -m benchmarks.ns3_agreement [--runs N] [--ours MODULE:FUNCTION]`. ns-3's figures were recorded once, in
-`tests/comms/reference/`; ours are computed over seeds 1 to N, of the presets unless another function is named.
-Scenarios in which every node sends at the tick's start are left out, since the function cannot be told.
+`python -m benchmarks.ns3_agreement [TABLE ...] [--runs N] [--ours MODULE:FUNCTION]`; the tables are `contention`,
+`hidden-node` and `distance`, all unless some are named. ns-3's figures were recorded once, in `tests/comms/reference/`.
+Those of contention are computed over seeds 1 to N, of the presets unless another function is named; scenarios in which
+every node sends at the tick's start are left out, since the function cannot be told.
 """
 
 import argparse
 import importlib
-import json
 import statistics
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Protocol, cast
 
+from benchmarks import ns3_distance, ns3_hidden_node
+from benchmarks.ns3_reference import radio_in_one_spot, recorded
 from swarmwire.comms.air.contention import contention as contend
-from swarmwire.deploy.probe import radio_of
 
-REFERENCE = Path(__file__).parents[1] / "tests" / "comms" / "reference"
 CONTENTION = ("ns3_802154_contention.json", "ns3_80211_contention.json")
-PRESETS = {"802.15.4": "ieee802154", "802.11a 6 Mbit/s": "wifi-a-6M", "802.11b 1 Mbit/s": "wifi-b-1M"}
-AS_RUN = {  # ns-3 was run without IP and UDP headers, and its 802.15.4 queue has no end
-    "ieee802154": ["radio.queue_limit=1000000"],
-    "wifi-a-6M": ["radio.overhead_bytes=36"],
-    "wifi-b-1M": ["radio.overhead_bytes=36"],
-}
 RATIO_LIMIT, DELAY_LIMIT = 0.03, 0.15  # absolute; relative
+TABLES = {
+    "contention": "Contention in one spot",
+    "hidden-node": "Two senders hidden from each other",
+    "distance": "Delivery over distance",
+}
 
 
 class Contention(Protocol):
     """What the air offers: nodes in one spot that send to all, each at a phase and jitter of its own."""
 
     def __call__(
-        self, *, preset: str, nodes: int, payload_bytes: int, interval_s: float, seed: int
+        self, *, technology: str, nodes: int, payload_bytes: int, interval_s: float, seed: int
     ) -> Mapping[str, float | None]:
         """`delivery_ratio` in [0, 1] and `mean_delay_s`, which is None if nothing was heard."""
         ...
@@ -82,16 +80,11 @@ def scenarios() -> list[Scenario]:
     ]
 
 
-def recorded(name: str) -> dict[str, Any]:
-    """One file of the reference: what was run, and `rows`."""
-    return json.loads((REFERENCE / name).read_text(encoding="utf-8"))
-
-
 def measured(contention: Contention, scenario: Scenario, seeds: Sequence[int]) -> Ours:
     """What the air makes of a scenario."""
     found = [
         contention(
-            preset=PRESETS[scenario.technology],
+            technology=scenario.technology,
             nodes=scenario.nodes,
             payload_bytes=scenario.payload_bytes,
             interval_s=scenario.interval_s,
@@ -151,11 +144,10 @@ def milliseconds(delay_s: float | None) -> str:
 
 
 def of_presets(
-    *, preset: str, nodes: int, payload_bytes: int, interval_s: float, seed: int
+    *, technology: str, nodes: int, payload_bytes: int, interval_s: float, seed: int
 ) -> Mapping[str, float | None]:
-    """What the air makes of nodes in one spot with this preset."""
-    radio = radio_of(preset, AS_RUN[preset])
-    found = contend(radio, nodes, payload_bytes, interval_s, [seed])
+    """What the air makes of nodes in one spot with the preset of this technology."""
+    found = contend(radio_in_one_spot(technology), nodes, payload_bytes, interval_s, [seed])
     return {"delivery_ratio": found.delivery_ratio, "mean_delay_s": found.mean_delay_s}
 
 
@@ -165,17 +157,31 @@ def named(where: str) -> Contention:
     return cast("Contention", getattr(importlib.import_module(module), name))
 
 
+def tables(contention: Contention, runs: int) -> dict[str, Iterator[str]]:
+    """All tables, by name."""
+    return {
+        "contention": table(contention, range(1, runs + 1)),
+        "hidden-node": ns3_hidden_node.table(),
+        "distance": ns3_distance.table(),
+    }
+
+
 def main(arguments: Sequence[str]) -> int:
-    """Print the table; 1 if a scenario is off limits."""
+    """Print the tables; 1 if a row is off limits."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.ns3_agreement", description="agreement with ns-3")
-    parser.add_argument("--ours", metavar="MODULE:FUNCTION", help="what computes ours (default: the presets)")
-    parser.add_argument("--runs", type=int, default=5, metavar="N", help="seeds 1 to N (default 5)")
+    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"{', '.join(TABLES)} (default: all)")
+    parser.add_argument("--ours", metavar="MODULE:FUNCTION", help="what computes contention (default: the presets)")
+    parser.add_argument("--runs", type=int, default=5, metavar="N", help="of contention: seeds 1 to N (default 5)")
     options = parser.parse_args(arguments)
-    contention = of_presets if options.ours is None else named(options.ours)
+    if unknown := set(options.tables) - set(TABLES):
+        parser.error(f"TABLE: expected {', '.join(TABLES)}; got {', '.join(sorted(unknown))}")
+    found = tables(of_presets if options.ours is None else named(options.ours), options.runs)
     off_limits = 0
-    for line in table(contention, range(1, options.runs + 1)):
-        print(line, flush=True)
-        off_limits += "**no**" in line
+    for name in options.tables or TABLES:
+        print(f"\n{TABLES[name]}:\n", flush=True)
+        for line in found[name]:
+            print(line, flush=True)
+            off_limits += "**no**" in line
     return 1 if off_limits else 0
 
 

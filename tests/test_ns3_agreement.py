@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from benchmarks import ns3_agreement
-from benchmarks.ns3_agreement import DELAY_LIMIT, PRESETS, RATIO_LIMIT, Contention, Ours, Scenario, agrees, table
+from benchmarks.ns3_agreement import DELAY_LIMIT, RATIO_LIMIT, Contention, Ours, Scenario, agrees, table
 
 ROW = Scenario("802.15.4", 20, 20, 0.1, 0.9, 0.004, compares_delay=True)
 
@@ -14,14 +14,13 @@ ROW = Scenario("802.15.4", 20, 20, 0.1, 0.9, 0.004, compares_delay=True)
 def off_by(ratio: float, relative_delay: float) -> Contention:
     """An air that misses every scenario by so much."""
     recorded = {
-        (PRESETS[row.technology], row.nodes, row.payload_bytes, row.interval_s): row
-        for row in ns3_agreement.scenarios()
+        (row.technology, row.nodes, row.payload_bytes, row.interval_s): row for row in ns3_agreement.scenarios()
     }
 
     def contention(
-        *, preset: str, nodes: int, payload_bytes: int, interval_s: float, seed: int
+        *, technology: str, nodes: int, payload_bytes: int, interval_s: float, seed: int
     ) -> Mapping[str, float | None]:
-        row = recorded[preset, nodes, payload_bytes, interval_s]
+        row = recorded[technology, nodes, payload_bytes, interval_s]
         delay_s = None if row.mean_delay_s is None else row.mean_delay_s * (1.0 + relative_delay)
         return {"delivery_ratio": row.delivery_ratio - ratio, "mean_delay_s": delay_s}
 
@@ -60,7 +59,7 @@ def test_the_table_has_a_line_for_each_scenario_and_a_verdict_only_if_there_is_s
 def test_the_exit_status_tells_whether_all_agree(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     def answers(contention: Contention) -> int:
         monkeypatch.setattr(ns3_agreement.importlib, "import_module", lambda _: SimpleNamespace(ours=contention))
-        return ns3_agreement.main(["--ours", "some.module:ours", "--runs", "1"])
+        return ns3_agreement.main(["contention", "--ours", "some.module:ours", "--runs", "1"])
 
     assert answers(off_by(0.0, 0.0)) == 0
     assert answers(off_by(0.0, 0.2)) == 1

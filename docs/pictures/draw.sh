@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Draws the pictures of README and docs from runs that it makes. Needs a Vulkan driver for those of rerun's viewer.
+# Draws the pictures of README and docs: from runs that it makes,
+# and the figures of the radio from its own functions. Needs a Vulkan driver for those of rerun's viewer.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 swarmwire() { .ci/uv run --no-sync swarmwire "$@"; }
@@ -14,3 +15,4 @@ swarmwire export "$runs/split" --png 35 --to docs/split.png
 swarmwire export "$runs/pso" --png 55 --to docs/pso.png
 swarmwire draw footbot --to docs/footbot.png
 .ci/uv run --no-sync python docs/pictures/panel.py
+.ci/uv run --no-sync python -m docs.pictures.radio

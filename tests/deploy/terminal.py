@@ -46,6 +46,16 @@ class Terminal:
         self.process.wait(20.0)
         return self.text
 
+    def close(self) -> None:
+        """Close the window: the system tells the command by SIGHUP, and its output goes nowhere."""
+        os.close(self._side)
+        self._side = -1
+
+    @property
+    def open(self) -> bool:
+        """Whether the window was not closed."""
+        return self._side >= 0
+
     @property
     def text(self) -> str:
         return CODES.sub("", self.output.decode(errors="ignore")).replace("\r\n", "\n")
@@ -82,10 +92,12 @@ def terminal(*arguments: str | Path, columns: int = 80, rows: int = 24) -> Gener
         env={**os.environ, "TERM": "xterm-256color"},
     )
     os.close(other)
+    window = Terminal(process, user, before)
     try:
-        yield Terminal(process, user, before)
+        yield window
     finally:
         if process.poll() is None:
             process.kill()
         process.wait()
-        os.close(user)
+        if window.open:
+            window.close()

@@ -275,6 +275,12 @@ def test_a_socket_in_use_or_of_no_use_is_refused(tmp_path):
     assert "free" in refused(LOSSY, runners=1, socket=taken)
 
 
+def test_a_refused_socket_leaves_no_run_folder(tmp_path):
+    for path in (tmp_path / "absent" / "s", tmp_path / ("s" * 110), tmp_path):
+        assert "--socket" in refused(LOSSY, runners=1, socket=path, out=tmp_path / "run")
+        assert not (tmp_path / "run").exists()
+
+
 def test_a_stale_socket_is_taken_over(tmp_path):
     stale = tmp_path / "s"
     with socket.socket(socket.AF_UNIX) as dead:

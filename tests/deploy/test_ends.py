@@ -7,7 +7,12 @@ from pathlib import Path
 
 import psutil
 import pytest
+import typer
 
+from swarmwire.comms.errors import Interrupted
+from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
+from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.metrics.verify import verify
 from tests.deploy.commands import LOSSY, family, runners_of, started, swarmwire
 
 LONG = ["--set", "duration_s=3600", "--runners", "4", "--set", "robots.flock.count=8"]
@@ -69,6 +74,43 @@ def test_an_interrupt_ends_the_run_with_a_summary(long_run, tmp_path):
     assert sum(summary["radio"]["fates"].values()) == summary["radio"]["intended"]
     _, alive = psutil.wait_procs(children, timeout=GONE_S)
     assert not alive
+
+
+def test_a_terminal_that_hangs_up_ends_the_run_with_a_summary_and_whole_records(long_run, tmp_path):
+    process, children = long_run
+    for _ in range(2):  # from the shell, and from the system
+        process.send_signal(signal.SIGHUP)
+    _, errors = process.communicate(timeout=GONE_S + 5)
+    assert (process.returncode, errors) == (129, "")
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["ended"] == "interrupted"
+    assert summary["ticks"] < 36_000
+    assert all(finding.good for finding in verify(tmp_path / "run"))
+    _, alive = psutil.wait_procs(children, timeout=GONE_S)
+    assert not alive
+
+
+def test_a_hang_up_that_is_ignored_stays_so():
+    """As nohup starts a program."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Interrupt() as interrupt:
+            signal.raise_signal(signal.SIGHUP)
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+        assert not interrupt.asked
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_hang_up_before_the_first_tick_has_its_own_exit_code():
+    interrupt = Interrupt()
+    with pytest.raises(Interrupted), leaving_when_hung_up(interrupt):
+        raise Interrupted("interrupted while it waited for its runners")
+    interrupt.hung_up = True
+    with pytest.raises(typer.Exit) as left, leaving_when_hung_up(interrupt):
+        raise Interrupted("interrupted while it waited for its runners")
+    assert left.value.exit_code == 129
 
 
 FAULTY = """

@@ -143,3 +143,25 @@ def test_over_twenty_seeds_survivors_end_in_the_range_of_flocks_unharmed_and_the
     assert low <= np.median(survivors) <= high
     assert np.sum((survivors < low) | (survivors > high)) <= 5
     assert np.median(mute) < low, "or the criterion could not tell"
+
+
+def test_infrared_is_blocked_by_obstacles_and_by_robots_and_loses_nothing_else():
+    whole, no_bodies = shipped("infrared"), shipped("infrared", ["radio.bodies_block=false"])
+    assert whole.radio is not None
+    assert no_bodies.radio is not None
+    fates = whole.radio.fates
+    assert {name for name, count in fates.items() if count} == {"heard", "out_of_range", "blocked", "in_flight"}
+    assert fates["blocked"] > fates["heard"]
+    assert 0 < no_bodies.radio.fates["blocked"] < 0.1 * fates["blocked"]
+    assert final(whole, "largest_component") == 1.0
+
+
+def test_racks_of_the_warehouse_halve_who_is_in_range_and_part_the_flock():
+    racks, none = shipped("warehouse-wifi"), shipped("warehouse-wifi", ["arena.obstacles=[]"])
+    assert racks.radio is not None
+    assert none.radio is not None
+    assert min(racks.radio.fates[name] for name in ("too_weak", "collided", "out_of_range")) > 1000
+    assert racks.radio.in_range < 0.7 * none.radio.in_range
+    assert racks.radio.fates["out_of_range"] > 2 * none.radio.fates["out_of_range"]
+    assert 0.5 < (racks.radio.pdr or 0.0) < 0.9
+    assert final(none, "fragmentations") == 0 < final(racks, "fragmentations")

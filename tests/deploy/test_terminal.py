@@ -88,3 +88,11 @@ def test_who_wants_quiet_gets_no_panel(tmp_path):
     with terminal("run", LOSSY, "--set", "duration_s=1", "--quiet", "--out", tmp_path / "run") as user:
         assert user.rest() == ""
         assert user.process.returncode == 0
+
+
+def test_closing_the_terminal_ends_a_run_with_its_summary(tmp_path):
+    with terminal("run", LOSSY, *LONG, "--runners", "2", "--out", tmp_path / "run") as user:
+        user.wait(lambda picture: tick(picture) > 0)
+        user.close()
+        assert user.process.wait(20.0) == 129
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["ended"] == "interrupted"

@@ -136,7 +136,7 @@ def killed(folder, monkeypatch, in_chunk=3):
 
 def test_of_a_killed_run_it_says_up_to_where_it_can_be_read(tmp_path, monkeypatch):
     killed(tmp_path, monkeypatch)
-    (tmp_path / "ticks" / "part-000003.parquet.aside").write_bytes(b"PAR1 half of it")
+    (tmp_path / "ticks" / ".aside-part-000003.parquet").write_bytes(b"PAR1 half of it")
     partial = dict.fromkeys(("ticks", "packets", "events", "trajectory.digests"), State.PARTIAL)
     assert states(tmp_path) == {"summary.json": State.MISSING, **partial}
     assert "up to tick 8 (0.8 s); 3 parts, never joined" in text_of(tmp_path, "ticks")

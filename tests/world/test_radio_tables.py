@@ -45,6 +45,7 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({**SIGNAL, "two_ray": {}}, 'radio.two_ray: expected model = "two-ray"'),
     ({**SIGNAL, "bit_rate_bps": 0}, "radio.bit_rate_bps: expected a whole number of at least 1"),
     ({**SIGNAL, "walls": {}, "line_of_sight": True}, "radio.walls: expected no line_of_sight"),
+    ({**SIGNAL, "bodies_block": True}, "radio.bodies_block: expected the model disk"),
     ({**SIGNAL, "access": {"method": "dcf"}}, "radio.access.method: expected a frame of IEEE 802.11"),
     ({**SIGNAL, "frame": "802.11b"}, "radio.bit_rate_bps: 802.11b has 1000000"),
     ({**SIGNAL, "reception": {"model": "table"}}, "radio.reception.table: is missing"),

@@ -23,7 +23,7 @@ def new_run_id() -> str:
 def local_endpoint(path: Path | None) -> Generator[str]:
     """An endpoint at `path`, or in a new directory that is gone afterwards; BadInput if the path will not do."""
     if path is not None:
-        _check(path.absolute())
+        check_socket(path)
         yield unix_endpoint(str(path.absolute()))
         return
     base = tempfile.gettempdir()
@@ -31,7 +31,9 @@ def local_endpoint(path: Path | None) -> Generator[str]:
         yield unix_endpoint(f"{directory}/world")
 
 
-def _check(path: Path) -> None:
+def check_socket(path: Path) -> None:
+    """Return if a unix socket can be made there; else BadInput. One that nobody listens at may be in its place."""
+    path = path.absolute()
     if not path.parent.is_dir():
         raise BadInput("--socket", str(path), "expected a path in a directory that exists")
     if len(os.fsencode(path)) > LONGEST_PATH:

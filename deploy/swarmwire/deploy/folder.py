@@ -5,6 +5,7 @@ from pathlib import Path
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.record.names import LOG
 
 
 def default_folder(scenario: str, seeds: tuple[int, ...]) -> Path:
@@ -16,12 +17,21 @@ def default_folder(scenario: str, seeds: tuple[int, ...]) -> Path:
 
 
 def make_folder(out: Path) -> Path:
-    """The run folder, made if need be; BadInput unless it is new or empty."""
+    """The run folder, made if need be and taken by its log; BadInput unless it is new or empty."""
     try:
         out.mkdir(parents=True, exist_ok=True)
-        empty = not any(out.iterdir())
+        taken = any(out.iterdir()) or not _claim(out)
     except OSError as error:
         raise BadInput("--out", str(out), f"expected a folder that can be made: {error.strerror}") from error
-    if not empty:
+    if taken:
         raise BadInput("--out", str(out), "expected a new or empty folder")
     return out
+
+
+def _claim(folder: Path) -> bool:
+    """Whether this run is the first there: of several that found it empty, the system lets one alone make the log."""
+    try:
+        (folder / LOG).touch(exist_ok=False)
+    except FileExistsError:
+        return False
+    return True

@@ -37,8 +37,7 @@ class Guarded:
     def _try(self, call: Callable[[], Any]) -> Any:
         try:
             return call()
-        # Whatever it is, the run goes on without it; rich leaves a program whose output nobody reads any more.
-        except (Exception, SystemExit):  # noqa: BLE001
+        except (Exception, SystemExit):  # noqa: BLE001 - the run goes on; rich exits where nobody reads its output
             if not self.failed:
                 self._say(f"observer {self.name} failed:\n{traceback.format_exc()}")
             self.failed = True

@@ -49,7 +49,7 @@ class Panel:
         try:
             self._live.start()
             self._draw()
-        except BaseException:
+        except BaseException:  # also Ctrl-C and rich's SystemExit must not leave the terminal without its echo
             self.end(None)
             raise
 

@@ -11,6 +11,7 @@ from swarmwire.deploy.arguments import Runners
 from swarmwire.deploy.inputs import RecordedInputs, recorded_inputs
 from swarmwire.deploy.origin import Origin, read_origin
 from swarmwire.deploy.recording import Recording
+from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
@@ -88,8 +89,8 @@ class RepeatedRun:
             out=out,
             observers=observers,
             record=record,
+            replay=Replay(self._ticks(recorded_anew=out is not None), self._inputs),
         )
-        self.simulation.inputs, self.simulation.ticks = self._inputs, self._ticks()
         self._check = TrajectoryCheck(folder, self.simulation.hashes)
         self.simulation.watch(self._check)
 
@@ -110,13 +111,13 @@ class RepeatedRun:
             changes=tuple(changes),
         )
 
-    def _ticks(self) -> int:
+    def _ticks(self, *, recorded_anew: bool) -> int:
         """As many as the run had; of one that was killed, if it is to be recorded anew, all that it was to have."""
         if self._summary:
             wanted = self._summary.ticks
         else:
             known = ticks_logged(self._folder)
-            wanted = known if known and self.simulation.folder is None else self.origin.ticks
+            wanted = known if known and not recorded_anew else self.origin.ticks
         return min(wanted, self._inputs.end_tick) if self._inputs else wanted
 
     def _why_not_all(self, result: Result) -> str:

@@ -19,12 +19,13 @@ from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.arguments import Runners, choose_seeds, real_time_factor, runner_count
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.crews import Crews
-from swarmwire.deploy.endpoint import new_run_id
+from swarmwire.deploy.endpoint import check_socket, new_run_id
 from swarmwire.deploy.guarded import Guarded
-from swarmwire.deploy.inputs import RecordedInputs, ReplayedCrew
+from swarmwire.deploy.inputs import ReplayedCrew
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.recording import Recording
+from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.run_record import RunRecord
 from swarmwire.metrics.event_log import EventLog
@@ -51,7 +52,8 @@ class Simulation:
                 truth = simulation.step()
         print(simulation.result.metrics["order"].final)
 
-    The arguments are those of `swarmwire.deploy.run`, and so are the errors.
+    The arguments are those of `swarmwire.deploy.run`, and so are the errors. `replay` says what a run that is repeated
+    takes from its record.
 
     Attributes:
         scenario: as checked.
@@ -61,7 +63,7 @@ class Simulation:
         runners: processes that run the agents; 0: none, they are in this one.
         agents: the spec of each group's agent.
         inputs: of a run that is repeated, what came into it from outside.
-        interrupt: entered, SIGINT ends `run` after the tick under way.
+        interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
         controls: pause, step, speed and end of `run`, for other threads.
     """
 
@@ -78,6 +80,7 @@ class Simulation:
         socket: Path | None = None,
         realtime: float | str | None = None,
         record: Recording | None = None,
+        replay: Replay | None = None,
     ) -> None:
         self._clock = WallClock()
         self._called_ns = self._clock.now_ns()
@@ -88,13 +91,16 @@ class Simulation:
         self.agents = agent_specs(self.scenario)
         needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
         self.world = World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
-        self.ticks = _ticks(self.scenario)
+        self.ticks = replay.ticks if replay else _ticks(self.scenario)
+        self.inputs = replay.inputs if replay else None
         self.runners = runner_count(runners, self.static.arenas * self.static.robots)
         self.run_id = new_run_id()
         self.interrupt = Interrupt()
         self.metrics = Metrics()
         what, may_drop = record or Recording(), factor is not None
         what.check(self.static)
+        if self.runners and socket is not None:
+            check_socket(socket)  # before there is a folder, which what is refused should not leave
         self._record = RunRecord(None if out is None else Path(out), self._clock)
         self._pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
         self.controls = Controls(self._clock, rate_hz, self._pace)
@@ -116,7 +122,6 @@ class Simulation:
             lost=self._losses.append,
             say=self._record.say,
         )
-        self.inputs: RecordedInputs | None = None
         self._crew: Crew | None = None
         self._loop: Loop | None = None
         self._result: Result | None = None

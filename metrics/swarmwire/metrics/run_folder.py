@@ -142,14 +142,14 @@ def _repeated(rows: int, times: int) -> "pl.Series":
     return pl.Series(np.repeat(np.arange(rows, dtype=np.uint32), times))
 
 
-def _is_summary(found: Any) -> bool:
+def _is_summary(found: object) -> bool:
     """Whether all is there, of the right kind, that is read from a summary."""
-    kinds = {"ticks": int, "sim_time_s": (int, float), "ended": str, "events": list, "metrics": (dict, list)}
-    kinds |= {"record": dict, "arenas": int, "trajectory_sha256": list}
-    if not isinstance(found, dict) or found.get("format") != 1:  # pyright: ignore[reportUnknownMemberType]
+    if not isinstance(found, dict):
         return False
     summary = cast("dict[str, Any]", found)
-    if not all(isinstance(summary.get(key), kind) for key, kind in kinds.items()) or summary["ticks"] < 0:
+    kinds = {"ticks": int, "sim_time_s": (int, float), "ended": str, "events": list, "metrics": (dict, list)}
+    kinds |= {"record": dict, "arenas": int, "trajectory_sha256": list}
+    if summary.get("format") != 1 or not all(isinstance(summary.get(key), kind) for key, kind in kinds.items()):
         return False
     hashes: list[Any] = summary["trajectory_sha256"]
-    return len(hashes) == summary["arenas"] and all(isinstance(item, str) for item in hashes)
+    return summary["ticks"] >= 0 and len(hashes) == summary["arenas"] and all(isinstance(item, str) for item in hashes)

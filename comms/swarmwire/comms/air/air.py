@@ -74,12 +74,13 @@ class Air:
         self.radio = self._coming_radio = radio
         self._robots = robots
         self._held, self._coming = Disruption.none(rows), Disruption.none(rows)
-        medium = Medium(radio, keys, robots, obstacles, self._held, antennas or Antennas.alike(robots))
+        radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
+        own = antennas or Antennas.alike(robots)
+        medium = Medium(radio, keys, robots, obstacles, size_m, radii_m, self._held, own)
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
         self._way: Way
         if radio.is_signal:
-            radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
             self._way = SignalWay(medium, size_m, send_times, radii_m)
         else:
             self._way = DiskWay(medium, size_m, send_times)

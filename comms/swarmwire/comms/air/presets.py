@@ -56,11 +56,12 @@ PRESETS: dict[str, Preset] = {
     ),
     "argos-rab": Preset(
         "ARGoS's range and bearing of the foot-bot: 3 m in line of sight, 10 bytes, from step to step",
-        "ARGoS 3, ci_range_and_bearing and the foot-bot's entity",
+        "ARGoS 3, ci_range_and_bearing, the foot-bot's entity, and rab_medium for what blocks",
         {
             "model": "disk",
             "range_m": 3.0,
             "line_of_sight": True,
+            "bodies_block": True,
             "max_payload_bytes": 10,
             "bit_rate_bps": 10**9,
             "send_offset": "tick",
@@ -69,11 +70,12 @@ PRESETS: dict[str, Preset] = {
     ),
     "infrared-epuck": Preset(
         "ARGoS's range and bearing of the e-puck: 0.8 m in line of sight, 2 bytes beside the tag",
-        "ARGoS 3, the e-puck's entity",
+        "ARGoS 3, the e-puck's entity, and rab_medium for what blocks",
         {
             "model": "disk",
             "range_m": 0.8,
             "line_of_sight": True,
+            "bodies_block": True,
             "max_payload_bytes": 4,
             "bit_rate_bps": 10**9,
             "send_offset": "tick",
@@ -94,7 +96,13 @@ PRESETS: dict[str, Preset] = {
             "bit_rate_bps": 1_000_000,
             "frame": "802.11b",
             "noise": {"bandwidth_hz": 22e6, "figure_db": 7.0},
-            "reception": {"model": "802.11b", "preamble_sinr_db": 4.0, "preamble_dbm": -94.0, "take_over_s": 4e-6},
+            "reception": {
+                "model": "802.11b",
+                "preamble_sinr_db": 4.0,
+                "preamble_dbm": -94.0,
+                "sensitivity_dbm": -94.0,  # its bits would need less, but without a preamble there are none
+                "take_over_s": 4e-6,
+            },
         },
     ),
     "wifi-a-6M": Preset(
@@ -106,7 +114,13 @@ PRESETS: dict[str, Preset] = {
             "bit_rate_bps": 6_000_000,
             "frame": "802.11a",
             "noise": {"bandwidth_hz": 20e6, "figure_db": 7.0},
-            "reception": {"model": "802.11ag", "preamble_sinr_db": 4.0, "preamble_dbm": -82.0, "take_over_s": 4e-6},
+            "reception": {
+                "model": "802.11ag",
+                "preamble_sinr_db": 4.0,
+                "preamble_dbm": -82.0,
+                "sensitivity_dbm": -82.0,
+                "take_over_s": 4e-6,
+            },
         },
     ),
 }

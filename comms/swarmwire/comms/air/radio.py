@@ -79,6 +79,7 @@ class Radio:
     line_of_sight: bool | None = parameter(
         None, help="obstacles block the signal; without it true for the disk, false for signals"
     )
+    bodies_block: bool = parameter(False, help="of the disk: robots in between block the signal, as obstacles do")
     loss: float = parameter(
         0.0, help="probability that a packet within reach is lost, for each receiver", at_least=0, at_most=1
     )
@@ -112,6 +113,14 @@ class Radio:
         help="an edge of the radio graph: a lone packet gets through both ways with this probability",
         at_least=0,
         at_most=1,
+    )
+    cut_off_db: float = parameter(
+        10.0,
+        help="of signals: a robot whose mean strength is so far below noise and sensitivity neither hears nor disturbs; "
+        "less is faster",
+        unit="dB",
+        at_least=0,
+        at_most=60,
     )
     frequency_hz: float = parameter(2.44e9, help="of signals: the carrier", unit="Hz", at_least=1e6, at_most=1e12)
     log_distance: LogDistance | None = parameter(None, help="of the model log-distance")

@@ -44,6 +44,8 @@ def _check_disk(radio: Radio, where: str) -> None:
 
 def _check_signal(radio: Radio, where: str) -> None:
     refuse_unfit(radio.reception_or_default, radio.bit_rate_bps, where, "radio.reception")
+    if radio.bodies_block:
+        raise BadInput(where, "radio.bodies_block", "expected the model disk with it; signals have radio.bodies")
     if radio.walls is not None and radio.needs_line_of_sight:
         raise BadInput(where, "radio.walls", "expected no line_of_sight with it: obstacles either block or weaken")
     if radio.access_or_default.method == "dcf" and radio.frame == "plain":

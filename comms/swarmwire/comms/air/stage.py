@@ -19,6 +19,8 @@ class Medium:
     keys: KeyArray  # (arenas,) for draws
     robots: int  # in each arena
     obstacles: Obstacles
+    size_m: tuple[float, float]  # of each arena
+    radius_m: FloatArray  # (rows,) of the robots
     disruption: Disruption  # kept up to date by the air
     antennas: Antennas  # of robots
 

@@ -14,6 +14,7 @@ To add a stage:
 """
 
 from swarmwire.comms.air import (
+    bodies_block,
     bursts,
     delay,
     delays,
@@ -27,7 +28,7 @@ from swarmwire.comms.air import (
 from swarmwire.comms.air.stage import Medium, Stage
 
 AFTER_RECEPTION = (given_range, given_bearing, given_rssi, delay, delays)
-ORDER = (line_of_sight, disrupted, fixed_loss, bursts, *AFTER_RECEPTION)
+ORDER = (line_of_sight, bodies_block, disrupted, fixed_loss, bursts, *AFTER_RECEPTION)
 
 
 def chain(medium: Medium) -> tuple[Stage, ...]:

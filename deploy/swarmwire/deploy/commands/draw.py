@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.commands.options import Overrides
+from swarmwire.deploy.commands.options import Overrides, Seed
 
 USUAL_SIZE_PX = 1280
 _ONLY_IN_BODIES = ("like", "drive", "radius_m")
@@ -21,7 +21,7 @@ def draw_command(
     to: Annotated[
         Path | None, typer.Option(help="The picture: .png, .svg or .pdf. Default: NAME.png in this folder.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed instead of the scenario's.")] = None,
+    seed: Seed = None,
     size: Annotated[int, typer.Option(help="Longer side in pixels.")] = USUAL_SIZE_PX,
     overrides: Overrides = None,
 ) -> None:

@@ -22,3 +22,8 @@ Packets = Annotated[
         metavar="off|all|SHARE",
     ),
 ]
+Runners = Annotated[
+    str, typer.Option(help='Processes that run the agents: "none" (all in this one), a number, or "per-robot".')
+]
+Seed = Annotated[int | None, typer.Option(help="Seed instead of the scenario's.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]

@@ -8,7 +8,8 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import DIFFERENT, INTERRUPTED
-from swarmwire.deploy.commands.options import Packets
+from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
+from swarmwire.deploy.commands.options import Packets, Quiet, Runners
 
 if TYPE_CHECKING:
     from swarmwire.deploy.repetition import Repetition
@@ -16,14 +17,12 @@ if TYPE_CHECKING:
 
 def repeat_command(
     folder: Annotated[Path, typer.Argument(help="The run folder.", metavar="RUN")],
-    runners: Annotated[
-        str, typer.Option(help='Processes that run the agents: "none" (all in this one), a number, or "per-robot".')
-    ] = "none",
+    runners: Runners = "none",
     out: Annotated[
         Path | None, typer.Option(help="A run folder for the repetition, new or empty. Default: nothing is written.")
     ] = None,
     packets: Packets = "off",
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Run a run again from its folder alone, and tell whether it came out the same, bit for bit.
 
@@ -41,7 +40,8 @@ def repeat_command(
         raise BadInput("--packets", "", "expected --out with it: a folder in which to record them")
     repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
     repeated.simulation.watch(progress(repeated.simulation, console))
-    repetition = repeated.run()
+    with leaving_when_hung_up(repeated.simulation.interrupt):
+        repetition = repeated.run()
     _print(repetition, console)
     if out is not None:
         console.print(f"written: {out}")

@@ -2,52 +2,59 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
-from swarmwire.deploy.commands.options import Overrides, Packets, ScenarioFile
+from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
+from swarmwire.deploy.commands.options import Overrides, Packets, Quiet, Runners, ScenarioFile, Seed
 from swarmwire.deploy.folder import default_folder
 from swarmwire.deploy.report import print_result
 from swarmwire.deploy.result import Result
 
+if TYPE_CHECKING:
+    from swarmwire.deploy.simulation import Simulation
+
 MOST_SEEDS = 10_000
+
+
+Out = Annotated[Path | None, typer.Option(help="The run folder, new or empty. Default: runs/<scenario>-s<seed>-<UTC>.")]
+Seeds = Annotated[str | None, typer.Option(help="One arena per seed, side by side: 1:9 (1 to 8) or 1,5,7.")]
+Socket = Annotated[
+    Path | None, typer.Option(help="Unix socket at which runners meet the world. Default: a private temporary one.")
+]
+RealTime = Annotated[
+    str | None,
+    typer.Option(
+        help="Keep to the wall clock, FACTOR (1 if left out) simulated seconds per second; wait for no runner.",
+        metavar="[FACTOR]",
+    ),
+]
+Rrd = Annotated[bool, typer.Option(help="Record run.rrd, for rerun's viewer.")]
+Select = Annotated[
+    str | None,
+    typer.Option(help="Robot that the views show in detail. Default: the first with rays.", metavar="ROBOT"),
+]
+View = Annotated[bool, typer.Option("--view", help="Look at it while it goes on, as `swarmwire view` does.")]
 
 
 def run_command(
     scenario: ScenarioFile,
-    runners: Annotated[
-        str, typer.Option(help='Processes that run the agents: "none" (all in this one), a number, or "per-robot".')
-    ] = "none",
-    out: Annotated[
-        Path | None, typer.Option(help="The run folder, new or empty. Default: runs/<scenario>-s<seed>-<UTC>.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed instead of the scenario's.")] = None,
-    seeds: Annotated[str | None, typer.Option(help="One arena per seed, side by side: 1:9 (1 to 8) or 1,5,7.")] = None,
+    runners: Runners = "none",
+    out: Out = None,
+    seed: Seed = None,
+    seeds: Seeds = None,
     overrides: Overrides = None,
-    socket: Annotated[
-        Path | None, typer.Option(help="Unix socket at which runners meet the world. Default: a private temporary one.")
-    ] = None,
-    realtime: Annotated[
-        str | None,
-        typer.Option(
-            help="Keep to the wall clock, FACTOR (1 if left out) simulated seconds per second; wait for no runner.",
-            metavar="[FACTOR]",
-        ),
-    ] = None,
+    socket: Socket = None,
+    realtime: RealTime = None,
     packets: Packets = "off",
-    rrd: Annotated[bool, typer.Option(help="Record run.rrd, for rerun's viewer.")] = True,
-    select: Annotated[
-        str | None,
-        typer.Option(help="Robot that the views show in detail. Default: the first with rays.", metavar="ROBOT"),
-    ] = None,
-    view: Annotated[
-        bool, typer.Option("--view", help="Look at it while it goes on, as `swarmwire view` does.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    rrd: Rrd = True,
+    select: Select = None,
+    view: View = False,
+    quiet: Quiet = False,
 ) -> None:
     """Run a scenario, show how it goes, and leave a run folder: summary, tables, recording, log.
 
@@ -55,14 +62,10 @@ def run_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.arguments import choose_seeds
-    from swarmwire.deploy.live.live_view import LiveView
     from swarmwire.deploy.recording import Recording, packet_share
-    from swarmwire.deploy.running import finished
-    from swarmwire.deploy.shown import progress
     from swarmwire.deploy.simulation import Simulation
     from swarmwire.world.scenario_file import load_scenario
 
-    console = Console(quiet=quiet, highlight=False)
     checked = load_scenario(scenario, overrides or [])
     chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
     folder = out or default_folder(scenario.stem, chosen)
@@ -75,18 +78,29 @@ def run_command(
         realtime=realtime,
         record=Recording(packets=packet_share(packets), rrd=rrd, select=select),
     )
+    result = _shown(simulation, folder, view, Console(quiet=quiet, highlight=False))
+    if result.ended == "interrupted":
+        raise typer.Exit(INTERRUPTED)
+
+
+def _shown(simulation: "Simulation", folder: Path, view: bool, console: Console) -> Result:
+    """The result of the run, told and shown while it goes on and afterwards."""
+    from swarmwire.deploy.live.live_view import LiveView
+    from swarmwire.deploy.running import finished
+    from swarmwire.deploy.shown import progress
+
     simulation.watch(progress(simulation, console))
     with LiveView(folder) as live:
         if view:
             simulation.watch(live)
-        result = finished(simulation)
+        with leaving_when_hung_up(simulation.interrupt):
+            result = finished(simulation)
         print_result(result, console)
         _say_where(result, folder, console)
         if live.pid is not None:
             console.print("the view stays open: close it, or press Ctrl-C, to end it")
         live.wait()
-    if result.ended == "interrupted":
-        raise typer.Exit(INTERRUPTED)
+    return result
 
 
 def _seed_list(text: str) -> list[int]:

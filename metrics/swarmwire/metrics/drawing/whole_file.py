@@ -1,10 +1,11 @@
-"""Files that are there whole or not at all: written under another name beside their place, then moved to it."""
+"""Files at a path that a person chose, which are there whole or not at all."""
 
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.written_aside import written_aside
 
 
 def check_path(to: Path, suffixes: tuple[str, ...]) -> None:
@@ -17,17 +18,10 @@ def check_path(to: Path, suffixes: tuple[str, ...]) -> None:
 
 @contextmanager
 def whole_file(to: Path) -> Generator[Path]:
-    """A path to write to; when the block ends well that file takes its place, which it may replace, else it is gone.
-
-    BadInput if nothing can be written there.
-    """
-    part = to.with_name(f".part-{to.name}")  # the ending stays: writers go by it
-    try:
-        part.touch()
-    except OSError as error:
-        raise BadInput(str(to), "", f"expected a file that can be written: {error.strerror}") from None
-    try:
-        yield part
-        part.replace(to)
-    finally:
-        part.unlink(missing_ok=True)
+    """A path to write to, as `written_aside` gives it; BadInput if nothing can be written there."""
+    with ExitStack() as stack:
+        try:
+            aside = stack.enter_context(written_aside(to))
+        except OSError as error:
+            raise BadInput(str(to), "", f"expected a file that can be written: {error.strerror}") from None
+        yield aside

@@ -1,17 +1,17 @@
 """A table on disk: numbered part files while a run goes on, one file once it is over.
 
 `NAME/part-000000.parquet` and so on become `NAME.parquet`. Each file is written aside and renamed, so whatever carries
-its name is whole: a Parquet file that is cut off is unreadable. (Against a killed process; there is no sync to disk for
-a power cut.)
+its name is whole: a Parquet file that is cut off is unreadable.
 """
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from swarmwire.metrics.written_aside import written_aside
+
 if TYPE_CHECKING:
     import polars as pl
 
-ASIDE = ".aside"  # the end of a name while the file is being written
 # Level 3 saves nothing on poses. Statistics of lists take seven times as long as all the rest.
 PARQUET: dict[str, Any] = {"compression": "zstd", "compression_level": 1, "statistics": False}
 
@@ -33,13 +33,8 @@ def parts_of(folder: Path, name: str) -> list[Path]:
 
 def write_file(frame: "pl.DataFrame", path: Path) -> None:
     """Write a frame under this name, all of it or nothing; OSError if the disk will not have it."""
-    aside = path.with_name(path.name + ASIDE)
-    try:
+    with written_aside(path) as aside:
         frame.write_parquet(aside, **PARQUET)
-        aside.replace(path)
-    except BaseException:
-        aside.unlink(missing_ok=True)  # on a full disk the half of it is in the way
-        raise
 
 
 def join_parts(folder: Path, name: str) -> None:
@@ -50,13 +45,8 @@ def join_parts(folder: Path, name: str) -> None:
     if len(parts) == 1:
         parts[0].replace(whole)
     else:
-        aside = whole.with_name(whole.name + ASIDE)
-        try:
+        with written_aside(whole) as aside:
             pl.scan_parquet(parts).sink_parquet(aside, **PARQUET)
-            aside.replace(whole)
-        except BaseException:
-            aside.unlink(missing_ok=True)
-            raise
         for part in parts:
             part.unlink()
     (folder / name).rmdir()

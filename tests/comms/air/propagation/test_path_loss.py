@@ -88,6 +88,19 @@ def test_two_ray_is_exact(distance_m: float, frequency_hz: float, sender_m: floa
     assert loss_db(curve, distance_m) == pytest.approx(expected, rel=EXACT, abs=1e-12)
 
 
+@given(FREQUENCIES, st.floats(0.05, 30.0), st.floats(0.05, 30.0))
+def test_the_crossover_of_two_rays_is_exact_and_both_lines_meet_there(
+    frequency_hz: float, sender_m: float, receiver_m: float
+):
+    model = TwoRay(sender_m, receiver_m)
+    expected = 4 * PI * Decimal(sender_m) * Decimal(receiver_m) * Decimal(frequency_hz) / LIGHT
+    assert model.crossover_m(frequency_hz) == pytest.approx(float(expected), rel=EXACT)
+    curve = model.curve(frequency_hz)
+    ground_db = float(40 * expected.log10() - 20 * (Decimal(sender_m) * Decimal(receiver_m)).log10())
+    assert friis_db(float(expected), frequency_hz) == pytest.approx(Decimal(ground_db), abs=Decimal("1e-11"))
+    assert curve.break_m == model.crossover_m(frequency_hz)
+
+
 @given(st.floats(1.0, 1e5), FREQUENCIES, st.integers(0, 4))
 def test_itu_indoor_is_exact(distance_m: float, frequency_hz: float, floors: int):
     floor_db = 15 + 4 * (floors - 1) if floors else 0

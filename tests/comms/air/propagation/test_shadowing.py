@@ -22,6 +22,7 @@ KEYS = np.array([derive_key("shadowing", arena) for arena in range(ARENAS)], np.
 WAVES = field_waves(KEYS, UNIT)
 AMPLITUDE_DB = amplitude_db(UNIT)
 STANDARD_ERRORS = 4.4
+SLOW = 64  # a power of two, as sums go by halves
 PLACES = st.floats(-200.0, 200.0)
 
 
@@ -77,6 +78,30 @@ def test_variogram_over_a_robots_way_is_that_of_the_field():
         half_square = 0.5 * (over_arenas(*there) - here) ** 2
         expected = covariance(link, link) - covariance(link, there)
         assert abs(half_square.mean() - expected) < STANDARD_ERRORS * half_square.std() / np.sqrt(ARENAS)
+
+
+def test_the_field_itself_is_correlated_by_the_exponential_of_distance():
+    """Links of 1 cm stand for points: half the mean squared change over the variance is 1 - exp(-d / delta)."""
+    here = over_arenas(0.0, 0.0, 0.01, 0.0)
+    variance = 0.01 / (2.0 * DELTA_M)  # of 1/sqrt(d) times d of a field with variance sigma^2 / (2 delta)
+    for moved_m in (0.5, 1.0, 2.5, 5.0, 10.0, 20.0):
+        half_square = 0.5 * (over_arenas(0.8 * moved_m, 0.6 * moved_m, 0.8 * moved_m + 0.01, 0.6 * moved_m) - here) ** 2
+        expected = variance * (1.0 - np.exp(-moved_m / DELTA_M))
+        assert abs(half_square.mean() - expected) < STANDARD_ERRORS * half_square.std() / np.sqrt(ARENAS)
+
+
+@pytest.mark.parametrize("link", [(0.0, 0.0, 3.0, 1.0), (-20.0, 5.0, 12.0, -9.0), (4.0, 4.0, 4.0, 4.2)])
+def test_a_link_collects_the_integral_of_the_waves_along_its_way(link: tuple[float, ...]):
+    """By quadrature, with the library's cosine, of the waves that have less than 20 turns in 40 m."""
+    ax, ay, bx, by = link
+    length_m = np.hypot(bx - ax, by - ay)
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    share = 0.5 * (nodes + 1.0)[:, None]
+    for kx, ky, phase in WAVES[:3, :, :SLOW]:
+        p = np.cos(2.0 * np.pi * (kx * (ax + share * (bx - ax)) + ky * (ay + share * (by - ay)) + phase)).sum(axis=1)
+        integral = 0.5 * length_m * (weights @ p) * AMPLITUDE_DB
+        found = shadowing_db(np.stack([kx, ky, phase]), AMPLITUDE_DB, *link)
+        assert found == pytest.approx(integral / np.sqrt(length_m), rel=1e-8, abs=1e-8)
 
 
 def test_wave_numbers_are_quantiles_of_the_planes_spectrum_one_to_a_stratum():

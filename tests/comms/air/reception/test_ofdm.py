@@ -1,5 +1,7 @@
 """IEEE 802.11a and g: the union bound, evaluated apart with fractions, and what ns-3's tests state."""
 
+import math
+from decimal import Decimal, getcontext
 from fractions import Fraction
 
 import numpy as np
@@ -7,10 +9,36 @@ import pytest
 from scipy import special
 
 from swarmwire.comms.air.decibels import from_db
-from swarmwire.comms.air.reception.ofdm import RATES_BPS, SPECTRA, ofdm_bit_errors, ofdm_success
+from swarmwire.comms.air.reception.ofdm import RATES_BPS, SPECTRA, ofdm_bit_errors, ofdm_success, raw_bit_errors
 
+getcontext().prec = 60
+PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
 EXACT = 1e-12
 FRAME_BITS = 2000 * 8  # of ns-3's test
+
+
+def erfc(x: Decimal) -> Decimal:
+    """1 - 2 / sqrt(pi) sum of (-1)^n x^(2n+1) / (n! (2n+1)); its terms reach 10^14 for x = 6, of 60 digits."""
+    term, total, n = x, x, 0
+    while abs(term) > Decimal("1e-55"):
+        n += 1
+        term *= -x * x / n
+        total += term / (2 * n + 1)
+    return 1 - 2 / PI.sqrt() * total
+
+
+@pytest.mark.parametrize("points", [2, 4, 16, 64])
+@pytest.mark.parametrize("sinr", [0.0, 0.01, 0.5, 2.0, 7.5, 20.0])
+def test_raw_errors_by_modulation_are_exact(points: int, sinr: float):
+    """Evaluated apart with 60 digits: erfc(sqrt(s)) of BPSK, and so on."""
+    s = Decimal(sinr)
+    if points <= 4:
+        expected = erfc((s if points == 2 else s / 2).sqrt()) / 2
+    else:
+        side = math.isqrt(points)
+        bits = side.bit_length() - 1  # log2 of the side
+        expected = Decimal(side - 1) / (side * bits) * erfc((3 * s / (2 * (points - 1))).sqrt())
+    assert raw_bit_errors(points, sinr) == pytest.approx(float(expected), rel=EXACT)
 
 
 @pytest.mark.parametrize("rate", range(8))

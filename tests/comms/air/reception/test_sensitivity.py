@@ -1,8 +1,11 @@
 """Noise and sensitivity: k T B F, and the power at which frames begin to get through."""
 
 import math
+from decimal import Decimal, getcontext
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.reception.noise import Noise, noise_dbm
@@ -10,6 +13,7 @@ from swarmwire.comms.air.reception.parameters import SuccessTable
 from swarmwire.comms.air.reception.reception import by_table, chunk_success, ieee80211ag, ieee802154
 from swarmwire.comms.air.reception.sensitivity import LEAST_DB, MOST_DB, sensitivity_dbm, sinr_for_db
 
+getcontext().prec = 40
 NS3_BOLTZMANN_DB = 10.0 * math.log10(1.3803e-23 / 1.380649e-23)
 
 
@@ -26,6 +30,13 @@ def test_thermal_noise_is_k_t_b(bandwidth_hz: float, stated_dbm: float):
 def test_thermal_noise_is_that_of_ns3_but_for_its_boltzmann_constant(bandwidth_hz: float, stated_dbm: float):
     """It has 1.3803e-23 J/K, which is 0.0011 dB less."""
     assert noise_dbm(bandwidth_hz) + NS3_BOLTZMANN_DB == pytest.approx(stated_dbm, abs=6e-4)
+
+
+@given(st.floats(1e3, 1e9), st.floats(0.0, 40.0), st.floats(50.0, 500.0))
+def test_thermal_noise_is_exact(bandwidth_hz: float, figure_db: float, temperature_k: float):
+    milliwatts = 1000 * Decimal("1.380649e-23") * Decimal(temperature_k) * Decimal(bandwidth_hz)
+    expected = float(10 * milliwatts.log10() + Decimal(figure_db))
+    assert noise_dbm(bandwidth_hz, figure_db, temperature_k) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
 def test_a_receivers_noise_is_thermal_noise_in_its_bandwidth_and_its_figure():

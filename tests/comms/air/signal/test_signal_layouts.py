@@ -98,3 +98,30 @@ def test_a_robot_beyond_the_cut_off_changes_nothing(method: str):
     )
     assert story(without)
     assert [row for row in story(with_it) if row[1] != ROBOTS - 1 and row[0] != ROBOTS - 1] == story(without)
+
+
+def test_the_cut_off_decides_from_where_on_a_robot_disturbs():
+    """A link at 1 dB over noise, and 20 robots that send at the same time, each at the receiver's noise less 9 dB."""
+    radio = with_access("aloha")
+    near_m, far_m = (10.0 ** ((-radio.noise_or_default.power_dbm - 46.6777 - db) / 30.0) for db in (1.0, -9.0))
+    pose = np.zeros((22, 3))
+    pose[1:, 0] = -far_m
+    pose[1, 0] = near_m
+    heard = {
+        (senders, cut_off_db): heard_from_1_at_0(
+            run(
+                make_air(replace(radio, cut_off_db=cut_off_db), 22),
+                pose,
+                lambda _, n=senders: packets([*range(1, n)]),
+                30,
+            )
+        )
+        for senders, cut_off_db in ((2, 10.0), (22, 8.0), (22, 10.0))
+    }
+    assert heard[2, 10.0] == heard[22, 8.0] > 20
+    assert heard[22, 10.0] < 10
+
+
+def heard_from_1_at_0(told: Run) -> int:
+    """How many packets robot 0 heard from robot 1."""
+    return sum(int(np.sum((one.heard.receiver == 0) & (one.heard.sender == 1))) for one in told.news)

@@ -1,5 +1,8 @@
 """Airtime and access timing: integers that standards and ns-3's tests state."""
 
+import math
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,6 +10,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.air.traffic.access_timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G, IEEE_802_15_4
 from swarmwire.comms.air.traffic.airtime import (
+    DSSS_RATES_BPS,
     OFDM_BITS_PER_SYMBOL,
     US,
     at_bit_rate_ns,
@@ -57,6 +61,20 @@ def test_a_hundred_octets_over_udp_take_the_stated_time():
     assert (b_ns, a_ns, ieee80211g_ns(octets, 6_000_000)) == (1504 * US, 244 * US, 250 * US)
     for airtime_ns, dcf, stated_us in ((b_ns, IEEE_802_11B, 1864), (a_ns, IEEE_802_11A, 345.5)):
         assert airtime_ns + dcf.difs_ns + dcf.least_window * dcf.slot_ns / 2 == stated_us * US
+
+
+@given(OCTETS, st.integers(1, 10**10))
+def test_airtimes_are_whole_bits_and_symbols_rounded_up(octets: int, bit_rate_bps: int):
+    """By exact fractions."""
+    assert at_bit_rate_ns(octets, bit_rate_bps) == math.ceil(Fraction(8 * octets * 10**9, bit_rate_bps))
+    assert ieee802154_ns(octets) == at_bit_rate_ns(octets + 6, 250_000)
+    for rate_bps in DSSS_RATES_BPS:
+        payload_us = math.ceil(Fraction(8 * octets * 10**6, rate_bps))
+        assert ieee80211b_ns(octets, rate_bps, short_preamble=False) == (192 + payload_us) * US
+    for rate_bps in OFDM_BITS_PER_SYMBOL:
+        symbols = math.ceil(Fraction(16 + 8 * octets + 6, 4 * rate_bps // 10**6))  # service field, PSDU, tail
+        assert ieee80211a_ns(octets, rate_bps) == (16 + 4 + 4 * symbols) * US
+        assert ieee80211g_ns(octets, rate_bps) == ieee80211a_ns(octets, rate_bps) + 6 * US
 
 
 def test_a_plain_bit_rate_rounds_up():

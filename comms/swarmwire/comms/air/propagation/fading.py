@@ -5,20 +5,12 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.propagation.loss_curve import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.air.propagation.nakagami import nakagami_gain
 from swarmwire.comms.air.propagation.parameters import FADINGS, Fading
-from swarmwire.comms.air.propagation.scattering import (
-    WAVES,
-    arriving,
-    own_number,
-    scatter_waves,
-    scattered,
-    signs_of,
-)
+from swarmwire.comms.air.propagation.scattering import scattered_between
 from swarmwire.comms.air.propagation.waves import cosine, sine
 
 RAYLEIGH, RICIAN, NAKAGAMI = range(len(FADINGS))
@@ -45,14 +37,7 @@ def fading_gain(law, key, a, b, ax, ay, bx, by):
 
     A ratio, mean 1; equal both ways to the last bit. For many links between few robots see `gain_of`.
     """
-    if b < a:
-        a, ax, ay, b, bx, by = b, bx, by, a, ax, ay
-    at = np.empty((2, 4, WAVES), np.float32)
-    waves = scatter_waves(key, law.wave_number)
-    arriving(waves, ax, ay, at[0])
-    arriving(waves, bx, by, at[1])
-    parts, signs = np.empty((2, WAVES), np.float32), signs_of(own_number(key, a), own_number(key, b))
-    h = scattered(signs, at, 0, 1, parts[0], parts[1])
+    h = scattered_between(key, law.wave_number, a, b, ax, ay, bx, by)
     return gain_of(law, h, math.sqrt((bx - ax) ** 2 + (by - ay) ** 2))
 
 

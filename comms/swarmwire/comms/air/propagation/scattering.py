@@ -89,3 +89,15 @@ def scattered(signs, at, a, b, real, imaginary):
         imaginary[n] = sign * (u_real * v_imaginary + u_imaginary * v_real)
     scale = 1.0 / math.sqrt(WAVES)
     return total(real) * scale, total(imaginary) * scale
+
+
+@njit(cache=True)
+def scattered_between(key, wave_number, a, b, ax, ay, bx, by):
+    """`scattered` of one link: robots a and b, indices in the arena with this key, at (ax, ay) and (bx, by) in m."""
+    if b < a:
+        a, ax, ay, b, bx, by = b, bx, by, a, ax, ay
+    at, parts = np.empty((2, 4, WAVES), np.float32), np.empty((2, WAVES), np.float32)
+    waves = scatter_waves(key, wave_number)
+    arriving(waves, ax, ay, at[0])
+    arriving(waves, bx, by, at[1])
+    return scattered(signs_of(own_number(key, a), own_number(key, b)), at, 0, 1, parts[0], parts[1])

@@ -31,8 +31,7 @@ from swarmwire.comms.clock import to_ns
 # What counts as sensitivity in data sheets: share of frames that are right, and their bytes (see `sensitivity_dbm`).
 SHEETS = {"802.15.4": (0.99, 26), "802.11b": (0.92, 1024), "802.11ag": (0.9, 1000)}
 SURE = 1.0 - 1e-12
-CUT_OFF_DB = 10.0  # below the noise, or the sensitivity if that is lower
-SHADOWS_CUT_OFF = 2.5  # deviations of shadowing, if that is more
+SHADOWS_CUT_OFF = 2.5  # deviations of shadowing by which a link may be better than its path loss
 DCF_OF = {"802.11a": IEEE_802_11A, "802.11b": IEEE_802_11B, "802.11g": IEEE_802_11G}
 
 
@@ -141,7 +140,7 @@ def levels_of(radio: Radio, rules: Rules) -> Levels:
 
 def cut_off_dbm(radio: Radio) -> float:
     """The mean power below which a robot neither hears nor is disturbed."""
-    return min(radio.noise_or_default.power_dbm, sensitivity_of(radio)) - CUT_OFF_DB
+    return min(radio.noise_or_default.power_dbm, sensitivity_of(radio)) - radio.cut_off_db
 
 
 def surroundings_of(
@@ -150,7 +149,7 @@ def surroundings_of(
     """What links go by; by robot row (rows,): radii, power and gain, and gain."""
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
     curve, law = radio.loss_model.curve(radio.frequency_hz), fading_law(fading or Fading(), radio.frequency_hz)
-    spread_db = max(SHADOWS_CUT_OFF * shadowing.deviation_db - CUT_OFF_DB, 0.0) if shadowing else 0.0
+    spread_db = max(SHADOWS_CUT_OFF * shadowing.deviation_db - radio.cut_off_db, 0.0) if shadowing else 0.0
     best_dbm = float(send_dbm.max() + receive_dbi.max())
     far_m = float(reach_m(curve, best_dbm - cut_off_dbm(radio) + spread_db))
     return Surroundings(

@@ -1,0 +1,31 @@
+"""Draws the figures of docs/radio.md: `python -m docs.pictures.radio [NAME ...]`, all of them without a name."""
+
+import sys
+
+from docs.pictures.radio import (
+    access,
+    bursts,
+    capture,
+    delays,
+    fading,
+    path_loss,
+    reception,
+    shadowing,
+    walls,
+)
+
+FIGURES = {
+    "path-loss": path_loss.draw,
+    "shadowing": shadowing.draw,
+    "walls": walls.draw,
+    "fading": fading.draw,
+    "reception": reception.draw,
+    "bursts": bursts.draw,
+    "delays": delays.draw,
+    "access": access.draw,
+    "capture": capture.draw,
+}
+
+if __name__ == "__main__":
+    for asked in sys.argv[1:] or FIGURES:
+        FIGURES[asked]()

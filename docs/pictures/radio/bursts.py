@@ -1,0 +1,57 @@
+"""Bursts: when some links are bad, and how long runs of lost packets are."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import numpy as np
+
+from docs.pictures.radio.sheet import legend, line_color, panels, say, write
+from swarmwire.comms.air.reception.burst_states import BurstStates
+from swarmwire.comms.air.reception.parameters import Bursts
+from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.draws import derive_key
+from swarmwire.metrics.radio_fit.expected_runs import expected_runs
+
+BURSTS = Bursts(bad_s=0.5, good_s=2.0)
+ROBOTS, INTERVAL_S = 20, 0.1
+SHOWN, SHOWN_PACKETS = 4, 300
+PACKETS, LONGEST = 2000, 30
+
+
+def draw() -> None:
+    """Write bursts.svg."""
+    lost = losses(PACKETS)
+    figure, (time, runs) = panels(2, 2.6, (1.35, 1.0))
+    for row in range(SHOWN):
+        at = np.flatnonzero(lost[row + 1, :SHOWN_PACKETS]) * INTERVAL_S
+        time.broken_barh([(s, INTERVAL_S) for s in at], (SHOWN - row - 0.35, 0.7), facecolors=[line_color(row)], lw=0)
+    time.set_yticks(range(1, SHOWN + 1), [f"0 to {SHOWN - row}" for row in range(SHOWN)])
+    time.set_xlim(0.0, SHOWN_PACKETS * INTERVAL_S)
+    time.grid(visible=False, axis="y")
+    say(time, "when links are bad: 0.5 s at a time, good for 2 s", "time in s", "from robot to robot")
+    lengths = run_lengths(lost)
+    counts = np.bincount(np.minimum(lengths, LONGEST + 1), minlength=LONGEST + 2)[1 : LONGEST + 1]
+    at = np.arange(1, LONGEST + 1)
+    runs.plot(at, expected_runs(BURSTS, INTERVAL_S, LONGEST), color=line_color(0), lw=1.4, label="geometric")
+    runs.plot(at, counts / len(lengths), "o", ms=3, color=line_color(1), label=f"{len(lengths)} runs")
+    runs.set_yscale("log")
+    say(runs, "runs of lost packets, one each 0.1 s", "length in packets", "share of runs")
+    legend(runs, "upper right")
+    write(figure, "bursts")
+
+
+def losses(packets: int) -> BoolArray:
+    """Which packets of each link are lost, (links, packets)."""
+    states = BurstStates(BURSTS, np.array([derive_key("figure of bursts")], np.uint64), ROBOTS)
+    links = ROBOTS * ROBOTS
+    sender, receiver = np.divmod(np.arange(links), ROBOTS)
+    at_ns = [round(n * INTERVAL_S * NS_PER_S) for n in range(packets)]
+    told = [states.lost(sender, receiver, np.full(links, n), np.full(links, at)) for n, at in enumerate(at_ns)]
+    return np.stack(told, axis=1)
+
+
+def run_lengths(lost: BoolArray) -> np.ndarray:
+    """Lengths of runs that begin after the first packet and well before the last, so that long ones are not cut."""
+    edges = np.diff(np.pad(lost.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    begins, ends = np.nonzero(edges == 1)[1], np.nonzero(edges == -1)[1]
+    return (ends - begins)[(begins > 0) & (begins < lost.shape[1] - 200)]

@@ -1,0 +1,74 @@
+"""Capture: how often a frame is heard though another is on air, over the ratio of the two."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.ns3_reference import PRESETS, radio_far_apart
+from docs.pictures.radio.sheet import legend_below, line_color, panels, say, write
+from swarmwire.comms.air.air import Air
+from swarmwire.comms.air.propagation.path_loss import reach_m
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.signal.parameters import Access
+from swarmwire.comms.draws import derive_key
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.packets import Payloads, Sent
+
+WANTED_LOSS_DB = 70.0
+SIR_DB = np.arange(-8.0, 12.1, 0.5)
+PAYLOAD_BYTES, ARENAS, FRAMES = 40, 20, 20
+PAIR_NS, LATER_NS = 20_000_000, 50_000  # between two pairs of frames, and between the frames of a pair
+CASES = {"it begins first": -1, "both begin at once": 0, "it begins second": 1}
+
+
+def draw() -> None:
+    """Write capture.svg."""
+    figure, row = panels(len(PRESETS), 2.7)
+    for axes, technology in zip(row, PRESETS, strict=True):
+        radio = replace(radio_far_apart(technology), access=Access("aloha"), send_offset="tick")
+        for index, (name, place) in enumerate(CASES.items()):
+            heard = [share_heard(radio, float(sir_db), place) for sir_db in SIR_DB]
+            axes.plot(SIR_DB, heard, color=line_color(index), lw=1.4, label=name)
+        axes.set_ylim(-0.03, 1.05)
+        axes.set_xlim(SIR_DB[0], SIR_DB[-1])
+        say(
+            axes,
+            technology,
+            "signal over the other's, in dB",
+            "share of frames that are heard" if axes is row[0] else "",
+        )
+    legend_below(figure, row[0], 3)
+    write(figure, "capture")
+
+
+def share_heard(radio: Radio, sir_db: float, place: int) -> float:
+    """How many of the frames of robot 0 robot 2 hears, while robot 1 sends, too."""
+    curve = radio.loss_model.curve(radio.frequency_hz)
+    wanted_m, other_m = (float(reach_m(curve, loss_db)) for loss_db in (WANTED_LOSS_DB, WANTED_LOSS_DB + sir_db))
+    keys = np.array([derive_key("figure of capture", arena) for arena in range(ARENAS)], np.uint64)
+    air = Air(radio, keys, 3, (100.0, 100.0), obstacle_arrays(((),) * ARENAS), 1)
+    pose = np.array([[wanted_m, 0.0, 0.0], [0.0, other_m, 0.0], [0.0, 0.0, 0.0]])
+    air.hold(np.tile(pose, (ARENAS, 1)), np.ones(3 * ARENAS, np.bool_))
+    heard = 0
+    for frame in range(FRAMES):
+        for sender, at_ns in order(place, frame * PAIR_NS):
+            heard += told(air, at_ns)
+            rows = 3 * np.arange(ARENAS) + sender
+            payloads = Payloads.of([bytes(PAYLOAD_BYTES)] * ARENAS)
+            air.send(at_ns, frame, Sent(rows, np.full(ARENAS, 2), payloads))
+    heard += told(air, FRAMES * PAIR_NS)
+    return heard / (ARENAS * FRAMES)
+
+
+def order(place: int, at_ns: int) -> list[tuple[int, int]]:
+    """Who sends when: robot 0 before robot 1, with it, or after it."""
+    return sorted([(0, at_ns + LATER_NS * (place > 0)), (1, at_ns + LATER_NS * (place < 0))], key=lambda one: one[1])
+
+
+def told(air: Air, until_ns: int) -> int:
+    """How many frames of robot 0 were heard."""
+    done = air.advance(until_ns).finished
+    return int(np.count_nonzero((done.sender == 0) & (done.fate == Fate.HEARD)))
