@@ -108,8 +108,14 @@ def test_a_bad_value_is_named_with_its_key_and_what_was_expected(agents, setting
 
 WIDER = [
     ("events=3", "events: expected a list, got 3"),
-    ("events=[{at_s=1}]", "events.0.do: is missing; expected one of blackout, kill, partition, revive"),
-    ("events=[{at_s=1, do='burn'}]", "events.0.do: expected one of blackout, kill, partition, revive; got 'burn'"),
+    (
+        "events=[{at_s=1}]",
+        "events.0.do: is missing; expected one of blackout, gain, jammer, kill, partition, ramp, revive",
+    ),
+    (
+        "events=[{at_s=1, do='burn'}]",
+        "events.0.do: expected one of blackout, gain, jammer, kill, partition, ramp, revive; got 'burn'",
+    ),
     (
         "events=[{at_s=nan, do='kill', robots={count=1}}]",
         "events.0.at_s: expected a number of at least 0 and at most 1000000000 (s), got nan",

@@ -47,6 +47,43 @@ def test_a_flock_finds_one_heading_over_a_perfect_radio_and_over_a_lossy_one(nam
     assert result.radio.latency_air_s.p50 == pytest.approx(latency_s, abs=0.001)
 
 
+def test_jammed_drowns_packets_keeps_robots_from_sending_and_is_over():
+    """By 16 s the pulses are over, by 26 s the jammer that is carried."""
+    clear = shipped("jammed", ["duration_s=16", "events=[]"]).radio
+    pulses = shipped("jammed", ["duration_s=16"]).radio
+    whole = shipped("jammed", ["duration_s=26"])
+    assert clear is not None
+    assert pulses is not None
+    assert whole.radio is not None
+    assert clear.fates["jammed"] == 0
+    assert pulses.fates["jammed"] > 2000
+    assert clear.pdr is not None
+    assert pulses.pdr is not None
+    assert pulses.pdr < clear.pdr - 0.05
+    assert whole.radio.fates["channel_busy"] > 10 * pulses.fates["channel_busy"]
+    assert sum(whole.radio.fates.values()) == whole.radio.intended
+    assert [(event.do, event.tick, event.ended) for event in whole.events] == [
+        ("jammer", 80, False),
+        ("jammer", 160, True),
+        ("jammer", 200, False),
+        ("jammer", 250, True),
+    ]
+
+
+def test_partition_falls_apart_twice_and_joins_again_each_time():
+    """For 10 s by halves and 6 s by blackouts; while a bridge joins its parts it holds together."""
+    result = shipped("partition")
+    assert result.radio is not None
+    fates = result.radio.fates
+    assert all(fates[name] > 0 for name in ("heard", "partitioned", "blackout", "queue_full", "lost"))
+    assert sum(fates.values()) == result.radio.intended
+    assert final(result, "fragmentations") == 2
+    assert final(result, "rejoin_worst") == pytest.approx(10.0)
+    assert final(result, "rejoin_median") == pytest.approx(8.0)
+    assert final(result, "unrejoined") == 0.0
+    assert final(result, "largest_component") == 1.0
+
+
 def test_flocking_disrupted_shows_every_disruption_and_its_end():
     result = shipped("flocking-disrupted")
     assert result.radio is not None

@@ -30,8 +30,8 @@ def partition(*between: list[str]) -> dict[str, Any]:
 
 FAULTS: list[tuple[Any, str]] = [
     (3, "events.0: expected a table, got 3"),
-    ({"at_s": 1.0}, "events.0.do: is missing; expected one of blackout, kill, partition, revive"),
-    (event("burn"), "events.0.do: expected one of blackout, kill, partition, revive; got 'burn'"),
+    ({"at_s": 1.0}, "events.0.do: is missing; expected one of blackout, gain, jammer, kill, partition, ramp, revive"),
+    (event("burn"), "events.0.do: expected one of blackout, gain, jammer, kill, partition, ramp, revive; got 'burn'"),
     ({"do": "revive", "robots": FLOCK}, "events.0.at_s: is missing; expected a number of at least 0 and at most 10"),
     (event(at_s=-1.0, robots=FLOCK), "events.0.at_s: expected a number of at least 0 and at most 1000000000 (s), got"),
     (event(robots=FLOCK, for_s=-1.0), "events.0.for_s: expected a number above 0 (s), got -1.0"),
@@ -55,11 +55,74 @@ FAULTS: list[tuple[Any, str]] = [
         partition(["flock"], ["flock-3", "big"]),
         "events.0.between.1: expected sets that do not overlap; 'flock-3'",
     ),
+    (
+        event("partition"),
+        "events.0: expected one of between, region, halves, isolate, bridge, or halves and bridge; got",
+    ),
+    (event("partition", halves="x", isolate=["big"]), "events.0: expected one of between, region, halves, isolate,"),
+    (event("partition", halves="z"), "events.0.halves: expected one of x, y, got 'z'"),
+    (event("partition", isolate=[]), "events.0.isolate: expected a list that is not empty, got []"),
+    (event("partition", bridge=["tall"]), f"events.0.bridge: {GROUPS} 'tall'"),
+    (event("partition", region={}), "events.0.region: expected either radius_m or size_m"),
+    (event("partition", region={"radius_m": 1.0, "size_m": [1.0, 1.0]}), "events.0.region: expected either radius_m"),
+    (
+        event("partition", region={"size_m": [1.0, 0.0]}),
+        "events.0.region.size_m: expected two numbers above 0 (m), got",
+    ),
+    (event("partition", region={"radius_m": -1.0}), "events.0.region.radius_m: expected a number above 0 and at most"),
+    (event("partition", isolate=["big"], one_way=True), "events.0.one_way: expected two sets with it"),
+    (event("partition", between=[["flock-0"], ["flock-1"], ["big"]], one_way=True), "events.0.one_way: expected two"),
     (event("blackout", robots={"group": "x"}), "events.0.robots.group: expected one of flock, big; got 'x'"),
 ]
 
 
-@pytest.mark.parametrize(("table", "text"), FAULTS)
+def ramp(what: str, to: float = 0.5, **keys: Any) -> dict[str, Any]:
+    return event("ramp", what=what, to=to, **keys)
+
+
+OF_RADIOS: list[tuple[Any, str]] = [
+    (event("gain", robots=FLOCK), "events.0: expected send_db or receive_db"),
+    (
+        event("gain", robots=FLOCK, send_db=-3.0),
+        "events.0.do: expected a radio with signals for 'gain': a disk knows no",
+    ),
+    (event("gain", robots=FLOCK, send_db=1e3), "events.0.send_db: expected a number of at least -200 and at most 100"),
+    (event("jammer", at=[0.0, 0.0]), "events.0.power_dbm: is missing; expected a number of at least -100"),
+    (event("jammer", power_dbm=0.0), "events.0: expected either at = [x, y] or robots"),
+    (event("jammer", at=[0.0, 0.0], robots=FLOCK, power_dbm=0.0), "events.0: expected either at = [x, y] or robots"),
+    (event("jammer", at=[0.0, 0.0], power_dbm=0.0, duty=0.0), "events.0.duty: expected a number above 0 and at most 1"),
+    (
+        event("jammer", at=[0.0, 0.0], power_dbm=0.0, period_s=1e-6),
+        "events.0.period_s: expected at least 0.000010 s, got 1e-06",
+    ),
+    (event("jammer", at=[0.0], power_dbm=0.0), "events.0.at"),
+    (
+        event("jammer", at=[0.0, 0.0], power_dbm=0.0),
+        "events.0.do: expected a radio with signals for 'jammer': a disk knows no strength",
+    ),
+    (event("ramp", to=0.5), "events.0.what: is missing; expected a text"),
+    (ramp("loss"), "events.0.what: expected a key of [radio], such as radio.loss; got 'loss'"),
+    (ramp("radio.lose"), "events.0.what: unknown key radio.lose; expected one of range_m, model, preset, "),
+    (ramp("radio.loss.x"), "events.0.what: expected a key of [radio]; radio.loss holds no keys"),
+    (ramp("radio.frame"), "events.0.what: expected a number; radio.frame is a text"),
+    (ramp("radio.gives"), "events.0.what: expected a number; radio.gives is a table"),
+    (
+        ramp("radio.line_of_sight"),
+        "events.0.what: expected a number that the scenario gives; radio.line_of_sight is left",
+    ),
+    (ramp("radio.bursts.bad_s"), "events.0.what: expected a table that the scenario gives; [radio.bursts] is left out"),
+    (
+        ramp("radio.send_offset"),
+        "events.0.what: expected a number that may change; radio.send_offset holds for the whole",
+    ),
+    (ramp("radio.loss", 1.5), "events.0.to: expected at most 1, got 1.5 for radio.loss"),
+    (ramp("radio.latency_s", -1.0), "events.0.to: expected at least 0 s, got -1.0 for radio.latency_s"),
+    (ramp("radio.queue_limit", 2.5), "events.0.to: expected a whole number for radio.queue_limit, got 2.5"),
+    (ramp("radio.loss", over_s=-1.0), "events.0.over_s: expected a number of at least 0 and at most"),
+]
+
+
+@pytest.mark.parametrize(("table", "text"), FAULTS + OF_RADIOS)
 def test_a_fault_is_one_line_with_file_key_and_what_was_expected(table: Any, text: str):
     with pytest.raises(BadInput) as caught:
         scenario_from(changed("events", [table]), "f.toml")
@@ -67,7 +130,7 @@ def test_a_fault_is_one_line_with_file_key_and_what_was_expected(table: Any, tex
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("table", [event("blackout", robots=FLOCK), partition(["flock"], ["big"])])
+@pytest.mark.parametrize("table", [event("blackout", robots=FLOCK), partition(["flock"], ["big"]), ramp("radio.loss")])
 def test_without_a_radio_there_is_nothing_to_disturb(table: Any):
     mute = {**{key: value for key, value in SAMPLE.items() if key != "radio"}, "events": [table]}
     with pytest.raises(BadInput, match=r"^f: events\.0\.do: expected a scenario with a \[radio\] for"):

@@ -162,8 +162,35 @@ def test_the_radio_graph_leaves_out_the_dead_radios_that_are_off_and_pairs_that_
     ]
 
 
+def test_a_ramp_changes_the_radio_tick_by_tick_and_only_while_it_moves():
+    """The two are 1 m apart; the reach falls from 9 m at 0.2 s to 0.5 m at 1.2 s, and is 9 m again at 1.5 s."""
+    ramp = {"do": "ramp", "at_s": 0.2, "what": "radio.range_m", "to": 0.5, "over_s": 1.0, "for_s": 1.3}
+    seen = ran(TWO, [ramp], 20)
+    joined = [truth.edges is not None and len(truth.edges) == 1 for truth in seen]
+    assert joined == [not 12 <= tick < 15 for tick in range(20)]
+    told = [(truth.tick, e.do, e.ended, e.changed.tolist()) for truth in seen for e in truth.events]
+    assert told == [(2, "ramp", False, [True, True]), (15, "ramp", True, [True, True])]
+
+
+def test_the_air_is_tuned_only_when_a_number_changes(monkeypatch: pytest.MonkeyPatch):
+    tuned: list[float] = []
+    monkeypatch.setattr(Air, "tune", lambda _, radio: tuned.append(radio.loss))
+    ran(TWO, [{"do": "ramp", "at_s": 0.2, "what": "radio.loss", "to": 0.4, "over_s": 0.4, "for_s": 1.0}], 20)
+    assert tuned == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.0])
+
+
+def test_a_partition_by_place_takes_robots_where_they_are_when_it_begins():
+    """Robot 0 drives across the middle, about which the second partition then has it on the other side."""
+    halves = {"do": "partition", "halves": "x"}
+    events = [{**halves, "at_s": 0.1, "for_s": 1.0}, {**halves, "at_s": 4.0}]
+    seen = ran([[-0.05, 0.0, 0.0], [-0.5, 1.0, 0.0]], events, 42)
+    joined = [truth.edges is not None and len(truth.edges) == 1 for truth in seen]
+    assert joined == [tick < 40 for tick in range(42)]
+
+
 def swarm(*keys: int, robots: int = 10) -> Swarm:
-    return Swarm({"a": range(4), "b": range(4, robots)}, robots, np.array(keys, np.uint64))
+    pose = np.zeros((robots * len(keys), 3))
+    return Swarm({"a": range(4), "b": range(4, robots)}, robots, np.array(keys, np.uint64), pose)
 
 
 def chosen(of: Swarm, serial: int = 0, eligible: Any = None, **keys: Any) -> list[list[int]]:

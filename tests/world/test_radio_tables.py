@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.air.presets import PRESETS
+from swarmwire.comms.air.propagation.parameters import OwnAntenna
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.parameters import Bursts, bursts_from_steps
 from swarmwire.comms.errors import BadInput
@@ -85,3 +86,21 @@ def test_a_contradiction_is_refused_with_its_key(table: dict[str, Any], text: st
     with pytest.raises(BadInput) as caught:
         radio_of(table)
     assert str(caught.value).startswith(f"f: {text}")
+
+
+def test_groups_may_have_their_own_power_and_gain_of_a_radio_with_signals() -> None:
+    table = {**SAMPLE, "radio": SIGNAL}
+    own = {**SAMPLE["robots"], "big": {**SAMPLE["robots"]["big"], "radio": {"power_dbm": -10.0}}}
+    scenario = scenario_from({**table, "robots": own}, "f")
+    assert scenario.robots["big"].radio == OwnAntenna(power_dbm=-10.0)
+    assert scenario.robots["flock"].radio is None
+    with pytest.raises(
+        BadInput, match=r"^f: robots\.big\.radio: expected a radio with signals: a disk knows no strength"
+    ):
+        scenario_from({**SAMPLE, "robots": own}, "f")
+    mute = {key: value for key, value in SAMPLE.items() if key != "radio"}
+    with pytest.raises(BadInput, match=r"^f: robots\.big\.radio: expected a radio with signals: there is no \[radio\]"):
+        scenario_from({**mute, "robots": own}, "f")
+    own["big"]["radio"] = {"power_dbm": 1000.0}
+    with pytest.raises(BadInput, match=r"^f: robots\.big\.radio\.power_dbm: expected a number of at least -100"):
+        scenario_from({**table, "robots": own}, "f")

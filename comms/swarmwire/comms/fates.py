@@ -31,6 +31,7 @@ class Fate(IntEnum):
     COLLIDED = 12, "other packets on air disturbed it, or the receiver was busy with another or sending itself"
     BURST = 13, "lost by a burst, while the link was in its bad state"
     CHANNEL_BUSY = 14, "the sender found the air busy each time it listened: never on air"
+    JAMMED = 15, "a jammer drowned it: without it the packet would have been right"
 
 
 FATE_NAMES = tuple(fate.name.lower() for fate in Fate)

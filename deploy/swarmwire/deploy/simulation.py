@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from swarmwire.comms.air.air import Air
+from swarmwire.comms.air.antennas import Antennas
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.geometry import obstacle_arrays
@@ -231,6 +232,7 @@ class Simulation:
         obstacles = obstacle_arrays(static.obstacles)
         size_m, every = static.arena_size_m, static.act_every_ticks
         radius_m = np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for group in static.groups])
+        antennas = Antennas.of_groups((table.count, table.radio) for table in self.scenario.robots.values())
         return Air(
             radio,
             self.world.keys,
@@ -241,6 +243,7 @@ class Simulation:
             every,
             radius_m,
             self._traces,
+            antennas,
         )
 
     def _from_outside(self, tick: int) -> bool:

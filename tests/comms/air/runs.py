@@ -28,6 +28,9 @@ class Run:
     air: Air
     news: list[News] = field(default_factory=list)
     last: Tally | None = None
+    edges: IntArray = field(
+        default_factory=lambda: np.empty((0, 2), np.int64)
+    )  # of the radio graph, if it was asked for
 
     @property
     def tally(self) -> Tally:

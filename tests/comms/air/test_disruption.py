@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.disruption import Disruption
+from swarmwire.comms.air.jammers import Jammers
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import tick_start_ns
@@ -120,7 +121,12 @@ def test_fates_add_up_whatever_happens(radio: Radio, arenas: int, robots: int, s
     now: dict[int, Disruption] = {}
     for tick in range(ticks):
         sides = rng.integers(0, 3, (int(rng.integers(0, 3)), rows))
-        now[tick] = Disruption(rng.random(rows) < 0.7, rng.random(rows) < 0.8, sides)
+        one_way = rng.integers(0, 3, (int(rng.integers(0, 2)), rows))
+        backlog = rng.integers(0, 3, rows)
+        gain_db = rng.normal(0.0, 3.0, (2, rows))
+        now[tick] = Disruption(
+            rng.random(rows) < 0.7, rng.random(rows) < 0.8, backlog, sides, one_way, *gain_db, Jammers.none()
+        )
     sent: dict[int, Sent] = {}
     for tick in range(ticks):
         drawn = random_traffic(rng, arenas, robots)

@@ -29,7 +29,7 @@ def test_packets_that_come_at_random_wait_as_theory_says(load: float, stated: fl
     sender, airtime_ns, fits = np.arange(SENDERS), np.full(SENDERS, AIRTIME_NS), np.zeros(SENDERS, bool)
     for k, at_ns in enumerate(sent_at_ns):
         on_air_at_ns, fate, free_at_ns = enter(
-            at_ns, free_at_ns, NOBODY, NOBODY, sender, airtime_ns, fits, queue_limit=10**9
+            at_ns, free_at_ns, NOBODY, NOBODY, sender, airtime_ns, fits, np.full(len(free_at_ns), 10**9)
         )
         assert (fate == ACCEPTED).all()
         if k >= WARM_UP:

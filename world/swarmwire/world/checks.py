@@ -23,6 +23,7 @@ def check(scenario: Scenario, where: str) -> None:
     _check_send_offset(scenario, where)
     if scenario.radio is not None:
         check_radio(scenario.radio, where)
+    _check_antennas(scenario, where)
     for i, event in enumerate(scenario.events):
         _check_event(scenario, event, f"events.{i}", where)
 
@@ -65,11 +66,20 @@ def _check_send_offset(scenario: Scenario, where: str) -> None:
         raise BadInput(where, "radio.send_offset", f"{expected}; got {offset!r}")
 
 
+def _check_antennas(scenario: Scenario, where: str) -> None:
+    for group, table in scenario.robots.items():
+        if table.radio is not None and (scenario.radio is None or not scenario.radio.is_signal):
+            why = "a disk knows no strength" if scenario.radio else "there is no [radio]"
+            raise BadInput(where, f"robots.{group}.radio", f"expected a radio with signals: {why}")
+
+
 def _check_event(scenario: Scenario, event: Event, key: str, where: str) -> None:
-    """An event names robots that there are, and radios only where there is a radio."""
+    """An event names robots that there are, and fits the radio, if it needs one."""
     if event.needs_radio and scenario.radio is None:
         raise BadInput(where, f"{key}.do", f"expected a scenario with a [radio] for {event.do!r}")
     try:
         event.check(scenario.groups())
+        if event.needs_radio and scenario.radio is not None:
+            event.check_radio(scenario.radio)
     except BadInput as error:
         raise BadInput(where, ".".join(part for part in (key, error.key) if part), error.expected) from None

@@ -2,8 +2,12 @@
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from swarmwire.comms.air.air import Air
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import KeyArray
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.events.conditions import Conditions
@@ -16,10 +20,13 @@ from swarmwire.world.world import World
 class Events:
     """The events of a run in order of time; at equal times those that end come first, then the scenario's order."""
 
-    def __init__(self, events: Sequence[Event], static: Static, keys: KeyArray) -> None:
+    def __init__(self, events: Sequence[Event], static: Static, keys: KeyArray, radio: Radio | None = None) -> None:
+        """`radio` is the scenario's."""
         self._events = tuple(events)
         groups = {group.name: range(group.start, group.stop) for group in static.groups}
-        self._swarm = Swarm(groups, static.robots, keys)
+        rows = len(keys) * static.robots
+        self._swarm = Swarm(groups, static.robots, keys, np.zeros((rows, 3)))
+        self._radio = self._tuned = radio
         self._conditions = Conditions(self._swarm.rows)
         due = [(to_ns(event.at_s), True, serial) for serial, event in enumerate(events)]
         for (at_ns, _, serial), event in zip(tuple(due), events, strict=True):
@@ -30,6 +37,7 @@ class Events:
     def apply(self, start_ns: int, world: World, air: Air | None) -> tuple[Happened, ...]:
         """Let happen what is due by the start of a tick, in ns; world and air go on under what holds after that."""
         happened: list[Happened] = []
+        self._swarm = replace(self._swarm, pose=world.pose)
         while self._coming and self._coming[0][0] <= start_ns:
             _, begins, serial = self._coming.popleft()
             happened.append(self._happen(serial, begins))
@@ -37,7 +45,14 @@ class Events:
             world.live(self._conditions.alive)
             if air:
                 air.disrupt(self._conditions.disruption())
+        if air and self._radio:
+            self._tune(air, self._conditions.radio_at(self._radio, start_ns))
         return tuple(happened)
+
+    def _tune(self, air: Air, radio: Radio) -> None:
+        if radio != self._tuned:
+            air.tune(radio)
+            self._tuned = radio
 
     def _happen(self, serial: int, begins: bool) -> Happened:
         event, conditions = self._events[serial], self._conditions

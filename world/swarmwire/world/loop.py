@@ -25,7 +25,7 @@ class Loop:
     ) -> None:
         self.world, self.air, self.crew, self.observers = world, air, crew, observers
         self.ticks_done = 0
-        self._events = Events(events, world.static, world.keys)
+        self._events = Events(events, world.static, world.keys, air.radio if air else None)
         self._mailbox = Mailbox(world.static)
         self._lost: Counter[str] = Counter()  # packets that never came to the air, by why
         self._open: Tally | None = None  # of the tick under way: no observer has seen it yet

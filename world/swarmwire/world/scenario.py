@@ -7,6 +7,7 @@ from pydantic import BaseModel, Field, PrivateAttr, StringConstraints, field_val
 from pydantic_core import PydanticCustomError
 
 from swarmwire.comms.air.presets import with_preset
+from swarmwire.comms.air.propagation.parameters import OwnAntenna
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.registry import ACTIONS
@@ -183,6 +184,8 @@ class RobotsTable(Table):
     """They act when the tick modulo this is 0, and hear then what has arrived since they last acted."""
     params: dict[str, Any] = Field(default_factory=dict)
     """The agent's parameters."""
+    radio: Annotated[OwnAntenna, AsTable()] | None = None
+    """Their own power and gain; only of a radio with signals."""
     place: Annotated[InDisc | InArena | OnGrid | AtPoses, Field(discriminator="how")] = InArena(how="arena")
     """Where the robots stand at the start."""
 

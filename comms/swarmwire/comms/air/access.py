@@ -20,12 +20,13 @@ def enter(
     sender: IntArray,
     airtime_ns: IntArray,
     too_large: BoolArray,
-    queue_limit: int,
+    queue_limit: IntArray,
 ) -> tuple[IntArray, IntArray, IntArray]:
     """First in, first out: `on_air_at = max(sent_at, end of the sender's previous packet)`, all times in ns.
 
     A packet that must wait is refused while `queue_limit` others of its sender wait (will go on air after `sent_at`).
-    `sent_at_ns` and `free_at_ns` (end of the last airtime) are by robot row, `queued` the packets that may still wait.
+    That limit, `sent_at_ns` and `free_at_ns` (end of the last airtime) are by robot row, `queued` the packets that may
+    still wait.
     Returns on_air_at_ns (k,) (sent_at of a refused packet), fate (k,) and the new free_at_ns (rows,).
     """
     free_at_ns = free_at_ns.copy()
@@ -41,7 +42,7 @@ def enter(
         must_wait = free_at_ns[s] > sent_at_ns[s]
         if too_large[p]:
             fate[p] = TOO_LARGE
-        elif must_wait and waiting[s] >= queue_limit:
+        elif must_wait and waiting[s] >= queue_limit[s]:
             fate[p] = QUEUE_FULL
         else:
             on_air_at_ns[p] = max(sent_at_ns[s], free_at_ns[s])

@@ -6,6 +6,7 @@ import numpy as np
 
 from swarmwire.comms.air import news
 from swarmwire.comms.air.accounts import Accounts
+from swarmwire.comms.air.antennas import Antennas
 from swarmwire.comms.air.disk_way import DiskWay
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.kept_order import wait_for_earlier
@@ -38,6 +39,8 @@ class News:
 class Air:
     """The emulated medium of every arena of a world; robot row r is robot r % robots of arena r // robots.
 
+    `radio` is what it goes by at the moment.
+
     A packet waits in its sender's queue, goes on air, and ends at each intended receiver in one fate. Tick k starts
     with `advance(its start)`; then come `hold` with the poses of tick k and `send`. So a packet sent in a tick is heard
     in the next at the earliest, and geometry is that of the tick in which the packet goes on air.
@@ -47,7 +50,8 @@ class Air:
 
     Events change who is alive and what is off or apart at the start of a tick (`disrupt`, before `advance`). What went
     on air before stays on air, but the dead hear nothing any more and their queues end; a radio that is off loses what
-    it was receiving. A robot revived hears only what is sent from then on.
+    it was receiving, and what it should send ends or waits as its `backlog` says. A robot revived hears only what is
+    sent from then on.
     """
 
     def __init__(
@@ -61,22 +65,25 @@ class Air:
         act_every_ticks: IntArray | None = None,
         radius_m: FloatArray | None = None,
         traces: LinkTraces | None = None,
+        antennas: Antennas | None = None,
     ) -> None:
         """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out.
 
         `radius_m` (robots,) are their radii, which count for bodies between two robots; 0 each if left out. `traces`
-        are what the file of the radio's trace holds. ValueError for a disk without `range_m`, or a trace without its
-        file or the other way round.
+        are what the file of the radio's trace holds, `antennas` those of a radio with signals. ValueError for a disk
+        without `range_m`, or a trace without its file or the other way round.
         """
         if not radio.is_signal and radio.range_m is None:
             raise ValueError("range_m: expected a range, as a disk has one")
         if (radio.trace is None) != (traces is None):
             raise ValueError("traces: expected what the file of the radio's trace holds, and nothing without one")
         rows = len(keys) * robots
-        self._radio, self._robots = radio, robots
+        self.radio = self._coming_radio = radio
+        self._robots = robots
         self._held, self._coming = Disruption.none(rows), Disruption.none(rows)
         radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
-        medium = Medium(radio, keys, robots, obstacles, size_m, radii_m, self._held, traces)
+        own = antennas or Antennas.alike(robots)
+        medium = Medium(radio, keys, robots, obstacles, size_m, radii_m, self._held, own, traces)
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
         self._way: Way
@@ -94,8 +101,11 @@ class Air:
     def hold(self, pose: FloatArray, alive: BoolArray) -> None:
         """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive."""
         self._lives.now(alive)
+        self._held.become(self._coming)
         self._held.alive = alive.copy()
-        self._held.radio_on, self._held.sides = self._coming.radio_on, self._coming.sides
+        if self._coming_radio is not self.radio:
+            self.radio = self._coming_radio
+            self._way.tune(self._now_ns, self.radio)
         self._way.hold(pose.copy())
         in_arena = alive.reshape(-1, self._robots).sum(axis=1)
         self._others_alive = np.repeat(in_arena, self._robots) - alive
@@ -103,6 +113,13 @@ class Air:
     def disrupt(self, coming: Disruption) -> None:
         """This holds from the end of the next `advance` on, until told otherwise."""
         self._coming = coming
+
+    def tune(self, radio: Radio) -> None:
+        """The radio has these numbers from the end of the next `advance` on; all but numbers is as it was.
+
+        What waits or is on air stays so.
+        """
+        self._coming_radio = radio
 
     def send(self, at_ns: int, tick: int, sent: Sent) -> None:
         """Queue the packets that agents sent in the tick that started at `at_ns`; `hold` has told the tick's poses.
@@ -126,7 +143,7 @@ class Air:
             raise ValueError(f"until_ns: expected at least {self._now_ns}, got {until_ns}")
         self._now_ns = until_ns
         self._take(*self._way.pass_time(until_ns, self._lives))
-        if not (self._coming.alive.all() and self._coming.radio_on.all()):
+        if self._coming.anyone_out or self._held.anyone_out:
             self._take(*self._way.disrupt(until_ns, self._coming, self._lives))
             self._cut_off(until_ns)
         self._lives.forget(self._way.queued.epoch)
@@ -134,8 +151,8 @@ class Air:
         ended = self._links if final.all() else self._links.select(np.flatnonzero(final))
         self._accounts.settle(ended)
         told = News(
-            news.heard(ended, self._on_air, self._radio.gives.columns, self._robots, len(self._others_alive)),
-            news.finished(ended, self._on_air, self._robots, self._radio.is_signal),
+            news.heard(ended, self._on_air, self.radio.gives.columns, self._robots, len(self._others_alive)),
+            news.finished(ended, self._on_air, self._robots, self.radio.is_signal),
             news.departed(ended, self._on_air, self._robots),
             self._accounts.close(),
         )
@@ -176,7 +193,7 @@ class Air:
             coming, rows = len(self._links.packet), len(self._others_alive)
             self._links = self._links.followed_by(links._replace(packet=links.packet + len(self._on_air.sender)))
             self._on_air = self._on_air.followed_by(packets)
-            if self._radio.delays is not None and self._radio.delays.keep_order:
+            if self.radio.delays is not None and self.radio.delays.keep_order:
                 wait_for_earlier(self._links, coming, rows)
 
     def _keep(self, index: IntArray) -> None:

@@ -21,8 +21,14 @@ class BurstLoss(Stage):
 
     def __init__(self, medium: Medium) -> None:
         assert medium.radio.bursts is not None
-        self._loss = medium.radio.bursts.loss
+        self._bursts, self._loss = medium.radio.bursts, medium.radio.bursts.loss
         self._states = BurstStates(medium.radio.bursts, medium.keys, medium.robots)
+
+    def go_on_from(self, before: Stage, at_ns: int) -> None:
+        """Links are as good or bad as they were."""
+        assert isinstance(before, BurstLoss)
+        before._states.change(self._bursts, at_ns)
+        self._states = before._states
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Links end that a burst takes; they were in range. A link's packets come in the order of their time."""

@@ -24,6 +24,14 @@ class Channel:
         self._columns = len(medium.radio.gives.columns)
         self._stages = chain(medium)
 
+    def tune(self, at_ns: int, medium: Medium) -> None:
+        """The medium's radio has other numbers from `at_ns` on; stages keep what they remember."""
+        before = {type(stage): stage for stage in self._stages if stage.remembers}
+        self._radio, self._stages = medium.radio, chain(medium)
+        for stage in self._stages:
+            if type(stage) in before:
+                stage.go_on_from(before[type(stage)], at_ns)
+
     def decide(self, packets: Transmissions, pose: FloatArray, lives: Lives) -> Links:
         """What becomes of packets that go on air, or are refused, while robots stand at `pose`."""
         # No geometry for what is too large; for a full queue it tells how many it would have reached.

@@ -18,8 +18,9 @@ from swarmwire.comms.air.propagation.path_loss import loss_db
 from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves, shadowing_db
 from swarmwire.comms.air.propagation.walls import wall_loss_db
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.signal.numbers import cut_off_dbm, passes_besides, rules_of, sensitivity_of
+from swarmwire.comms.air.signal.numbers import cut_off_dbm, rules_of, sensitivity_of
 from swarmwire.comms.air.signal.outcome import lone_deliveries
+from swarmwire.comms.air.signal.radio_graph import passes_besides
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.geometry import Obstacles, is_blocked
 

@@ -1,11 +1,14 @@
 """The disk's way: a packet's fates are decided when it goes on air, since no other packet changes them."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from swarmwire.comms.air.channel import Channel
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.lives import Lives
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.send_times import SendTimes
 from swarmwire.comms.air.senders import Senders
 from swarmwire.comms.air.stage import Medium
@@ -21,6 +24,7 @@ class DiskWay(Way):
     """Senders with a queue each, then the chain of stages."""
 
     def __init__(self, medium: Medium, size_m: tuple[float, float], send_times: SendTimes) -> None:
+        self._medium = medium
         self._senders = Senders(medium.radio, send_times, len(medium.keys) * medium.robots)
         self._channel = Channel(medium, size_m)
         self._pose = np.zeros((len(medium.keys) * medium.robots, 3))
@@ -36,6 +40,11 @@ class DiskWay(Way):
         """Packets that go on air from now on find robots at `pose` (rows, 3)."""
         self._pose = pose
 
+    def tune(self, at_ns: int, radio: Radio) -> None:
+        """The radio has other numbers for packets handed over, or on air, from `at_ns` on."""
+        self._senders.tune(radio)
+        self._channel.tune(at_ns, replace(self._medium, radio=radio))
+
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets: when they will go on air, or be refused, is known at once."""
         return self._senders.accept(at_ns, tick, sent, others_alive, epoch)
@@ -46,8 +55,10 @@ class DiskWay(Way):
         return self._decided(self._senders.leave(until_ns, self._held), lives)
 
     def disrupt(self, at_ns: int, coming: Disruption, lives: Lives) -> Decided:
-        """The queues of the dead end; what is on air has its fates already."""
-        return self._decided(self._senders.die(at_ns, coming.alive), lives)
+        """The queues of the dead end, those of radios that are off may wait; what is on air has its fates already."""
+        decided = self._decided(self._senders.die(at_ns, coming.alive), lives)
+        self._senders.switch(at_ns, coming)
+        return decided
 
     def drain(self) -> Transmissions:
         """Take out all that is queued."""

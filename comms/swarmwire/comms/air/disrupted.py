@@ -33,9 +33,8 @@ class Disrupted(Stage):
             links.fate[under_way & ends] = fate
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
-        """0 where a radio is off or a partition between, else 1; the radio graph knows the dead already."""
+        """0 where a radio is off or a partition between, be it one-way, else 1; the radio graph knows the dead."""
         now = self._disruption
         if not now.anything:
             return 1.0
-        passes = now.radio_on[links.sender] & now.radio_on[links.receiver] & ~now.apart(links.sender, links.receiver)
-        return passes.astype(np.float64)
+        return now.joined(links.sender, links.receiver).astype(np.float64)

@@ -3,7 +3,8 @@
 import numpy as np
 
 from swarmwire.comms.air import access
-from swarmwire.comms.air.disruption import Disruption
+from swarmwire.comms.air.backlog import FAR_NS, held_back, let_go, newest_only
+from swarmwire.comms.air.disruption import DROP, NEWEST, Disruption
 from swarmwire.comms.air.frames import airtime_ns
 from swarmwire.comms.air.intake import Intake
 from swarmwire.comms.air.radio import Radio
@@ -13,6 +14,8 @@ from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import Sent
 
+NO_LIMIT = 2**31  # where all but the newest packet end anyway
+
 
 class Senders:
     """Each robot's radio: a queue, first in, first out, and a count of the packets that it was handed."""
@@ -21,7 +24,12 @@ class Senders:
         self._radio, self._send_times = radio, send_times
         self._intake = Intake(rows)
         self._free_at_ns = np.zeros(rows, np.int64)
+        self._kept_back = np.full(rows, DROP)
         self.queued = Transmissions.none()
+
+    def tune(self, radio: Radio) -> None:
+        """The radio has other numbers for packets to come."""
+        self._radio = radio
 
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """The packets as the radios take them up, sorted by sender; also kept in `queued`.
@@ -32,13 +40,14 @@ class Senders:
         packets = self._intake.take(sent_at_ns, sent, others_alive, epoch)
         on_air_at_ns, off_air_at_ns, fate = self._access(sent_at_ns, packets.sender, packets.payloads.sizes)
         packets = packets._replace(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns, fate=fate)
-        self.queued = self.queued.followed_by(packets)
+        self.queued = newest_only(self.queued.followed_by(packets), self._kept_back == NEWEST, sent_at_ns)
         return packets
 
     def leave(self, until_ns: int, now: Disruption) -> Transmissions:
         """Take out of the queues what goes on air, or is refused, before `until_ns`.
 
-        What a radio that is off should put on air ends at that moment as BLACKOUT: its queue drains at the usual pace.
+        What a radio that is off should put on air ends at that moment as BLACKOUT: its queue drains at the usual pace,
+        unless it is kept back.
         """
         packets = self._taken(self.queued.on_air_at_ns < until_ns)
         accepted = packets.fate == access.ACCEPTED
@@ -48,6 +57,16 @@ class Senders:
         fate = np.where(dead, Fate.SENDER_DEAD, np.where(off, Fate.BLACKOUT, packets.fate))
         off_air_at_ns = np.where(off | dead, packets.on_air_at_ns, packets.off_air_at_ns)
         return packets._replace(fate=fate, off_air_at_ns=off_air_at_ns)
+
+    def switch(self, at_ns: int, now: Disruption) -> None:
+        """Radios are off or on from `at_ns` on: queues are kept back, or go on air again."""
+        before, self._kept_back = self._kept_back, now.kept_back
+        held, free = self._kept_back != DROP, (before != DROP) & (self._kept_back == DROP)
+        if free.any():
+            self.queued, self._free_at_ns = let_go(self.queued, free, self._free_at_ns, at_ns)
+        if (held & (before == DROP)).any():
+            self.queued, self._free_at_ns = held_back(self.queued, held & (before == DROP), self._free_at_ns)
+        self.queued = newest_only(self.queued, self._kept_back == NEWEST, np.full(len(held), at_ns))
 
     def die(self, at_ns: int, alive: BoolArray) -> Transmissions:
         """Take out all that waits at radios of robots not alive (rows,): SENDER_DEAD now, and the radios are free."""
@@ -65,14 +84,16 @@ class Senders:
     def _access(self, sent_at_ns: IntArray, sender: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray, IntArray]:
         radio = self._radio
         lasts_ns = airtime_ns(radio, sizes + radio.overhead_bytes)
-        on_air_at_ns, fate, self._free_at_ns = access.enter(
+        held = self._kept_back != DROP
+        on_air_at_ns, fate, free_at_ns = access.enter(
             sent_at_ns,
-            self._free_at_ns,
+            np.where(held, FAR_NS, self._free_at_ns),
             self.queued.sender,
             self.queued.on_air_at_ns,
             sender,
             lasts_ns,
             sizes > radio.max_payload_bytes,
-            radio.queue_limit,
+            np.where(self._kept_back == NEWEST, NO_LIMIT, radio.queue_limit),
         )
+        self._free_at_ns = np.where(held, self._free_at_ns, free_at_ns)
         return on_air_at_ns, on_air_at_ns + np.where(fate == access.ACCEPTED, lasts_ns, 0), fate

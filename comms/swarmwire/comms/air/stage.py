@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+from swarmwire.comms.air.antennas import Antennas
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.radio import Radio
@@ -22,6 +23,7 @@ class Medium:
     size_m: tuple[float, float]  # of each arena
     radius_m: FloatArray  # (rows,) of the robots
     disruption: Disruption  # kept up to date by the air
+    antennas: Antennas  # of robots
     traces: LinkTraces | None = None  # of the radio's trace, where it has one
 
 
@@ -37,6 +39,9 @@ class Stage(ABC):
         Only links with fate HEARD are still under way. `pose` (rows, 3) is that at `on_air_at`: x, y in m, heading.
         A stage before reception that ends a link also sets its `in_range` to 0.
         """
+
+    def go_on_from(self, before: "Stage", at_ns: int) -> None:  # noqa: B027 - most stages remember nothing
+        """Remember what a stage of the same kind did, whose radio had other numbers until `at_ns`."""
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
         """With which probability lone packets pass, fast fading apart, (k,) or one for all: for the radio graph.

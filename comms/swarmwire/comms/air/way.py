@@ -5,6 +5,7 @@ from abc import ABC, abstractmethod
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.lives import Lives
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.packets import Sent
@@ -29,6 +30,10 @@ class Way(ABC):
         """Robots stand at `pose` (rows, 3) from now on, under the disruption that holds; the array stays as it is."""
 
     @abstractmethod
+    def tune(self, at_ns: int, radio: Radio) -> None:
+        """The radio has other numbers from `at_ns` on; what waits or is on air stays so."""
+
+    @abstractmethod
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets; they as the radios take them up. `others_alive` (rows,) are whom a broadcast intends."""
 
@@ -38,7 +43,10 @@ class Way(ABC):
 
     @abstractmethod
     def disrupt(self, at_ns: int, coming: Disruption, lives: Lives) -> Decided:
-        """Robots that are dead from now on lose their queues, radios that are off what they receive."""
+        """Robots that are dead from now on lose their queues, radios that are off what they receive.
+
+        Called while anybody is dead or off, and once when nobody is any more: queues that waited go on air.
+        """
 
     @abstractmethod
     def drain(self) -> Transmissions:

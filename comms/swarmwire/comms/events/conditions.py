@@ -1,25 +1,36 @@
 """What events hold over robots and radios now, by the event that does."""
 
 from collections.abc import Iterable
+from functools import reduce
 
 import numpy as np
 
-from swarmwire.comms.air.disruption import Disruption
-from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.air.disruption import ALL, DROP, Disruption
+from swarmwire.comms.air.jammers import Jammers
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.tuning import Slope, radio_at
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
 
 class Conditions:
     """Each event holds what it holds until it ends, so those that overlap do not undo one another.
 
     A robot is dead while any kill holds it; a radio is off while any blackout does; two robots are apart while any
-    partition has them in different sets.
+    partition has them in different sets; a one-way partition keeps only what the first sends from the second.
     """
 
     def __init__(self, rows: int) -> None:
-        self._rows = rows
+        self.rows = rows
         self.kills: dict[int, BoolArray] = {}  # by event: (rows,) robots that it holds dead
         self.blackouts: dict[int, BoolArray] = {}  # by event: (rows,) robots whose radios it holds off
+        self.backlogs: dict[int, int] = {}  # by blackout: DROP, NEWEST or ALL
+        self.gains: dict[
+            int, FloatArray
+        ] = {}  # by event: (2, rows) dB added to what robots send, and to what they hear
+        self.jammers: dict[int, Jammers] = {}  # by event
+        self.slopes: dict[int, Slope] = {}  # by ramp, in the order in which they began
         self.partitions: dict[int, IntArray] = {}  # by event: (rows,) the set of each robot, from 1; 0: in none
+        self.one_way: dict[int, IntArray] = {}  # by event: (rows,) the same, where the second does not hear the first
 
     @property
     def alive(self) -> BoolArray:
@@ -31,13 +42,37 @@ class Conditions:
         """Which robots' radios are on, (rows,)."""
         return ~self._any(self.blackouts.values())
 
+    @property
+    def backlog(self) -> IntArray:
+        """What becomes of the packets of radios that are off, (rows,): by the strictest of the blackouts."""
+        least = np.full(self.rows, ALL)
+        for serial, mask in self.blackouts.items():
+            least[mask] = np.minimum(least[mask], self.backlogs[serial])
+        return np.where(self.radio_on, DROP, least)
+
+    def radio_at(self, radio: Radio, at_ns: int) -> Radio:
+        """What ramps have made of the scenario's radio by a time."""
+        return radio_at(radio, self.slopes.values(), at_ns) if self.slopes else radio
+
     def disruption(self) -> Disruption:
         """All that matters to the air, as it is now."""
-        sides = np.array(list(self.partitions.values()), np.int64).reshape(-1, self._rows)
-        return Disruption(self.alive, self.radio_on, sides)
+        gain_db = sum(self.gains.values(), np.zeros((2, self.rows)))
+        return Disruption(
+            alive=self.alive,
+            radio_on=self.radio_on,
+            backlog=self.backlog,
+            sides=self._sides(self.partitions),
+            one_way=self._sides(self.one_way),
+            send_gain_db=gain_db[0],
+            receive_gain_db=gain_db[1],
+            jammers=reduce(Jammers.followed_by, self.jammers.values(), Jammers.none()),
+        )
+
+    def _sides(self, of: dict[int, IntArray]) -> IntArray:
+        return np.array(list(of.values()), np.int64).reshape(-1, self.rows)
 
     def _any(self, masks: Iterable[BoolArray]) -> BoolArray:
-        found = np.zeros(self._rows, np.bool_)
+        found = np.zeros(self.rows, np.bool_)
         for mask in masks:
             found |= mask
         return found

@@ -1,10 +1,14 @@
 """What an event is: a frozen dataclass of parameters that knows how to begin, and how to end if it lasts."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import ClassVar
 
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.swarm import Groups, Swarm
 from swarmwire.comms.parameters import parameter
@@ -31,6 +35,9 @@ class Event(ABC):
     def check(self, groups: Groups) -> None:
         """Raise BadInput, with a key within the event's table, for what does not fit these groups of robots."""
 
+    def check_radio(self, radio: Radio) -> None:  # noqa: B027 - most events fit any radio
+        """Raise BadInput, with a key within the event's table, for what does not fit this radio; it needs one."""
+
     @abstractmethod
     def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
         """Change `conditions`; `serial` is the event's place in the scenario. Which robots it changed, (rows,)."""
@@ -50,3 +57,12 @@ class LastingEvent(Event):
     def lasts_s(self) -> float | None:
         """`for_s`."""
         return self.for_s
+
+
+@contextmanager
+def within(key: str) -> Generator[None]:
+    """A fault that is found inside names its key within the table `key`."""
+    try:
+        yield
+    except BadInput as error:
+        raise BadInput("", ".".join(part for part in (key, error.key) if part), error.expected) from None

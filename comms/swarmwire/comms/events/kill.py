@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
-from swarmwire.comms.events.event import LastingEvent
+from swarmwire.comms.events.event import LastingEvent, within
 from swarmwire.comms.events.selection import Selection
 from swarmwire.comms.events.swarm import Groups, Swarm
 from swarmwire.comms.parameters import parameter
@@ -37,7 +36,5 @@ class Kill(LastingEvent):
 
 def check_robots(robots: Selection, groups: Groups) -> None:
     """Raise the fault of a selection under the key `robots`."""
-    try:
+    with within("robots"):
         robots.check(groups)
-    except BadInput as error:
-        raise BadInput("", ".".join(part for part in ("robots", error.key) if part), error.expected) from None

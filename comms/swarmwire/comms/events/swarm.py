@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from swarmwire.comms.arrays import KeyArray
+from swarmwire.comms.arrays import FloatArray, KeyArray
 
 Groups = Mapping[str, range]  # by name: indices within an arena
 
@@ -15,6 +15,7 @@ class Swarm:
     groups: Groups
     robots: int  # in each arena
     keys: KeyArray  # (arenas,) for draws
+    pose: FloatArray  # (rows, 3) where robots stand at the moment: x, y in m, heading in rad
 
     @property
     def rows(self) -> int:
@@ -28,3 +29,9 @@ def index_of(name: str, groups: Groups) -> int | None:
     members = groups.get(group, range(0))
     known = number.isdecimal() and number == str(int(number)) and int(number) < len(members)
     return members[int(number)] if known else None
+
+
+def members_of(name: str, groups: Groups) -> range:
+    """Indices within an arena of a group, or the one of a robot; empty if there is neither of this name."""
+    index = index_of(name, groups)
+    return groups.get(name, range(0)) if index is None else range(index, index + 1)

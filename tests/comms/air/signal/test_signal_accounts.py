@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.air.disruption import Disruption
-from swarmwire.comms.air.propagation.parameters import Bodies, Fading, Shadowing, Walls
+from swarmwire.comms.air.jammers import NO_ROBOT, Jammers
+from swarmwire.comms.air.propagation.parameters import Antenna, Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.fates import Fate
@@ -85,6 +86,8 @@ def test_fates_add_up_when_robots_die_and_are_revived(radio: Radio, robots: int,
     disruption = [random_disruption(robots, rng) for _ in range(6)]
     for tick in range(6):
         air.disrupt(disruption[tick])
+        if rng.random() < 0.3:
+            air.tune(replace(radio, queue_limit=int(rng.integers(0, 4)), loss=0.2, antenna=Antenna(power_dbm=-3.0)))
         tally.append(air.advance(tick * 10**8).tally)
         air.hold(pose, disruption[tick].alive)
         living = np.flatnonzero(disruption[tick].alive)
@@ -98,7 +101,27 @@ def test_fates_add_up_when_robots_die_and_are_revived(radio: Radio, robots: int,
 def random_disruption(robots: int, rng: np.random.Generator) -> Disruption:
     """Some are dead, some have their radio off, some are kept apart."""
     sides = rng.integers(0, 3, (1, robots))
-    return Disruption(rng.random(robots) < 0.7, rng.random(robots) < 0.8, sides)
+    one_way = rng.integers(0, 3, (int(rng.integers(0, 2)), robots))
+    backlog = rng.integers(0, 3, robots)
+    gain_db = rng.normal(0.0, 3.0, (2, robots))
+    jammers = random_jammers(robots, rng)
+    return Disruption(rng.random(robots) < 0.7, rng.random(robots) < 0.8, backlog, sides, one_way, *gain_db, jammers)
+
+
+def random_jammers(robots: int, rng: np.random.Generator) -> Jammers:
+    """Up to three in the one arena, some of them carried."""
+    k = int(rng.integers(0, 4))
+    period_ns = rng.integers(10**5, 10**8, k)
+    return Jammers(
+        arena=np.zeros(k, np.int64),
+        carrier=rng.integers(NO_ROBOT, robots, k),
+        x_m=rng.normal(0.0, 20.0, k),
+        y_m=rng.normal(0.0, 20.0, k),
+        power_dbm=rng.uniform(-60.0, 20.0, k),
+        on_ns=rng.integers(1, period_ns + 1),
+        period_ns=period_ns,
+        phase_ns=rng.integers(0, period_ns),
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)

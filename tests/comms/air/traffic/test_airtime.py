@@ -118,7 +118,7 @@ def test_802_15_4_counts_its_waits_in_symbols():
     for name, symbols in stated.items():
         assert getattr(timing, name) == symbols * timing.symbol_ns, name
     assert timing.acknowledgement_wait_ns == (20 + 12 + 10 + 12) * timing.symbol_ns
-    assert [timing.space_ns(octets) for octets in (18, 19)] == [192 * US, 640 * US]
+    assert timing.space_ns(np.array([18, 19])).tolist() == [192 * US, 640 * US]
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,18 @@ class Antenna:
 
 
 @dataclass(frozen=True)
+class OwnAntenna:
+    """What the antennas of a group's robots have of their own, instead of what `[radio.antenna]` says."""
+
+    power_dbm: float | None = parameter(
+        None, help="their transmit power into the antenna", unit="dBm", at_least=-100, at_most=100
+    )
+    gain_dbi: float | None = parameter(
+        None, help="the gain of their antenna, for what they send and hear", unit="dBi", at_least=-100, at_most=100
+    )
+
+
+@dataclass(frozen=True)
 class Shadowing:
     """How strongly and over which distance the surroundings vary."""
 

@@ -37,6 +37,12 @@ class BurstStates:
         """How many links are kept."""
         return self._kept
 
+    def change(self, bursts: Bursts, now_ns: int) -> None:
+        """Links are good and bad by other numbers from `now_ns` on."""
+        # All that no longer counts is forgotten now: slower bursts must not find what chance has kept of the faster.
+        self._rebuild(now_ns, 0)
+        self._bursts = bursts
+
     def lost(self, sender: IntArray, receiver: IntArray, sequence: IntArray, at_ns: IntArray) -> BoolArray:
         """Which packets (k,) bursts take; rows of sender and receiver, times in ns that never fall for a link."""
         if not len(sender):

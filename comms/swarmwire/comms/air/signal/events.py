@@ -2,7 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from swarmwire.comms.air.signal import on_air, service
+from swarmwire.comms.air.signal import jamming, on_air, service
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import ENTER, LISTENED, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY, RECEIVING, SILENT
@@ -39,9 +39,13 @@ def run_until(rules, bursts, state, queue, told, most_links, until_ns):
     No robot has more than `most_links`.
     """
     rows = len(state.robot)
-    while queue.size[0] > 0:
+    jam = state.jam
+    while queue.size[0] > 0 or jam.next[0] < len(jam.at_ns):
         event = queue.heap[0]
-        now_ns = queue.at_ns[event]
+        now_ns = queue.at_ns[event] if queue.size[0] > 0 else until_ns
+        if jam.next[0] < len(jam.at_ns) and jam.at_ns[jam.next[0]] <= now_ns:
+            jamming.toggle(rules, state, queue)  # all of them are before `until_ns`
+            continue
         if now_ns >= until_ns:
             break
         kind, r = event // rows, event % rows

@@ -34,6 +34,7 @@ class Surroundings(NamedTuple):
     curve: LossCurve
     reach_m: float  # no link is longer
     least_dbm: float  # no link is weaker, fading apart
+    spread_db: float  # by how much shadowing may make up for path loss
     shadows: bool
     amplitude_db: float
     field: FloatArray  # (arenas, 3, n), as `field_waves` has them
@@ -74,6 +75,8 @@ def pairs_of(
     robots = len(x) // len(keys)
     cells = grid.build(x, y, len(keys), size_m, around.reach_m * CELL_SLACK)
     a, b, loss = _near(x, y, robots, cells, around.reach_m, around.curve)
+    # Who is near enough must not depend on other robots' antennas, of which `reach_m` knows the best.
+    a, b, loss = _above(around.least_dbm - around.spread_db, around.send_dbm, around.receive_dbi, a, b, loss)
     if around.shadows:
         _add_shadows(loss, x, y, robots, around.field, around.amplitude_db, a, b)
     if around.walls:
@@ -89,14 +92,14 @@ def pairs_of(
     if around.line_of_sight:
         _find_blocked(blocked, x, y, robots, obstacles, a, b)
     pairs = Pairs(a, b, loss, loss, gain, blocked)
-    return pairs if measured is None else _measured(pairs, measured, around.send_dbm, around.receive_dbi)
+    return pairs if measured is None else _measured(pairs, measured)
 
 
-def _measured(pairs: Pairs, measured: MeasuredLinks, send_dbm: FloatArray, receive_dbi: FloatArray) -> Pairs:
+def _measured(pairs: Pairs, measured: MeasuredLinks) -> Pairs:
     """The pairs with what was measured in place of the model, each way; what blocked them was measured, too."""
     a, b, blocked = pairs.a, pairs.b, pairs.blocked > 0
-    there_db, is_there = measured.loss_db(a, b, pairs.loss_db, send_dbm[a] + receive_dbi[b])
-    back_db, is_back = measured.loss_db(b, a, pairs.loss_db, send_dbm[b] + receive_dbi[a])
+    there_db, is_there = measured.loss_db(a, b, pairs.loss_db)
+    back_db, is_back = measured.loss_db(b, a, pairs.loss_db)
     there_db[blocked & is_back & ~is_there] = np.inf
     back_db[blocked & is_there & ~is_back] = np.inf
     still_blocked = np.where(is_there | is_back, 0, pairs.blocked)

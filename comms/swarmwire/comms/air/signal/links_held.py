@@ -21,6 +21,7 @@ class LinksHeld:
         link: the links.
         places: those of each robot under the poses held.
         pairs: the pairs of robots that these links join.
+        around: what links go by.
     """
 
     def __init__(
@@ -32,13 +33,8 @@ class LinksHeld:
         measured: MeasuredLinks | None,
     ) -> None:
         """`measured` are the links of the radio's trace, kept up to date by others."""
-        self._measured, self._medium, self._size_m, self._around, self._levels = (
-            measured,
-            medium,
-            size_m,
-            around,
-            levels,
-        )
+        self._medium, self._size_m, self._measured = medium, size_m, measured
+        self.around, self._levels = around, levels
         rows = len(medium.keys) * medium.robots
         self.pose = np.zeros((rows, 3))
         self.pairs = self.pairs_at(self.pose)
@@ -47,13 +43,17 @@ class LinksHeld:
     def pairs_at(self, pose: FloatArray) -> Pairs:
         """The pairs of robots that stand at `pose` (rows, 3)."""
         medium = self._medium
-        return pairs_of(pose, self._size_m, medium.keys, medium.obstacles, self._around, self._measured)
+        return pairs_of(pose, self._size_m, medium.keys, medium.obstacles, self.around, self._measured)
 
     def mean_dbm(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
         """The mean power of each pair from a to b, and back, (k,) each."""
-        send_dbm, receive_dbi = self._around.send_dbm, self._around.receive_dbi
+        send_dbm, receive_dbi = self.around.send_dbm, self.around.receive_dbi
         there, back = send_dbm[pairs.a] + receive_dbi[pairs.b], send_dbm[pairs.b] + receive_dbi[pairs.a]
         return there - pairs.loss_db, back - pairs.back_db
+
+    def tune(self, around: Surroundings, levels: Levels) -> None:
+        """The radio or its antennas are others from the next `move` on."""
+        self.around, self._levels = around, levels
 
     def move(self, pose: FloatArray, robot: Table, reception: Table) -> None:
         """Robots stand at `pose` from now on; tables of dtype ROBOT and RECEPTION are told where their links are."""
@@ -75,7 +75,7 @@ class LinksHeld:
     def _links(self) -> tuple[LinkTable, LinkPlaces]:
         pairs, now = self.pairs, self._medium.disruption
         fate = np.stack([_fates(now, *ends, pairs.blocked) for ends in ((pairs.a, pairs.b), (pairs.b, pairs.a))])
-        return links_by_sender(pairs, self._around.send_dbm, self._around.receive_dbi, fate, self._levels)
+        return links_by_sender(pairs, self.around.send_dbm, self.around.receive_dbi, fate, self._levels)
 
     def _keep_on_air(self, robot: Table, reception: Table) -> LinkTable:
         """The links of frames on air, and where they are from now on."""
@@ -113,4 +113,4 @@ def open_ways(now: Disruption, a: IntArray, b: IntArray) -> BoolArray:
     """Which pairs of robot rows no disruption keeps apart, (k,)."""
     if not now.anything:
         return np.ones(len(a), np.bool_)
-    return now.radio_on[a] & now.radio_on[b] & ~now.apart(a, b)
+    return now.joined(a, b)

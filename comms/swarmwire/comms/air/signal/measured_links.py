@@ -13,8 +13,15 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 class MeasuredLinks:
     """What a radio's trace says of the links of all arenas, which are measured alike, at one moment."""
 
-    def __init__(self, traces: LinkTraces, others: str, robots: int, arenas: int) -> None:
-        """`others` is the radio's `trace.others`; `robots` stand in each arena."""
+    def __init__(
+        self, traces: LinkTraces, others: str, robots: int, arenas: int, send_dbm: FloatArray, receive_dbi: FloatArray
+    ) -> None:
+        """`others` is the radio's `trace.others`; `robots` stand in each arena.
+
+        `send_dbm` and `receive_dbi` (robots,) are what the antennas had when links were measured: what events change of
+        them then counts on top.
+        """
+        self._send_dbm, self._receive_dbi = send_dbm, receive_dbi
         self._traces, self._others_end = traces, others == "none"
         self._robots, self._arenas = robots, arenas
         self._link = np.unique(np.concatenate([np.empty(0, np.int64), *(trace.link for trace in traces.all)]))
@@ -25,7 +32,9 @@ class MeasuredLinks:
         """Those of the radio's trace; None without one."""
         if medium.traces is None or medium.radio.trace is None:
             return None
-        return cls(medium.traces, medium.radio.trace.others, medium.robots, len(medium.keys))
+        antennas, antenna = medium.antennas, medium.radio.antenna_or_default
+        own = antennas.send_dbm(antenna), antennas.receive_dbi(antenna)
+        return cls(medium.traces, medium.radio.trace.others, medium.robots, len(medium.keys), *own)
 
     def move_to(self, now_ns: int) -> None:
         """It is this time from now on."""
@@ -57,13 +66,9 @@ class MeasuredLinks:
         a, b = np.concatenate([a, more_a]), np.concatenate([b, more_b])
         return a, b, np.concatenate([loss_db, np.full(len(more_a), np.inf)])
 
-    def loss_db(
-        self, sender: IntArray, receiver: IntArray, modelled_db: FloatArray, budget_db: FloatArray
-    ) -> tuple[FloatArray, BoolArray]:
-        """The loss of links between robot rows, (k,), and whether it was measured.
-
-        `modelled_db` is the model's, `budget_db` the sender's power with both antennas.
-        """
+    def loss_db(self, sender: IntArray, receiver: IntArray, modelled_db: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """The loss of links between robot rows, (k,), and whether it was measured; `modelled_db` is the model's."""
+        budget_db = self._send_dbm[sender % self._robots] + self._receive_dbi[receiver % self._robots]
         rssi_dbm = self._of(self._rssi_dbm, np.nan, sender, receiver)
         is_measured = ~np.isnan(rssi_dbm)
         loss = np.where(is_measured, budget_db - rssi_dbm, modelled_db)

@@ -2,12 +2,8 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-import math
-from collections.abc import Callable
-
 import numpy as np
 
-from swarmwire.comms.air.channel import ROUNDING
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.frames import acknowledgement_bytes, airtime_ns
 from swarmwire.comms.air.propagation.fading import fading_law
@@ -21,7 +17,6 @@ from swarmwire.comms.air.reception.sensitivity import sensitivity_dbm, sinr_for_
 from swarmwire.comms.air.signal.link_table import Surroundings
 from swarmwire.comms.air.signal.links_by_sender import Levels
 from swarmwire.comms.air.signal.log_success import log_success_table
-from swarmwire.comms.air.signal.outcome import lone_delivery
 from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import Rules
 from swarmwire.comms.air.traffic.access_timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G, IEEE_802_15_4
@@ -108,28 +103,6 @@ def rules_of(radio: Radio, robots: int) -> Rules:
     )
 
 
-def edge_dbm(radio: Radio, rules: Rules) -> float:
-    """The least mean power with which a lone packet gets through with `min_delivery`; inf if none does."""
-    bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
-    others = passes_besides(radio)
-    return least_where(lambda dbm: lone_delivery(rules, dbm, bits) * others >= radio.min_delivery - ROUNDING)
-
-
-def passes_besides(radio: Radio) -> float:
-    """The share of packets that neither fixed loss nor bursts take."""
-    return (1.0 - radio.loss) * (1.0 - (radio.bursts.loss if radio.bursts else 0.0))
-
-
-def least_where(is_enough: Callable[[float], bool]) -> float:
-    """The least power in dBm, to the last bit, that is enough, if more is never worse; inf if none is."""
-    low_dbm, high_dbm = -300.0, 300.0
-    if is_enough(low_dbm) or not is_enough(high_dbm):
-        return -math.inf if is_enough(low_dbm) else math.inf
-    while low_dbm < (middle_dbm := 0.5 * (low_dbm + high_dbm)) < high_dbm:
-        low_dbm, high_dbm = (low_dbm, middle_dbm) if is_enough(middle_dbm) else (middle_dbm, high_dbm)
-    return high_dbm
-
-
 def levels_of(radio: Radio, rules: Rules) -> Levels:
     """What power makes of a link."""
     heard_mw = max(rules.least_mw, rules.least_sinr * rules.noise_mw)
@@ -142,20 +115,22 @@ def cut_off_dbm(radio: Radio) -> float:
     return min(radio.noise_or_default.power_dbm, sensitivity_of(radio)) - radio.cut_off_db
 
 
-def surroundings_of(radio: Radio, keys: KeyArray, radius_m: FloatArray) -> Surroundings:
-    """What links go by; `radius_m` (rows,) are the robots' radii."""
-    antenna = radio.antenna_or_default
+def surroundings_of(
+    radio: Radio, keys: KeyArray, radius_m: FloatArray, send_dbm: FloatArray, receive_dbi: FloatArray
+) -> Surroundings:
+    """What links go by; by robot row (rows,): radii, power and gain, and gain."""
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
     curve, law = radio.loss_model.curve(radio.frequency_hz), fading_law(fading or Fading(), radio.frequency_hz)
     spread_db = max(SHADOWS_CUT_OFF * shadowing.deviation_db - radio.cut_off_db, 0.0) if shadowing else 0.0
-    budget_dbm = antenna.power_dbm + 2.0 * antenna.gain_dbi
-    far_m = float(reach_m(curve, budget_dbm - cut_off_dbm(radio) + spread_db))
+    best_dbm = float(send_dbm.max() + receive_dbi.max())
+    far_m = float(reach_m(curve, best_dbm - cut_off_dbm(radio) + spread_db))
     return Surroundings(
-        send_dbm=np.full(len(radius_m), antenna.power_dbm + antenna.gain_dbi),
-        receive_dbi=np.full(len(radius_m), antenna.gain_dbi),
+        send_dbm=send_dbm,
+        receive_dbi=receive_dbi,
         curve=curve,
         reach_m=far_m if radio.range_m is None else min(far_m, radio.range_m),
         least_dbm=cut_off_dbm(radio),
+        spread_db=spread_db,
         shadows=shadowing is not None,
         amplitude_db=amplitude_db(shadowing or Shadowing()),
         field=field_waves(keys, shadowing or Shadowing()),

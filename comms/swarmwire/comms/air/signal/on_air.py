@@ -18,7 +18,7 @@ from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import DATA, NOBODY, RECEIVING, SILENT, TURNING
 from swarmwire.comms.fates import Fate
 
-HEARD, TOO_WEAK, COLLIDED = int(Fate.HEARD), int(Fate.TOO_WEAK), int(Fate.COLLIDED)
+HEARD, TOO_WEAK, COLLIDED, JAMMED = int(Fate.HEARD), int(Fate.TOO_WEAK), int(Fate.COLLIDED), int(Fate.JAMMED)
 HOPELESS = -50.0  # a logarithm below that of the least draw
 ALONE, DCF = METHODS.index("none"), METHODS.index("dcf")
 
@@ -45,13 +45,13 @@ def put_on_air(rules, state, queue, s, kind, now_ns, airtime_ns, bits):
             now[i] = fate[i]
             continue
         it = reception[receiver[i]]
-        _count_chunk(rules, robot, it, now_ns)
+        count_chunk(rules, robot, it, now_ns)
         _arrive(rules, robot, it, now, s, i, power_mw[i], now_ns)
         if is_dcf and dcf.has_changed(rules, it):
             dcf.change(rules, state, queue, receiver[i], now_ns)
     for i in range(me.weak_link, me.stop_link):
         it = reception[receiver[i]]
-        _count_chunk(rules, robot, it, now_ns)
+        count_chunk(rules, robot, it, now_ns)
         _add(it, power_mw[i])
         if is_dcf and dcf.has_changed(rules, it):
             dcf.change(rules, state, queue, receiver[i], now_ns)
@@ -76,7 +76,7 @@ def take_off_air(rules, bursts, state, queue, s, now_ns):
         if fate[i] != HEARD:
             continue
         it = reception[receiver[i]]
-        _count_chunk(rules, robot, it, now_ns)
+        count_chunk(rules, robot, it, now_ns)
         _remove(it, power_mw[i])
         if it.locked_to == s and it.link == i:
             let_go(it)
@@ -89,7 +89,7 @@ def take_off_air(rules, bursts, state, queue, s, now_ns):
             dcf.change(rules, state, queue, receiver[i], now_ns)
     for i in range(me.weak_link, me.stop_link):
         it = reception[receiver[i]]
-        _count_chunk(rules, robot, it, now_ns)
+        count_chunk(rules, robot, it, now_ns)
         _remove(it, power_mw[i])
         if is_dcf and dcf.has_changed(rules, it):
             dcf.change(rules, state, queue, receiver[i], now_ns)
@@ -134,10 +134,13 @@ def _remove(it, power_mw):
 def _arrive(rules, robot, it, now, s, i, power_mw, now_ns):
     """Frame s comes to a robot on link i; it locks to the frame, or takes it for noise."""
     noise_mw = rules.noise_mw + it.jam_mw
-    could = power_mw >= rules.least_mw and power_mw >= rules.least_sinr * noise_mw
+    could = power_mw >= rules.least_mw and power_mw >= rules.least_sinr * rules.noise_mw
     does = could and power_mw >= rules.least_sinr * (noise_mw + it.power_mw) and not it.is_deaf
-    _add(it, power_mw)
     now[i] = COLLIDED if could else TOO_WEAK
+    if it.jam_mw > 0.0 and could and not (does or it.is_deaf) and it.locked_to == NOBODY:
+        would = power_mw >= rules.least_sinr * (rules.noise_mw + it.power_mw)
+        now[i] = JAMMED if would else COLLIDED
+    _add(it, power_mw)
     if it.locked_to != NOBODY:
         if now_ns - robot[it.locked_to].on_air_ns > rules.take_over_ns:
             does = False
@@ -149,11 +152,12 @@ def _arrive(rules, robot, it, now, s, i, power_mw, now_ns):
                 let_go(it)
     if does:
         now[i] = RECEIVING
-        it.locked_to, it.link, it.since_ns, it.signal_mw, it.log_success = s, i, now_ns, power_mw, 0.0
+        it.locked_to, it.link, it.since_ns, it.signal_mw = s, i, now_ns, power_mw
+        it.log_success = it.jam_log = 0.0
 
 
 @borrowing(inline="always")
-def _count_chunk(rules, robot, it, now_ns):
+def count_chunk(rules, robot, it, now_ns):
     """The interference at a robot is about to change: what it received so far counts."""
     # Without a branch for robots that receive nothing, which would be guessed wrong often: their signal is infinite.
     others_mw = max(it.power_mw - it.signal_mw, 0.0) if it.signals > 1 else 0.0
@@ -161,5 +165,9 @@ def _count_chunk(rules, robot, it, now_ns):
     if it.signal_mw < rules.sure_sinr * noise_mw and it.log_success > HOPELESS:
         sender = robot[it.locked_to]
         bits = sender.bits * ((now_ns - it.since_ns) / sender.airtime_ns)
-        it.log_success += log_success(rules.log_success, rules.receiver, it.signal_mw / noise_mw, bits)
+        log_right = log_success(rules.log_success, rules.receiver, it.signal_mw / noise_mw, bits)
+        it.log_success += log_right
+        if it.jam_mw > 0.0:
+            sinr = it.signal_mw / (rules.noise_mw + others_mw)
+            it.jam_log += log_success(rules.log_success, rules.receiver, sinr, bits) - log_right
     it.since_ns = now_ns

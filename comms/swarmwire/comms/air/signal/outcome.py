@@ -22,7 +22,7 @@ RECEPTION, ACKNOWLEDGED = purpose("reception"), purpose("reception of an acknowl
 ACKNOWLEDGED_LOSS = purpose("fixed loss of an acknowledgement")
 ACKNOWLEDGED_TRACE = purpose("trace of an acknowledgement")
 HEARD, LOST, TOO_WEAK = int(Fate.HEARD), int(Fate.LOST), int(Fate.TOO_WEAK)
-COLLIDED, BURST = int(Fate.COLLIDED), int(Fate.BURST)
+COLLIDED, BURST, JAMMED = int(Fate.COLLIDED), int(Fate.BURST), int(Fate.JAMMED)
 ONE_BIT = 1.0
 
 
@@ -31,7 +31,7 @@ def outcome(rules, bursts, state, s, i, log_right):
     """What becomes of the frame that robot s has on air, on link i, if it is right with this probability's logarithm.
 
     By draws keyed by (sender, receiver, sequence), and attempt. The same draw tells why it was not right: COLLIDED if
-    it would have been right without interference.
+    it would have been right without interference, JAMMED if without jammers alone.
     """
     me = state.robot[s]
     receiver = state.link.receiver[i]
@@ -47,6 +47,8 @@ def outcome(rules, bursts, state, s, i, log_right):
         reception, fixed_loss, trace = RECEPTION, LOSS, TRACE
     u = uniform(key, a, b, sequence, reception + attempt)
     if u >= math.exp(log_right):
+        if u < math.exp(log_right + state.reception[receiver].jam_log):
+            return JAMMED
         alone = math.exp(alone_log_success(rules, state.link.power_mw[i], me.bits))
         return COLLIDED if u < alone else TOO_WEAK
     if rules.loss > 0.0 and uniform(key, a, b, sequence, fixed_loss + attempt) < rules.loss:

@@ -13,6 +13,9 @@ from swarmwire.comms.air.signal.tables import (
     AWAITING,
     BACKING_OFF,
     DATA,
+    HELD,
+    KEPT_ALL,
+    KEPT_NEWEST,
     LISTENING,
     NOBODY,
     NOTHING,
@@ -41,14 +44,25 @@ def enter(rules, state, queue, told, r, now_ns):
         me.entry += 1
         if packet.refused:
             telling.refuse(state, told, index, packet.refused, now_ns)
-        elif me.stage != NOTHING and me.waiting >= rules.queue_limit:
+        elif state.off[r] != KEPT_NEWEST and _is_full(rules, state, r):
             telling.refuse(state, told, index, QUEUE_FULL, now_ns)
         else:
+            if state.off[r] == KEPT_NEWEST:
+                telling.give_up_older(state, told, r, me.entry - 1, now_ns)
             me.waiting += 1
             if me.stage == NOTHING:
                 serve(rules, state, queue, r, now_ns)
     if me.entry < me.stop:
         schedule(queue, ENTER, r, state.packet[state.order[me.entry]].sent_at_ns)
+
+
+@borrowing()
+def _is_full(rules, state, r):
+    """Whether no packet more may wait at the robot's radio."""
+    me = state.robot[r]
+    if state.off[r] == KEPT_ALL:
+        return me.waiting + (me.stage == HELD) >= rules.queue_limit
+    return me.stage != NOTHING and me.waiting >= rules.queue_limit
 
 
 @borrowing()
@@ -70,9 +84,11 @@ def serve(rules, state, queue, r, now_ns):
 
 @borrowing()
 def begin(rules, state, queue, r, now_ns):
-    """An attempt at the packet being served."""
+    """An attempt at the packet being served, unless the radio is off and keeps it back."""
     me = state.robot[r]
-    if rules.method == CSMA:
+    if state.off[r] <= KEPT_ALL:
+        me.stage = HELD
+    elif rules.method == CSMA:
         me.busy_times, me.exponent = 0, rules.least_exponent
         back_off(rules, state, queue, r, now_ns)
     elif rules.method == DCF:

@@ -2,25 +2,30 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+from dataclasses import replace
+
 import numpy as np
 
-from swarmwire.comms.air.channel import ROUNDING, with_the_rest
-from swarmwire.comms.air.disruption import Disruption
-from swarmwire.comms.air.frames import airtime_ns
+from swarmwire.comms.air.disruption import ALL, NEWEST, Disruption
 from swarmwire.comms.air.intake import Intake
-from swarmwire.comms.air.links import HEARD, Links
 from swarmwire.comms.air.lives import Lives
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.burst_states import BurstStates
 from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.air.send_times import SendTimes
-from swarmwire.comms.air.signal import events
+from swarmwire.comms.air.signal import events, jamming, kept_back
 from swarmwire.comms.air.signal.event_queue import event_queue
-from swarmwire.comms.air.signal.link_table import Pairs
-from swarmwire.comms.air.signal.links_held import LinksHeld, open_ways
+from swarmwire.comms.air.signal.jam_held import JamHeld
+from swarmwire.comms.air.signal.link_table import Surroundings
+from swarmwire.comms.air.signal.links_held import LinksHeld
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
-from swarmwire.comms.air.signal.numbers import edge_dbm, levels_of, passes_besides, rules_of, surroundings_of
-from swarmwire.comms.air.signal.outcome import lone_deliveries
+from swarmwire.comms.air.signal.numbers import levels_of, rules_of, surroundings_of
+from swarmwire.comms.air.signal.packet_rows import packet_rows
+from swarmwire.comms.air.signal.radio_graph import RadioGraph
+from swarmwire.comms.air.signal.reports import Reports, taken_out
 from swarmwire.comms.air.signal.tables import (
+    KEPT_ALL,
+    KEPT_NEWEST,
     NOBODY,
     NOT_TRACED,
     NOTHING,
@@ -35,13 +40,11 @@ from swarmwire.comms.air.signal.tables import (
     told,
 )
 from swarmwire.comms.air.stage import Medium
-from swarmwire.comms.air.stages import chain_after_reception
-from swarmwire.comms.air.traffic.access_timing import IEEE_802_15_4
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Decided, Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.packets import BROADCAST, Sent
+from swarmwire.comms.packets import Sent
 
 LEAST_ROOM = 4096
 LONG_AGO_NS = -(10**15)
@@ -58,14 +61,14 @@ class SignalWay(Way):
         self._medium, self._radio, self._send_times = medium, medium.radio, send_times
         rows = len(medium.keys) * medium.robots
         self._rules = rules_of(medium.radio, medium.robots)
-        around = surroundings_of(medium.radio, medium.keys, radius_m)
+        self._radius_m, self._antennas = radius_m, self._antennas_now()
         self._measured = MeasuredLinks.of(medium)
         levels = levels_of(medium.radio, self._rules)
-        self._links = LinksHeld(medium, size_m, around, levels, self._measured)
-        self._edge_dbm = edge_dbm(medium.radio, self._rules)
+        self._links = LinksHeld(medium, size_m, self._around(), levels, self._measured)
+        self._jam, self._was_jammed = JamHeld(medium), False
+        self._graph = RadioGraph(medium, self._rules, self._links, self._jam, self._measured)
+        self._reports = Reports(medium, self._links)
         self._intake = Intake(rows)
-        self._stages = chain_after_reception(medium)
-        self._columns = len(medium.radio.gives.columns)
         self._bursts = BurstStates(medium.radio.bursts or Bursts(), medium.keys, medium.robots)
         self._events = event_queue(rows)
         self._robot: Table = np.zeros(rows, ROBOT)
@@ -91,20 +94,40 @@ class SignalWay(Way):
         self._poses = {hold: at for hold, at in self._poses.items() if hold in holds} | {self._hold: pose}
         if self._measured is not None:
             self._measured.move_to(self._now_ns)
+        antennas = self._antennas_now()
+        if not np.array_equal(antennas, self._antennas):
+            self._antennas = antennas
+            self._links.tune(self._around(), levels_of(self._radio, self._rules))
         self._links.move(pose, self._robot, self._reception)
+        self._jam.move(pose, self._links.around)
+        if self._jam.anything or self._was_jammed:
+            self._refresh()
+        self._was_jammed = self._jam.anything
+
+    def tune(self, at_ns: int, radio: Radio) -> None:
+        """The radio has other numbers from `at_ns` on; what was received until then counts by the old ones."""
+        self._refresh()
+        if radio.bursts is not None:
+            self._bursts.change(radio.bursts, at_ns)
+        self._radio, self._rules = radio, rules_of(radio, self._medium.robots)
+        self._graph.tune(radio, self._rules)
+        self._reports.tune(replace(self._medium, radio=radio))
+        self._antennas = self._antennas_now()
+        self._links.tune(self._around(), levels_of(radio, self._rules))
+        self._refresh()
 
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets; when they go on air will turn out."""
         taken = self._intake.take(self._send_times.at(at_ns, tick), sent, others_alive, epoch)
-        self._packet = np.concatenate([self._packet, self._as_packets(taken)])
+        self._packet = np.concatenate([self._packet, packet_rows(taken, self._radio, self._medium.robots)])
         self._queued = self._queued.followed_by(taken)
         return taken
 
     def pass_time(self, until_ns: int, lives: Lives) -> Decided:
         """Let happen what is due before `until_ns`."""
         parts: list[Told] = []
-        if len(self._packet) or self._events.size[0]:
-            state, start = self._state()
+        if len(self._packet) or self._events.size[0] or self._jam.anything:
+            state, start = self._state(self._medium.disruption, until_ns)
             bursts = self._bursting()
             events.line_up(state, self._events, start)
             most = int(max((state.places.stop - state.places.first).max(), _lengths(self._robot).max()))
@@ -112,20 +135,21 @@ class SignalWay(Way):
             done = False
             while not done:
                 done = events.run_until(self._rules, bursts, state, self._events, room, most, until_ns)
-                parts.append(_taken_out(room))
+                parts.append(taken_out(room))
             self._told = sum(len(part.packet) for part in parts)
             self._bursts.added(int(bursts.added[0]))
         self._now_ns = until_ns
         return self._decided(parts, lives)
 
     def disrupt(self, at_ns: int, coming: Disruption, lives: Lives) -> Decided:
-        """The queues of the dead end, and what the dead and radios that are off were receiving."""
-        state, start = self._state()
+        """The queues of the dead end, those of radios that are off may wait; they hear nothing of what is on air."""
+        state, start = self._state(coming, at_ns)
         events.line_up(state, self._events, start)
         room = told(len(self._packet) + 1)
         events.stop_the_dead(state, self._events, room, coming.alive, at_ns)
         events.cut_off(state, coming.alive, coming.radio_on)
-        return self._decided([_taken_out(room)], lives)
+        kept_back.switch(self._rules, state, self._events, room, at_ns)
+        return self._decided([taken_out(room)], lives)
 
     def drain(self) -> Transmissions:
         """Take out all that is queued or under way."""
@@ -136,46 +160,27 @@ class SignalWay(Way):
 
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
         """Pairs of robot rows a < b joined in the radio graph, sorted, (e, 2)."""
-        links = self._links
-        pairs = links.pairs if np.array_equal(pose, links.pose) else links.pairs_at(pose)
-        is_open = alive[pairs.a] & alive[pairs.b] & (pairs.blocked == 0)
-        is_open &= open_ways(self._medium.disruption, pairs.a, pairs.b)
-        joined = is_open & (np.minimum(*links.mean_dbm(pairs)) >= self._edge_dbm)
-        if self._measured is not None:
-            joined &= self._passes_as_measured(pairs)
-        return np.stack(np.divmod(np.sort((pairs.a * len(pose) + pairs.b)[joined]), len(pose)), axis=1)
+        return self._graph.edges(pose, alive)
 
-    def _passes_as_measured(self, pairs: Pairs) -> BoolArray:
-        """Whether lone packets get through both ways with `min_delivery` by what was measured, too, (k,)."""
-        assert self._measured is not None
-        radio, ends = self._radio, (pairs.a, pairs.b)
-        bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
-        there, back = (lone_deliveries(self._rules, dbm, bits) for dbm in self._links.mean_dbm(pairs))
-        worse = np.minimum(there * self._measured.ratio(*ends), back * self._measured.ratio(*ends[::-1]))
-        return worse * passes_besides(radio) >= radio.min_delivery - ROUNDING
+    def _antennas_now(self) -> FloatArray:
+        """What each robot radiates in dBm, and the gain in dBi with which it hears, under events too, (2, rows)."""
+        antennas, antenna, now = self._medium.antennas, self._radio.antenna_or_default, self._medium.disruption
+        own = np.stack([antennas.send_dbm(antenna), antennas.receive_dbi(antenna)])
+        return np.tile(own, len(self._medium.keys)) + np.stack([now.send_gain_db, now.receive_gain_db])
 
-    def _as_packets(self, taken: Transmissions) -> Table:
-        radio, robots = self._radio, self._medium.robots
-        frame_bytes = taken.payloads.sizes + radio.overhead_bytes
-        packet: Table = np.zeros(len(taken.sender), PACKET)
-        packet["sender"], packet["sequence"] = taken.sender, taken.sequence
-        packet["to"] = np.where(taken.to == BROADCAST, NOBODY, taken.sender - taken.sender % robots + taken.to)
-        packet["sent_at_ns"] = packet["on_air_at_ns"] = taken.sent_at_ns
-        packet["airtime_ns"], packet["bits"] = airtime_ns(radio, frame_bytes), 8 * frame_bytes
-        packet["refused"] = np.where(taken.payloads.sizes > radio.max_payload_bytes, int(Fate.TOO_LARGE), 0)
-        if radio.access_or_default.method == "csma-802154":
-            csma = IEEE_802_15_4
-            short = frame_bytes - HEADER_BYTES <= csma.short_frame_octets
-            packet["pause_ns"] = np.where(short, csma.short_space_ns, csma.long_space_ns)
-        return packet
+    def _around(self) -> Surroundings:
+        return surroundings_of(self._radio, self._medium.keys, self._radius_m, *self._antennas)
 
-    def _state(self) -> tuple[State, IntArray]:
-        """What events work on, and where each robot's packets start in its order, (rows + 1,)."""
+    def _refresh(self) -> None:
+        """Noise, or what it is made of, has changed, or is about to."""
+        state, _ = self._state(self._medium.disruption, self._now_ns)
+        jamming.refresh(self._rules, state, self._events, self._now_ns)
+
+    def _state(self, held: Disruption, until_ns: int) -> tuple[State, IntArray]:
+        """What events work on until then, and where each robot's packets start in its order, (rows + 1,)."""
         sender = self._packet["sender"]
         order = np.argsort(sender, kind="stable")
         start = np.searchsorted(sender[order], np.arange(len(self._robot) + 1))
-        held = self._medium.disruption
-        off = np.where(held.alive, np.where(held.radio_on, int(Fate.HEARD), int(Fate.BLACKOUT)), int(Fate.SENDER_DEAD))
         state = State(
             self._medium.keys,
             self._robot,
@@ -185,7 +190,8 @@ class SignalWay(Way):
             self._hold,
             self._packet,
             order,
-            off,
+            _off(held),
+            self._jam.between(self._now_ns, until_ns),
         )
         return state, start
 
@@ -201,61 +207,10 @@ class SignalWay(Way):
 
     def _decided(self, parts: list[Told], lives: Lives) -> Decided:
         """What was told, as packets and links; packets that are done leave the queue."""
-        if not parts:
-            return Transmissions.none(), Links.none(self._columns)
-        row = (
-            parts[0] if len(parts) == 1 else Told._make(np.concatenate(columns) for columns in zip(*parts, strict=True))
-        )
-        packet = self._packet
-        # An addressed packet may have been heard in an earlier call, and only now be done at its sender.
-        used = (packet["is_done"] > 0) & (self._queued.intended > 0)
-        used[row.packet] = True
-        index, local = np.flatnonzero(used), np.cumsum(used) - 1
-        was_on_air, on_air_at_ns = packet["fate"] == HEARD, packet["on_air_at_ns"].copy()
-        on_air_at_ns[row.packet] = row.on_air_at_ns
-        packets = self._queued.select(index)._replace(
-            on_air_at_ns=on_air_at_ns[index],
-            off_air_at_ns=(on_air_at_ns + np.where(was_on_air, packet["airtime_ns"], 0))[index],
-            fate=packet["fate"][index],
-        )
-        kept = row.receiver != NOBODY
-        if lives.any_dead:
-            kept &= _meant(self._queued, row, lives)
-        if not kept.all():
-            row = Told._make([*(column[kept] for column in row[:-1]), row.count])
-        links = self._as_links(row, local)
-        decided = with_the_rest(links, packets, self._would_reach(packets, lives), self._columns)
-        self._forget_done()
-        return packets, decided
-
-    def _as_links(self, row: Told, local: IntArray) -> Links:
-        """Links from rows that were told, after the stages that follow reception."""
-        sender, sequence = self._packet["sender"][row.packet], self._packet["sequence"][row.packet]
-        links = Links.under_way(local[row.packet], sender, row.receiver, sequence, row.final_at_ns, self._columns)
-        with np.errstate(divide="ignore"):
-            rssi_dbm = 10.0 * np.log10(row.power_mw)
-        links = links._replace(in_range=row.in_range, fate=row.fate, rssi_dbm=rssi_dbm)
-        if not self._stages:
-            return links
-        for hold in np.unique(row.hold).tolist():
-            index = np.flatnonzero(row.hold == hold)
-            of_hold = links.select(index)
-            for stage in self._stages:
-                stage.decide(of_hold, self._poses[hold])
-            links.final_at_ns[index], links.given[index] = of_hold.final_at_ns, of_hold.given
-        return links
-
-    def _would_reach(self, packets: Transmissions, lives: Lives) -> IntArray:
-        """How many receivers in range packets would have that never went on air, (packets,)."""
-        found = np.zeros(len(packets.sender), np.int64)
-        tried = np.flatnonzero((packets.fate != HEARD) & (packets.fate != Fate.TOO_LARGE))
-        at, receiver = self._links.reached(packets.sender[tried])
-        at = tried[at]
-        to_all = packets.to[at] == BROADCAST
-        to_one = packets.to[at] == receiver % self._medium.robots
-        meant = to_one | (to_all & lives.intended(packets.epoch[at], receiver))
-        np.add.at(found, at[meant], 1)
-        return found
+        decided = self._reports.decided(parts, self._queued, self._packet, self._poses, lives)
+        if parts:
+            self._forget_done()
+        return decided
 
     def _forget_done(self) -> None:
         settled = self._packet["is_settled"] > 0
@@ -264,18 +219,11 @@ class SignalWay(Way):
         self._queued, self._packet = queued.select(kept), self._packet[kept]
 
 
+def _off(held: Disruption) -> IntArray:
+    """What becomes of what each robot should send, (rows,): HEARD if its radio is on."""
+    off = np.select([held.backlog == ALL, held.backlog == NEWEST], [KEPT_ALL, KEPT_NEWEST], int(Fate.BLACKOUT))
+    return np.where(held.alive, np.where(held.radio_on, int(Fate.HEARD), off), int(Fate.SENDER_DEAD))
+
+
 def _lengths(robot: Table) -> IntArray:
     return robot["stop_link"] - robot["first_link"]
-
-
-def _taken_out(room: Told) -> Told:
-    """The rows that were told, out of `room`, which is empty again."""
-    count = int(room.count[0])
-    rows = Told._make([*(column[:count].copy() for column in room[:-1]), room.count.copy()])
-    room.count[0] = 0
-    return rows
-
-
-def _meant(queued: Transmissions, row: Told, lives: Lives) -> BoolArray:
-    """Which rows are for receivers that were alive when the packet was sent, or that it was addressed to, (k,)."""
-    return lives.intended(queued.epoch[row.packet], row.receiver) | (queued.to[row.packet] != BROADCAST)

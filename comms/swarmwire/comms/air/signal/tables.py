@@ -11,7 +11,9 @@ from swarmwire.comms.air.reception.reception import Receiver
 from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, Int32Array, IntArray, KeyArray
 
 # What a robot's radio does with the packet at the head of its queue; from BACKING_OFF on there is one.
-NOTHING, PAUSING, BACKING_OFF, LISTENING, TURNING, SENDING, AWAITING = range(7)
+NOTHING, PAUSING, BACKING_OFF, LISTENING, TURNING, SENDING, AWAITING, HELD = range(8)
+# What becomes of packets of a radio that is off, beside the fates: they wait for it.
+KEPT_ALL, KEPT_NEWEST = -1, -2
 # What a robot has on air.
 SILENT, DATA, ACKNOWLEDGEMENT = range(3)
 RECEIVING = 255  # of a link, beside the fates: the frame on air may still be heard
@@ -56,7 +58,6 @@ ROBOT = np.dtype(
 RECEPTION = np.dtype(
     [
         ("power_mw", _F),  # all frames on air here
-        ("jam_mw", _F),  # all that is no frame
         ("peak_mw", _F),  # CSMA: most of `power_mw` while it listens
         ("signal_mw", _F),  # the frame being received; inf if there is none
         ("log_success", _F),  # of its chunks so far
@@ -64,6 +65,8 @@ RECEPTION = np.dtype(
         ("locked_to", np.int32),  # sender row of the frame being received, or NOBODY
         ("link", np.int32),  # and its link
         ("signals", np.int32),  # frames on air here
+        ("jam_mw", np.float32),  # all that is no frame
+        ("jam_log", np.float32),  # what that has taken from `log_success`
         ("is_deaf", np.int8),  # it sends, or is about to
         ("is_busy", np.int8),  # DCF: as it was when last looked at
     ],
@@ -184,6 +187,17 @@ class Told(NamedTuple):
     count: IntArray  # (1,) rows told
 
 
+class Jam(NamedTuple):
+    """Jammers under the poses held, and when they go on or off until the next."""
+
+    arena: IntArray  # (k,)
+    power_mw: FloatArray  # (k, robots) at each robot of the arena
+    is_on: BoolArray  # (k,)
+    at_ns: IntArray  # (n,) rising
+    which: IntArray  # (n,) the jammer that goes on if it is off, or off
+    next: IntArray  # (1,) the first of them that has not come yet
+
+
 class State(NamedTuple):
     """All that events read and change."""
 
@@ -195,7 +209,8 @@ class State(NamedTuple):
     hold: int  # which poses these are
     packet: Table
     order: IntArray  # packets by sender, in the order of sending
-    off: IntArray  # (rows,) HEARD: the radio is on; else the fate of what it should send
+    off: IntArray  # (rows,) HEARD: the radio is on; else the fate of what it should send, or KEPT_ALL or KEPT_NEWEST
+    jam: Jam
 
 
 def told(capacity: int) -> Told:

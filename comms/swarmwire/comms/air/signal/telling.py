@@ -4,10 +4,10 @@
 
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import ANSWER, schedule
-from swarmwire.comms.air.signal.tables import NOBODY
+from swarmwire.comms.air.signal.tables import HELD, NOBODY, NOTHING
 from swarmwire.comms.fates import Fate
 
-HEARD, BLOCKED = int(Fate.HEARD), int(Fate.BLOCKED)
+HEARD, BLOCKED, BLACKOUT = int(Fate.HEARD), int(Fate.BLOCKED), int(Fate.BLACKOUT)
 
 
 @borrowing()
@@ -16,6 +16,22 @@ def refuse(state, told, index, fate, now_ns):
     packet = state.packet[index]
     packet.is_done, packet.fate, packet.on_air_at_ns = 1, fate, now_ns
     _tell(state, told, index, NOBODY, fate, 0, now_ns, 0, 0.0)
+
+
+@borrowing()
+def give_up_older(state, told, r, newest, now_ns):
+    """What waits at the robot's radio before the packet at place `newest` of its order ends: the radio is off."""
+    me = state.robot[r]
+    if me.stage == HELD:
+        if me.last_fate == NOBODY:
+            refuse(state, told, me.packet, BLACKOUT, now_ns)
+        else:
+            settle(state, told, r, now_ns)
+        me.stage, me.packet = NOTHING, NOBODY
+    for at in range(me.next, newest):
+        if not state.packet[state.order[at]].is_done:
+            refuse(state, told, state.order[at], BLACKOUT, now_ns)
+    me.waiting = 0
 
 
 @borrowing()

@@ -2,6 +2,10 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from swarmwire.comms.arrays import IntArray
+
 US = 1_000  # ns
 
 
@@ -27,9 +31,9 @@ class UnslottedCsma:
     most_backoffs: int = 4  # macMaxCSMABackoffs
     most_retries: int = 3  # macMaxFrameRetries, of unicast frames
 
-    def space_ns(self, psdu_octets: int) -> int:
-        """The silence that follows a frame of so many octets."""
-        return self.short_space_ns if psdu_octets <= self.short_frame_octets else self.long_space_ns
+    def space_ns(self, psdu_octets: IntArray) -> IntArray:
+        """The silence that follows frames of so many octets, (k,)."""
+        return np.where(psdu_octets <= self.short_frame_octets, self.short_space_ns, self.long_space_ns)
 
 
 @dataclass(frozen=True, slots=True)

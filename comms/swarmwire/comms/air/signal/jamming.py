@@ -1,0 +1,90 @@
+"""Jamming: the power of jammers at each robot, and how it comes and goes.
+
+It adds to the robot's noise, and to what its radio senses. Powers are those under the poses held; within a tick only
+whether a jammer is on changes.
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import math
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.air.decibels import from_db
+from swarmwire.comms.air.jammers import Jammers
+from swarmwire.comms.air.propagation.path_loss import loss_db
+from swarmwire.comms.air.propagation.shadowing import shadowing_db
+from swarmwire.comms.air.propagation.walls import wall_loss_db
+from swarmwire.comms.air.signal import dcf
+from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.comms.air.signal.link_table import Surroundings
+from swarmwire.comms.air.signal.on_air import count_chunk
+from swarmwire.comms.air.signal.parameters import METHODS
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.geometry import Obstacles, is_blocked
+
+DCF = METHODS.index("dcf")
+
+
+def powers_of(
+    jammers: Jammers, pose: FloatArray, robots: int, obstacles: Obstacles, around: Surroundings
+) -> FloatArray:
+    """The power of each jammer at each robot of its arena in mW, robots at `pose` (rows, 3); (k, robots)."""
+    x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
+    return _powers(jammers, jammers.places(pose), x, y, robots, obstacles, around)
+
+
+@njit(cache=True)
+def _powers(jammers, place, x, y, robots, obstacles, around):
+    power_mw = np.zeros((len(place), robots))
+    for j in range(len(place)):
+        arena, jx, jy = jammers.arena[j], place[j, 0], place[j, 1]
+        for i in range(robots):
+            r = arena * robots + i
+            if r == jammers.carrier[j]:
+                continue
+            if around.line_of_sight and is_blocked(obstacles, arena, jx, jy, x[r], y[r]):
+                continue
+            loss = loss_db(around.curve, math.hypot(x[r] - jx, y[r] - jy))
+            if around.shadows:
+                loss += shadowing_db(around.field[arena], around.amplitude_db, jx, jy, x[r], y[r])
+            if around.walls:
+                crossing_db, inside_db_per_m = around.crossing_db, around.inside_db_per_m
+                loss += wall_loss_db(obstacles, arena, crossing_db, inside_db_per_m, jx, jy, x[r], y[r])
+            power_mw[j, i] = from_db(jammers.power_dbm[j] + around.receive_dbi[r] - loss)
+    return power_mw
+
+
+@borrowing()
+def refresh(rules, state, queue, now_ns):
+    """Jammers, what they do, or the radio's rules have changed: every robot's noise is what it should be."""
+    for arena in range(len(state.keys)):
+        _refresh_arena(rules, state, queue, arena, now_ns)
+
+
+@borrowing()
+def toggle(rules, state, queue):
+    """The next jammer that goes on or off does."""
+    jam = state.jam
+    at = jam.next[0]
+    jam.next[0] += 1
+    which = jam.which[at]
+    jam.is_on[which] = not jam.is_on[which]
+    _refresh_arena(rules, state, queue, jam.arena[which], jam.at_ns[at])
+
+
+@borrowing()
+def _refresh_arena(rules, state, queue, arena, now_ns):
+    jam = state.jam
+    for i in range(rules.robots):
+        r = arena * rules.robots + i
+        jam_mw = 0.0  # added up anew each time, so that no rounding piles up
+        for j in range(len(jam.arena)):
+            if jam.arena[j] == arena and jam.is_on[j]:
+                jam_mw += jam.power_mw[j, i]
+        it = state.reception[r]
+        count_chunk(rules, state.robot, it, now_ns)
+        it.jam_mw = jam_mw
+        if rules.method == DCF and dcf.has_changed(rules, it):
+            dcf.change(rules, state, queue, r, now_ns)

@@ -1,0 +1,38 @@
+"""Kept back: what a radio that is off should send waits for it, or gives way to what is newer."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from swarmwire.comms.air.signal import service, telling
+from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.comms.air.signal.event_queue import LISTENED, SEND, TIMER, cancel
+from swarmwire.comms.air.signal.tables import BACKING_OFF, HELD, KEPT_ALL, KEPT_NEWEST, NOTHING, SILENT, TURNING
+
+
+@borrowing()
+def switch(rules, state, queue, told, now_ns):
+    """Radios are off or on from now on, as `state.off` says; after `line_up`.
+
+    A packet whose turn it was goes back to the start: what its radio had listened to is long past when it is on again.
+    """
+    for r in range(len(state.robot)):
+        me = state.robot[r]
+        if state.off[r] <= KEPT_ALL:
+            _hold_back(state, queue, r)
+            if state.off[r] == KEPT_NEWEST and me.waiting > 0:
+                telling.give_up_older(state, told, r, me.entry - 1, now_ns)
+                me.waiting = 1
+                if me.stage == NOTHING:
+                    service.serve(rules, state, queue, r, now_ns)
+        elif me.stage == HELD:
+            service.begin(rules, state, queue, r, now_ns)
+
+
+@borrowing()
+def _hold_back(state, queue, r):
+    me = state.robot[r]
+    if BACKING_OFF <= me.stage <= TURNING:
+        cancel(queue, TIMER, r)
+        cancel(queue, LISTENED, r)
+        cancel(queue, SEND, r)
+        me.stage = HELD
+        state.reception[r].is_deaf = me.on_air != SILENT

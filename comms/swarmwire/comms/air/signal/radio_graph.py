@@ -1,0 +1,76 @@
+"""The radio graph of signals: which robots a lone packet joins both ways, fast fading apart."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from swarmwire.comms.air.channel import ROUNDING
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.signal.jam_held import JamHeld
+from swarmwire.comms.air.signal.link_table import Pairs
+from swarmwire.comms.air.signal.links_held import LinksHeld, open_ways
+from swarmwire.comms.air.signal.measured_links import MeasuredLinks
+from swarmwire.comms.air.signal.outcome import lone_deliveries, lone_delivery
+from swarmwire.comms.air.signal.tables import Rules
+from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+
+
+class RadioGraph:
+    """Joins pairs of links held; jammers and measured ratios count, carrier sense does not."""
+
+    def __init__(self, medium: Medium, rules: Rules, links: LinksHeld, jam: JamHeld, measured: MeasuredLinks | None):
+        self._disruption, self._links, self._jam, self._measured = medium.disruption, links, jam, measured
+        self.tune(medium.radio, rules)
+
+    def tune(self, radio: Radio, rules: Rules) -> None:
+        """The radio has these numbers from now on."""
+        self._rules, self._bits = rules, 8 * (radio.max_payload_bytes + radio.overhead_bytes)
+        others = passes_besides(radio)
+        self._least = radio.min_delivery / others if others > 0.0 else math.inf if radio.min_delivery > 0.0 else 0.0
+        self._least_dbm = least_where(lambda dbm: lone_delivery(rules, dbm, self._bits) >= self._least - ROUNDING)
+
+    def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
+        """Pairs of robot rows a < b joined while robots stand at `pose` (rows, 3), sorted, (e, 2)."""
+        links = self._links
+        pairs = links.pairs if np.array_equal(pose, links.pose) else links.pairs_at(pose)
+        joined = alive[pairs.a] & alive[pairs.b] & (pairs.blocked == 0)
+        joined &= open_ways(self._disruption, pairs.a, pairs.b)
+        if self._jam.anything or self._measured is not None:
+            joined &= self._get_through(pairs)
+        else:
+            joined &= np.minimum(*links.mean_dbm(pairs)) >= self._least_dbm
+        return np.stack(np.divmod(np.sort((pairs.a * len(pose) + pairs.b)[joined]), len(pose)), axis=1)
+
+    def _get_through(self, pairs: Pairs) -> BoolArray:
+        """Which pairs, (k,): a packet meets either no jammer or all of them, each for the share of time that is so."""
+        jam_mw, clear = self._jam.at_worst()
+        weakened_db = 10.0 * np.log10(1.0 + jam_mw / self._rules.noise_mw)
+        joined = np.ones(len(pairs.a), np.bool_)
+        ways = (pairs.a, pairs.b), (pairs.b, pairs.a)
+        for mean_dbm, (sender, receiver) in zip(self._links.mean_dbm(pairs), ways, strict=True):
+            lone = lone_deliveries(self._rules, mean_dbm, self._bits)
+            jammed = lone_deliveries(self._rules, mean_dbm - weakened_db[receiver], self._bits)
+            delivery = clear[receiver] * lone + (1.0 - clear[receiver]) * jammed
+            if self._measured is not None:
+                delivery *= self._measured.ratio(sender, receiver)
+            joined &= delivery >= self._least - ROUNDING
+        return joined
+
+
+def passes_besides(radio: Radio) -> float:
+    """The share of packets that neither fixed loss nor bursts take."""
+    return (1.0 - radio.loss) * (1.0 - (radio.bursts.loss if radio.bursts else 0.0))
+
+
+def least_where(is_enough: Callable[[float], bool]) -> float:
+    """The least power in dBm, to the last bit, that is enough, if more is never worse; inf if none is."""
+    low_dbm, high_dbm = -300.0, 300.0
+    if is_enough(low_dbm) or not is_enough(high_dbm):
+        return -math.inf if is_enough(low_dbm) else math.inf
+    while low_dbm < (middle_dbm := 0.5 * (low_dbm + high_dbm)) < high_dbm:
+        low_dbm, high_dbm = (low_dbm, middle_dbm) if is_enough(middle_dbm) else (middle_dbm, high_dbm)
+    return high_dbm
