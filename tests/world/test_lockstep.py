@@ -70,7 +70,7 @@ def actions(rows: list[int]) -> Actions:
 
 
 def rows_of(frame: bytes) -> list[int]:
-    found, _ = decode_tick(frames.decode(frame), GIVES, GROUPS)
+    found, *_ = decode_tick(frames.decode(frame), GIVES, GROUPS)
     return [row for part in found.values() for row in part.rows.tolist()]
 
 
@@ -291,7 +291,7 @@ def test_robots_that_do_not_act_are_neither_sent_nor_expected() -> None:
 def test_a_runner_none_of_whose_robots_acts_gets_its_groups_empty_so_that_they_forget() -> None:
     lockstep = playing()
     out = dict(lockstep.open_tick(0, {"flock": senses(0, [4]), "scouts": senses(0, [])}, Heard.none(GIVES)))
-    found, _ = decode_tick(frames.decode(out["a"]), GIVES, GROUPS)
+    found, *_ = decode_tick(frames.decode(out["a"]), GIVES, GROUPS)
     assert {name: part.rows.tolist() for name, part in found.items()} == {"flock": [], "scouts": []}
     lockstep.answer("a", encode_actions(0, actions([])))
     lockstep.answer("b", encode_actions(0, actions([4])))
@@ -322,7 +322,7 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
     packets: list[Any] = []
     answers: list[tuple[str, bytes]] = []
     for (name, frame), own in zip(out, owned, strict=True):
-        got_senses, got = decode_tick(frames.decode(frame), GIVES, GROUPS)
+        got_senses, got, _ = decode_tick(frames.decode(frame), GIVES, GROUPS)
         rows: list[int] = []
         for part_name, part in got_senses.items():
             rows += part.rows.tolist()

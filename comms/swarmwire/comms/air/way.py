@@ -7,6 +7,7 @@ from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Sent
 
 Decided = tuple[Transmissions, Links]
@@ -39,6 +40,10 @@ class Way(ABC):
     @abstractmethod
     def disrupt(self, at_ns: int, coming: Disruption, lives: Lives) -> Decided:
         """Robots that are dead from now on lose their queues, radios that are off what they receive."""
+
+    def outcomes(self, alive: BoolArray) -> Outcomes:
+        """What senders have learned since the last call, those `alive` (rows,); nothing without acknowledgements."""
+        return NO_OUTCOMES
 
     @abstractmethod
     def drain(self) -> Transmissions:

@@ -15,6 +15,7 @@ from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.air.send_times import SendTimes
 from swarmwire.comms.air.signal import events
 from swarmwire.comms.air.signal.event_queue import event_queue
+from swarmwire.comms.air.signal.learning import learned, result_at_first, sent_in_vain
 from swarmwire.comms.air.signal.links_held import LinksHeld, open_ways
 from swarmwire.comms.air.signal.numbers import edge_dbm, levels_of, rules_of, surroundings_of
 from swarmwire.comms.air.signal.tables import (
@@ -36,6 +37,7 @@ from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Decided, Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import BROADCAST, Sent
 
 LEAST_ROOM = 4096
@@ -69,6 +71,7 @@ class SignalWay(Way):
         self._queued, self._packet = Transmissions.none(), np.zeros(0, PACKET)
         self._hold, self._poses = 0, {0: np.zeros((rows, 3))}
         self._now_ns = self._told = 0
+        self._outcomes: list[Outcomes] = []
 
     @property
     def queued(self) -> Transmissions:
@@ -84,6 +87,8 @@ class SignalWay(Way):
 
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets; when they go on air will turn out."""
+        if self._rules.acknowledged:
+            self._outcomes.append(sent_in_vain(sent, self._radio.max_payload_bytes))
         taken = self._intake.take(self._send_times.at(at_ns, tick), sent, others_alive, epoch)
         self._packet = np.concatenate([self._packet, self._as_packets(taken)])
         self._queued = self._queued.followed_by(taken)
@@ -116,6 +121,11 @@ class SignalWay(Way):
         events.cut_off(state, coming.alive, coming.radio_on)
         return self._decided([_taken_out(room)], lives)
 
+    def outcomes(self, alive: BoolArray) -> Outcomes:
+        """What senders have learned since the last call, those `alive` (rows,)."""
+        told, self._outcomes = Outcomes.joined(self._outcomes), []
+        return told.select(np.flatnonzero(alive[told.row])) if len(told) else told
+
     def drain(self) -> Transmissions:
         """Take out all that is queued or under way."""
         packets, self._queued, self._packet = self._queued, Transmissions.none(), np.zeros(0, PACKET)
@@ -141,6 +151,7 @@ class SignalWay(Way):
         packet["sent_at_ns"] = packet["on_air_at_ns"] = taken.sent_at_ns
         packet["airtime_ns"], packet["bits"] = airtime_ns(radio, frame_bytes), 8 * frame_bytes
         packet["refused"] = np.where(taken.payloads.sizes > radio.max_payload_bytes, int(Fate.TOO_LARGE), 0)
+        packet["result"] = result_at_first(taken.payloads.sizes, radio.max_payload_bytes)
         if radio.access_or_default.method == "csma-802154":
             csma = IEEE_802_15_4
             short = frame_bytes - HEADER_BYTES <= csma.short_frame_octets
@@ -236,6 +247,8 @@ class SignalWay(Way):
 
     def _forget_done(self) -> None:
         settled = self._packet["is_settled"] > 0
+        if self._rules.acknowledged:
+            self._outcomes.append(learned(self._packet, self._queued.outcome_id))
         kept = np.flatnonzero(self._packet["is_done"] == 0)
         queued = self._queued._replace(intended=np.where(settled, 0, self._queued.intended))
         self._queued, self._packet = queued.select(kept), self._packet[kept]
