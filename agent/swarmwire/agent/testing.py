@@ -1,8 +1,8 @@
 """Checks for agents, ours and users': two agents that are the same rule, and rows that do not see one another.
 
 Both feed made-up senses and packets, keyed by a seed, through the same host that runs agents anywhere: ragged packets
-(what robots sent a tick ago, heard by some), outcomes of those for one robot if the agent asks, some of them late, robots
-that drop out and come back, any body and parameters.
+(what robots sent a tick ago, heard by some), outcomes of addressed ones if the agent asks, robots that drop out and
+come back, any body and parameters.
 """
 
 from collections.abc import Callable, Iterator
