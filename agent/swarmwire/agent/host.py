@@ -80,7 +80,7 @@ class Hosted(ABC):
         return turn.actions()
 
     def _own_outcomes(self, outcomes: Outcomes, rows: IntArray, place: slice | IntArray) -> Outcomes:
-        """The outcomes of the robots `rows`, with the sender as a place in `rows`.
+        """The outcomes of the robots `rows`, with the sender as a place in `rows`; a copy, which agents may write to.
 
         Without those of packets that an agent before this one sent: the robot died since, or its runner was lost.
         """

@@ -23,7 +23,7 @@ class LocalCrew:
         """What every robot does in this tick."""
         if self._host is None:
             raise RuntimeError("the crew has not been started")
-        return self._host.act(tick, _read_only(senses), _heard_read_only(heard), _told_read_only(outcomes))
+        return self._host.act(tick, _read_only(senses), _heard_read_only(heard), outcomes)
 
     def counts(self) -> dict[str, int]:
         """Nothing is lost within a process."""
@@ -60,7 +60,3 @@ def _heard_read_only(heard: Heard) -> Heard:
         _frozen(heard.payload),
         Payloads(_frozen(heard.payloads.data), _frozen(heard.payloads.offset)),
     )
-
-
-def _told_read_only(outcomes: Outcomes) -> Outcomes:
-    return Outcomes(_frozen(outcomes.row), _frozen(outcomes.id), _frozen(outcomes.result))

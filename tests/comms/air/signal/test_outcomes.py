@@ -145,7 +145,7 @@ def test_a_sender_that_finds_the_air_busy_each_time_says_so_also_after_an_attemp
     busy = {id_ for one in told(of) for _, id_, result in listed(one) if result == "CHANNEL_BUSY"}
     own = of.finished("sender") == 0
     fates = dict(zip(of.finished("sequence")[own].tolist(), of.finished("fate")[own].tolist(), strict=True))
-    assert {fates[id_] for id_ in busy} == {Fate.CHANNEL_BUSY, Fate.LOST}
+    assert {fates[id_] for id_ in busy} >= {Fate.CHANNEL_BUSY, Fate.LOST}
     assert {id_ for id_, fate in fates.items() if fate == Fate.CHANNEL_BUSY} <= busy
 
 
