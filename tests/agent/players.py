@@ -37,6 +37,51 @@ class Chatter(Agent):
         robot.radio.send(Other(number=7), to=1)
 
 
+class Insisting(Agent):
+    """Sends a number to its neighbour until it is acknowledged, then the next one; its speed tells what it was told."""
+
+    needs = ("radio.outcomes",)
+
+    def __init__(self) -> None:
+        self.number, self.waits_for, self.told = 0, -1, 0
+
+    def step(self, robot: Robot) -> None:
+        for outcome in robot.radio.outcomes:
+            self.told = 7 * self.told + outcome.id + 100 * outcome.result
+            self.told %= 10_007
+            self.number += outcome.acknowledged
+            if outcome.id == self.waits_for:
+                self.waits_for = -1
+        if self.waits_for < 0:
+            robot.radio.send(Other(number=-1))
+            self.waits_for = robot.radio.send(Other(number=self.number), to=0)
+        robot.drive(1e-5 * self.told, 1e-3 * self.number)
+
+
+class Insistence(State):
+    number: IntColumn = column(0)
+    waits_for: IntColumn = column(-1)
+    told: IntColumn = column(0)
+
+
+class VectorInsisting(VectorAgent[Insistence]):
+    """The same for n robots."""
+
+    needs: ClassVar[tuple[str, ...]] = ("radio.outcomes",)
+
+    def step(self, robots: Robots, state: Insistence) -> None:
+        outcomes = robots.radio.outcomes
+        for at, row in enumerate(outcomes.row.tolist()):
+            told = 7 * state.told[row] + outcomes.id[at] + 100 * outcomes.result[at]
+            state.told[row] = told % 10_007
+        state.number += np.bincount(outcomes.row[outcomes.acknowledged], minlength=robots.n)
+        state.waits_for[outcomes.row[outcomes.id == state.waits_for[outcomes.row]]] = -1
+        again = state.waits_for < 0
+        robots.radio.send(Other, rows=again, number=-1.0)
+        state.waits_for[again] = robots.radio.send(Other, rows=again, to=0, number=state.number.astype(float))
+        robots.drive(1e-5 * state.told, 1e-3 * state.number)
+
+
 class Counter(Agent):
     """Drives as many m/s as it has made steps."""
 

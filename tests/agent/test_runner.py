@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from swarmwire.agent.runner import _Inbox
+from swarmwire.comms.outcomes import NO_OUTCOMES
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import encode_tick
@@ -31,7 +32,7 @@ def inbox_of(*arrived: Any) -> _Inbox:
 
 
 def tick(number: int) -> bytes:
-    return encode_tick(number, {"flock": senses(number, [0])}, Heard.none(GIVES))
+    return encode_tick(number, {"flock": senses(number, [0])}, Heard.none(GIVES), NO_OUTCOMES)
 
 
 ASSIGNMENT = assignment(group("unused:Agent", [0]))
@@ -43,7 +44,7 @@ def test_of_frames_that_wait_the_newest_is_acted_on_and_the_others_are_counted()
     ticks = inbox.ticks(ASSIGNMENT)
     assert next(ticks)[0] == 2
     assert inbox.dropped == 2
-    strange = encode_tick(9, {"others": senses(9, [1])}, Heard.none(GIVES))
+    strange = encode_tick(9, {"others": senses(9, [1])}, Heard.none(GIVES), NO_OUTCOMES)
     for data in (tick(2), tick(1), b"\xc1", strange, tick(3), tick(5), tick(4)):
         inbox.put_frame(Sample(Bytes(data)))
     assert next(ticks)[0] == 5

@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions
 
@@ -53,6 +54,32 @@ def test_sent_packets_keep_their_order_when_joined() -> None:
     assert joined.to.tolist() == [BROADCAST, 0, 2]
     assert listed(joined.payloads) == [b"aa", b"b", b"ccc"]
     assert len(Sent.joined([])) == 0
+
+
+def test_outcome_ids_follow_their_packets_and_are_left_out_where_nobody_asks() -> None:
+    silent = Sent(np.array([3]), np.array([BROADCAST]), Payloads.of([b"aa"]))
+    asking = Sent(np.array([1, 1]), np.array([0, 2]), Payloads.of([b"b", b"ccc"]), np.array([4, 5]))
+    joined = Sent.joined([silent, Sent.none(), asking])
+    assert joined.outcome_ids.tolist() == [-1, 4, 5]
+    picked = joined.select(np.array([2, 0]))
+    assert (picked.sender.tolist(), picked.to.tolist(), picked.outcome_ids.tolist()) == ([1, 3], [2, -1], [5, -1])
+    assert listed(picked.payloads) == [b"ccc", b"aa"]
+    assert Sent.joined([silent, silent]).outcome_id is None
+
+
+def test_outcomes_joined_are_sorted_by_robot_and_id() -> None:
+    parts = [
+        Outcomes(np.array(row), np.array(id_), np.array(what))
+        for row, id_, what in (([2, 0], [7, 9], [1, 0]), ([0, 2], [3, 1], [4, 2]))
+    ]
+    joined = Outcomes.joined([*parts, NO_OUTCOMES])
+    assert (joined.row.tolist(), joined.id.tolist(), joined.result.tolist()) == (
+        [0, 0, 2, 2],
+        [3, 9, 1, 7],
+        [4, 0, 2, 1],
+    )
+    assert joined.acknowledged.tolist() == [False, True, False, False]
+    assert len(Outcomes.joined([])) == 0
 
 
 def test_actions_joined_carry_the_packets_of_all() -> None:

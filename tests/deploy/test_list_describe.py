@@ -88,7 +88,7 @@ def assert_tells(text: str, wanted: list[tuple[str, ...]]) -> None:
     ("kind", "names"),
     [
         ("bodies", body_names()),
-        ("senses", [*SHEETS, *(f"radio.{of.name}" for of in fields(Gives))]),
+        ("senses", [*SHEETS, *(f"radio.{of.name}" for of in fields(Gives)), "radio.outcomes"]),
         ("behaviours", behaviours.__all__),
         ("events", list(ACTION_OF)),
         ("metrics", list(METRICS)),

@@ -11,6 +11,7 @@ import psutil
 import pytest
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.deploy import repeat, run
@@ -180,7 +181,7 @@ class Standing:
 
     def start(self) -> None: ...
 
-    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> Actions:
         return Actions(np.zeros(1, np.int64), np.ones(1, np.bool_), np.zeros(1), np.zeros(1))
 
     def counts(self) -> dict[str, int]:
@@ -193,7 +194,7 @@ def test_a_record_that_cannot_be_written_does_not_end_the_run_and_is_counted(tmp
     (tmp_path / "inputs").write_text("in the way")
     crew = RecordedCrew(Standing(), tmp_path, lambda tick: tick >= 2)
     for tick in range(5):
-        crew.act(tick, {}, Heard.none())
+        crew.act(tick, {}, Heard.none(), NO_OUTCOMES)
     record = crew.record()
     assert record is not None
     assert (record.first_tick, record.ticks, record.ticks_not_recorded) == (2, 0, 3)

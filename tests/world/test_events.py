@@ -10,6 +10,7 @@ from swarmwire.comms.air.air import Air
 from swarmwire.comms.events.selection import Selection
 from swarmwire.comms.events.swarm import Swarm
 from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
@@ -43,7 +44,7 @@ class Ahead:
 
     def start(self) -> None: ...
 
-    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> Actions:
         rows = np.concatenate([group.rows for group in senses.values()])
         self.rows.append(rows.tolist())
         n = len(rows)
@@ -141,7 +142,7 @@ def test_all_may_be_dead_and_the_run_goes_on():
     world.live(np.zeros(2, np.bool_))
     crew = LocalCrew(whole)
     crew.start()
-    assert len(crew.act(0, world.sense(0), Heard.none()).rows) == 0
+    assert len(crew.act(0, world.sense(0), Heard.none(), NO_OUTCOMES).rows) == 0
 
 
 def test_the_radio_graph_leaves_out_the_dead_radios_that_are_off_and_pairs_that_are_apart():

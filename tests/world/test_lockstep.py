@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, RunnerLost
+from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
@@ -70,7 +71,7 @@ def actions(rows: list[int]) -> Actions:
 
 
 def rows_of(frame: bytes) -> list[int]:
-    found, _ = decode_tick(frames.decode(frame), GIVES, GROUPS)
+    found, *_ = decode_tick(frames.decode(frame), GIVES, GROUPS)
     return [row for part in found.values() for row in part.rows.tolist()]
 
 
@@ -291,11 +292,22 @@ def test_robots_that_do_not_act_are_neither_sent_nor_expected() -> None:
 def test_a_runner_none_of_whose_robots_acts_gets_its_groups_empty_so_that_they_forget() -> None:
     lockstep = playing()
     out = dict(lockstep.open_tick(0, {"flock": senses(0, [4]), "scouts": senses(0, [])}, Heard.none(GIVES)))
-    found, _ = decode_tick(frames.decode(out["a"]), GIVES, GROUPS)
+    found, *_ = decode_tick(frames.decode(out["a"]), GIVES, GROUPS)
     assert {name: part.rows.tolist() for name, part in found.items()} == {"flock": [], "scouts": []}
     lockstep.answer("a", encode_actions(0, actions([])))
     lockstep.answer("b", encode_actions(0, actions([4])))
     assert lockstep.take().rows.tolist() == [4]
+
+
+def test_each_runner_gets_the_outcomes_of_its_own_robots_in_their_order():
+    lockstep = Lockstep(parts(dict(enumerate([1, 0, 1, 0, 2, 2, 2, 2]))))
+    ready(joined(lockstep, "a", "b", "c"), "a", "b", "c")
+    told = Outcomes(np.array([0, 1, 1, 2, 3]), np.array([9, 2, 3, 0, 1]), np.array([0, 1, 2, 3, 4]))
+    got: dict[str, list[list[int]]] = {}
+    for name, frame in lockstep.open_tick(0, all_senses(), Heard.none(GIVES), told):
+        _, _, its = decode_tick(frames.decode(frame), GIVES, GROUPS)
+        got[name] = [its.row.tolist(), its.id.tolist(), its.result.tolist()]
+    assert got == {"a": [[1, 1, 3], [2, 3, 1], [1, 2, 4]], "b": [[0, 2], [9, 0], [0, 3]], "c": [[], [], []]}
 
 
 owners_ = st.lists(st.integers(0, 3), min_size=8, max_size=8)
@@ -322,7 +334,7 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
     packets: list[Any] = []
     answers: list[tuple[str, bytes]] = []
     for (name, frame), own in zip(out, owned, strict=True):
-        got_senses, got = decode_tick(frames.decode(frame), GIVES, GROUPS)
+        got_senses, got, _ = decode_tick(frames.decode(frame), GIVES, GROUPS)
         rows: list[int] = []
         for part_name, part in got_senses.items():
             rows += part.rows.tolist()

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Heard, Payloads
 from swarmwire.world.mailbox import Mailbox
 from swarmwire.world.scenario_file import scenario_from
@@ -65,6 +66,24 @@ def test_what_waits_for_a_robot_that_dies_is_lost():
     box.hand_over(1, heard((12, 3, 0, 7), (13, 3, 0, 7)), ALIVE)
     box.hand_over(2, heard(), np.arange(15) != 12)
     assert read(box.hand_over(3, heard(), ALIVE)) == [(13, 3, 0, 7)]
+
+
+def outcomes(*rows: tuple[int, int, int]) -> Outcomes:
+    return Outcomes(*np.array(rows, np.int64).reshape(-1, 3).T)
+
+
+def rows_of(told: Outcomes) -> list[tuple[int, ...]]:
+    return list(zip(told.row.tolist(), told.id.tolist(), told.result.tolist(), strict=True))
+
+
+def test_outcomes_wait_for_robots_that_act_later_and_not_for_the_dead():
+    box = Mailbox(world(1, 3).static)
+    first = box.hand_over_outcomes(1, outcomes((0, 4, 1), (12, 0, 0), (13, 0, 2)), ALIVE)
+    assert rows_of(first) == [(0, 4, 1)]
+    assert rows_of(box.hand_over_outcomes(2, outcomes((12, 2, 0), (14, 1, 0)), np.arange(15) != 13)) == []
+    third = box.hand_over_outcomes(3, outcomes((0, 5, 0), (12, 1, 3)), ALIVE)
+    assert rows_of(third) == [(0, 5, 0), (12, 0, 0), (12, 1, 3), (12, 2, 0), (14, 1, 0)]
+    assert rows_of(box.hand_over_outcomes(6, outcomes(), ALIVE)) == []
 
 
 def test_only_groups_that_act_sense():

@@ -8,6 +8,7 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import RunnerLost
+from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions
 from swarmwire.comms.wire import frames
@@ -140,6 +141,17 @@ def test_frames_that_were_passed_over_are_dropped_with_what_was_heard_in_them() 
     assert not runners.late.any()
     runners.answer("b", said("b", 0, 1.0))
     assert (runners.frames_dropped, runners.packets_dropped) == (2, 3)
+
+
+def test_outcomes_in_frames_that_were_passed_over_are_counted() -> None:
+    runners = playing()
+    told = Outcomes(np.array([0, 0, 2]), np.array([0, 1, 0]), np.array([0, 1, 0]))
+    for tick in range(2):
+        runners.open_tick(tick, tick * TICK_NS, one_group(tick, ROWS), Heard.none(GIVES), told)
+    assert runners.outcomes_dropped == 0
+    owned = sum(row in OWN["a"] for row in told.row.tolist())
+    runners.answer("a", said("a", 1, 1.0))
+    assert (runners.frames_dropped, runners.outcomes_dropped) == (1, owned)
 
 
 def test_a_robot_without_answers_keeps_its_command_until_the_watchdog_stops_it_once() -> None:

@@ -1,12 +1,14 @@
 """The robots' side: write an `Agent` for one robot, or a `VectorAgent` for n at a time, and it runs anywhere."""
 
 from swarmwire.agent.agent import Agent
+from swarmwire.agent.outcome import Outcome
 from swarmwire.agent.packet import Packet
 from swarmwire.agent.per_robot import PerRobot, per_robot
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, IntColumn, State, VectorAgent, column
 from swarmwire.comms.messages import Message, f4, f8, i1, i2, i4, u1, u2, u4
+from swarmwire.comms.outcomes import Outcomes, SendResult
 
 __all__ = [
     "Agent",
@@ -14,10 +16,13 @@ __all__ = [
     "FloatColumn",
     "IntColumn",
     "Message",
+    "Outcome",
+    "Outcomes",
     "Packet",
     "PerRobot",
     "Robot",
     "Robots",
+    "SendResult",
     "State",
     "VectorAgent",
     "column",

@@ -11,7 +11,8 @@ class Agent(ABC):
 
     Annotated class attributes (float, int, bool, str) are its parameters, set before `__init__` runs; what it should
     remember it keeps in attributes of its own, made in `__init__`. `needs` names the senses of the body that it reads
-    ("proximity", "compass", "odometry") and what it reads of a packet ("radio.range", "radio.bearing").
+    ("proximity", "compass", "odometry"), what it reads of a packet ("radio.range", "radio.bearing"), and
+    "radio.outcomes" if it wants to know what became of packets that it sent to one robot.
     """
 
     needs: ClassVar[tuple[str, ...]] = ()

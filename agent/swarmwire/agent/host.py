@@ -17,6 +17,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 
@@ -29,10 +30,12 @@ class Host:
         self._gives = assignment.gives or ()
         self._groups = {group.name: hosted(group, load_agent(group.agent)) for group in assignment.groups}
 
-    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What the robots do in this tick; AgentFailed with the robot and the agent's traceback if one raises."""
         acting = ((self._groups[name], group) for name, group in senses.items())
-        return Actions.joined([agents.act(self._time(tick, agents.group), group, heard) for agents, group in acting])
+        return Actions.joined(
+            [agents.act(self._time(tick, agents.group), group, heard, outcomes) for agents, group in acting]
+        )
 
     def _time(self, tick: int, group: GroupAssignment) -> tuple[int, int, int]:
         time_ns = tick_start_ns(tick, self._rate_hz)
@@ -46,21 +49,47 @@ class Hosted(ABC):
         self.group, self.needs = group, needs
         self.rows: IntArray = group.rows  # that acted last: state is kept for these
         self._sent_before = np.zeros(len(group.rows), np.int64)
+        self._first_own = np.zeros(len(group.rows), np.int64)  # id of the first packet that the agent itself sent
 
-    def act(self, time: tuple[int, int, int], senses: GroupSenses, heard: Heard) -> Actions:
+    def act(
+        self, time: tuple[int, int, int], senses: GroupSenses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES
+    ) -> Actions:
         """What the robots `senses.rows` do; `time` is the tick, its start and the robots' period in ns."""
         # As many rows as the group has are all of them; most ticks are so.
         everyone = len(senses.rows) == len(self.group.rows)
         place = slice(None) if everyone else np.searchsorted(self.group.rows, senses.rows)
         sent_before = self._sent_before[place]
-        turn = Turn(self.group, self.needs, time, senses, _own(heard, senses.rows), self.group.keys[place], sent_before)
         if not (everyone and len(self.rows) == len(senses.rows)) and not np.array_equal(senses.rows, self.rows):
+            fresh = np.flatnonzero(~np.isin(senses.rows, self.rows))
+            self._first_own[np.arange(len(self.group.rows))[place][fresh]] = sent_before[fresh]
             self.keep(senses.rows)
             self.rows = senses.rows
+        turn = Turn(
+            self.group,
+            self.needs,
+            time,
+            senses,
+            _own(heard, senses.rows),
+            self._own_outcomes(outcomes, senses.rows, place),
+            self.group.keys[place],
+            sent_before,
+        )
         if turn.n:  # no step for nobody: an agent must not tell whether others share its process
             self.step(turn)
         self._sent_before[place] = sent_before
         return turn.actions()
+
+    def _own_outcomes(self, outcomes: Outcomes, rows: IntArray, place: slice | IntArray) -> Outcomes:
+        """The outcomes of the robots `rows`, with the sender as a place in `rows`; a copy, which agents may write to.
+
+        Without those of packets that an agent before this one sent: the robot died since, or its runner was lost.
+        """
+        if not len(outcomes) or not len(rows):
+            return NO_OUTCOMES
+        mine = outcomes.select(np.flatnonzero(np.isin(outcomes.row, rows)))
+        at = np.searchsorted(rows, mine.row)
+        own = (self._first_own[place][at] <= mine.id) & (mine.id < self._sent_before[place][at])
+        return Outcomes(at, mine.id, mine.result).select(np.flatnonzero(own))
 
     @abstractmethod
     def step(self, turn: Turn) -> None:

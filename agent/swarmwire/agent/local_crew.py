@@ -3,6 +3,7 @@
 from swarmwire.agent.host import Host
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard, Payloads
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 
@@ -18,11 +19,11 @@ class LocalCrew:
         """Make the agents."""
         self._host = Host(self._assignment)
 
-    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick."""
         if self._host is None:
             raise RuntimeError("the crew has not been started")
-        return self._host.act(tick, _read_only(senses), _heard_read_only(heard))
+        return self._host.act(tick, _read_only(senses), _heard_read_only(heard), outcomes)
 
     def counts(self) -> dict[str, int]:
         """Nothing is lost within a process."""

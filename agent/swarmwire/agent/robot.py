@@ -7,6 +7,7 @@ import numpy as np
 
 from swarmwire.agent.draw import Draw
 from swarmwire.agent.handle import Handle
+from swarmwire.agent.outcome import Outcome
 from swarmwire.agent.packet import Packet, Packets
 from swarmwire.agent.readings import (
     BumperReading,
@@ -18,7 +19,9 @@ from swarmwire.agent.readings import (
 )
 from swarmwire.agent.robots import had
 from swarmwire.agent.turn import Turn
+from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.messages import DICT_TAG, Message, decode_dict, encode_dict
+from swarmwire.comms.outcomes import SendResult
 from swarmwire.comms.packets import Payloads
 
 M = TypeVar("M", bound=Message)
@@ -106,6 +109,16 @@ class RadioPort:
         payload = encode_dict(message) if isinstance(message, dict) else message.encode()
         return int(self._turn.send(np.array([self._row]), to, Payloads.of([payload]))[0])
 
+    @property
+    def outcomes(self) -> list[Outcome]:
+        """Packets sent to one robot that the radio is done with since the robot's last step, by id."""
+        table = self._turn.outcomes
+        ids, results = table.id.tolist(), table.result.tolist()
+        return [Outcome(ids[at], SendResult(results[at])) for at in self._span(table.row)]
+
     def _mine(self, packets: Packets[Any]) -> Iterator[int]:
-        first, last = np.searchsorted(packets.row, [self._row, self._row + 1])
-        return iter(range(int(first), int(last)))
+        return iter(self._span(packets.row))
+
+    def _span(self, row: IntArray) -> range:
+        first, last = np.searchsorted(row, [self._row, self._row + 1])
+        return range(int(first), int(last))

@@ -19,6 +19,7 @@ from swarmwire.agent.readings import (
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.messages import Message, encode_rows
+from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.sheets import Ring
 
 M = TypeVar("M", bound=Message)
@@ -91,6 +92,11 @@ class RadioRows:
     def heard(self, kind: type[M]) -> Packets[M]:
         """All packets of a message class heard since the robots' last step."""
         return self._turn.packets(kind)
+
+    @property
+    def outcomes(self) -> Outcomes:
+        """Packets sent to one robot that the radios are done with since the last step: row (0 to n - 1), id, result."""
+        return self._turn.outcomes
 
     def send(
         self,

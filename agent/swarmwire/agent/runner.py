@@ -20,6 +20,7 @@ from zenoh.handlers import Callback
 from swarmwire.agent.host import Host
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
+from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Senses
 from swarmwire.comms.wire import frames
@@ -72,11 +73,11 @@ class _Inbox:
             return False
         return arrived
 
-    def ticks(self, assignment: Assignment) -> Iterator[tuple[int, Senses, Heard]]:
+    def ticks(self, assignment: Assignment) -> Iterator[tuple[int, Senses, Heard, Outcomes]]:
         """What the newest tick brings, each time, until the world says "end" or is gone; lockstep has but one."""
         gives, groups = assignment.gives or (), {group.name for group in assignment.groups}
         every = math.gcd(*(group.act_every_ticks for group in assignment.groups))
-        newest: tuple[int, Senses, Heard] | None = None
+        newest: tuple[int, Senses, Heard, Outcomes] | None = None
         tick = -1
         while True:
             if newest is not None and self._arrived.empty():
@@ -93,12 +94,12 @@ class _Inbox:
                     return
                 if frame.kind != "tick" or frame.tick <= tick or frame.tick % every:
                     raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
-                senses, heard = decode_tick(frame, gives, groups)
+                told = decode_tick(frame, gives, groups)
             except BadFrame:
                 self.dropped += 1
                 continue
             self.dropped += newest is not None
-            newest, tick = (frame.tick, senses, heard), frame.tick
+            newest, tick = (frame.tick, *told), frame.tick
 
 
 def _join(session: zenoh.Session, keys: Keys, runner: str, inbox: _Inbox) -> Assignment:
@@ -117,8 +118,8 @@ def _answers(assignment: Assignment, inbox: _Inbox) -> Iterator[bytes]:
     try:
         host = Host(assignment)
         yield frames.encode("ready", -1, {})
-        for tick, senses, heard in inbox.ticks(assignment):
-            actions = host.act(tick, senses, heard)
+        for tick, senses, heard, outcomes in inbox.ticks(assignment):
+            actions = host.act(tick, senses, heard, outcomes)
             dropped, inbox.dropped = inbox.dropped, 0
             yield encode_actions(tick, actions, dropped)
         return

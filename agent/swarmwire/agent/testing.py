@@ -1,12 +1,13 @@
 """Checks for agents, ours and users': two agents that are the same rule, and rows that do not see one another.
 
 Both feed made-up senses and packets, keyed by a seed, through the same host that runs agents anywhere: ragged packets
-(what robots sent a tick ago, heard by some), robots that drop out and come back, any body and parameters.
+(what robots sent a tick ago, heard by some), outcomes of addressed ones if the agent asks, robots that drop out and
+come back, any body and parameters.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,13 +20,15 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import GroupAssignment, params_of
 from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.packets import Heard, Payloads, Sent
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
+from swarmwire.comms.packets import UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
 
 RATE_HZ = 10
 GIVEN = ("range_m", "bearing_rad", "rssi_dbm")
 DROP_OUT = 0.1  # share of the robots missing in a tick
 HEARING = 0.4  # share of the senders that a robot hears
+LEARNING = 0.6  # share of the outcomes still to come that come in a tick
 
 
 @dataclass(frozen=True)
@@ -43,10 +46,10 @@ def assert_equivalent(single: type[Agent], vector: type[VectorAgent[Any]], trial
     """AssertionError unless both do exactly the same, bit for bit, for robots that sense and hear the same."""
     trial = trial or Trial()
     one, other = (_host(kind, trial, np.arange(trial.robots)) for kind in (single, vector))
-    for time, senses, heard, show in _inputs(trial):
-        first, second = one.act(time, senses, heard), other.act(time, senses, heard)
+    for given, show in _inputs(trial):
+        first, second = one.act(*given), other.act(*given)
         names = f"{single.__name__} and {vector.__name__}"
-        _assert_same(first, second, f"{names} differ in tick {time[0]}")
+        _assert_same(first, second, f"{names} differ in tick {given.time[0]}")
         show(first.sent)
 
 
@@ -55,10 +58,11 @@ def assert_rows_independent(vector: type[VectorAgent[Any]], trial: Trial | None 
     trial = trial or Trial()
     together = _host(vector, trial, np.arange(trial.robots))
     alone = [_host(vector, trial, np.array([row])) for row in range(trial.robots)]
-    for time, senses, heard, show in _inputs(trial):
-        at_once = together.act(time, senses, heard)
-        each = [host.act(time, *_only(row, senses, heard)) for row, host in enumerate(alone)]
-        _assert_same(at_once, Actions.joined(each), f"rows of {vector.__name__} are not independent in tick {time[0]}")
+    for given, show in _inputs(trial):
+        at_once = together.act(*given)
+        each = [host.act(*_only(row, given)) for row, host in enumerate(alone)]
+        text = f"rows of {vector.__name__} are not independent in tick {given.time[0]}"
+        _assert_same(at_once, Actions.joined(each), text)
         show(at_once.sent)
 
 
@@ -71,14 +75,25 @@ def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> Hosted:
 
 
 class _Ether:
-    """What was sent a tick ago, heard at random."""
+    """What was sent a tick ago, heard at random, and what became of it, told at random."""
 
     def __init__(self, key: int) -> None:
         self._key, self._sent = key, Sent.none()
+        self._untold = NO_OUTCOMES
 
     def show(self, sent: Sent) -> None:
-        order = np.argsort(sent.sender, kind="stable")
-        self._sent = Sent(sent.sender[order], sent.to[order], sent.payloads.rows(order))
+        self._sent = sent.select(np.argsort(sent.sender, kind="stable"))
+        asked = np.flatnonzero(self._sent.outcome_ids != UNTOLD)
+        row, id_ = self._sent.sender[asked], self._sent.outcome_ids[asked]
+        chance = draws.uniform(self._key, row, id_, 0, draws.purpose("outcome"))
+        new = Outcomes(row, id_, (chance * len(SendResult)).astype(np.int64))
+        self._untold = Outcomes.joined([self._untold, new])
+
+    def outcomes(self, tick: int) -> Outcomes:
+        """As the air would tell them: also to robots that have dropped out, and to those that have forgotten."""
+        comes = _uniform(self._key, tick, "learning", (len(self._untold),)) < LEARNING
+        told, self._untold = (self._untold.select(np.flatnonzero(now)) for now in (comes, ~comes))
+        return told
 
     def heard(self, tick: int, rows: IntArray) -> Heard:
         chance = _uniform(self._key, tick, "hearing", (len(rows), len(self._sent)))
@@ -90,14 +105,25 @@ class _Ether:
         return Heard(rows[receiver], sender, np.full(len(receiver), tick), at_ns, given, payload, payloads)
 
 
-def _inputs(trial: Trial) -> Iterator[tuple[tuple[int, int, int], GroupSenses, Heard, Any]]:
+class _Given(NamedTuple):
+    """What a group is given in a tick."""
+
+    time: tuple[int, int, int]
+    senses: GroupSenses
+    heard: Heard
+    outcomes: Outcomes
+
+
+def _inputs(trial: Trial) -> Iterator[tuple[_Given, Callable[[Sent], None]]]:
+    """What the robots are given, tick by tick, and whom to show what they sent."""
     key = draws.derive_key("inputs", trial.seed)
     body, ether = load_body(trial.body), _Ether(key)
     for tick in range(trial.ticks):
         rows = np.flatnonzero(_uniform(key, tick, "drop-out", (trial.robots,)) >= DROP_OUT)
         time_ns = tick_start_ns(tick, RATE_HZ)
         time = (tick, time_ns, tick_start_ns(tick + 1, RATE_HZ) - time_ns)
-        yield time, GroupSenses(rows, _senses(body, key, tick, rows)), ether.heard(tick, rows), ether.show
+        senses = GroupSenses(rows, _senses(body, key, tick, rows))
+        yield _Given(time, senses, ether.heard(tick, rows), ether.outcomes(tick)), ether.show
 
 
 def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatArray]:
@@ -125,10 +151,11 @@ def _uniform(key: int, tick: int, purpose: str, shape: tuple[int, ...]) -> Float
     return draws.uniform(key, tick, count, 0, draws.purpose(purpose))
 
 
-def _only(row: int, senses: GroupSenses, heard: Heard) -> tuple[GroupSenses, Heard]:
-    at = np.flatnonzero(senses.rows == row)
-    own = GroupSenses(senses.rows[at], {name: column[at] for name, column in senses.fields.items()})
-    return own, heard.select(np.flatnonzero(heard.receiver == row))
+def _only(row: int, given: _Given) -> _Given:
+    at = np.flatnonzero(given.senses.rows == row)
+    own = GroupSenses(given.senses.rows[at], {name: column[at] for name, column in given.senses.fields.items()})
+    heard = given.heard.select(np.flatnonzero(given.heard.receiver == row))
+    return _Given(given.time, own, heard, given.outcomes.select(np.flatnonzero(given.outcomes.row == row)))
 
 
 def _assert_same(first: Actions, second: Actions, text: str) -> None:
@@ -147,6 +174,7 @@ def _states(actions: Actions) -> dict[int, str]:
     return {int(row): notes.names[code] for row, code in zip(notes.rows, notes.code, strict=True)}
 
 
-def _packets(sent: Sent) -> list[tuple[int, int, bytes]]:
-    order = np.argsort(sent.sender, kind="stable")
-    return [(int(sent.sender[i]), int(sent.to[i]), sent.payloads.row(int(i))) for i in order]
+def _packets(sent: Sent) -> list[tuple[int, int, int, bytes]]:
+    of = sent.select(np.argsort(sent.sender, kind="stable"))
+    numbers = zip(of.sender.tolist(), of.to.tolist(), of.outcome_ids.tolist(), strict=True)
+    return [(*three, of.payloads.row(i)) for i, three in enumerate(numbers)]

@@ -9,14 +9,16 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
 from swarmwire.comms.messages import Message, decode_alike, decode_rows
 from swarmwire.comms.notes import Notes, checked_state
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.outcomes import Outcomes
+from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
 
 M = TypeVar("M", bound=Message)
+OUTCOMES = "radio.outcomes"
 
 
 class Turn:
-    """The robots `senses.rows` of a group in one tick; `heard.receiver` counts these rows from 0."""
+    """The robots `senses.rows` of a group in one tick; `heard.receiver` and `outcomes.row` count these rows from 0."""
 
     def __init__(
         self,
@@ -25,12 +27,14 @@ class Turn:
         time: tuple[int, int, int],
         senses: GroupSenses,
         heard: Heard,
+        outcomes: Outcomes,
         keys: KeyArray,
         sent_before: IntArray,
     ) -> None:
         self.group, self.needs = group, needs
         self.tick, self.time_ns, self.period_ns = time
         self.senses, self.heard = senses, heard
+        self._outcomes, self._asks = outcomes, OUTCOMES in needs
         self.keys = keys  # (n,) of the robots' draws
         self.n = len(senses.rows)
         self.drive = np.zeros(self.n, np.bool_)
@@ -43,9 +47,14 @@ class Turn:
 
     def field(self, sense: str, name: str) -> FloatArray:
         """A field of a sense, (n, …); NotDeclared if the agent's needs do not name the sense."""
-        if sense not in self.needs:
-            raise NotDeclared(f"reads {sense!r}, which its needs do not name: {', '.join(self.needs) or 'none'}")
+        self._require(sense)
         return self.senses.fields[f"{sense}.{name}"]
+
+    @property
+    def outcomes(self) -> Outcomes:
+        """What became of packets that these robots sent; NotDeclared if the agent's needs do not name it."""
+        self._require(OUTCOMES)
+        return self._outcomes
 
     def packets(self, kind: type[M]) -> Packets[M]:
         """All packets of a message class that these robots heard."""
@@ -76,9 +85,11 @@ class Turn:
             receiver[:] = to
             if (receiver < 0).any():
                 raise ValueError("send(to=…): expected the index of a robot in the arena, 0 or more")
-        self._outbox.append(Sent(self.senses.rows[place], receiver, payloads))
         ids = self._sent_before[place].copy()
         self._sent_before[place] += 1
+        # Whoever does not ask is not told, and nothing of it crosses the wire.
+        outcome_id = np.where(receiver == BROADCAST, UNTOLD, ids) if self._asks else None
+        self._outbox.append(Sent(self.senses.rows[place], receiver, payloads, outcome_id))
         return ids
 
     def note(self, rows: IntArray | BoolArray | slice, state: str) -> None:
@@ -91,6 +102,10 @@ class Turn:
         """What the robots did."""
         sent = Sent.joined(self._outbox)
         return Actions(self.senses.rows, self.drive, self.linear_mps, self.angular_radps, sent, self._notes())
+
+    def _require(self, need: str) -> None:
+        if need not in self.needs:
+            raise NotDeclared(f"reads {need!r}, which its needs do not name: {', '.join(self.needs) or 'none'}")
 
     def _notes(self) -> Notes:
         if self._state is None:

@@ -7,6 +7,8 @@ import numpy as np
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 
 BROADCAST = -1
+NOWHERE = -2  # addressed to a robot that is not there: numbered, never on air
+UNTOLD = -1  # the outcome id of a packet whose sender does not ask
 TAG_BYTES = 2
 
 
@@ -82,11 +84,22 @@ class Sent:
     """Packets that agents sent in one tick; those of one sender stand in the order in which it sent them."""
 
     sender: IntArray  # (k,) robot row: arena x robots + index
-    to: IntArray  # (k,) index in the arena of the one receiver, or BROADCAST
+    to: IntArray  # (k,) index in the arena of the one receiver, BROADCAST or, between loop and air, NOWHERE
     payloads: Payloads  # (k,)
+    outcome_id: IntArray | None = None  # (k,) under which a sender is told of a packet, or UNTOLD; None: all UNTOLD
 
     def __len__(self) -> int:
         return len(self.sender)
+
+    @property
+    def outcome_ids(self) -> IntArray:
+        """`outcome_id`, also where nobody asks, (k,)."""
+        return np.full(len(self), UNTOLD) if self.outcome_id is None else self.outcome_id
+
+    def select(self, index: IntArray) -> "Sent":
+        """The packets of `index`, in its order."""
+        outcome_id = None if self.outcome_id is None else self.outcome_id[index]
+        return Sent(self.sender[index], self.to[index], self.payloads.rows(index), outcome_id)
 
     @classmethod
     def none(cls) -> "Sent":
@@ -105,6 +118,9 @@ class Sent:
             np.concatenate([part.sender for part in parts]),
             np.concatenate([part.to for part in parts]),
             Payloads.joined([part.payloads for part in parts]),
+            np.concatenate([part.outcome_ids for part in parts])
+            if any(part.outcome_id is not None for part in parts)
+            else None,
         )
 
 

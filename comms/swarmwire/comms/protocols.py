@@ -2,6 +2,7 @@
 
 from typing import Any, Protocol
 
+from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
@@ -14,7 +15,7 @@ class Crew(Protocol):
         """Return once every robot has an agent that is ready to act; RunnerLost or AgentFailed otherwise."""
         ...
 
-    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> Actions:
         """What every robot does in this tick; AgentFailed or RunnerLost ends the run."""
         ...
 

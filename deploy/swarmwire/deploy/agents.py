@@ -31,14 +31,20 @@ def _checked(scenario: Scenario, name: str, spec: str) -> AgentClass:
     except BadParameter as error:
         raise BadInput(where, f"robots.{name}.params.{error.key}", error.expected) from error
     body = load_body(group.body)
-    of_radio = scenario.radio.gives.needs if scenario.radio else ()
+    of_radio = scenario.radio.tells if scenario.radio else ()
     for need in kind.needs:
         if need.startswith("radio."):
             if need not in of_radio:
-                told = ", ".join(of_radio) or "nothing"
-                text = f"{kind.__name__} needs {need!r}, which the radio does not tell: [radio] gives {told}"
+                text = f"{kind.__name__} needs {need!r}, which {_untold(need, scenario)}"
                 raise BadInput(where, f"robots.{name}.agent", text)
         elif need not in body.senses:
             text = f"{kind.__name__} needs {need!r}, which the body {body.name} lacks: it has {', '.join(body.senses)}"
             raise BadInput(where, f"robots.{name}.agent", text)
     return kind
+
+
+def _untold(need: str, scenario: Scenario) -> str:
+    if need == "radio.outcomes":
+        return "only a radio that acknowledges tells: expected radio.access.method csma-802154 or dcf, acknowledged"
+    told = ", ".join(scenario.radio.gives.needs) if scenario.radio else ""
+    return f"the radio does not tell: [radio] gives {told or 'nothing'}"

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.protocols import Crew
 from swarmwire.comms.senses import Actions, Senses
@@ -43,9 +44,9 @@ class RecordedCrew:
         self._ticks = self._missed = 0
         self.start, self.counts, self.close = crew.start, crew.counts, crew.close
 
-    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick."""
-        actions = self._crew.act(tick, senses, heard)
+        actions = self._crew.act(tick, senses, heard, outcomes)
         if self._first_tick is not None or self._outside(tick):
             self._record(tick, actions)
         return actions
@@ -142,10 +143,10 @@ class ReplayedCrew:
         self._agents, self._inputs, self._robots = agents, inputs, robots
         self.start, self.counts, self.close = agents.start, agents.counts, agents.close
 
-    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick, or did."""
         if tick < self._inputs.first_tick:
-            return self._agents.act(tick, senses, heard)
+            return self._agents.act(tick, senses, heard, outcomes)
         return self._inputs.actions(tick, self._robots)
 
 

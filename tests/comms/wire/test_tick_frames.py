@@ -12,7 +12,8 @@ from hypothesis.extra import numpy as npst
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.notes import Notes
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
+from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_actions, encode_tick
@@ -58,7 +59,10 @@ def same(one: Any, other: Any) -> bool:
 def test_senses_and_heard_packets_come_over_whole(senses: Senses, gives: tuple[str, ...], data: st.DataObject) -> None:
     assume(senses)
     heard = data.draw(heard_(gives))
-    got_senses, got = decode_tick(frames.decode(encode_tick(5, senses, heard)), gives, senses.keys())
+    frame = frames.decode(encode_tick(5, senses, heard, NO_OUTCOMES))
+    got_senses, got, outcomes = decode_tick(frame, gives, senses.keys())
+    assert "outcomes" not in frame.arrays
+    assert len(outcomes) == 0
     assert list(got_senses) == list(senses)
     for name, group in senses.items():
         assert same(got_senses[name].rows, group.rows)
@@ -73,13 +77,44 @@ def test_senses_and_heard_packets_come_over_whole(senses: Senses, gives: tuple[s
     assert [got_of.row(int(p)) for p in got.payload] == [of.row(int(p)) for p in heard.payload]
 
 
+def telling(outcomes: Outcomes) -> frames.Frame:
+    return frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, Heard.none(), outcomes))
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, I64.max), st.sampled_from(SendResult)), min_size=1))
+def test_outcomes_come_over_whole(listed: list[tuple[int, int, int]]) -> None:
+    outcomes = Outcomes(*np.array(listed, np.int64).T)
+    _, _, got = decode_tick(telling(outcomes), (), {"flock"})
+    assert all(same(getattr(got, name), getattr(outcomes, name)) for name in ("row", "id", "result"))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.array([[4], [0], [len(SendResult)]]),
+        np.array([[4], [0], [-1]]),
+        np.array([[4], [0]]),
+        np.array([4, 0, 0]),
+        np.array([[4.0], [0.0], [0.0]]),
+    ],
+    ids=repr,
+)
+def test_outcomes_that_are_none_are_refused(wrong: Any) -> None:
+    frame = telling(NO_OUTCOMES)
+    with pytest.raises(BadFrame) as caught:
+        decode_tick(replace(frame, arrays={**frame.arrays, "outcomes": wrong}), (), {"flock"})
+    assert caught.value.fault == "malformed"
+
+
 @given(payload_lists, st.data())
 def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> None:
     k = len(payloads)
     sender = np.array(data.draw(st.lists(st.sampled_from(ROWS.tolist()), min_size=k, max_size=k)), np.int64)
     to = np.array(data.draw(st.lists(st.integers(BROADCAST, I64.max), min_size=k, max_size=k)), np.int64)
     drive = data.draw(npst.arrays(np.bool_, 3))
-    actions = Actions(ROWS, drive, data.draw(floats(3)), data.draw(floats(3)), Sent(sender, to, Payloads.of(payloads)))
+    ids = np.where(to == BROADCAST, UNTOLD, data.draw(npst.arrays(np.int64, k, elements=st.integers(UNTOLD, I64.max))))
+    sent = Sent(sender, to, Payloads.of(payloads), data.draw(st.sampled_from([None, ids])))
+    actions = Actions(ROWS, drive, data.draw(floats(3)), data.draw(floats(3)), sent)
     frame = frames.decode(encode_actions(8, actions))
     assert (frame.kind, frame.tick) == ("actions", 8)
     got = decode_actions(frame, ROWS)
@@ -87,6 +122,8 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
         assert same(getattr(got, column), getattr(actions, column))
     assert same(got.sent.sender, sender)
     assert same(got.sent.to, to)
+    assert (got.sent.outcome_id is None) == (sent.outcome_id is None)
+    assert same(got.sent.outcome_ids, sent.outcome_ids)
     assert [got.sent.payloads.row(i) for i in range(k)] == payloads
 
 
@@ -160,6 +197,13 @@ def test_packets_of_robots_that_are_not_the_runners_are_refused(sender: list[int
 @pytest.mark.parametrize("to", [-2, I64.min])
 def test_packets_to_a_negative_index_are_refused(to: int) -> None:
     refused(sent=np.array([[4, 9, 9], [0, to, 0]]))
+
+
+@pytest.mark.parametrize(
+    "ids", [[0, 1, 2], [-1, -2, 0], [-1, I64.min, 0], [-1, 1], [[-1, 1, 2]], [-1.0, 1.0, 2.0]], ids=repr
+)
+def test_outcome_ids_that_fit_no_packet_or_a_broadcast_are_refused(ids: list[int]) -> None:
+    refused(**{"sent/outcome_id": np.array(ids)})
 
 
 def test_packets_without_any_sender_are_none() -> None:

@@ -14,12 +14,13 @@ import numpy as np
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
 from swarmwire.world.roster import OnLoss, Refused, Roster, Slot, rows_of
-from swarmwire.world.split_tick import acting, split_heard, split_senses
+from swarmwire.world.split_tick import acting, split_heard, split_outcomes, split_senses
 
 __all__ = ["Lockstep", "Refused", "standing"]
 
@@ -36,17 +37,20 @@ class Lockstep(Roster[_Slot]):
     def __init__(self, assignments: list[Assignment], on_loss: OnLoss = "stop") -> None:
         super().__init__([_Slot(assignment, rows_of(assignment)) for assignment in assignments], on_loss)
 
-    def open_tick(self, tick: int, senses: Senses, heard: Heard) -> list[tuple[str, bytes]]:
+    def open_tick(
+        self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES
+    ) -> list[tuple[str, bytes]]:
         """Begin a tick: one frame for each runner of a group that acts; the others stay ready."""
         self._tick = tick
         parts = split_senses(senses, self._owner, [slot.assignment for slot in self._slots])
         packets = split_heard(heard, self._owner, len(self._slots))
+        told = split_outcomes(outcomes, self._owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
-        for slot, part, own in zip(self._slots, parts, packets, strict=True):
+        for slot, part, own, its in zip(self._slots, parts, packets, told, strict=True):
             slot.rows, slot.actions, slot.frame = acting(part), None, None
             if slot.state == "dead" or not part:
                 continue
-            slot.frame = encode_tick(tick, part, own)
+            slot.frame = encode_tick(tick, part, own, its)
             if slot.state == "ready":
                 slot.state = "waiting"
                 out.append((slot.runner or "", slot.frame))

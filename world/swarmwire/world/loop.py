@@ -2,13 +2,15 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.events.event import Event
-from swarmwire.comms.packets import Heard, Sent
+from swarmwire.comms.outcomes import NO_OUTCOMES
+from swarmwire.comms.packets import NOWHERE, Heard, Sent
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.comms.truth import Tally, Truth
 from swarmwire.world.events import Events
@@ -53,7 +55,9 @@ class Loop:
         heard = news.heard if news else Heard.none()
         self._open = news.tally if news else None
         senses = world.sense(tick)
-        actions = self.crew.act(tick, senses, self._mailbox.hand_over(tick, heard, world.alive))
+        packets = self._mailbox.hand_over(tick, heard, world.alive)
+        outcomes = self._mailbox.hand_over_outcomes(tick, news.outcomes if news else NO_OUTCOMES, world.alive)
+        actions = self.crew.act(tick, senses, packets, outcomes)
 
         pose, velocity, alive = world.pose, world.velocity, world.alive.copy()
         if self.air:
@@ -105,11 +109,10 @@ class Loop:
         return {**self.crew.counts(), **self.world.counts(), **self._lost}
 
     def _addressable(self, sent: Sent) -> Sent:
-        """Without packets for a robot that is not there, or for the sender itself: counted, never on air."""
+        """Packets for a robot that is not there, or for the sender itself, are counted and go NOWHERE."""
         robots = self.world.static.robots
         nobody = (sent.to >= robots) | (sent.to == sent.sender % robots)
         if not nobody.any():
             return sent
         self._lost["packets_to_nobody"] += int(nobody.sum())
-        keep = np.flatnonzero(~nobody)
-        return Sent(sent.sender[keep], sent.to[keep], sent.payloads.rows(keep))
+        return replace(sent, to=np.where(nobody, NOWHERE, sent.to))

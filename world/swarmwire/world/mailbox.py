@@ -1,19 +1,24 @@
-"""The mailbox: packets wait here for robots that do not act in every tick."""
+"""The mailbox: packets, and outcomes of packets, wait here for robots that do not act in every tick."""
 
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.truth import Static
 
 
 class Mailbox:
-    """What robots heard since they last acted. Where all act in every tick it passes everything on at no cost."""
+    """What robots heard, and learned of their packets, since they last acted.
+
+    Where all act in every tick it passes everything on at no cost.
+    """
 
     def __init__(self, static: Static) -> None:
         self._every: IntArray = np.tile(static.act_every_ticks, static.arenas)  # (rows,)
         self._always = bool((self._every == 1).all())
         self._waiting = Heard.none()
+        self._outcomes = NO_OUTCOMES
 
     def hand_over(self, tick: int, heard: Heard, alive: BoolArray) -> Heard:
         """All that waits for the robots that act in this tick, with what they `heard` since the last tick.
@@ -25,4 +30,13 @@ class Mailbox:
         here = heard.merged(self._waiting) if len(self._waiting) else heard
         acts = (tick % self._every == 0)[here.receiver]
         self._waiting = here.select(np.flatnonzero(~acts & alive[here.receiver])).compacted()
+        return here.select(np.flatnonzero(acts))
+
+    def hand_over_outcomes(self, tick: int, outcomes: Outcomes, alive: BoolArray) -> Outcomes:
+        """The same of `outcomes`."""
+        if self._always:
+            return outcomes
+        here = Outcomes.joined([self._outcomes, outcomes])
+        acts = (tick % self._every == 0)[here.row]
+        self._outcomes = here.select(np.flatnonzero(~acts & alive[here.row]))
         return here.select(np.flatnonzero(acts))

@@ -25,13 +25,14 @@ from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.notes import Notes
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
 from swarmwire.world.roster import OnLoss, Roster, Slot, rows_of
 from swarmwire.world.runner_health import RunnerHealth
-from swarmwire.world.split_tick import acting, split_heard, split_senses
+from swarmwire.world.split_tick import acting, split_heard, split_outcomes, split_senses
 
 ANSWERED = -1
 
@@ -42,6 +43,7 @@ class _Asked(NamedTuple):
     tick: int
     rows: IntArray  # (n,) in the order of the answer
     packets: int  # heard, that it carried
+    outcomes: int  # of packets sent
     at_ns: int  # wall time, pauses left out
 
 
@@ -59,6 +61,7 @@ class RealTime(Roster[_Slot]):
         frames_dropped: frames to runners that were never answered though a later one was, or that were still out when
             their runner was lost: dropped by the network, or passed over by a runner that had a newer one.
         packets_dropped: packets in them, or for robots without a runner: heard by a radio, never by an agent.
+        outcomes_dropped: outcomes in them, or for such robots: known to a radio, never to its agent.
     """
 
     def __init__(self, assignments: list[Assignment], watchdog_s: float, timeout_s: float, on_loss: OnLoss) -> None:
@@ -72,7 +75,7 @@ class RealTime(Roster[_Slot]):
         self._sent: list[Sent] = []
         self._notes: list[Notes] = []
         self.late, self.watchdog_stops = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
-        self.frames_dropped = self.packets_dropped = 0
+        self.frames_dropped = self.packets_dropped = self.outcomes_dropped = 0
 
     def health(self) -> RunnerHealth:
         """How the runners are doing."""
@@ -83,14 +86,17 @@ class RealTime(Roster[_Slot]):
             watchdog_stops=int(self.watchdog_stops.sum()),
         )
 
-    def open_tick(self, tick: int, now_ns: int, senses: Senses, heard: Heard) -> list[tuple[str, bytes]]:
+    def open_tick(
+        self, tick: int, now_ns: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES
+    ) -> list[tuple[str, bytes]]:
         """Begin a tick at wall time `now_ns`, pauses left out: one frame for each runner that is ready."""
         self._tick = tick
         start_ns = tick_start_ns(tick, self._rate_hz)
         parts = split_senses(senses, self._owner, [slot.assignment for slot in self._slots])
         packets = split_heard(heard, self._owner, len(self._slots))
+        told = split_outcomes(outcomes, self._owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
-        for slot, part, own in zip(self._slots, parts, packets, strict=True):
+        for slot, part, own, its in zip(self._slots, parts, packets, told, strict=True):
             if slot.asked and now_ns - slot.asked[0].at_ns > self._timeout_ns:
                 self._lose(slot, f"no answer for {to_s(self._timeout_ns):g} s")
             if not part:  # none of its groups acts
@@ -98,10 +104,11 @@ class RealTime(Roster[_Slot]):
             rows = acting(part)
             self._asked_ns[rows[self._asked_ns[rows] == ANSWERED]] = start_ns
             if slot.state == "ready":
-                slot.asked.append(_Asked(tick, rows, len(own), now_ns))
-                out.append((slot.runner or "", encode_tick(tick, part, own)))
+                slot.asked.append(_Asked(tick, rows, len(own), len(its), now_ns))
+                out.append((slot.runner or "", encode_tick(tick, part, own, its)))
             elif slot.state != "dead":
                 self.packets_dropped += len(own)
+                self.outcomes_dropped += len(its)
         return out
 
     def take(self) -> Actions:
@@ -155,6 +162,7 @@ class RealTime(Roster[_Slot]):
     def _drop(self, asked: _Asked) -> None:
         self.frames_dropped += 1
         self.packets_dropped += asked.packets
+        self.outcomes_dropped += asked.outcomes
 
     def _stop(self, rows: IntArray) -> None:
         self._stopped[rows] = self._drive[rows] = True

@@ -9,6 +9,7 @@ import zenoh
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock, to_s
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.protocols import Crew
 from swarmwire.comms.senses import Actions, Senses
@@ -29,6 +30,7 @@ class RealTimeReport:
     watchdog_stops: dict[str, int] = field(default_factory=dict[str, int])  # by robot
     frames_dropped: int = 0  # to runners, never acted on: middleware loss
     packets_dropped: int = 0  # in these frames: heard by the radio, never by the agent
+    outcomes_dropped: int = 0  # in these frames: what radios knew of packets sent, and agents never learned
 
 
 class PacedCrew:
@@ -38,10 +40,10 @@ class PacedCrew:
         self._crew, self._pace = crew, pace
         self.start, self.counts, self.close = crew.start, crew.counts, crew.close
 
-    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick."""
         self._pace.begin()
-        actions = self._crew.act(tick, senses, heard)
+        actions = self._crew.act(tick, senses, heard, outcomes)
         self._pace.hold(tick)
         return actions
 
@@ -71,9 +73,9 @@ class RealTimeCrew(RunnerCrew[RealTime]):
         super().__init__(endpoint, run_id, roster, timeout_s, clock, around)
         self._pace, self._assignments = pace, assignments
 
-    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """A frame to every runner; what has come when the tick is over."""
-        self._send(self._roster.open_tick(tick, self._pace.begin(), senses, heard))
+        self._send(self._roster.open_tick(tick, self._pace.begin(), senses, heard, outcomes))
         self._pace.hold(tick)
         self._take_in()
         return self._roster.take()
@@ -89,6 +91,7 @@ class RealTimeCrew(RunnerCrew[RealTime]):
             watchdog_stops=self._by_robot(roster.watchdog_stops),
             frames_dropped=roster.frames_dropped,
             packets_dropped=roster.packets_dropped,
+            outcomes_dropped=roster.outcomes_dropped,
         )
 
     def _take_in(self) -> None:

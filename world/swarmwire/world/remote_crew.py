@@ -2,6 +2,7 @@
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.world.lockstep import Lockstep
@@ -27,8 +28,8 @@ class RemoteCrew(RunnerCrew[Lockstep]):
     ) -> None:
         super().__init__(endpoint, run_id, Lockstep(assignments, on_loss), timeout_s, clock, around, start_s)
 
-    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """One frame to every runner, one answer from each."""
-        self._send(self._roster.open_tick(tick, senses, heard))
+        self._send(self._roster.open_tick(tick, senses, heard, outcomes))
         self._wait()
         return self._roster.take()

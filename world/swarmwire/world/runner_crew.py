@@ -13,6 +13,7 @@ import zenoh
 
 from swarmwire.comms.clock import Clock, to_ns
 from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
@@ -93,7 +94,7 @@ class RunnerCrew(ABC, Generic[R]):
         self._patience_s = self._timeout_s
 
     @abstractmethod
-    def act(self, tick: int, senses: Senses, heard: Heard) -> Actions:
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick."""
 
     def counts(self) -> dict[str, int]:

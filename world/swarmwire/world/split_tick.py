@@ -1,9 +1,12 @@
 """What all robots sense and heard, cut into one part for each runner."""
 
+import itertools
+
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import GroupSenses, Senses
 
@@ -56,3 +59,13 @@ def split_heard(heard: Heard, owner: IntArray, slots: int) -> list[Heard]:
         )
         for a, b, p, q in zip(first_row[:-1], first_row[1:], first_payload[:-1], first_payload[1:], strict=True)
     ]
+
+
+def split_outcomes(outcomes: Outcomes, owner: IntArray, slots: int) -> list[Outcomes]:
+    """What the robots of each of `slots` parts learn of their packets."""
+    if not len(outcomes):
+        return [NO_OUTCOMES] * slots
+    slot_of = owner[outcomes.row]
+    by_slot = np.argsort(slot_of, kind="stable")
+    first = np.searchsorted(slot_of[by_slot], np.arange(slots + 1)).tolist()
+    return [outcomes.select(by_slot[a:b]) for a, b in itertools.pairwise(first)]

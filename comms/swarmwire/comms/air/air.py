@@ -22,7 +22,8 @@ from swarmwire.comms.air.way import Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry import Obstacles
-from swarmwire.comms.packets import BROADCAST, Heard, Sent
+from swarmwire.comms.outcomes import Outcomes
+from swarmwire.comms.packets import BROADCAST, NOWHERE, Heard, Sent
 from swarmwire.comms.truth import Departed, Finished, Tally
 
 
@@ -34,6 +35,7 @@ class News:
     finished: Finished
     departed: Departed
     tally: Tally
+    outcomes: Outcomes  # of packets whose senders ask and are alive
 
 
 class Air:
@@ -124,7 +126,8 @@ class Air:
     def send(self, at_ns: int, tick: int, sent: Sent) -> None:
         """Queue the packets that agents sent in the tick that started at `at_ns`; `hold` has told the tick's poses.
 
-        A broadcast intends every other robot of the arena that is alive now; an addressed packet its one receiver.
+        A broadcast intends every other robot of the arena that is alive now; an addressed packet its one receiver, and
+        one to NOWHERE nobody: it takes a sequence number, and its sender learns that it was not acknowledged.
         Senders may stand in any order. ValueError, and nothing changed, for a receiver outside the arena or the sender
         itself, or for a time that has passed.
         """
@@ -155,6 +158,7 @@ class Air:
             news.finished(ended, self._on_air, self._robots, self.radio.is_signal),
             news.departed(ended, self._on_air, self._robots),
             self._accounts.close(),
+            self._way.outcomes(self._coming.alive),
         )
         self._keep(np.flatnonzero(~final))
         return told
@@ -175,7 +179,7 @@ class Air:
     def _refuse(self, at_ns: int, sent: Sent) -> None:
         if at_ns < self._now_ns:
             raise ValueError(f"at_ns: expected at least {self._now_ns}, got {at_ns}")
-        addressed = sent.to != BROADCAST
+        addressed = (sent.to != BROADCAST) & (sent.to != NOWHERE)
         wrong = addressed & ((sent.to < 0) | (sent.to >= self._robots) | (sent.to == sent.sender % self._robots))
         if wrong.any():
             raise ValueError(f"to: expected another robot of the arena's {self._robots}, got {sent.to[wrong][0]}")

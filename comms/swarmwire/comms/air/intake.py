@@ -5,7 +5,7 @@ import numpy as np
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.packets import BROADCAST, Sent
+from swarmwire.comms.packets import BROADCAST, NOWHERE, Sent
 
 
 class Intake:
@@ -15,18 +15,22 @@ class Intake:
         self._sent_before = np.zeros(rows, np.int64)
 
     def take(self, sent_at_ns: IntArray, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
-        """The packets, sorted by sender, as if each were on air at once, for no time.
+        """The packets, sorted by sender, as if each were on air at once, for no time; those to NOWHERE only count.
 
         `sent_at_ns` (rows,) is when each robot sends, `others_alive` (rows,) whom a robot's broadcast intends: those of
         the epoch.
         """
         # By sender, so that nothing depends on how the crew was divided.
         order = np.argsort(sent.sender, kind="stable")
+        sequence = self._numbers(sent.sender[order])
+        somewhere = sent.to[order] != NOWHERE
+        if not somewhere.all():
+            order, sequence = order[somewhere], sequence[somewhere]
         sender, to, payloads = sent.sender[order], sent.to[order], sent.payloads.rows(order)
         return Transmissions(
             sender=sender,
             to=to,
-            sequence=self._numbers(sender),
+            sequence=sequence,
             intended=np.where(to == BROADCAST, others_alive[sender], 1),
             epoch=np.full(len(sender), epoch),
             tag=payloads.tags(),
@@ -34,6 +38,7 @@ class Intake:
             on_air_at_ns=sent_at_ns[sender],
             off_air_at_ns=sent_at_ns[sender],
             fate=np.full(len(sender), int(Fate.HEARD)),
+            outcome_id=sent.outcome_ids[order],
             payloads=payloads,
         )
 

@@ -146,6 +146,16 @@ class Radio:
         return self.model != "disk"
 
     @property
+    def acknowledges(self) -> bool:
+        """Whether senders learn what became of addressed packets."""
+        return self.is_signal and self.access_or_default.acknowledges
+
+    @property
+    def tells(self) -> tuple[str, ...]:
+        """What agents may need of it, by the names that they declare."""
+        return (*self.gives.needs, "radio.outcomes") if self.acknowledges else self.gives.needs
+
+    @property
     def needs_line_of_sight(self) -> bool:
         """Whether obstacles block."""
         return not self.is_signal if self.line_of_sight is None else self.line_of_sight

@@ -24,12 +24,13 @@ class Transmissions(NamedTuple):
     on_air_at_ns: IntArray  # (k,) the first bit
     off_air_at_ns: IntArray  # (k,) the end of the last bit
     fate: IntArray  # (k,) HEARD: accepted, to be decided for each receiver; else the fate for all of them
+    outcome_id: IntArray  # (k,) under which the sender is told what became of it, or UNTOLD
     payloads: Payloads  # (k,)
 
     @classmethod
     def none(cls) -> "Transmissions":
         """No packets."""
-        return cls._make([*[np.empty(0, np.int64)] * 10, Payloads.of([])])
+        return cls._make([*[np.empty(0, np.int64)] * 11, Payloads.of([])])
 
     def __bool__(self) -> bool:
         return len(self.sender) > 0

@@ -8,6 +8,7 @@ from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Sent
 
 Decided = tuple[Transmissions, Links]
@@ -47,6 +48,10 @@ class Way(ABC):
 
         Called while anybody is dead or off, and once when nobody is any more: queues that waited go on air.
         """
+
+    def outcomes(self, alive: BoolArray) -> Outcomes:
+        """What senders have learned since the last call, those `alive` (rows,); nothing without acknowledgements."""
+        return NO_OUTCOMES
 
     @abstractmethod
     def drain(self) -> Transmissions:

@@ -8,15 +8,16 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.notes import MOST_STATES, Notes, checked_state
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
+from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.checked import checked_array
 from swarmwire.comms.wire.frames import Frame
 
 
-def encode_tick(tick: int, senses: Senses, heard: Heard) -> bytes:
-    """A `tick` frame: what a runner's robots sense and heard."""
+def encode_tick(tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> bytes:
+    """A `tick` frame: what a runner's robots sense and heard, and what became of packets that they sent."""
     arrays: dict[str, AnyArray] = {}
     for name, group in senses.items():
         arrays[f"sense/{name}/rows"] = group.rows
@@ -29,11 +30,13 @@ def encode_tick(tick: int, senses: Senses, heard: Heard) -> bytes:
         arrays["heard/given"] = np.array(list(heard.given.values())).reshape(len(heard.given), len(heard))
         arrays["heard/data"] = heard.payloads.data
         arrays["heard/offset"] = heard.payloads.offset
+    if len(outcomes):
+        arrays["outcomes"] = np.array((outcomes.row, outcomes.id, outcomes.result))
     return frames.encode("tick", tick, arrays)
 
 
-def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[Senses, Heard]:
-    """Senses and heard packets of a `tick` frame; BadFrame if it holds none, or some of groups that are not known."""
+def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[Senses, Heard, Outcomes]:
+    """What `encode_tick` was given; BadFrame if there are no senses, or some of groups that are not known."""
     groups: dict[str, dict[str, AnyArray]] = {}
     try:
         for key, array in frame.arrays.items():
@@ -43,7 +46,7 @@ def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[
         senses = {name: GroupSenses(fields.pop("rows"), fields) for name, fields in groups.items()}
         if not senses or not senses.keys() <= known:
             raise BadFrame("malformed", "sense: expected groups of this runner")
-        return senses, _heard(frame.arrays, gives)
+        return senses, _heard(frame.arrays, gives), _outcomes(frame)
     except (KeyError, ValueError) as error:
         raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error
 
@@ -57,6 +60,15 @@ def _heard(arrays: Mapping[str, AnyArray], gives: tuple[str, ...]) -> Heard:
     return Heard(receiver, sender, sequence, heard_at_ns, given, payload, payloads)
 
 
+def _outcomes(frame: Frame) -> Outcomes:
+    if "outcomes" not in frame.arrays:
+        return NO_OUTCOMES
+    row, id_, result = checked_array(frame, "outcomes", "<i8", (3, None))
+    if ((result < 0) | (result >= len(SendResult))).any():
+        raise BadFrame("malformed", f"outcomes: expected results from 0 to {len(SendResult) - 1}")
+    return Outcomes(row, id_, result)
+
+
 def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
     """An `actions` frame: what a runner's robots do and send, and how many frames to it were none that it could use."""
     arrays: dict[str, AnyArray] = {
@@ -67,6 +79,8 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
         arrays["sent"] = np.array((actions.sent.sender, actions.sent.to))
         arrays["sent/data"] = actions.sent.payloads.data
         arrays["sent/offset"] = actions.sent.payloads.offset
+        if actions.sent.outcome_id is not None:
+            arrays["sent/outcome_id"] = actions.sent.outcome_id
     values: dict[str, Any] = {"dropped": dropped} if dropped else {}
     if len(actions.notes):
         arrays["notes"] = np.array((actions.notes.rows, actions.notes.code))
@@ -93,7 +107,16 @@ def _sent(frame: Frame, rows: IntArray) -> Sent:
         raise BadFrame("malformed", "sent/offset: expected rising offsets into sent/data")
     if not _own(sender, rows) or (to < BROADCAST).any():
         raise BadFrame("malformed", "sent: expected packets of the runner's own robots")
-    return Sent(sender, to, Payloads(data, offset))
+    return Sent(sender, to, Payloads(data, offset), _outcome_id(frame, to))
+
+
+def _outcome_id(frame: Frame, to: IntArray) -> IntArray | None:
+    if "sent/outcome_id" not in frame.arrays:
+        return None
+    outcome_id = checked_array(frame, "sent/outcome_id", "<i8", (len(to),))
+    if (outcome_id < UNTOLD).any() or ((outcome_id != UNTOLD) & (to == BROADCAST)).any():
+        raise BadFrame("malformed", "sent/outcome_id: expected numbers from 0, or -1, as for every broadcast")
+    return outcome_id
 
 
 def _notes(frame: Frame, rows: IntArray) -> Notes:

@@ -1,13 +1,15 @@
-"""Senses: what an agent's `needs` may name, of its body and of the packets that it hears."""
+"""Senses: what an agent's `needs` may name, of its body, of packets that it hears and of those that it sent."""
 
 from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any, get_args, get_type_hints
 
 from swarmwire.agent.packet import Packet
-from swarmwire.agent.robot import Robot
+from swarmwire.agent.robot import RadioPort, Robot
+from swarmwire.agent.turn import OUTCOMES
 from swarmwire.comms.air.radio import Gives
 from swarmwire.comms.body import body_names, load_body
+from swarmwire.comms.outcomes import SendResult
 from swarmwire.comms.sheets import SHEETS
 from swarmwire.deploy.catalogue.docs import first_line, paragraphs
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
@@ -16,7 +18,7 @@ from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 
 def senses() -> list[Entry]:
     """Those of bodies, then those of packets."""
-    return [*_of_bodies(), *_of_packets()]
+    return [*_of_bodies(), *_of_packets(), _of_outcomes()]
 
 
 def _of_bodies() -> Iterator[Entry]:
@@ -34,6 +36,17 @@ def _of_packets() -> Iterator[Entry]:
         (column,) = Gives(**{of.name: kind()}).columns
         told = first_line(getattr(Packet, column).__doc__)
         yield _sense(f"radio.{of.name}", kind, f"packet.{column}: {told}", ("given by", f"[radio] gives.{of.name}"))
+
+
+def _of_outcomes() -> Entry:
+    results = tuple((result.name, result.meaning) for result in SendResult)
+    facts = (
+        ("in an agent", f'needs = ("{OUTCOMES}", …)'),
+        ("read as", f"robot.radio.outcomes: {first_line(RadioPort.outcomes.__doc__)}"),
+        ("given by", "[radio.access] with method csma-802154 or dcf, acknowledged"),
+    )
+    told = "The sender learns what became of a packet to one robot, as far as its own radio knows."
+    return Entry(kind="sense", name=OUTCOMES, help=told, facts=(*facts, *results))
 
 
 def _sense(name: str, sheet: type[Any], read: str, where: tuple[str, str]) -> Entry:

@@ -73,7 +73,7 @@ def rules_of(radio: Radio, robots: int) -> Rules:
     return Rules(
         robots=robots,
         method=METHODS.index(access.method),
-        acknowledged=access.acknowledged and access.method in ("csma-802154", "dcf"),
+        acknowledged=access.acknowledges,
         queue_limit=radio.queue_limit,
         noise_mw=float(from_db(radio.noise_or_default.power_dbm)),
         least_sinr=float(from_db(reception.preamble_sinr_db)),

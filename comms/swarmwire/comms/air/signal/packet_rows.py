@@ -6,6 +6,7 @@ import numpy as np
 
 from swarmwire.comms.air.frames import airtime_ns
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.signal.learning import result_at_first
 from swarmwire.comms.air.signal.tables import NOBODY, PACKET, Table
 from swarmwire.comms.air.traffic.access_timing import IEEE_802_15_4
 from swarmwire.comms.air.transmissions import Transmissions
@@ -24,6 +25,7 @@ def packet_rows(taken: Transmissions, radio: Radio, robots: int) -> Table:
     packet["sent_at_ns"] = packet["on_air_at_ns"] = taken.sent_at_ns
     packet["airtime_ns"], packet["bits"] = airtime_ns(radio, frame_bytes), 8 * frame_bytes
     packet["refused"] = np.where(taken.payloads.sizes > radio.max_payload_bytes, int(Fate.TOO_LARGE), 0)
+    packet["result"] = result_at_first(taken.payloads.sizes, radio.max_payload_bytes)
     if radio.access_or_default.method == "csma-802154":
         packet["pause_ns"] = IEEE_802_15_4.space_ns(frame_bytes - HEADER_BYTES)
     return packet

@@ -34,3 +34,8 @@ class Access:
         at_least=0,
         at_most=7,
     )
+
+    @property
+    def acknowledges(self) -> bool:
+        """Whether senders learn what became of addressed packets."""
+        return self.acknowledged and self.method in ("csma-802154", "dcf")

@@ -27,9 +27,12 @@ from swarmwire.comms.air.signal.tables import (
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.outcomes import SendResult
 
 BACKOFF = purpose("csma backoff")
 HEARD, QUEUE_FULL, CHANNEL_BUSY = int(Fate.HEARD), int(Fate.QUEUE_FULL), int(Fate.CHANNEL_BUSY)
+IS_ACKNOWLEDGED, FOUND_BUSY = int(SendResult.ACKNOWLEDGED), int(SendResult.CHANNEL_BUSY)
+FOUND_FULL = int(SendResult.QUEUE_FULL)
 CSMA, DCF = METHODS.index("csma-802154"), METHODS.index("dcf")
 
 
@@ -45,6 +48,7 @@ def enter(rules, state, queue, told, r, now_ns):
         if packet.refused:
             telling.refuse(state, told, index, packet.refused, now_ns)
         elif state.off[r] != KEPT_NEWEST and _is_full(rules, state, r):
+            packet.result = FOUND_FULL
             telling.refuse(state, told, index, QUEUE_FULL, now_ns)
         else:
             if state.off[r] == KEPT_NEWEST:
@@ -139,6 +143,7 @@ def listened(rules, state, queue, told, r, now_ns):
     if me.busy_times <= rules.most_backoffs:
         back_off(rules, state, queue, r, now_ns)
         return
+    state.packet[me.packet].result = FOUND_BUSY
     if me.last_fate == NOBODY:
         telling.refuse(state, told, me.packet, CHANNEL_BUSY, now_ns)
     else:
@@ -273,6 +278,7 @@ def _acknowledged(rules, state, queue, told, r, now_ns):
         it = state.robot[receiver]
         if it.stage == AWAITING and state.packet[it.packet].to == r:
             cancel(queue, TIMER, receiver)
+            state.packet[it.packet].result = IS_ACKNOWLEDGED
             telling.settle(state, told, receiver, now_ns)
             pause(rules, state, queue, receiver, state.packet[it.packet].pause_ns, now_ns)
     me.answers_to = NOBODY

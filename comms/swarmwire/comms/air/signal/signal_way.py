@@ -16,6 +16,7 @@ from swarmwire.comms.air.send_times import SendTimes
 from swarmwire.comms.air.signal import events, jamming, kept_back
 from swarmwire.comms.air.signal.event_queue import event_queue
 from swarmwire.comms.air.signal.jam_held import JamHeld
+from swarmwire.comms.air.signal.learning import learned, sent_in_vain
 from swarmwire.comms.air.signal.link_table import Surroundings
 from swarmwire.comms.air.signal.links_held import LinksHeld
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
@@ -44,6 +45,7 @@ from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Decided, Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Sent
 
 LEAST_ROOM = 4096
@@ -79,6 +81,7 @@ class SignalWay(Way):
         self._queued, self._packet = Transmissions.none(), np.zeros(0, PACKET)
         self._hold, self._poses = 0, {0: np.zeros((rows, 3))}
         self._now_ns = self._told = 0
+        self._outcomes: list[Outcomes] = []
 
     @property
     def queued(self) -> Transmissions:
@@ -118,6 +121,8 @@ class SignalWay(Way):
 
     def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets; when they go on air will turn out."""
+        if self._rules.acknowledged:
+            self._outcomes.append(sent_in_vain(sent, self._radio.max_payload_bytes))
         taken = self._intake.take(self._send_times.at(at_ns, tick), sent, others_alive, epoch)
         self._packet = np.concatenate([self._packet, packet_rows(taken, self._radio, self._medium.robots)])
         self._queued = self._queued.followed_by(taken)
@@ -150,6 +155,11 @@ class SignalWay(Way):
         events.cut_off(state, coming.alive, coming.radio_on)
         kept_back.switch(self._rules, state, self._events, room, at_ns)
         return self._decided([taken_out(room)], lives)
+
+    def outcomes(self, alive: BoolArray) -> Outcomes:
+        """What senders have learned since the last call, those `alive` (rows,)."""
+        told, self._outcomes = Outcomes.joined(self._outcomes), []
+        return told.select(np.flatnonzero(alive[told.row])) if len(told) else told
 
     def drain(self) -> Transmissions:
         """Take out all that is queued or under way."""
@@ -214,6 +224,8 @@ class SignalWay(Way):
 
     def _forget_done(self) -> None:
         settled = self._packet["is_settled"] > 0
+        if self._rules.acknowledged:
+            self._outcomes.append(learned(self._packet, self._queued.outcome_id))
         kept = np.flatnonzero(self._packet["is_done"] == 0)
         queued = self._queued._replace(intended=np.where(settled, 0, self._queued.intended))
         self._queued, self._packet = queued.select(kept), self._packet[kept]

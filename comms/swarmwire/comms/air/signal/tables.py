@@ -87,6 +87,7 @@ PACKET = np.dtype(
         ("is_done", _I),
         ("on_air_at_ns", _I),  # of the latest attempt
         ("fate", _I),  # that it had at the sender's radio, or HEARD: it was on air
+        ("result", _I),  # SendResult, once it is done: what its sender knows
     ],
     align=True,
 )
