@@ -23,10 +23,11 @@ from swarmwire.comms.air import (
     given_range,
     given_rssi,
     line_of_sight,
+    propagation_delay,
 )
 from swarmwire.comms.air.stage import Medium, Stage
 
-AFTER_RECEPTION = (given_range, given_bearing, given_rssi, delay, delays)
+AFTER_RECEPTION = (given_range, given_bearing, given_rssi, delay, delays, propagation_delay)
 ORDER = (line_of_sight, disrupted, fixed_loss, bursts, *AFTER_RECEPTION)
 
 

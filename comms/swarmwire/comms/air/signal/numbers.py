@@ -11,6 +11,7 @@ from swarmwire.comms.air.channel import ROUNDING
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.frames import acknowledgement_bytes, airtime_ns
 from swarmwire.comms.air.propagation.fading import fading_law
+from swarmwire.comms.air.propagation.loss_curve import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.air.propagation.parameters import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.air.propagation.path_loss import reach_m
 from swarmwire.comms.air.propagation.scattering import scatter_waves
@@ -142,7 +143,8 @@ def surroundings_of(radio: Radio, keys: KeyArray, radius_m: FloatArray) -> Surro
     """What links go by; `radius_m` (rows,) are the robots' radii."""
     antenna = radio.antenna_or_default
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
-    curve, law = radio.loss_model.curve(radio.frequency_hz), fading_law(fading or Fading(), radio.frequency_hz)
+    curve = radio.loss_model.curve(radio.frequency_hz)
+    law = fading_law(fading or Fading(), radio.frequency_hz, radio.propagation_mps or SPEED_OF_LIGHT_MPS)
     spread_db = max(SHADOWS_CUT_OFF * shadowing.deviation_db - CUT_OFF_DB, 0.0) if shadowing else 0.0
     budget_dbm = antenna.power_dbm + 2.0 * antenna.gain_dbi
     far_m = float(reach_m(curve, budget_dbm - cut_off_dbm(radio) + spread_db))
