@@ -1,7 +1,8 @@
 """Path loss: what distance takes from a signal, in dB. Every model is a curve of straight lines over log10 of distance.
 
-So one compiled function serves all models, and its inverse is exact, or found by bisection where something absorbs. A
-model is a frozen dataclass with a method `curve(frequency_hz)` in a file of its own: `friis`, `log_distance`, `two_ray`, `itu_indoor`.
+So one compiled function serves all models, and its inverse is exact, or found by bisection where something absorbs.
+A model is a frozen dataclass with a method `curve(frequency_hz)` in a file of its own: `friis`, `log_distance`,
+`two_ray`, `itu_indoor`.
 
 No model holds in the near field of the antennas: below `NEAREST_M` the loss is that at `NEAREST_M`, as in ns-3's
 log-distance model, so that touching robots do not amplify each other.
