@@ -95,6 +95,7 @@ class Finished:
     sender: IntArray  # (k,) index in the arena
     receiver: IntArray  # (k,) index in the arena; -1: all that the packet was meant for
     receivers: IntArray  # (k,) how many intended receivers the row stands for: 1, or all of them
+    to: IntArray  # (k,) index in the arena of the one that the packet was addressed to; -1: a broadcast
     sequence: IntArray  # (k,)
     sent_at_ns: IntArray  # (k,)
     on_air_at_ns: IntArray  # (k,)

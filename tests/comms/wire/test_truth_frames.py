@@ -50,7 +50,13 @@ def floats(*shape: int) -> st.SearchStrategy[Any]:
 @st.composite
 def finished_(draw: st.DrawFn) -> Finished:
     k = draw(st.integers(0, 4))
-    bounds = {"arena": (0, ARENAS), "sender": (0, ROBOTS), "receiver": (-1, ROBOTS), "fate": (0, len(Fate))}
+    bounds = {
+        "arena": (0, ARENAS),
+        "sender": (0, ROBOTS),
+        "receiver": (-1, ROBOTS),
+        "to": (-1, ROBOTS),
+        "fate": (0, len(Fate)),
+    }
     columns = {
         of.name: draw(ints(k, least=bounds[of.name][0], most=bounds[of.name][1] - 1))
         if of.name in bounds

@@ -40,6 +40,7 @@ def finished(ended: Links, packets: Transmissions, robots: int, has_strength: bo
         sender=in_arena(sender, robots),
         receiver=np.where(the_rest[index], THE_REST, in_arena(ended.receiver[index], robots)),
         receivers=ended.receivers[index],
+        to=packets.to[packet],
         sequence=ended.sequence[index],
         sent_at_ns=packets.sent_at_ns[packet],
         on_air_at_ns=packets.on_air_at_ns[packet],

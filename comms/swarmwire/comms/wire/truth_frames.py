@@ -130,6 +130,7 @@ def _finished(frame: Frame, static: Static) -> Finished | None:
     _within("finished.arena", columns["arena"], static.arenas)
     _within("finished.sender", columns["sender"], static.robots)
     _within("finished.receiver", columns["receiver"], static.robots, first=-1)
+    _within("finished.to", columns["to"], static.robots, first=-1)
     _within("finished.fate", columns["fate"], len(Fate))
     rssi_dbm = None
     if "finished/rssi_dbm" in frame.arrays:

@@ -15,7 +15,7 @@ from swarmwire.comms.truth import Finished, Static
 if TYPE_CHECKING:
     import polars as pl
 
-NOBODY = -1  # Finished's receiver of a packet that never went on air
+NOBODY = -1  # Finished's receiver of a packet that never went on air, and whom a broadcast is addressed to
 
 
 def packet_schema() -> "dict[str, Any]":
@@ -27,6 +27,7 @@ def packet_schema() -> "dict[str, Any]":
         "sender": pl.Int32,
         "receiver": pl.Int32,  # null: never on air
         "receivers": pl.Int32,
+        "to": pl.Int32,  # null: a broadcast
         "sequence": pl.Int64,
         "sent_at_ns": pl.Int64,
         "on_air_at_ns": pl.Int64,
@@ -73,7 +74,7 @@ class PacketColumns:
         keep = [self.sample(part) for part in self.parts]
         taken = {name: self._joined(name, keep) for name in Finished.__slots__ if name != "rssi_dbm"}
         fate, tag = taken.pop("fate"), taken.pop("tag")
-        has_receiver = pl.Series(taken["receiver"] != NOBODY)
+        has_receiver, is_addressed = (pl.Series(taken[name] != NOBODY) for name in ("receiver", "to"))
         columns: dict[str, Any] = {
             **taken,
             "fate": pl.Series(FATE_NAMES).gather(fate),
@@ -83,7 +84,7 @@ class PacketColumns:
         }
         schema = packet_schema()
         frame = pl.DataFrame({name: columns[name] for name in schema}, schema_overrides=schema)
-        return frame.with_columns(receiver=pl.when(has_receiver).then("receiver"))
+        return frame.with_columns(receiver=pl.when(has_receiver).then("receiver"), to=pl.when(is_addressed).then("to"))
 
     def _joined(self, name: str, keep: list[BoolArray]) -> IntArray:
         return np.concatenate([getattr(part, name)[rows] for part, rows in zip(self.parts, keep, strict=True)])
