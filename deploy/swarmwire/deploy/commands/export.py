@@ -1,5 +1,6 @@
 """`swarmwire export`."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -77,11 +78,14 @@ def export_command(
 ) -> None:
     """Draw a run as a picture or a film, without a screen: the arena, and metrics beside it. Or capture its radio.
 
-    A file that ends in .pcapng holds the frames on air of a run with --packets all, for Wireshark. In pictures lines join robots in radio range and sight of one another, whatever partitions and failed radios part them.
+    Lines join robots in radio range and sight of one another, whatever partitions and failed radios part them. A file
+    that ends in .pcapng holds the frames on air of a run with --packets all, for Wireshark.
     """
     console = Console(highlight=False)
     if to is not None and to.suffix.lower() == SUFFIX:
-        _refuse_drawing_options(png is not None or gif or mp4, {"--fps": fps, "--speed": speed, "--size": size})
+        _refuse_drawing_options(
+            png is not None or gif or mp4, {"--fps": fps, "--speed": speed, "--metric": metric, "--size": size}
+        )
         frames = export_traffic(run, to, arena, from_s, until_s)
         console.print(f"written: {to} ({frames} frames)", soft_wrap=True)
         return
@@ -147,7 +151,7 @@ def _refuse_film_options(given: dict[str, float | None]) -> None:
             raise BadInput(option, "", "expected --gif or --mp4 with it; a picture is of one moment, --png T")
 
 
-def _refuse_drawing_options(draws: bool, given: dict[str, float | None]) -> None:
+def _refuse_drawing_options(draws: bool, given: Mapping[str, object]) -> None:
     if draws:
         raise BadInput("--to", "", f"expected a picture or a film of --png, --gif or --mp4; {SUFFIX} is neither")
     for option, value in given.items():

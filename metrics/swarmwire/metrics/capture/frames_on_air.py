@@ -51,5 +51,5 @@ def _fates(row: dict[str, Any], names: Sequence[str]) -> list[str]:
     of_fate: dict[str, list[str]] = {}
     for receiver, fate, rssi_dbm in zip(row["receiver"], row["fate"], row["rssi_dbm"], strict=True):
         strength = "" if rssi_dbm is None else f" {rssi_dbm:.1f} dBm"
-        of_fate.setdefault(fate, []).append(names[receiver] + strength)
+        of_fate.setdefault(fate, []).append(f"{names[receiver]}{strength}")
     return [f"{fate}: {', '.join(of_fate[fate])}" for fate in FATE_NAMES if fate in of_fate]

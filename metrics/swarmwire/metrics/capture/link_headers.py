@@ -11,6 +11,7 @@ Robots' addresses are their indices. No frame has a checksum at its end.
 
 import struct
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -52,9 +53,9 @@ class Link(NamedTuple):
 def link_of(radio: Radio) -> Link:
     """The link type whose frames this radio sends."""
     if radio.is_signal and radio.frame != "plain":
-        return Link(IEEE802_11_RADIOTAP, 1 << 24, lambda frame: _radiotap(radio, frame) + _ieee80211(radio, frame))
+        return Link(IEEE802_11_RADIOTAP, 1 << 24, partial(_headers_80211, radio))
     if radio.is_signal and radio.reception_or_default.model == "802.15.4":
-        return Link(IEEE802_15_4_TAP, SHORT_ROBOTS, lambda frame: _tap(radio, frame) + _ieee802154(radio, frame))
+        return Link(IEEE802_15_4_TAP, SHORT_ROBOTS, partial(_headers_802154, radio))
     return Link(USER0, EVERYBODY, _plain)
 
 
@@ -62,6 +63,10 @@ def _plain(frame: Frame) -> bytes:
     to = EVERYBODY if frame.to is None else frame.to
     rssi_dbm = float("nan") if frame.rssi_dbm is None else frame.rssi_dbm
     return PLAIN.pack(0, PLAIN.size, 0, frame.sender, to, frame.sequence & 0xFFFFFFFF, rssi_dbm)
+
+
+def _headers_802154(radio: Radio, frame: Frame) -> bytes:
+    return _tap(radio, frame) + _ieee802154(radio, frame)
 
 
 def _tap(radio: Radio, frame: Frame) -> bytes:
@@ -84,6 +89,10 @@ def _ieee802154(radio: Radio, frame: Frame) -> bytes:
     control = DATA | SAME_PAN | SHORT_TO | SHORT_FROM | (ACKNOWLEDGE if is_answered else 0)
     to = SHORT_EVERYBODY if frame.to is None else frame.to
     return struct.pack("<HBHHH", control, frame.sequence & 0xFF, PAN, to, frame.sender)
+
+
+def _headers_80211(radio: Radio, frame: Frame) -> bytes:
+    return _radiotap(radio, frame) + _ieee80211(radio, frame)
 
 
 def _radiotap(radio: Radio, frame: Frame) -> bytes:
