@@ -6,6 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.body import Body
+from swarmwire.comms.packets import Payloads
 from swarmwire.comms.senses import Senses
 
 
@@ -104,6 +105,8 @@ class Finished:
     size_bytes: IntArray  # (k,) payload with its tag
     tag: IntArray  # (k,) topic
     rssi_dbm: FloatArray | None = None  # (k,) strength at the receiver; None: this radio knows no strength
+    payload: IntArray | None = None  # (k,) the row of `payloads`; None: not known
+    payloads: Payloads | None = None
 
 
 @dataclass(frozen=True, slots=True)

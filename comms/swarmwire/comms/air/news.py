@@ -49,6 +49,8 @@ def finished(ended: Links, packets: Transmissions, robots: int, has_strength: bo
         size_bytes=packets.payloads.sizes[packet],
         tag=packets.tag[packet],
         rssi_dbm=ended.rssi_dbm[index] if has_strength else None,
+        payload=packet,
+        payloads=packets.payloads,
     )
 
 

@@ -17,7 +17,7 @@ from swarmwire.comms.wire.checked import checked_array
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.scene_frames import OBSERVED_VERSION, check_version
 
-_FINISHED = tuple(field.name for field in fields(Finished) if field.name != "rssi_dbm")
+_FINISHED = tuple(of.name for of in fields(Finished) if of.name not in ("rssi_dbm", "payload", "payloads"))
 _COUNTED = ("sent", "intended", "in_range")  # a row each; the fates have an array of their own
 
 

@@ -12,5 +12,6 @@ class Frame:
     to: int | None  # index of the one that it is addressed to; None: a broadcast
     sequence: int  # packets that the sender had sent before
     size_bytes: int  # payload
+    payload: bytes = b""  # as far as it is known
     rssi_dbm: float | None = None  # at the receiver where it was strongest; None: unknown
     comments: tuple[str, ...] = ()  # what it is, and what became of it where

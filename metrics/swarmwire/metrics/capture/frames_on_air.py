@@ -9,6 +9,8 @@ from swarmwire.metrics.capture.frame import Frame
 if TYPE_CHECKING:
     import polars as pl
 
+LATER_COLUMNS = {"to": "Int32", "payload": "Binary"}  # unknown in older records: all looks like a broadcast there
+
 
 def frames_on_air(packets: "pl.DataFrame", names: Sequence[str]) -> Iterator[Frame]:
     """The frames of one arena in the order of time; `packets` as `RunFolder.packets` has them, `names` of robots.
@@ -17,9 +19,10 @@ def frames_on_air(packets: "pl.DataFrame", names: Sequence[str]) -> Iterator[Fra
     """
     import polars as pl
 
-    if "to" not in packets.columns:  # recorded before it was: an addressed packet looks like a broadcast
-        packets = packets.with_columns(to=pl.lit(None, pl.Int32))
-    once = ("on_air_at_ns", "to", "size_bytes", "topic")
+    for name, kind in LATER_COLUMNS.items():
+        if name not in packets.columns:
+            packets = packets.with_columns(pl.lit(None, getattr(pl, kind)).alias(name))
+    once = ("on_air_at_ns", "to", "size_bytes", "topic", "payload")
     each = packets.filter(pl.col("receiver").is_not_null()).sort("receiver")
     frames = each.group_by("sender", "sequence").agg(
         *(pl.col(name).first() for name in once),
@@ -41,6 +44,7 @@ def _frame(row: dict[str, Any], names: Sequence[str]) -> Frame:
         to=to,
         sequence=row["sequence"],
         size_bytes=row["size_bytes"],
+        payload=row["payload"] or b"",
         rssi_dbm=row["strongest_dbm"],
         comments=(told, *_fates(row, names)),
     )

@@ -14,14 +14,15 @@ APPLICATION = "swarmwire"
 def write_capture(to: Path, link: Link, name: str, description: str, frames: Iterable[Frame]) -> int:
     """Write the frames, and say how many; BadInput if nothing can be written there.
 
-    Of each frame the headers are captured; its length counts the payload too, which runs do not record. Times are since
-    the run's start, which a reader takes for 1970.
+    Times are since the run's start, which a reader takes for 1970. A payload that is not known is not captured, but
+    counts in the frame's length.
     """
     count = 0
     with whole_file(to) as part, part.open("wb") as file:
         file.write(pcapng.section(APPLICATION) + pcapng.interface(link.link_type, name, description))
         for frame in frames:
             header = link.header(frame)
-            file.write(pcapng.packet(frame.on_air_at_ns, header, len(header) + frame.size_bytes, frame.comments))
+            length = len(header) + frame.size_bytes
+            file.write(pcapng.packet(frame.on_air_at_ns, header + frame.payload, length, frame.comments))
             count += 1
     return count

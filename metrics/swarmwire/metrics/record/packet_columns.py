@@ -15,6 +15,7 @@ from swarmwire.comms.truth import Finished, Static
 if TYPE_CHECKING:
     import polars as pl
 
+OTHERWISE = ("rssi_dbm", "payload", "payloads")  # of Finished: not joined as columns of numbers
 NOBODY = -1  # Finished's receiver of a packet that never went on air, and whom a broadcast is addressed to
 
 
@@ -37,6 +38,7 @@ def packet_schema() -> "dict[str, Any]":
         "size_bytes": pl.Int32,
         "topic": pl.String,
         "distance_m": pl.Float32,  # null: never on air, or longer ago than poses are kept
+        "payload": pl.Binary,  # with its tag
     }
 
 
@@ -72,7 +74,7 @@ class PacketColumns:
         import polars as pl
 
         keep = [self.sample(part) for part in self.parts]
-        taken = {name: self._joined(name, keep) for name in Finished.__slots__ if name != "rssi_dbm"}
+        taken = {name: self._joined(name, keep) for name in Finished.__slots__ if name not in OTHERWISE}
         fate, tag = taken.pop("fate"), taken.pop("tag")
         has_receiver, is_addressed = (pl.Series(taken[name] != NOBODY) for name in ("receiver", "to"))
         columns: dict[str, Any] = {
@@ -81,6 +83,7 @@ class PacketColumns:
             "rssi_dbm": self._rssi_dbm(keep),
             "topic": self._topic(tag),
             "distance_m": pl.Series(self._distance_m(taken)).fill_nan(None),
+            "payload": pl.concat([_payload(part, rows) for part, rows in zip(self.parts, keep, strict=True)]),
         }
         schema = packet_schema()
         frame = pl.DataFrame({name: columns[name] for name in schema}, schema_overrides=schema)
@@ -118,3 +121,15 @@ class PacketColumns:
             receiver = place[tick[known], first + links["receiver"][known]]
             distance_m[known] = np.hypot(*(sender - receiver).T)
         return distance_m
+
+
+def _payload(part: Finished, keep: BoolArray) -> "pl.Series":
+    """The bytes of the rows to keep; each packet's are taken out once, however many receivers it has."""
+    import polars as pl
+
+    if part.payload is None or part.payloads is None:
+        return pl.Series([None] * int(keep.sum()), dtype=pl.Binary)
+    packet, place = np.unique(part.payload[keep], return_inverse=True)
+    data, offset = part.payloads.data, part.payloads.offset
+    texts = [data[offset[row] : offset[row + 1]].tobytes() for row in packet.tolist()]
+    return pl.Series(texts, dtype=pl.Binary).gather(place)
