@@ -10,7 +10,10 @@ from tests.metrics.capture.reading import Captured, read
 def test_blocks_are_those_of_the_specification():
     section = "0a0d0d0a 28000000 4d3c2b1a 0100 0000 ffffffffffffffff 0400 0200 73770000 00000000 28000000"
     assert pcapng.section("sw").hex() == section.replace(" ", "")
-    interface = "01000000 30000000 1b01 0000 00000000 0200 0300 61697200 0300 0200 68690000 0900 0100 09000000 00000000 30000000"
+    interface = (
+        "01000000 30000000 1b01 0000 00000000"
+        " 0200 0300 61697200 0300 0200 68690000 0900 0100 09000000 00000000 30000000"
+    )
     assert pcapng.interface(283, "air", "hi").hex() == interface.replace(" ", "")
     packet = "06000000 28000000 00000000 01000000 02000000 05000000 09000000 0102030405000000 28000000"
     assert pcapng.packet(2**32 + 2, bytes([1, 2, 3, 4, 5]), 9).hex() == packet.replace(" ", "")
