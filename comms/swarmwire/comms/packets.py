@@ -41,7 +41,7 @@ class Payloads:
         """The rows of `index`, in its order; a row may be taken more than once."""
         sizes = self.sizes[index]
         offset = offsets(sizes)
-        if len(index) and (self.sizes == sizes[0]).all():  # as most often: whole rows at a time
+        if len(index) and sizes[0] and (self.sizes == sizes[0]).all():  # as most often: whole rows at a time
             return Payloads(self.data.reshape(-1, sizes[0])[index].reshape(-1), offset)
         first = np.repeat(self.offset[index] - offset[:-1], sizes)
         return Payloads(self.data[first + np.arange(offset[-1])], offset)

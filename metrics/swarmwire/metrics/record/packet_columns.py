@@ -130,6 +130,4 @@ def _payload(part: Finished, keep: BoolArray) -> "pl.Series":
     if part.payload is None or part.payloads is None:
         return pl.Series([None] * int(keep.sum()), dtype=pl.Binary)
     packet, place = np.unique(part.payload[keep], return_inverse=True)
-    data, offset = part.payloads.data, part.payloads.offset
-    texts = [data[offset[row] : offset[row + 1]].tobytes() for row in packet.tolist()]
-    return pl.Series(texts, dtype=pl.Binary).gather(place)
+    return pl.Series([part.payloads.row(row) for row in packet.tolist()], dtype=pl.Binary).gather(place)
