@@ -114,3 +114,8 @@ def test_heard_packets_selected_keep_their_columns_together() -> None:
 def test_a_medium_that_gives_range_gives_it_also_when_nothing_is_heard() -> None:
     assert set(Heard.none(("range_m",)).given) == {"range_m"}
     assert len(Heard.none()) == 0
+
+
+def test_rows_without_bytes_can_be_taken_too():
+    nothing = Payloads.of([b"", b""]).rows(np.array([1, 0, 1]))
+    assert (len(nothing), nothing.row(2)) == (3, b"")

@@ -16,6 +16,7 @@ from swarmwire import agent, deploy
 from swarmwire.agent import behaviours, readings, testing
 from swarmwire.agent.declared import parameters_of
 from swarmwire.comms import errors
+from swarmwire.comms.air.presets import PRESETS
 from swarmwire.comms.air.radio import Gives
 from swarmwire.comms.body import body_names, load_body
 from swarmwire.comms.events.registry import ACTIONS
@@ -114,6 +115,14 @@ def test_the_behaviours_page_names_every_behaviour_and_parameter(site):
     named = code(site, "behaviours")
     for name in behaviours.__all__:
         assert {f"swarmwire.agent.behaviours:{name}", *parameters_of(getattr(behaviours, name))} <= named
+
+
+def test_the_radio_page_names_every_preset_with_its_source(site):
+    told = html.unescape(page(site, "radio"))
+    assert set(PRESETS) <= code(site, "radio")
+    for preset in PRESETS.values():
+        # Quotation marks may be typeset.
+        assert all(part in told for part in preset.source.split("'"))
 
 
 def commands_within(group: Any, within: str = "") -> Iterator[tuple[str, Any]]:

@@ -58,9 +58,13 @@ def wandering(of, ticks, seed=5, **fields):
         )
 
 
-def links(sender, receiver, sequence, on_air_at_ns, fate=Fate.HEARD, arena=0, tag=0x1A2B, receivers=1, rssi_dbm=None):
+def links(
+    sender, receiver, sequence, on_air_at_ns, fate=Fate.HEARD, arena=0, tag=0x1A2B, receivers=1, rssi_dbm=None, to=-1
+):
     """Rows of `Finished`: lists or a number for all."""
-    columns = np.broadcast_arrays(arena, sender, receiver, receivers, sequence, on_air_at_ns, fate, tag)
-    arena, sender, receiver, receivers, sequence, on_air, fate, tag = (np.array(c, np.int64).ravel() for c in columns)
+    columns = np.broadcast_arrays(arena, sender, receiver, receivers, to, sequence, on_air_at_ns, fate, tag)
+    arena, sender, receiver, receivers, to, sequence, on_air, fate, tag = (
+        np.array(c, np.int64).ravel() for c in columns
+    )
     sent, final, size = on_air - 1, on_air + 1000, np.full(len(sender), 10)
-    return Finished(arena, sender, receiver, receivers, sequence, sent, on_air, final, fate, size, tag, rssi_dbm)
+    return Finished(arena, sender, receiver, receivers, to, sequence, sent, on_air, final, fate, size, tag, rssi_dbm)

@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Payloads
 from swarmwire.comms.truth import Happened
 from swarmwire.metrics.record import packet_recorder
 from swarmwire.metrics.record.packet_columns import PacketSample
@@ -20,7 +23,7 @@ def packets(folder):
 
 def test_a_row_holds_all_that_is_known_of_a_link(tmp_path):
     of = static(4)
-    heard = links([0, 2], [1, 3], [7, 8], TICK_NS, rssi_dbm=np.array([-61.5, np.nan]))
+    heard = links([0, 2], [1, 3], [7, 8], TICK_NS, to=[-1, 3], rssi_dbm=np.array([-61.5, np.nan]))
     never = links(3, -1, 9, TICK_NS, fate=Fate.QUEUE_FULL, receivers=3, tag=0x0001)
     seen = [truth(of, 0), truth(of, 1), truth(of, 2, finished=heard), truth(of, 3, finished=never)]
     recorded = record(tmp_path, of, seen, packets=1.0, topics={1: "Beacon"})
@@ -28,10 +31,22 @@ def test_a_row_holds_all_that_is_known_of_a_link(tmp_path):
     table = packets(tmp_path).drop("distance_m")
     times = (TICK_NS - 1, TICK_NS, TICK_NS + 1000)
     assert table.rows() == [
-        (0, 0, 1, 1, 7, *times, "heard", -61.5, 10, "0x1a2b"),
-        (0, 2, 3, 1, 8, *times, "heard", None, 10, "0x1a2b"),
-        (0, 3, None, 3, 9, *times, "queue_full", None, 10, "Beacon"),
+        (0, 0, 1, 1, None, 7, *times, "heard", -61.5, 10, "0x1a2b", None),
+        (0, 2, 3, 1, 3, 8, *times, "heard", None, 10, "0x1a2b", None),
+        (0, 3, None, 3, None, 9, *times, "queue_full", None, 10, "Beacon", None),
     ]
+
+
+def test_a_row_holds_the_bytes_of_its_packet(tmp_path):
+    of = static(4)
+    both = replace(
+        links([2, 0, 0], [1, 3, 2], [8, 7, 7], TICK_NS),
+        payload=np.array([0, 2, 2]),
+        payloads=Payloads.of([b"first", b"nobody's", b"second"]),
+    )
+    unknown = links(3, 1, 9, TICK_NS)
+    record(tmp_path, of, [truth(of, 0), truth(of, 1, finished=both), truth(of, 2, finished=unknown)], packets=1.0)
+    assert packets(tmp_path)["payload"].to_list() == [b"first", b"second", b"second", None]
 
 
 @pytest.mark.parametrize("in_chunk", [1, 100_000])

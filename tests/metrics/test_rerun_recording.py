@@ -188,7 +188,7 @@ def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_pa
         receiver=np.array([1, 2, 0, 1, -1]),
         receivers=np.array([1, 1, 1, 1, 2]),
         **dict.fromkeys(
-            ("sequence", "sent_at_ns", "on_air_at_ns", "final_at_ns", "size_bytes", "tag"), np.zeros(5, int)
+            ("to", "sequence", "sent_at_ns", "on_air_at_ns", "final_at_ns", "size_bytes", "tag"), np.zeros(5, int)
         ),
         fate=np.array([Fate.LOST, Fate.HEARD, Fate.BLOCKED, Fate.LOST, Fate.QUEUE_FULL]),
     )

@@ -78,7 +78,7 @@ def finished(
 ) -> Finished:
     sent, final = np.array(sent_at_ns, np.int64), np.array(final_at_ns, np.int64)
     zero = np.zeros(len(sent), np.int64)
-    return Finished(zero + arena, zero, zero + 1, zero + 1, zero, sent, sent, final, zero + fate, zero, zero)
+    return Finished(zero + arena, zero, zero + 1, zero + 1, zero - 1, zero, sent, sent, final, zero + fate, zero, zero)
 
 
 def measured(name: str, of: Static, seen: Truth) -> list[float]:

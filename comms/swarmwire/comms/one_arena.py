@@ -61,8 +61,9 @@ def _tally_of(tally: Tally, arena: int) -> Tally:
 def _finished_of(finished: Finished, arena: int) -> Finished:
     own = finished.arena == arena
     columns: dict[str, Any] = {field.name: getattr(finished, field.name) for field in fields(Finished)}
+    payloads = columns.pop("payloads")
     kept: dict[str, Any] = {name: None if column is None else column[own] for name, column in columns.items()}
-    return Finished(**{**kept, "arena": np.zeros_like(kept["arena"])})
+    return Finished(**{**kept, "arena": np.zeros_like(kept["arena"])}, payloads=payloads)
 
 
 def _departed_of(departed: Departed, arena: int) -> Departed:

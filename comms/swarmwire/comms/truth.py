@@ -6,6 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.body import Body
+from swarmwire.comms.packets import Payloads
 from swarmwire.comms.senses import Senses
 
 
@@ -95,6 +96,7 @@ class Finished:
     sender: IntArray  # (k,) index in the arena
     receiver: IntArray  # (k,) index in the arena; -1: all that the packet was meant for
     receivers: IntArray  # (k,) how many intended receivers the row stands for: 1, or all of them
+    to: IntArray  # (k,) index in the arena of the one that the packet was addressed to; -1: a broadcast
     sequence: IntArray  # (k,)
     sent_at_ns: IntArray  # (k,)
     on_air_at_ns: IntArray  # (k,)
@@ -103,6 +105,8 @@ class Finished:
     size_bytes: IntArray  # (k,) payload with its tag
     tag: IntArray  # (k,) topic
     rssi_dbm: FloatArray | None = None  # (k,) strength at the receiver; None: this radio knows no strength
+    payload: IntArray | None = None  # (k,) the row of `payloads`; None: not known
+    payloads: Payloads | None = None
 
 
 @dataclass(frozen=True, slots=True)

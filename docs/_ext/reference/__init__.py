@@ -21,6 +21,7 @@ from reference.fates import fate_table
 from reference.fields import field_table
 from reference.keys import key_tables
 from reference.metrics import metric_details, metric_table
+from reference.presets import preset_sources, preset_table
 from reference.senses import sense_tables
 
 TABLES: dict[str, Callable[..., str]] = {
@@ -34,6 +35,8 @@ TABLES: dict[str, Callable[..., str]] = {
     "keys": key_tables,
     "metric-details": metric_details,
     "metrics": metric_table,
+    "preset-sources": preset_sources,
+    "presets": preset_table,
     "senses": sense_tables,
 }
 

@@ -103,8 +103,9 @@ class RunFolder:
         """A row per (packet, receiver within reach), of one arena or of all; BadInput if none were recorded.
 
         Columns: arena, sender and receiver (indices; receiver null: never on air, `receivers` tells how many it was
-        meant for), sequence, sent_at_ns, on_air_at_ns, final_at_ns, fate, rssi_dbm (null: unknown), size_bytes, topic,
-        distance_m (between the two when it went on air; null: unknown).
+        meant for), to (the one that it was addressed to; null: a broadcast), sequence, sent_at_ns, on_air_at_ns,
+        final_at_ns, fate, rssi_dbm (null: unknown), size_bytes, topic, distance_m (between the two when it went on air;
+        null: unknown), payload (bytes, the tag first).
         """
         return self._read("packets", arena)
 

@@ -22,6 +22,7 @@ MODULES = [
         "reception.noise",
         "signal.parameters",
         "presets",
+        "preset_tables.success",
         "radio_checks",
         "traces.parameters",
         "traffic.parameters",

@@ -21,6 +21,7 @@ from swarmwire.comms.wire.scene_frames import decode_scene, encode_scene
 from swarmwire.comms.wire.truth_frames import decode_truth, encode_truth
 
 ROBOTS, ARENAS = 3, 2
+NOT_SENT = ("rssi_dbm", "payload", "payloads")  # as columns of numbers
 ROWS = ROBOTS * ARENAS
 OBSTACLES = (Obstacle("box", 1.0, 0.5, 0.2, size_m=(1.0, 2.0)), Obstacle("polygon", 0, 0, points_m=((0, 0), (1, 0))))
 STATIC = Static(
@@ -50,13 +51,19 @@ def floats(*shape: int) -> st.SearchStrategy[Any]:
 @st.composite
 def finished_(draw: st.DrawFn) -> Finished:
     k = draw(st.integers(0, 4))
-    bounds = {"arena": (0, ARENAS), "sender": (0, ROBOTS), "receiver": (-1, ROBOTS), "fate": (0, len(Fate))}
+    bounds = {
+        "arena": (0, ARENAS),
+        "sender": (0, ROBOTS),
+        "receiver": (-1, ROBOTS),
+        "to": (-1, ROBOTS),
+        "fate": (0, len(Fate)),
+    }
     columns = {
         of.name: draw(ints(k, least=bounds[of.name][0], most=bounds[of.name][1] - 1))
         if of.name in bounds
         else draw(ints(k))
         for of in fields(Finished)
-        if of.name != "rssi_dbm"
+        if of.name not in NOT_SENT
     }
     return Finished(**columns, rssi_dbm=draw(st.none() | floats(k)))
 
@@ -130,7 +137,7 @@ def quiet(**given: Any) -> Glimpse:
 
 
 def one_finished(**given: int) -> Finished:
-    names = [of.name for of in fields(Finished) if of.name != "rssi_dbm"]
+    names = [of.name for of in fields(Finished) if of.name not in NOT_SENT]
     return Finished(**{name: np.array([given.get(name, 0)]) for name in names})
 
 

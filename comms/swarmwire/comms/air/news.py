@@ -39,6 +39,7 @@ def finished(ended: Links, packets: Transmissions, robots: int, has_strength: bo
         sender=in_arena(sender, robots),
         receiver=np.where(the_rest, THE_REST, in_arena(ended.receiver[index], robots)),
         receivers=ended.receivers[index],
+        to=packets.to[packet],
         sequence=ended.sequence[index],
         sent_at_ns=packets.sent_at_ns[packet],
         on_air_at_ns=packets.on_air_at_ns[packet],
@@ -47,6 +48,8 @@ def finished(ended: Links, packets: Transmissions, robots: int, has_strength: bo
         size_bytes=packets.payloads.sizes[packet],
         tag=packets.tag[packet],
         rssi_dbm=ended.rssi_dbm[index] if has_strength else None,
+        payload=packet,
+        payloads=packets.payloads,
     )
 
 

@@ -123,7 +123,15 @@ class Radio:
         at_least=0,
         at_most=60,
     )
-    frequency_hz: float = parameter(2.44e9, help="of signals: the carrier", unit="Hz", at_least=1e6, at_most=1e12)
+    propagation_mps: float | None = parameter(
+        None,
+        help="speed of the wave, for sound and the like: packets are heard later with distance, though they are on "
+        "air everywhere at once, and fading goes by this wave's length; without it that of light, and no delay",
+        unit="m/s",
+        at_least=1,
+        at_most=3e8,
+    )
+    frequency_hz: float = parameter(2.44e9, help="of signals: the carrier", unit="Hz", at_least=1e3, at_most=1e12)
     log_distance: LogDistance | None = parameter(None, help="of the model log-distance")
     two_ray: TwoRay | None = parameter(None, help="of the model two-ray")
     itu_indoor: ItuIndoor | None = parameter(None, help="of the model itu-indoor")

@@ -24,11 +24,12 @@ from swarmwire.comms.air import (
     given_range,
     given_rssi,
     line_of_sight,
+    propagation_delay,
     trace,
 )
 from swarmwire.comms.air.stage import Medium, Stage
 
-AFTER_RECEPTION = (trace, given_range, given_bearing, given_rssi, delay, delays)
+AFTER_RECEPTION = (trace, given_range, given_bearing, given_rssi, delay, delays, propagation_delay)
 ORDER = (line_of_sight, bodies_block, disrupted, fixed_loss, bursts, *AFTER_RECEPTION)
 
 

@@ -17,7 +17,7 @@ from swarmwire.comms.wire.checked import checked_array
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.scene_frames import OBSERVED_VERSION, check_version
 
-_FINISHED = tuple(field.name for field in fields(Finished) if field.name != "rssi_dbm")
+_FINISHED = tuple(of.name for of in fields(Finished) if of.name not in ("rssi_dbm", "payload", "payloads"))
 _COUNTED = ("sent", "intended", "in_range")  # a row each; the fates have an array of their own
 
 
@@ -130,6 +130,7 @@ def _finished(frame: Frame, static: Static) -> Finished | None:
     _within("finished.arena", columns["arena"], static.arenas)
     _within("finished.sender", columns["sender"], static.robots)
     _within("finished.receiver", columns["receiver"], static.robots, first=-1)
+    _within("finished.to", columns["to"], static.robots, first=-1)
     _within("finished.fate", columns["fate"], len(Fate))
     rssi_dbm = None
     if "finished/rssi_dbm" in frame.arrays:

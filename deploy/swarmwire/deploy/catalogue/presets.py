@@ -2,7 +2,8 @@
 
 from typing import Any, cast
 
-from swarmwire.comms.air.presets import PRESETS, Preset
+from swarmwire.comms.air.preset import Preset
+from swarmwire.comms.air.presets import PRESETS
 from swarmwire.deploy.catalogue.entry import Entry
 
 
@@ -13,7 +14,8 @@ def presets() -> list[Entry]:
 
 def _preset(name: str, preset: Preset) -> Entry:
     values = tuple((f"radio.{path}", str(value)) for path, value in _flat(preset.radio))
-    facts = (("in a scenario", f'[radio] preset = "{name}"'), ("source", preset.source), *values)
+    otherwise = (("but", preset.otherwise),) if preset.otherwise else ()
+    facts = (("in a scenario", f'[radio] preset = "{name}"'), ("source", preset.source), *otherwise, *values)
     return Entry(kind="preset", name=name, help=preset.told, facts=facts)
 
 

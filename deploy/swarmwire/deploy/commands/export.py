@@ -1,5 +1,6 @@
 """`swarmwire export`."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -9,6 +10,7 @@ from rich.progress import track
 from typer.core import TyperCommand
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.commands.export_traffic import SUFFIX, export_traffic
 
 if TYPE_CHECKING:
     from swarmwire.metrics.drawing.film_figure import FilmFigure
@@ -50,10 +52,17 @@ def export_command(
     ] = False,
     to: Annotated[
         Path | None,
-        typer.Option(help="The file; pictures: .png, .svg or .pdf. Default: picture.png, film.*, pdr.png in RUN."),
+        typer.Option(
+            help="The file; a picture may be .png, .svg or .pdf; .pcapng captures the radio. Default: picture.png, "
+            "film.* or pdr.png in RUN."
+        ),
     ] = None,
-    from_s: Annotated[float | None, typer.Option("--from", help="Start of the film, in s.", metavar="S")] = None,
-    until_s: Annotated[float | None, typer.Option("--until", help="End of the film, in s.", metavar="S")] = None,
+    from_s: Annotated[
+        float | None, typer.Option("--from", help="Start of the film or capture, in s.", metavar="S")
+    ] = None,
+    until_s: Annotated[
+        float | None, typer.Option("--until", help="End of the film or capture, in s.", metavar="S")
+    ] = None,
     fps: Annotated[
         float | None,
         typer.Option(help="Frames per second. Default: 10 (GIF), 25 (MP4), or as many as there are ticks."),
@@ -70,14 +79,22 @@ def export_command(
         int | None, typer.Option(help="Longer side in pixels. Default: 1280 (pictures), 480 (GIF), 960 (MP4).")
     ] = None,
 ) -> None:
-    """Draw a run as a picture or a film, without a screen: the arena, and metrics beside it.
+    """Draw a run as a picture or a film, without a screen: the arena, and metrics beside it. Or capture its radio.
 
-    Lines join robots in radio range and sight of one another, whatever partitions and failed radios part them.
+    Lines join robots in radio range and sight of one another, whatever partitions and failed radios part them. A file
+    that ends in .pcapng holds the frames on air of a run with --packets all, for Wireshark.
     """
+    console = Console(highlight=False)
+    if to is not None and to.suffix.lower() == SUFFIX:
+        _refuse_drawing_options(
+            png is not None or gif or mp4 or pdr, {"--fps": fps, "--speed": speed, "--metric": metric, "--size": size}
+        )
+        frames = export_traffic(run, to, arena, from_s, until_s)
+        console.print(f"written: {to} ({frames} frames)", soft_wrap=True)
+        return
     from swarmwire.metrics.drawing.film_figure import FilmFigure
     from swarmwire.metrics.drawing.whole_file import check_path
 
-    console = Console(highlight=False)
     kind = _kind(png, gif, mp4, pdr)
     target, size_px = to or run / USUAL_NAME[kind], USUAL_SIZE_PX[kind] if size is None else size
     if kind in ("png", "pdr"):
@@ -145,6 +162,14 @@ def _refuse_film_options(given: dict[str, float | None]) -> None:
     for option, value in given.items():
         if value is not None:
             raise BadInput(option, "", "expected --gif or --mp4 with it; a picture is of one moment, --png T")
+
+
+def _refuse_drawing_options(draws: bool, given: Mapping[str, object]) -> None:
+    if draws:
+        raise BadInput("--to", "", f"expected a picture or a film of --png, --gif or --mp4; {SUFFIX} is neither")
+    for option, value in given.items():
+        if value is not None:
+            raise BadInput(option, "", f"expected a picture or a film with it; {SUFFIX} is neither")
 
 
 def _time_s(text: str, film: "Film") -> float:

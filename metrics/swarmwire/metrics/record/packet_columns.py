@@ -15,7 +15,8 @@ from swarmwire.metrics.geometry_tick import geometry_tick
 if TYPE_CHECKING:
     import polars as pl
 
-NOBODY = -1  # Finished's receiver of a packet that never went on air
+OTHERWISE = ("rssi_dbm", "payload", "payloads")  # of Finished: not joined as columns of numbers
+NOBODY = -1  # Finished's receiver of a packet that never went on air, and whom a broadcast is addressed to
 
 
 def packet_schema() -> "dict[str, Any]":
@@ -27,6 +28,7 @@ def packet_schema() -> "dict[str, Any]":
         "sender": pl.Int32,
         "receiver": pl.Int32,  # null: never on air
         "receivers": pl.Int32,
+        "to": pl.Int32,  # null: a broadcast
         "sequence": pl.Int64,
         "sent_at_ns": pl.Int64,
         "on_air_at_ns": pl.Int64,
@@ -36,6 +38,7 @@ def packet_schema() -> "dict[str, Any]":
         "size_bytes": pl.Int32,
         "topic": pl.String,
         "distance_m": pl.Float32,  # null: never on air, or longer ago than poses are kept
+        "payload": pl.Binary,  # with its tag
     }
 
 
@@ -71,19 +74,20 @@ class PacketColumns:
         import polars as pl
 
         keep = [self.sample(part) for part in self.parts]
-        taken = {name: self._joined(name, keep) for name in Finished.__slots__ if name != "rssi_dbm"}
+        taken = {name: self._joined(name, keep) for name in Finished.__slots__ if name not in OTHERWISE}
         fate, tag = taken.pop("fate"), taken.pop("tag")
-        has_receiver = pl.Series(taken["receiver"] != NOBODY)
+        has_receiver, is_addressed = (pl.Series(taken[name] != NOBODY) for name in ("receiver", "to"))
         columns: dict[str, Any] = {
             **taken,
             "fate": pl.Series(FATE_NAMES).gather(fate),
             "rssi_dbm": self._rssi_dbm(keep),
             "topic": self._topic(tag),
             "distance_m": pl.Series(self._distance_m(taken)).fill_nan(None),
+            "payload": pl.concat([_payload(part, rows) for part, rows in zip(self.parts, keep, strict=True)]),
         }
         schema = packet_schema()
         frame = pl.DataFrame({name: columns[name] for name in schema}, schema_overrides=schema)
-        return frame.with_columns(receiver=pl.when(has_receiver).then("receiver"))
+        return frame.with_columns(receiver=pl.when(has_receiver).then("receiver"), to=pl.when(is_addressed).then("to"))
 
     def _joined(self, name: str, keep: list[BoolArray]) -> IntArray:
         return np.concatenate([getattr(part, name)[rows] for part, rows in zip(self.parts, keep, strict=True)])
@@ -116,3 +120,13 @@ class PacketColumns:
             receiver = place[tick[known], first + links["receiver"][known]]
             distance_m[known] = np.hypot(*(sender - receiver).T)
         return distance_m
+
+
+def _payload(part: Finished, keep: BoolArray) -> "pl.Series":
+    """The bytes of the rows to keep; each packet's are taken out once, however many receivers it has."""
+    import polars as pl
+
+    if part.payload is None or part.payloads is None:
+        return pl.Series([None] * int(keep.sum()), dtype=pl.Binary)
+    packet, place = np.unique(part.payload[keep], return_inverse=True)
+    return pl.Series([part.payloads.row(row) for row in packet.tolist()], dtype=pl.Binary).gather(place)

@@ -25,6 +25,7 @@ MODELS = (
     Friis(),
     LogDistance(2.7),
     LogDistance(3.0, 46.6777),
+    LogDistance(2.0, 0.0, absorption_db_per_m=0.0074),
     TwoRay(),
     TwoRay(0.2, 0.2),
     TwoRay(0.05, 0.05),

@@ -25,10 +25,10 @@ class FadingLaw(NamedTuple):
     wave_number: float  # 1 / wavelength, in cycles per m
 
 
-def fading_law(fading: Fading, frequency_hz: float) -> FadingLaw:
-    """The law at this frequency."""
+def fading_law(fading: Fading, frequency_hz: float, speed_mps: float = SPEED_OF_LIGHT_MPS) -> FadingLaw:
+    """The law at this frequency of waves with this speed."""
     kind = FADINGS.index(fading.distribution)
-    return FadingLaw(kind, fading.k, fading.m, frequency_hz / SPEED_OF_LIGHT_MPS)
+    return FadingLaw(kind, fading.k, fading.m, frequency_hz / speed_mps)
 
 
 @njit(cache=True)

@@ -9,7 +9,7 @@ SPEED_OF_LIGHT_MPS = 299_792_458.0
 class LossCurve(NamedTuple):
     """L(d) = near_db + near_slope_db log10 d up to `break_m`, far_db + far_slope_db log10 d beyond; d in m.
 
-    Slopes are positive and the curve does not fall at the break.
+    On top comes absorption_db_per_m x d. Slopes are positive and the curve does not fall at the break.
     """
 
     near_db: float
@@ -17,8 +17,9 @@ class LossCurve(NamedTuple):
     break_m: float
     far_db: float
     far_slope_db: float  # per decade of distance
+    absorption_db_per_m: float = 0.0
 
 
-def straight(loss_db_at_1_m: float, slope_db: float) -> LossCurve:
-    """A curve that is one straight line, with a slope in dB per decade of distance."""
-    return LossCurve(loss_db_at_1_m, slope_db, math.inf, loss_db_at_1_m, slope_db)
+def straight(loss_db_at_1_m: float, slope_db: float, absorption_db_per_m: float = 0.0) -> LossCurve:
+    """A curve that is one straight line, with a slope in dB per decade of distance, but for what is absorbed."""
+    return LossCurve(loss_db_at_1_m, slope_db, math.inf, loss_db_at_1_m, slope_db, absorption_db_per_m)

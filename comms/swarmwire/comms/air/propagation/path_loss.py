@@ -1,7 +1,8 @@
 """Path loss: what distance takes from a signal, in dB. Every model is a curve of straight lines over log10 of distance.
 
-So one compiled function serves all models, and its inverse is exact. A model is a frozen dataclass with a method
-`curve(frequency_hz)` in a file of its own: `friis`, `log_distance`, `two_ray`, `itu_indoor`.
+So one compiled function serves all models, and its inverse is exact, or found by bisection where something absorbs.
+A model is a frozen dataclass with a method `curve(frequency_hz)` in a file of its own: `friis`, `log_distance`,
+`two_ray`, `itu_indoor`.
 
 No model holds in the near field of the antennas: below `NEAREST_M` the loss is that at `NEAREST_M`, as in ns-3's
 log-distance model, so that touching robots do not amplify each other.
@@ -14,15 +15,17 @@ import math
 from numba import njit
 
 NEAREST_M = 1.0
+HALVINGS = 60
 
 
 @njit(cache=True)
 def loss_db(curve, distance_m):
     """The loss in dB over a distance in m."""
     distance_m = max(distance_m, NEAREST_M)
+    absorbed_db = curve.absorption_db_per_m * distance_m
     if distance_m <= curve.break_m:
-        return curve.near_db + curve.near_slope_db * math.log10(distance_m)
-    return curve.far_db + curve.far_slope_db * math.log10(distance_m)
+        return curve.near_db + curve.near_slope_db * math.log10(distance_m) + absorbed_db
+    return curve.far_db + curve.far_slope_db * math.log10(distance_m) + absorbed_db
 
 
 @njit(cache=True)
@@ -30,6 +33,21 @@ def reach_m(curve, most_loss_db):
     """The greatest distance in m with at most this loss, to 1e-12 relative; 0 if even `NEAREST_M` has more."""
     if loss_db(curve, NEAREST_M) > most_loss_db:
         return 0.0
+    reached_m = _reach_of_lines_m(curve, most_loss_db)
+    if curve.absorption_db_per_m == 0.0:
+        return reached_m
+    within_m, beyond_m = NEAREST_M, reached_m
+    for _ in range(HALVINGS):
+        middle_m = math.sqrt(within_m * beyond_m)
+        if loss_db(curve, middle_m) <= most_loss_db:
+            within_m = middle_m
+        else:
+            beyond_m = middle_m
+    return within_m
+
+
+@njit(cache=True)
+def _reach_of_lines_m(curve, most_loss_db):
     near_m = 10.0 ** ((most_loss_db - curve.near_db) / curve.near_slope_db)
     if near_m <= curve.break_m:
         return near_m

@@ -20,7 +20,11 @@ class Noise:
 
     bandwidth_hz: float = parameter(2e6, help="bandwidth of the receiver", unit="Hz", above=0, at_most=1e12)
     figure_db: float = parameter(
-        6.0, help="noise figure: how far the receiver's noise is above thermal noise", unit="dB", at_least=0, at_most=60
+        6.0,
+        help="noise figure: how far what it hears is above thermal noise",
+        unit="dB",
+        at_least=0,
+        at_most=200,
     )
 
     @property

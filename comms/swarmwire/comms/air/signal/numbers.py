@@ -7,6 +7,7 @@ import numpy as np
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.frames import acknowledgement_bytes, airtime_ns
 from swarmwire.comms.air.propagation.fading import fading_law
+from swarmwire.comms.air.propagation.loss_curve import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.air.propagation.parameters import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.air.propagation.path_loss import reach_m
 from swarmwire.comms.air.propagation.scattering import scatter_waves
@@ -41,7 +42,8 @@ def sensitivity_of(radio: Radio) -> float:
     if reception.sensitivity_dbm is not None:
         return reception.sensitivity_dbm
     success, frame_bytes = SHEETS.get(reception.model, (0.9, radio.max_payload_bytes + radio.overhead_bytes))
-    return sensitivity_dbm(receiver_for(radio), radio.noise_or_default.power_dbm, success, 8 * frame_bytes)
+    of_bits_dbm = sensitivity_dbm(receiver_for(radio), radio.noise_or_default.power_dbm, success, 8 * frame_bytes)
+    return max(of_bits_dbm, reception.preamble_dbm)  # without a preamble there are no bits
 
 
 def range_of(radio: Radio) -> float | None:
@@ -120,7 +122,8 @@ def surroundings_of(
 ) -> Surroundings:
     """What links go by; by robot row (rows,): radii, power and gain, and gain."""
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
-    curve, law = radio.loss_model.curve(radio.frequency_hz), fading_law(fading or Fading(), radio.frequency_hz)
+    curve = radio.loss_model.curve(radio.frequency_hz)
+    law = fading_law(fading or Fading(), radio.frequency_hz, radio.propagation_mps or SPEED_OF_LIGHT_MPS)
     spread_db = max(SHADOWS_CUT_OFF * shadowing.deviation_db - radio.cut_off_db, 0.0) if shadowing else 0.0
     best_dbm = float(send_dbm.max() + receive_dbi.max())
     far_m = float(reach_m(curve, best_dbm - cut_off_dbm(radio) + spread_db))

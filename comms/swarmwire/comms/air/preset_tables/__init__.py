@@ -1,0 +1,1 @@
+"""The presets by family, a table of them each."""

@@ -1,0 +1,45 @@
+"""`swarmwire export --to traffic.pcapng`: the frames of a run, for Wireshark."""
+
+from pathlib import Path
+
+from swarmwire.comms.errors import BadInput
+
+SUFFIX = ".pcapng"
+
+
+def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_s: float | None) -> int:
+    """Write what was on air in an arena from `from_s` to before `until_s`, and say how many frames it was.
+
+    BadInput for a folder without recorded packets, or of a run without a radio.
+    """
+    from swarmwire.comms.clock import to_ns
+    from swarmwire.metrics.capture.frames_on_air import frames_on_air
+    from swarmwire.metrics.capture.link_headers import link_of
+    from swarmwire.metrics.capture.write_capture import write_capture
+    from swarmwire.metrics.drawing.whole_file import check_path
+    from swarmwire.metrics.record.names import SCENARIO
+    from swarmwire.metrics.run_folder import RunFolder
+    from swarmwire.world.scenario_file import load_scenario
+
+    check_path(to, (SUFFIX,))
+    folder = RunFolder(run)
+    if not 0 <= arena < folder.static.arenas:
+        raise BadInput("--arena", "", f"expected 0 to {folder.static.arenas - 1}, got {arena}")
+    radio = load_scenario(run / SCENARIO).radio
+    if radio is None:
+        raise BadInput(str(run), "radio", "expected a run with a radio: this one has none")
+    if not folder.files("packets"):
+        expected = "expected packets, recorded with --packets all; swarmwire repeat RUN --packets all --out … does it"
+        raise BadInput(str(run), "packets", expected)
+    link, names = link_of(radio), folder.static.robot_names
+    if len(names) > link.most_robots:
+        raise BadInput(str(run), "robots", f"expected at most {link.most_robots}, which have addresses of their own")
+    first_ns = 0 if from_s is None else to_ns(from_s)
+    stop_ns = None if until_s is None else to_ns(until_s)
+    frames = (
+        frame
+        for frame in frames_on_air(folder.packets(arena), names)
+        if first_ns <= frame.on_air_at_ns and (stop_ns is None or frame.on_air_at_ns < stop_ns)
+    )
+    description = f"{folder.static.name}, seed {folder.static.seeds[arena]}: {radio.preset or radio.model}"
+    return write_capture(to, link, f"air-{arena}", description, frames)

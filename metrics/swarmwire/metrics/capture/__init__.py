@@ -1,0 +1,1 @@
+"""Captures: what was on air, as a file that Wireshark opens."""
