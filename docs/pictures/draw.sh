@@ -14,5 +14,8 @@ swarmwire export "$runs/flocking-disrupted" --gif --to docs/demo.gif
 swarmwire export "$runs/split" --png 35 --to docs/split.png
 swarmwire export "$runs/pso" --png 55 --to docs/pso.png
 swarmwire draw footbot --to docs/footbot.png
+swarmwire radio probe scenarios/warehouse-wifi.toml --at=-6,-3.5 --bytes 64 --to docs/coverage.png
+swarmwire run scenarios/warehouse-wifi.toml --quiet --no-rrd --out "$runs/warehouse"
+swarmwire export "$runs/warehouse" --pdr --to docs/delivery.png
 .ci/uv run --no-sync python docs/pictures/panel.py
 .ci/uv run --no-sync python -m docs.pictures.radio

@@ -31,6 +31,7 @@ def repeat_command(
     holds no run that can be repeated.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
+    from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.recording import Recording, packet_share
     from swarmwire.deploy.repetition import RepeatedRun
     from swarmwire.deploy.shown import progress
@@ -43,7 +44,7 @@ def repeat_command(
         raise BadInput("--links", "", "expected --out with it: a folder in which to record them")
     repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
     repeated.simulation.watch(progress(repeated.simulation, console))
-    with leaving_when_hung_up(repeated.simulation.interrupt):
+    with leaving_when_hung_up(repeated.simulation.interrupt), compiling_told(console):
         repetition = repeated.run()
     _print(repetition, console)
     if out is not None:

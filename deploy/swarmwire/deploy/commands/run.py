@@ -63,6 +63,7 @@ def run_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.arguments import choose_seeds
+    from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.recording import Recording, packet_share
     from swarmwire.deploy.simulation import Simulation
     from swarmwire.world.scenario_file import load_scenario
@@ -70,16 +71,18 @@ def run_command(
     checked = load_scenario(scenario, overrides or [])
     chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
     folder = out or default_folder(scenario.stem, chosen)
-    simulation = Simulation(
-        checked,
-        seeds=chosen,
-        runners=runners,
-        out=folder,
-        socket=socket,
-        realtime=realtime,
-        record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
-    )
-    result = _shown(simulation, folder, view, Console(quiet=quiet, highlight=False))
+    console = Console(quiet=quiet, highlight=False)
+    with compiling_told(console):
+        simulation = Simulation(
+            checked,
+            seeds=chosen,
+            runners=runners,
+            out=folder,
+            socket=socket,
+            realtime=realtime,
+            record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
+        )
+        result = _shown(simulation, folder, view, console)
     if result.ended == "interrupted":
         raise typer.Exit(INTERRUPTED)
 

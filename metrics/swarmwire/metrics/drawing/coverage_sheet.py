@@ -50,15 +50,14 @@ def draw_coverage(
     delivery.set_title("delivery of lone packets over distance in m", **_TITLE)
     _draw_band(delivery, distances, distances.delivery)
     delivery.set_ylim(-0.03, 1.03)
+    explained = delivery
     if distances.mean_dbm is not None:
-        strength = _axes(figure, (0.55, 0.115, 0.425, 0.3))
+        explained = strength = _axes(figure, (0.55, 0.115, 0.425, 0.3))
         strength.set_title("mean strength in dBm over distance in m", **_TITLE)
         _draw_band(strength, distances, distances.mean_dbm)
         if sensitivity_dbm is not None:
             strength.axhline(sensitivity_dbm, color=SOFT, lw=0.9, ls=(0, (4, 3)), label="sensitivity")
-        strength.legend(**_LEGEND)
-    else:
-        delivery.legend(**_LEGEND)
+    delivery.legend(*explained.get_legend_handles_labels(), **_LEGEND)  # where curves leave room
     save(figure, to)
 
 

@@ -71,7 +71,7 @@ def _kinds(pairs, both_alike, send_dbm, receive_dbi, fate, levels):
 @njit(cache=True)
 def _filled(a, b, fate, kind, power_mw, places, links):
     table = LinkTable(
-        np.empty(links, np.int32),
+        np.empty(links, np.int64),
         np.empty(links),
         np.zeros(links, np.bool_),
         np.zeros(links, np.uint8),

@@ -70,7 +70,7 @@ class LinksHeld:
         counts = self.places.weak[sender] - first
         at, link = np.repeat(np.arange(len(sender)), counts), _ranges(first, counts)
         counts_as = self.link.is_listed[link] & (self.link.fate[link] != Fate.BLOCKED)
-        return at[counts_as], self.link.receiver[link[counts_as]].astype(np.int64)
+        return at[counts_as], self.link.receiver[link[counts_as]]
 
     def _links(self) -> tuple[LinkTable, LinkPlaces]:
         pairs, now = self.pairs, self._medium.disruption

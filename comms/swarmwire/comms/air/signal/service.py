@@ -2,9 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-import numpy as np
-
-from swarmwire.comms.air.signal import dcf, on_air, telling
+from swarmwire.comms.air.signal import csma, dcf, on_air, telling
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import ANSWER, ENTER, LISTENED, SEND, TIMER, cancel, schedule
 from swarmwire.comms.air.signal.parameters import METHODS
@@ -16,7 +14,6 @@ from swarmwire.comms.air.signal.tables import (
     HELD,
     KEPT_ALL,
     KEPT_NEWEST,
-    LISTENING,
     NOBODY,
     NOTHING,
     PAUSING,
@@ -24,12 +21,9 @@ from swarmwire.comms.air.signal.tables import (
     SILENT,
     TURNING,
 )
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.outcomes import SendResult
 
-BACKOFF = purpose("csma backoff")
 HEARD, QUEUE_FULL, CHANNEL_BUSY = int(Fate.HEARD), int(Fate.QUEUE_FULL), int(Fate.CHANNEL_BUSY)
 IS_ACKNOWLEDGED, FOUND_BUSY = int(SendResult.ACKNOWLEDGED), int(SendResult.CHANNEL_BUSY)
 FOUND_FULL = int(SendResult.QUEUE_FULL)
@@ -93,8 +87,7 @@ def begin(rules, state, queue, r, now_ns):
     if state.off[r] <= KEPT_ALL:
         me.stage = HELD
     elif rules.method == CSMA:
-        me.busy_times, me.exponent = 0, rules.least_exponent
-        back_off(rules, state, queue, r, now_ns)
+        csma.want(rules, state, queue, r, now_ns)
     elif rules.method == DCF:
         dcf.want(rules, state, queue, r, now_ns)
     else:
@@ -103,23 +96,11 @@ def begin(rules, state, queue, r, now_ns):
 
 
 @borrowing()
-def back_off(rules, state, queue, r, now_ns):
-    """CSMA: wait U{0 .. 2^BE - 1} backoff periods, keyed by (robot, sequence, attempt and busy times)."""
-    me = state.robot[r]
-    me.stage = BACKING_OFF
-    sequence, attempt = state.packet[me.packet].sequence, 16 * me.attempt + me.busy_times
-    u = uniform(state.keys[r // rules.robots], r % rules.robots, sequence, attempt, BACKOFF)
-    schedule(queue, TIMER, r, now_ns + np.int64(u * 2**me.exponent) * rules.backoff_ns)
-
-
-@borrowing()
 def timer(rules, state, queue, told, r, now_ns):
     """What the robot waited for has passed."""
     me = state.robot[r]
     if me.stage == BACKING_OFF:
-        me.stage = LISTENING
-        state.reception[r].peak_mw = 0.0
-        schedule(queue, LISTENED, r, now_ns + rules.listen_ns)
+        csma.listen(rules, state, queue, r, now_ns)
     elif me.stage == AWAITING:
         fail(rules, state, queue, told, r, now_ns)
     else:
@@ -128,21 +109,10 @@ def timer(rules, state, queue, told, r, now_ns):
 
 @borrowing()
 def listened(rules, state, queue, told, r, now_ns):
-    """CSMA: the radio has listened whether the air is free.
-
-    As in ns-3, it is busy if a frame began meanwhile or is on air at the end; one that ended meanwhile does not count.
-    """
-    me, it = state.robot[r], state.reception[r]
-    if max(it.peak_mw, it.power_mw) + it.jam_mw < rules.busy_mw and me.on_air == SILENT:
-        me.stage = TURNING
-        on_air.turn_away(state, r)
-        schedule(queue, SEND, r, now_ns + rules.turnaround_ns)
+    """CSMA: the radio has listened whether the air is free."""
+    if not csma.gives_up(rules, state, queue, r, now_ns):
         return
-    me.busy_times += 1
-    me.exponent = min(me.exponent + 1, rules.most_exponent)
-    if me.busy_times <= rules.most_backoffs:
-        back_off(rules, state, queue, r, now_ns)
-        return
+    me = state.robot[r]
     state.packet[me.packet].result = FOUND_BUSY
     if me.last_fate == NOBODY:
         telling.refuse(state, told, me.packet, CHANNEL_BUSY, now_ns)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.comms.air.reception.reception import Receiver
-from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, Int32Array, IntArray, KeyArray
+from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray, KeyArray
 
 # What a robot's radio does with the packet at the head of its queue; from BACKING_OFF on there is one.
 NOTHING, PAUSING, BACKING_OFF, LISTENING, TURNING, SENDING, AWAITING, HELD = range(8)
@@ -159,7 +159,7 @@ class Bursting(NamedTuple):
 class LinkTable(NamedTuple):
     """Links by sender: to robots that may be told of a frame, and then to those that it only disturbs."""
 
-    receiver: Int32Array  # (links,) robot rows
+    receiver: IntArray  # (links,) robot rows
     power_mw: FloatArray  # (links,) at the receiver, with fading
     is_listed: BoolArray  # (links,) mean power reaches the sensitivity
     fate: ByteArray  # (links,) HEARD: open; else what ends every packet here

@@ -2,6 +2,8 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+import numpy as np
+
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import ANSWER, schedule
 from swarmwire.comms.air.signal.tables import HELD, NOBODY, NOTHING
@@ -42,7 +44,7 @@ def report(rules, state, queue, told, r, now_ns):
     me.last_fate, me.last_in_range, me.last_mw = NOBODY, 0, 0.0
     link, to, hold, index = state.link, packet.to, me.hold, me.packet
     for i in range(me.first_link, me.weak_link):
-        receiver, fate, power_mw = link.receiver[i], link.now[i], link.power_mw[i]
+        receiver, fate, power_mw = link.receiver[i], np.int64(link.now[i]), link.power_mw[i]
         is_meant = to == NOBODY or to == receiver  # noqa: PLR1714 - `in` would make a tuple
         if not (is_meant and (link.is_listed[i] or fate == HEARD)):
             continue

@@ -88,6 +88,7 @@ def _probe_scenario(
     # Imported here: pydantic and numba take a second, which --help should not.
     from rich.console import Console
 
+    from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.coverage_probe import probe_coverage
     from swarmwire.deploy.coverage_report import coverage_json, print_coverage
     from swarmwire.metrics.drawing.canvas import SUFFIXES
@@ -95,15 +96,16 @@ def _probe_scenario(
 
     if to is not None:
         check_path(to, SUFFIXES)
-    probe = probe_coverage(
-        Path(scenario),
-        seed=seed,
-        overrides=settings,
-        at_m=None if at is None else _place(at),
-        robot=robot,
-        payload_bytes=payload_bytes,
-        points=JSON_POINTS if as_json and to is None else POINTS,
-    )
+    with compiling_told(Console(stderr=True)):
+        probe = probe_coverage(
+            Path(scenario),
+            seed=seed,
+            overrides=settings,
+            at_m=None if at is None else _place(at),
+            robot=robot,
+            payload_bytes=payload_bytes,
+            points=JSON_POINTS if as_json and to is None else POINTS,
+        )
     if as_json:
         typer.echo(json.dumps(coverage_json(probe)))
     else:
@@ -121,12 +123,16 @@ def _draw(probe: "CoverageProbe", to: Path, size_px: int) -> None:
 
 
 def _probe_contention(preset: str, contention: str | None, settings: list[str], runs: int, measured_s: float) -> None:
+    from rich.console import Console
+
     from swarmwire.comms.air.contention import contention as contend
+    from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.probe import radio_of
 
     radio = radio_of(preset, settings)
     nodes, payload_bytes, interval_s = _parts(contention or "")
-    found = contend(radio, nodes, payload_bytes, interval_s, range(1, runs + 1), measured_s=measured_s)
+    with compiling_told(Console(stderr=True)):
+        found = contend(radio, nodes, payload_bytes, interval_s, range(1, runs + 1), measured_s=measured_s)
     typer.echo(json.dumps(asdict(found)))
 
 
