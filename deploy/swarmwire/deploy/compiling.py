@@ -1,8 +1,7 @@
 """Compiling: kernels are compiled where they are first used on a machine, and people are told why nothing moves."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
-from typing import Any
 
 from rich.console import Console
 
@@ -11,19 +10,19 @@ TOLD = "compiling kernels for this machine: once, for a minute or so"
 
 
 @contextmanager
-def compiling_told(console: Console) -> Iterator[None]:
+def compiling_told(console: Console) -> Generator[None]:
     """Say so, once, if something is compiled meanwhile."""
     from numba.core import event
 
     class Teller(event.Listener):
         has_told = False
 
-        def on_start(self, event: Any) -> None:
+        def on_start(self, event: event.Event) -> None:
             if not self.has_told:
                 self.has_told = True
                 console.print(TOLD, soft_wrap=True)
 
-        def on_end(self, event: Any) -> None:
+        def on_end(self, event: event.Event) -> None:
             """What comes next shows that it is over."""
 
     teller = Teller()
