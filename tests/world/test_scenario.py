@@ -86,7 +86,7 @@ FAULTS: list[tuple[str, Any, str]] = [
     (
         "robots.flock.colour",
         "red",
-        "robots.flock.colour: unknown key; expected one of body, count, agent, act_every_ticks, params, place",
+        "robots.flock.colour: unknown key; expected one of body, count, agent, act_every_ticks, params, radio, place",
     ),
     ("robots.flock.place", 3, "robots.flock.place: expected a table, got 3"),
     ("robots.flock.place", {}, "robots.flock.place.how: is missing; expected one of arena, disc, grid, poses"),

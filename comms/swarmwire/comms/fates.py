@@ -17,9 +17,9 @@ class Fate(IntEnum):
         return fate
 
     HEARD = 0, "reached the receiver"
-    OUT_OF_RANGE = 1, "the receiver was farther than the radio reaches when the packet went on air"
+    OUT_OF_RANGE = 1, "the receiver was out of the radio's reach when the packet went on air"
     BLOCKED = 2, "an obstacle stood in the line of sight"
-    LOST = 3, "within reach, but lost by the medium's fixed loss"
+    LOST = 3, "within reach, but lost by the medium's fixed loss, or a trace's delivery ratio"
     QUEUE_FULL = 4, "the sender's queue was full: never on air"
     TOO_LARGE = 5, "above the medium's largest payload: never on air"
     IN_FLIGHT = 6, "queued or on its way when the run ended"

@@ -13,6 +13,7 @@ from swarmwire.comms.air.preset_tables.other_media import OTHER_MEDIA
 from swarmwire.comms.air.preset_tables.simulators import SIMULATORS
 from swarmwire.comms.air.preset_tables.standards import STANDARDS
 
+PATH_LOSS = ("log_distance", "two_ray", "itu_indoor")
 PRESETS: dict[str, Preset] = {**DISKS, **STANDARDS, **SIMULATORS, **OTHER_MEDIA}
 
 
@@ -20,7 +21,12 @@ def with_preset(radio: Mapping[str, Any]) -> dict[str, Any]:
     """The radio's table with the values of its preset, if it names a known one, where it has none itself."""
     name = radio.get("preset")
     preset = PRESETS.get(name) if isinstance(name, str) else None
-    return _filled(radio, preset.radio) if preset else dict(radio)
+    if preset is None:
+        return dict(radio)
+    values = dict(preset.radio)
+    if radio.get("model", values["model"]) != values["model"]:  # another model's path loss goes with it
+        values = {key: value for key, value in values.items() if key not in PATH_LOSS}
+    return _filled(radio, values)
 
 
 def _filled(given: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:

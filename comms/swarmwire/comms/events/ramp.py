@@ -20,9 +20,10 @@ from swarmwire.comms.parameters import parameter
 class Ramp(LastingEvent):
     """A number of `[radio]` moves evenly to `to`, tick by tick, and stays there; undone, it is at once what it was.
 
-    Any number that the scenario or its preset gives, but `send_offset`, which holds for the whole run. Packets that
-    wait or are on air stay so; airtime and limits are those of the moment at which a packet is handed over. A
-    ramp sets out from what those before it have made of the number.
+    Any number that the scenario or its preset gives, but `send_offset`, which holds for the whole run; groups' own
+    power and gain stay, and bursts given by steps move by `bad_s` and `good_s`. Packets that wait or are on air stay
+    so; airtime and limits are those of the moment at which a packet is handed over. A ramp sets out from what those
+    before it have made of the number.
     """
 
     do: str = parameter("ramp", help="a number of the radio moves to another value", choices=("ramp",))

@@ -2,13 +2,15 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from swarmwire.comms.air.signal import jamming, on_air, service
+from swarmwire.comms.air.signal import dcf, jamming, on_air, service
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import ENTER, LISTENED, OFF_AIR, SEND, TIMER, cancel, schedule
+from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY, RECEIVING, SILENT
 from swarmwire.comms.fates import Fate
 
 SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_DEAD), int(Fate.BLACKOUT)
+DCF = METHODS.index("dcf")
 FEW = 64  # rows that any one event tells beyond a frame's links
 
 
@@ -60,7 +62,7 @@ def run_until(rules, bursts, state, queue, told, most_links, until_ns):
         elif kind == TIMER:
             service.timer(rules, state, queue, told, r, now_ns)
         elif kind == SEND:
-            service.send(rules, state, queue, r, now_ns)
+            service.send(rules, state, queue, told, r, now_ns)
         elif kind == ENTER:
             service.enter(rules, state, queue, told, r, now_ns)
         else:
@@ -77,7 +79,7 @@ def stop_the_dead(state, queue, told, alive, now_ns):
 
 
 @borrowing()
-def cut_off(state, alive, radio_on):
+def cut_off(rules, state, queue, alive, radio_on, now_ns):
     """Robots that are dead (rows,), or whose radio is off, do not hear the frames on air to their end."""
     for s in range(len(state.robot)):
         me = state.robot[s]
@@ -88,3 +90,5 @@ def cut_off(state, alive, radio_on):
             if state.link.now[i] == RECEIVING and not (alive[r] and radio_on[r]):
                 state.link.now[i] = BLACKOUT if alive[r] else RECEIVER_DEAD
                 on_air.let_go(state.reception[r])
+                if rules.method == DCF and dcf.has_changed(rules, state.reception[r]):
+                    dcf.change(rules, state, queue, r, now_ns)

@@ -35,11 +35,18 @@ class JamHeld:
         is_on = self._jammers.is_on(from_ns - 1)
         return Jam(self._jammers.arena, self._power_mw, is_on, at_ns, which, np.zeros(1, np.int64))
 
-    def at_worst(self) -> tuple[FloatArray, FloatArray]:
-        """By robot row (rows,): the power in mW with all jammers on, and for what share of time none of them is."""
-        arenas = len(self._medium.keys)
-        power_mw, clear = np.zeros((arenas, self._medium.robots)), np.ones((arenas, self._medium.robots))
+    def by_robot(self, least_mw: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """By robot row (rows,): the power in mW of jammers that never pause, that of all, and the clear share of time.
+
+        Clear is when none of the others is on; less than `least_mw` of one does not count.
+        """
+        shape = len(self._medium.keys), self._medium.robots
+        steady_mw, all_mw, clear = np.zeros(shape), np.zeros(shape), np.ones(shape)
         for jammer, arena in enumerate(self._jammers.arena.tolist()):
-            power_mw[arena] += self._power_mw[jammer]
-            clear[arena, self._power_mw[jammer] > 0.0] *= 1.0 - self._jammers.duty[jammer]
-        return power_mw.ravel(), clear.ravel()
+            power_mw, duty = self._power_mw[jammer], self._jammers.duty[jammer]
+            all_mw[arena] += power_mw
+            if duty == 1.0:
+                steady_mw[arena] += power_mw
+            else:
+                clear[arena, power_mw >= least_mw] *= 1.0 - duty
+        return steady_mw.ravel(), all_mw.ravel(), clear.ravel()

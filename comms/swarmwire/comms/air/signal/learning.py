@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarmwire.comms.air.signal.tables import Table
+from swarmwire.comms.air.signal.tables import NOT_LEARNED, Table
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
@@ -10,8 +10,9 @@ from swarmwire.comms.packets import NOWHERE, UNTOLD, Sent
 
 
 def learned(packet: Table, outcome_id: IntArray) -> Outcomes:
-    """Of packets that are done, what senders learn who ask; whom death made drop a packet is not there to learn it."""
-    asked = (packet["is_done"] > 0) & (outcome_id != UNTOLD) & (packet["fate"] != Fate.SENDER_DEAD)
+    """Of packets that are done, what senders learn who ask; those that died before are not there to learn it."""
+    died = (packet["fate"] == Fate.SENDER_DEAD) | (packet["result"] == NOT_LEARNED)
+    asked = (packet["is_done"] > 0) & (outcome_id != UNTOLD) & ~died
     index = np.flatnonzero(asked)
     if not len(index):
         return NO_OUTCOMES

@@ -10,7 +10,7 @@ from swarmwire.comms.air.signal.links_by_sender import Levels, links_by_sender
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.air.signal.tables import NOBODY, SILENT, LinkPlaces, LinkTable, Table
 from swarmwire.comms.air.stage import Medium
-from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.fates import Fate
 
 
@@ -107,10 +107,3 @@ def _fates(now: Disruption, sender: IntArray, receiver: IntArray, blocked: IntAr
         fate[~now.alive[receiver]] = Fate.RECEIVER_DEAD
     fate[blocked > 0] = Fate.BLOCKED
     return fate
-
-
-def open_ways(now: Disruption, a: IntArray, b: IntArray) -> BoolArray:
-    """Which pairs of robot rows no disruption keeps apart, (k,)."""
-    if not now.anything:
-        return np.ones(len(a), np.bool_)
-    return now.joined(a, b)

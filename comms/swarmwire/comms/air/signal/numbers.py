@@ -71,6 +71,8 @@ def rules_of(radio: Radio, robots: int) -> Rules:
     answer_ns = int(airtime_ns(radio, np.array([answer_bytes]))[0])
     short_space_ns = dcf.short_space_ns if is_dcf else csma.turnaround_ns
     dcf_patience_ns = short_space_ns + answer_ns + dcf.slot_ns
+    # The standard's at its bit rate, and as long as an answer takes at a lower one.
+    csma_patience_ns = max(csma.acknowledgement_wait_ns, short_space_ns + answer_ns + csma.backoff_ns)
     most_bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
     return Rules(
         robots=robots,
@@ -88,7 +90,7 @@ def rules_of(radio: Radio, robots: int) -> Rules:
         short_space_ns=short_space_ns,
         acknowledgement_ns=answer_ns,
         acknowledgement_bits=8 * answer_bytes,
-        patience_ns=dcf_patience_ns if is_dcf else csma.acknowledgement_wait_ns,
+        patience_ns=dcf_patience_ns if is_dcf else csma_patience_ns,
         backoff_ns=csma.backoff_ns,
         listen_ns=csma.cca_ns,
         turnaround_ns=csma.turnaround_ns,

@@ -29,7 +29,6 @@ def put_on_air(rules, state, queue, s, kind, now_ns, airtime_ns, bits):
     me = state.robot[s]
     me.on_air, me.on_air_ns, me.airtime_ns, me.bits = kind, now_ns, airtime_ns, bits
     schedule(queue, OFF_AIR, s, now_ns + airtime_ns)
-    # Once and by name: each look into `state` counts references, and this is the innermost loop.
     robot, reception = state.robot, state.reception
     receiver, power_mw, fate, now = state.link.receiver, state.link.power_mw, state.link.fate, state.link.now
     if rules.method == ALONE:

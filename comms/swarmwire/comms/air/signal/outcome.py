@@ -23,7 +23,6 @@ ACKNOWLEDGED_LOSS = purpose("fixed loss of an acknowledgement")
 ACKNOWLEDGED_TRACE = purpose("trace of an acknowledgement")
 HEARD, LOST, TOO_WEAK = int(Fate.HEARD), int(Fate.LOST), int(Fate.TOO_WEAK)
 COLLIDED, BURST, JAMMED = int(Fate.COLLIDED), int(Fate.BURST), int(Fate.JAMMED)
-ONE_BIT = 1.0
 
 
 @borrowing()

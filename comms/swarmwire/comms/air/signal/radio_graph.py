@@ -11,12 +11,14 @@ from swarmwire.comms.air.channel import ROUNDING
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.signal.jam_held import JamHeld
 from swarmwire.comms.air.signal.link_table import Pairs
-from swarmwire.comms.air.signal.links_held import LinksHeld, open_ways
+from swarmwire.comms.air.signal.links_held import LinksHeld
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.air.signal.outcome import lone_deliveries, lone_delivery
 from swarmwire.comms.air.signal.tables import Rules
 from swarmwire.comms.air.stage import Medium
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+
+NEGLIGIBLE = 1e-3  # power of a jammer over that of the noise
 
 
 class RadioGraph:
@@ -38,7 +40,8 @@ class RadioGraph:
         links = self._links
         pairs = links.pairs if np.array_equal(pose, links.pose) else links.pairs_at(pose)
         joined = alive[pairs.a] & alive[pairs.b] & (pairs.blocked == 0)
-        joined &= open_ways(self._disruption, pairs.a, pairs.b)
+        if self._disruption.anything:
+            joined &= self._disruption.joined(pairs.a, pairs.b)
         if self._jam.anything or self._measured is not None:
             joined &= self._get_through(pairs)
         else:
@@ -46,14 +49,15 @@ class RadioGraph:
         return np.stack(np.divmod(np.sort((pairs.a * len(pose) + pairs.b)[joined]), len(pose)), axis=1)
 
     def _get_through(self, pairs: Pairs) -> BoolArray:
-        """Which pairs, (k,): a packet meets either no jammer or all of them, each for the share of time that is so."""
-        jam_mw, clear = self._jam.at_worst()
-        weakened_db = 10.0 * np.log10(1.0 + jam_mw / self._rules.noise_mw)
+        """Which pairs, (k,): beside jammers that never pause, a packet meets no other or all of them."""
+        noise_mw = self._rules.noise_mw
+        steady_mw, all_mw, clear = self._jam.by_robot(NEGLIGIBLE * noise_mw)
+        steady_db, all_db = 10.0 * np.log10(1.0 + steady_mw / noise_mw), 10.0 * np.log10(1.0 + all_mw / noise_mw)
         joined = np.ones(len(pairs.a), np.bool_)
         ways = (pairs.a, pairs.b), (pairs.b, pairs.a)
         for mean_dbm, (sender, receiver) in zip(self._links.mean_dbm(pairs), ways, strict=True):
-            lone = lone_deliveries(self._rules, mean_dbm, self._bits)
-            jammed = lone_deliveries(self._rules, mean_dbm - weakened_db[receiver], self._bits)
+            lone = lone_deliveries(self._rules, mean_dbm - steady_db[receiver], self._bits)
+            jammed = lone_deliveries(self._rules, mean_dbm - all_db[receiver], self._bits)
             delivery = clear[receiver] * lone + (1.0 - clear[receiver]) * jammed
             if self._measured is not None:
                 delivery *= self._measured.ratio(sender, receiver)

@@ -39,7 +39,7 @@ class Reports:
             parts[0] if len(parts) == 1 else Told._make(np.concatenate(columns) for columns in zip(*parts, strict=True))
         )
         # An addressed packet may have been heard in an earlier call, and only now be done at its sender.
-        used = (packet["is_done"] > 0) & (queued.intended > 0)
+        used = (packet["is_done"] > 0) & (packet["is_departed"] == 0)
         used[row.packet] = True
         index, local = np.flatnonzero(used), np.cumsum(used) - 1
         was_on_air, on_air_at_ns = packet["fate"] == HEARD, packet["on_air_at_ns"].copy()

@@ -15,6 +15,7 @@ from swarmwire.comms.air.signal.tables import (
     KEPT_ALL,
     KEPT_NEWEST,
     NOBODY,
+    NOT_LEARNED,
     NOTHING,
     PAUSING,
     SENDING,
@@ -114,7 +115,7 @@ def listened(rules, state, queue, told, r, now_ns):
         return
     me = state.robot[r]
     state.packet[me.packet].result = FOUND_BUSY
-    if me.last_fate == NOBODY:
+    if me.attempt == 0:
         telling.refuse(state, told, me.packet, CHANNEL_BUSY, now_ns)
     else:
         telling.settle(state, told, r, now_ns)
@@ -122,13 +123,18 @@ def listened(rules, state, queue, told, r, now_ns):
 
 
 @borrowing()
-def send(rules, state, queue, r, now_ns):
+def send(rules, state, queue, told, r, now_ns):
     """The packet being served goes on air."""
     me = state.robot[r]
     if me.on_air != SILENT:  # an acknowledgement of its own is still on air
         begin(rules, state, queue, r, now_ns)
         return
     packet = state.packet[me.packet]
+    if me.attempt > 0 and state.off[r] != HEARD:  # it was on air before: that is what becomes of it
+        state.reception[r].is_deaf = 0
+        telling.settle(state, told, r, now_ns)
+        pause(rules, state, queue, r, packet.pause_ns, now_ns)
+        return
     packet.on_air_at_ns = now_ns
     me.stage = SENDING
     packet.fate = state.off[r]
@@ -156,7 +162,7 @@ def sent(rules, bursts, state, queue, told, r, now_ns):
         pause(rules, state, queue, r, packet.pause_ns, now_ns)
         return
     telling.report(rules, state, queue, told, r, now_ns)
-    if packet.to != NOBODY and rules.acknowledged:
+    if packet.to != NOBODY and rules.acknowledged and packet.result != NOT_LEARNED:
         me.stage = AWAITING
         schedule(queue, TIMER, r, now_ns + rules.patience_ns)
         return
@@ -194,6 +200,10 @@ def fail(rules, state, queue, told, r, now_ns):
         me.exponent += 1
         dcf.wait_after(rules, state, r)
     begin(rules, state, queue, r, now_ns)
+    if state.off[r] == KEPT_NEWEST and me.waiting > 0:
+        telling.give_up_older(state, told, r, me.entry - 1, now_ns)
+        me.waiting = 1
+        serve(rules, state, queue, r, now_ns)
 
 
 @borrowing()
@@ -215,7 +225,9 @@ def stop(state, queue, told, r, now_ns, fate):
     for kind in (TIMER, LISTENED, SEND, ANSWER, ENTER):
         cancel(queue, kind, r)
     sending = me.stage == SENDING
-    if me.stage == AWAITING:
+    if sending:
+        state.packet[me.packet].result = NOT_LEARNED
+    elif me.stage >= BACKING_OFF and (me.stage == AWAITING or me.attempt > 0):  # it was on air
         telling.settle(state, told, r, now_ns)
     first = me.next - (me.stage >= BACKING_OFF)
     for at in range(first, me.stop):

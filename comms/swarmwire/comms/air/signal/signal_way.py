@@ -50,7 +50,6 @@ from swarmwire.comms.packets import Sent
 
 LEAST_ROOM = 4096
 LONG_AGO_NS = -(10**15)
-HEADER_BYTES = 6  # of IEEE 802.15.4 before its PSDU
 
 
 class SignalWay(Way):
@@ -152,7 +151,7 @@ class SignalWay(Way):
         events.line_up(state, self._events, start)
         room = told(len(self._packet) + 1)
         events.stop_the_dead(state, self._events, room, coming.alive, at_ns)
-        events.cut_off(state, coming.alive, coming.radio_on)
+        events.cut_off(self._rules, state, self._events, coming.alive, coming.radio_on, at_ns)
         kept_back.switch(self._rules, state, self._events, room, at_ns)
         return self._decided([taken_out(room)], lives)
 
@@ -227,6 +226,7 @@ class SignalWay(Way):
         if self._rules.acknowledged:
             self._outcomes.append(learned(self._packet, self._queued.outcome_id))
         kept = np.flatnonzero(self._packet["is_done"] == 0)
+        self._packet["is_departed"] |= settled
         queued = self._queued._replace(intended=np.where(settled, 0, self._queued.intended))
         self._queued, self._packet = queued.select(kept), self._packet[kept]
 

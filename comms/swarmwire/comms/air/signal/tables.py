@@ -18,6 +18,7 @@ KEPT_ALL, KEPT_NEWEST = -1, -2
 SILENT, DATA, ACKNOWLEDGEMENT = range(3)
 RECEIVING = 255  # of a link, beside the fates: the frame on air may still be heard
 NOBODY = -1
+NOT_LEARNED = -1  # the result of a packet whose sender died while it was on air
 
 _I, _F = np.int64, np.float64
 
@@ -85,6 +86,7 @@ PACKET = np.dtype(
         ("is_entered", _I),
         ("is_settled", _I),  # its one receiver heard it
         ("is_done", _I),
+        ("is_departed", _I),  # it was reported before, and is not done yet
         ("on_air_at_ns", _I),  # of the latest attempt
         ("fate", _I),  # that it had at the sender's radio, or HEARD: it was on air
         ("result", _I),  # SendResult, once it is done: what its sender knows

@@ -25,7 +25,7 @@ def give_up_older(state, told, r, newest, now_ns):
     """What waits at the robot's radio before the packet at place `newest` of its order ends: the radio is off."""
     me = state.robot[r]
     if me.stage == HELD:
-        if me.last_fate == NOBODY:
+        if me.attempt == 0:
             refuse(state, told, me.packet, BLACKOUT, now_ns)
         else:
             settle(state, told, r, now_ns)

@@ -49,7 +49,6 @@ class Dcf:
     least_window: int  # CWmin, slots
     most_window: int = 1023  # CWmax, slots
     most_retries: int = 7  # of short unicast frames
-    busy_frame_dbm: float = -82.0  # a frame of its own kind that counts as busy (17.3.10.5)
     busy_energy_dbm: float = -62.0  # anything else
 
     @property

@@ -131,6 +131,9 @@ def _probe_contention(preset: str, contention: str | None, settings: list[str], 
 
     radio = radio_of(preset, settings)
     nodes, payload_bytes, interval_s = _parts(contention or "")
+    most = radio.max_payload_bytes
+    if payload_bytes > most:
+        raise BadInput("--contention", "", f"expected 0 to {most} bytes, which the radio takes; got {payload_bytes}")
     with compiling_told(Console(stderr=True)):
         found = contend(radio, nodes, payload_bytes, interval_s, range(1, runs + 1), measured_s=measured_s)
     typer.echo(json.dumps(asdict(found)))
