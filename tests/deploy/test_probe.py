@@ -62,6 +62,16 @@ def test_signals_have_a_strength_that_walls_and_distance_take():
     assert strength[0] > strength[-1]
 
 
+def test_a_robot_that_sends_does_so_with_the_power_of_its_group():
+    jammed = ROOT / "scenarios" / "jammed.toml"
+    base, strong = (
+        coverage(jammed, "--from", "lead-0", "--set", f"robots.lead.radio.power_dbm={dbm}") for dbm in (-25.0, -5.0)
+    )
+    assert base["map"]["at_m"] == strong["map"]["at_m"]
+    by_distance = [found["by_distance"]["mean_dbm"]["mean"] for found in (base, strong)]
+    assert by_distance[1][5] == pytest.approx(by_distance[0][5] + 20.0)
+
+
 def test_people_get_a_table_and_a_picture(tmp_path):
     text = said(WALLED, "--to", tmp_path / "coverage.png", "--size", "400")
     assert "sensitivity -101.0 dBm" in text

@@ -68,7 +68,7 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({**SIGNAL, "frame": "802.11b"}, "radio.bit_rate_bps: 802.11b has 1000000"),
     ({**SIGNAL, "reception": {"model": "table"}}, "radio.reception.table: is missing"),
     ({**SIGNAL, "delays": {"distribution": "uniform", "deviation_s": 1.0}}, "radio.delays.deviation_s"),
-    ({"preset": "ieee802154", "model": "disk", "range_m": 1.0}, "radio.log_distance: expected model"),
+    ({"preset": "ieee802154", "model": "disk", "range_m": 1.0}, "radio.antenna: expected a model with signals"),
     (
         {**SIGNAL, "bursts": {"p": 0.1, "r": 0.5, "interval_s": 0.1, "bad_s": 1.0}},
         "radio.bursts.p: expected either bad_s and good_s, or p, r and interval_s; got bad_s and p and r",
@@ -78,7 +78,27 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({**SIGNAL, "bursts": {"interval_s": 0.1}}, "radio.bursts.p: is missing; expected p, r and"),
     ({**SIGNAL, "bursts": {"p": 0.5, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.r: expected less than 1 - p"),
     ({**SIGNAL, "bursts": {"p": 1.0, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.p: expected a number above 0 and"),
+    ({"range_m": 2.0, "cut_off_db": 3.0}, "radio.cut_off_db: expected a model with signals"),
+    (
+        {**SIGNAL, "bursts": {"loss_bad": 0.1, "loss_good": 0.2}},
+        "radio.bursts.loss_bad: expected at least loss_good",
+    ),
+    ({**SIGNAL, "access": {"method": "aloha", "most_retries": 3}}, "radio.access.most_retries: expected method csma-"),
+    ({**SIGNAL, "access": {"method": "none", "busy_dbm": -70.0}}, "radio.access.busy_dbm: expected method csma-802154"),
+    ({**SIGNAL, "reception": {"least_sinr_db": 3.0}}, 'radio.reception.least_sinr_db: expected "threshold" with it'),
+    ({**SIGNAL, "fading": {"distribution": "nakagami", "k": 3.0}}, 'radio.fading.k: expected "rician" with it'),
+    ({**SIGNAL, "fading": {"distribution": "rician", "m": 1.0}}, 'radio.fading.m: expected "nakagami" with it'),
+    (
+        {"preset": "wifi-b-1M", "reception": {"model": "802.15.4"}},
+        "radio.reception.model: expected one of threshold, table, 802.11b for frames of 802.11b; got 802.15.4",
+    ),
 ]
+
+
+def test_another_model_than_the_presets_takes_the_presets_path_loss_with_it() -> None:
+    radio = radio_of({"preset": "ieee802154", "model": "friis"})
+    assert (radio.model, radio.log_distance) == ("friis", None)
+    assert radio.access_or_default.method == "csma-802154"
 
 
 @pytest.mark.parametrize(("table", "text"), FAULTS)

@@ -35,6 +35,8 @@ def check_radio(radio: Radio, where: str) -> None:
     if radio.bit_rate_bps not in rates_bps:
         listed = ", ".join(str(rate_bps) for rate_bps in rates_bps)
         raise BadInput(where, "radio.bit_rate_bps", f"{radio.frame} has {listed}; got {radio.bit_rate_bps} bit/s")
+    if radio.is_signal:
+        _check_fits(radio, where)
 
 
 def _check_disk(radio: Radio, where: str) -> None:
@@ -51,7 +53,6 @@ def _check_disk(radio: Radio, where: str) -> None:
 
 def _check_signal(radio: Radio, where: str) -> None:
     refuse_unfit(radio.reception_or_default, radio.bit_rate_bps, where, "radio.reception")
-    _check_fits(radio, where)
     if radio.bodies_block:
         raise BadInput(where, "radio.bodies_block", "expected the model disk with it; signals have radio.bodies")
     if radio.walls is not None and radio.needs_line_of_sight:
