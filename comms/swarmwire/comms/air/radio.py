@@ -69,7 +69,7 @@ class Radio:
 
     range_m: float | None = parameter(
         None,
-        help="no packet reaches receivers farther than this, centre to centre, but on measured links; the disk needs it",
+        help="no packet reaches receivers farther than this, centre to centre, but over measured links; disks need it",
         unit="m",
         above=0,
     )
