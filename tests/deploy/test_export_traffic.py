@@ -1,9 +1,11 @@
 """`swarmwire export --to traffic.pcapng`: what was on air, as an independent reader and tshark find it."""
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
+import polars as pl
 import pytest
 from typer.testing import CliRunner
 
@@ -11,6 +13,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, run
 from swarmwire.deploy.cli import app
 from swarmwire.deploy.recording import Recording
+from swarmwire.metrics.finding import State
+from swarmwire.metrics.verify import verify
 from tests.deploy.commands import ROOT
 from tests.metrics.capture.reading import Capture, read
 
@@ -90,7 +94,12 @@ def test_tshark_reads_every_frame_and_finds_no_fault(folders, tmp_path, preset):
 
 
 FAULTS = [
-    (["--gif"], "--to: expected a picture or a film"),
+    (["--gif"], "--to: expected a file name for --png, --gif, --mp4 or --pdr"),
+    (["--pdr"], "--to: expected a file name for --png, --gif, --mp4 or --pdr"),
+    (["--from", "5", "--until", "4"], "--until: expected a time after --from 5, got 4"),
+    (["--from", "0.1", "--until", "0.1"], "--until: expected a time after --from 0.1, got 0.1"),
+    (["--from", "nan"], "--from: expected a time of 0 to 1e\\+09 s, got nan"),
+    (["--until", "inf"], "--until: expected a time of 0 to 1e\\+09 s, got inf"),
     (["--size", "300"], "--size: expected a picture or a film with it"),
     (["--arena", "3"], "--arena: expected 0 to 0, got 3"),
 ]
@@ -101,6 +110,42 @@ def test_what_does_not_fit_a_capture_is_refused(folders, tmp_path, options, text
     with pytest.raises(BadInput, match=text):
         exported(folders["argos-rab"], tmp_path / "t.pcapng", *options)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_older_kind_of_capture_is_refused_with_the_name_of_the_newer(folders, tmp_path):
+    with pytest.raises(BadInput, match=r"t\.pcap: expected a file name that ends in \.pcapng for a capture"):
+        exported(folders["argos-rab"], tmp_path / "t.pcap")
+
+
+DAMAGED = [
+    (pl.lit(99).cast(pl.Int32).alias("sender"), r"sender is beyond 5, the last of static\.json in \d+ rows"),
+    (pl.lit(-1).cast(pl.Int32).alias("to"), r"to is below 0 in \d+ rows"),
+    (pl.lit(None).cast(pl.Int64).alias("on_air_at_ns"), r"on_air_at_ns is null in \d+ rows"),
+    (pl.col("on_air_at_ns").cast(pl.String), "on_air_at_ns is of type String, expected Int64"),
+    (pl.lit("eaten").alias("fate"), "fate is of type String, expected Enum"),
+]
+
+
+@pytest.mark.parametrize(("change", "text"), DAMAGED)
+def test_damaged_packets_are_refused_with_file_and_fault_and_verify_finds_them(folders, tmp_path, change, text):
+    folder = tmp_path / "run"
+    shutil.copytree(folders["argos-rab"], folder)
+    file = folder / "packets.parquet"
+    pl.read_parquet(file).with_columns(change).write_parquet(file)
+    with pytest.raises(BadInput, match=rf"packets\.parquet: expected a table as a run writes it, but {text}"):
+        exported(folder, tmp_path / "t.pcapng")
+    assert not (tmp_path / "t.pcapng").exists()
+    (found,) = (finding for finding in verify(folder) if finding.part == "packets")
+    assert found.state is State.DAMAGED
+    assert re.match(text, found.text)
+
+
+def test_packets_of_an_older_record_without_addressees_are_captured(folders, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(folders["argos-rab"], folder)
+    file = folder / "packets.parquet"
+    pl.read_parquet(file).drop("to", "payload").write_parquet(file)
+    assert len(exported(folder, tmp_path / "t.pcapng").packets) > 20
 
 
 def test_a_run_whose_packets_were_not_recorded_is_refused_with_the_way_out(tmp_path):

@@ -11,6 +11,7 @@ from swarmwire.metrics.verify import verify
 from tests.deploy.commands import LOSSY, ROOT
 
 SIGNALS = ROOT / "scenarios" / "flocking-802154.toml"
+JAMMED = ROOT / "scenarios" / "jammed.toml"
 TABLES = ("radio_robots", "radio_distances", "radio_links")
 
 
@@ -26,6 +27,18 @@ def test_tables_of_the_radio_are_alike_in_one_process_and_in_many_and_agree_with
         one, many = (getattr(folder, table)() for folder in folders.values())
         assert len(one) > 0
         assert_frame_equal(one, many)
+
+
+def test_what_a_jammer_drowned_is_counted_for_sender_receiver_and_link(tmp_path):
+    record = Recording(links=True, rrd=False)
+    summary = run(
+        JAMMED, overrides=["duration_s=2", "events.0.at_s=0.5"], out=tmp_path / "run", record=record
+    ).summary()
+    folder, jammed = RunFolder(tmp_path / "run"), summary["radio"]["fates"]["jammed"]
+    robots, links = folder.radio_robots(), folder.radio_links()
+    assert jammed > 0
+    assert robots["as_sender_jammed"].sum() == robots["as_receiver_jammed"].sum() == jammed
+    assert links.filter(links["fate"] == "jammed")["packets"].sum() == jammed
 
 
 def called(*arguments):

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,6 +39,14 @@ def bins(table, arena=0):
 @pytest.mark.parametrize(("range_m", "width_m"), [(2.0, 0.1), (3.9, 0.1), (4.0, 0.2), (100.0, 5.0), (0.05, 0.002)])
 def test_bins_have_a_round_width_and_at_least_twenty_lie_within_range(range_m, width_m):
     assert bin_width_m(range_m) == pytest.approx(width_m)
+
+
+@pytest.mark.parametrize("range_m", [5e-324, 1e-300, 1e-7, 0.2, 2.0, None, 1e300])
+def test_however_short_the_range_the_bins_reach_across_the_arena_and_are_few(range_m):
+    counts = DistanceCounts(replace(static(2), range_m=range_m))
+    across_m = math.hypot(8.0, 6.0)
+    assert across_m < counts.intended.shape[1] * counts.width_m < 1.2 * across_m
+    assert 20 <= counts.intended.shape[1] <= 2002
 
 
 def test_everybody_alive_is_meant_by_a_broadcast_however_far_away_and_only_one_by_an_addressed_packet():

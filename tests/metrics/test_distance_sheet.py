@@ -3,6 +3,7 @@
 import struct
 
 import numpy as np
+import polars as pl
 import pytest
 
 from swarmwire.comms.errors import BadInput
@@ -44,3 +45,23 @@ def test_what_cannot_be_drawn_is_refused(tmp_path):
     (tmp_path / "radio_distances.parquet").unlink()
     with pytest.raises(BadInput, match="radio_distances: expected this table"):
         draw_distances(RunFolder(tmp_path), 0, tmp_path / "pdr.png", 640)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (pl.col("pdr").cast(pl.String), "pdr is of type String, expected Float64"),
+        (pl.lit(None, pl.Float64).alias("from_m"), r"from_m is null in \d+ rows"),
+        (pl.lit(7.0).alias("pdr"), r"pdr is not heard / intended in \d+ rows"),
+        (None, "no column pdr"),
+    ],
+)
+def test_a_damaged_table_is_refused_with_file_and_fault(tmp_path, change, text):
+    of = static(6)
+    record(tmp_path, of, ticks(DISK, of, 3, count=20))
+    file = tmp_path / "radio_distances.parquet"
+    table = pl.read_parquet(file)
+    (table.drop("pdr") if change is None else table.with_columns(change)).write_parquet(file)
+    with pytest.raises(BadInput, match=rf"radio_distances\.parquet: expected a table as a run writes it, but {text}"):
+        draw_distances(RunFolder(tmp_path), 0, tmp_path / "pdr.png", 640)
+    assert not (tmp_path / "pdr.png").exists()

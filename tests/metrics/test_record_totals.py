@@ -1,6 +1,7 @@
 """The tables that are totals: written as the run ends, read back, and compared with the summary."""
 
 import json
+import re
 
 import numpy as np
 import polars as pl
@@ -59,14 +60,48 @@ def test_the_tables_of_a_run_agree_with_its_summary_and_with_one_another(folder)
 
 
 @pytest.mark.parametrize(
-    ("table", "column"), [("radio_robots", "as_sender_lost"), ("radio_links", "packets"), ("radio_distances", "heard")]
+    ("table", "columns"),
+    [
+        ("radio_robots", ["as_sender_lost", "as_receiver_lost"]),
+        ("radio_links", ["packets"]),
+        ("radio_distances", ["heard", "intended"]),
+    ],
 )
-def test_a_table_that_does_not_agree_with_the_summary_is_named(folder, table, column):
+def test_a_table_that_does_not_agree_with_the_summary_is_named(folder, table, columns):
     file = folder.path / f"{table}.parquet"
-    pl.read_parquet(file).with_columns(pl.col(column) + 1).write_parquet(file)
+    pl.read_parquet(file).with_columns(pl.col(columns) * 2).write_parquet(file)
     assert states(folder) == {**dict.fromkeys(TOTALS, State.WHOLE), table: State.DIFFERS}
     file.unlink()
     assert states(folder)[table] == State.MISSING
+
+
+@pytest.mark.parametrize(
+    ("table", "change", "state", "text"),
+    [
+        ("radio_distances", pl.lit(7.0).alias("pdr"), State.DAMAGED, r"pdr is not heard / intended in \d+ rows"),
+        ("radio_distances", pl.col("pdr").cast(pl.String), State.DAMAGED, "pdr is of type String, expected Float64"),
+        ("radio_distances", pl.lit(None, pl.Float64).alias("from_m"), State.DAMAGED, "from_m is null in"),
+        ("radio_robots", pl.col("robot").reverse(), State.DAMAGED, r"flock-4 \(arena 0\) stands in the place"),
+        ("radio_robots", pl.lit(0, pl.Int64).alias("as_receiver_heard"), State.DIFFERS, "0 heard over receivers and"),
+        ("radio_robots", pl.lit(-1, pl.Int64).alias("packets"), State.DAMAGED, "packets is below 0 in 10 rows"),
+        ("radio_links", pl.lit(99, pl.Int32).alias("sender"), State.DAMAGED, "sender is beyond 4, the last of static"),
+        ("radio_links", pl.lit(2, pl.Int32).alias("arena"), State.DAMAGED, "arena is beyond 1, the last of static"),
+    ],
+)
+def test_what_cannot_be_in_a_table_is_named(folder, table, change, state, text):
+    file = folder.path / f"{table}.parquet"
+    pl.read_parquet(file).with_columns(change).write_parquet(file)
+    assert states(folder) == {**dict.fromkeys(TOTALS, State.WHOLE), table: state}
+    (found,) = (finding for finding in verify(folder.path) if finding.part == table)
+    assert re.match(text, found.text)
+
+
+def test_without_static_json_tables_are_checked_as_far_as_they_go(folder):
+    (folder.path / "static.json").unlink()
+    assert states(folder) == dict.fromkeys(TOTALS, State.WHOLE)
+    file = folder.path / "radio_links.parquet"
+    pl.read_parquet(file).with_columns(pl.col("packets").cast(pl.Float64)).write_parquet(file)
+    assert states(folder)["radio_links"] == State.DAMAGED
 
 
 def test_the_ratio_is_heard_over_intended_in_bins_side_by_side(folder):

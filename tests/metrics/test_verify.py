@@ -26,7 +26,7 @@ DIGEST = sha256("".join(HASHES).encode()).digest()[:8]
 
 def seen_ticks(of):
     kill = Happened(0, 0.0, "kill", False, np.array([False, True, False] * ARENAS))
-    ended = links([0, 0, 1], [1, 2, 0], [5, 5, 6], 0, arena=[0, 0, 1], fate=[Fate.HEARD, Fate.LOST, Fate.HEARD])
+    ended = links([0, 0, 1], [1, 2, 0], [5, 5, 6], 1, arena=[0, 0, 1], fate=[Fate.HEARD, Fate.LOST, Fate.HEARD])
     counted = tally({Fate.HEARD: 1, Fate.LOST: 1, Fate.OUT_OF_RANGE: 3}, {Fate.HEARD: 1})
     yield from wandering(of, TICKS, events=(kill,), finished=ended, tally=counted)
 

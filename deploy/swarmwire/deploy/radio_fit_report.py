@@ -14,7 +14,9 @@ from swarmwire.metrics.radio_fit.radio_fit import RadioFit
 def print_fit(fit: RadioFit, title: str, console: Console) -> None:
     """Parameters with their standard errors, residuals, models of loss, and what may be biased."""
     received, links = int(fit.log.received.sum()), len(fit.log.links)
-    console.print(f"{title}: {len(fit.sequences.lost)} packets on {links} links, {received} received", soft_wrap=True)
+    packets = len(fit.sequences.lost)
+    counts = f"{packets} packet{'s' if packets != 1 else ''} on {links} link{'s' if links != 1 else ''}"
+    console.print(f"{title}: {counts}, {received} received", soft_wrap=True)
     _print_parameters(fit, console)
     residuals = list(residual_rows(fit))
     if residuals:

@@ -29,7 +29,10 @@ class AgeOfInformation(Metric):
     """
 
     name = "age_of_information"
-    help = "age of the newest packet that a robot has heard from another, mean over pairs that ever heard, in s"
+    help = (
+        "age of the newest packet that a robot has heard from another, mean over pairs that ever heard, in s; pairs "
+        "that are out of reach now age on"
+    )
     unit = "s"
     bounds = (0.0, None)
 

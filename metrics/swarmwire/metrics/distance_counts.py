@@ -12,6 +12,7 @@ from swarmwire.comms.truth import Departed, Finished, Static, Truth
 from swarmwire.metrics.geometry_tick import geometry_tick
 
 BINS_WITHIN_RANGE = 20  # at least
+RANGES_ACROSS = 40  # ranges that an arena has bins of their own for; of shorter ones it has 2000 bins at most
 ROUND_WIDTHS = (1.0, 2.0, 5.0)
 PAIRS_PER_TICK = 5_000  # at most about, in an arena where each robot broadcasts once in a tick
 # Odd multipliers: that of Knuth's Fibonacci hashing (2^64 over the golden ratio), and another.
@@ -40,7 +41,8 @@ class DistanceCounts:
     def __init__(self, static: Static) -> None:
         self._static = static
         across_m = math.hypot(*static.arena_size_m)
-        self.width_m = bin_width_m(min(static.range_m or across_m, across_m))
+        range_m = across_m if static.range_m is None else static.range_m
+        self.width_m = bin_width_m(min(max(range_m, across_m / RANGES_ACROSS), across_m))
         self._bins = int(across_m / self.width_m) + 2
         self._bits = max(0, math.ceil(math.log2(static.robots**2 / PAIRS_PER_TICK)))
         self.every = 2**self._bits

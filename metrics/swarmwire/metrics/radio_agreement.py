@@ -14,14 +14,29 @@ if TYPE_CHECKING:
 # Fates that every receiver has on a link of its own.
 LINK_FATES = tuple(
     FATE_NAMES[fate]
-    for fate in (Fate.HEARD, Fate.BLOCKED, Fate.LOST, Fate.TOO_WEAK, Fate.COLLIDED, Fate.BURST, Fate.PARTITIONED)
+    for fate in (
+        Fate.HEARD,
+        Fate.BLOCKED,
+        Fate.LOST,
+        Fate.TOO_WEAK,
+        Fate.COLLIDED,
+        Fate.BURST,
+        Fate.PARTITIONED,
+        Fate.JAMMED,
+    )
 )
 NOT_FINAL = FATE_NAMES[Fate.IN_FLIGHT]  # the summary counts packets too that never left their sender's radio
 
 
 def robots_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
-    """As many receivers of each fate, over all senders."""
+    """As many receivers of each fate over all senders, and of fates that links have over all receivers too."""
     table = _counted(files)
+    for row in _sums(table, [f"{side}_{fate}" for side in ("as_sender", "as_receiver") for fate in LINK_FATES]):
+        for fate in LINK_FATES:
+            sent, got = row[f"as_sender_{fate}"], row[f"as_receiver_{fate}"]
+            if sent != got:
+                text = f"{got} {fate} over receivers and {sent} over senders (arena {row['arena']})"
+                return State.DIFFERS, f"{text}; expected as many"
     columns = {fate: f"as_sender_{fate}" for fate in FATE_NAMES if fate != NOT_FINAL}
     totals = {
         (row["arena"], fate): row[name]
@@ -58,7 +73,7 @@ def _counted(files: list[Path]) -> "pl.LazyFrame":
 def _sums(table: "pl.LazyFrame", columns: list[str]) -> list[dict[str, Any]]:
     import polars as pl
 
-    return table.group_by("arena").agg(pl.col(columns).sum()).collect().to_dicts()
+    return table.group_by("arena").agg(pl.col(columns).sum()).sort("arena").collect().to_dicts()
 
 
 def _compared(

@@ -15,6 +15,7 @@ from swarmwire.metrics.record.tick_columns import ROBOT_COLUMNS
 from swarmwire.metrics.recording_check import check_recording
 from swarmwire.metrics.run_folder import SCHEMAS, RunFolder
 from swarmwire.metrics.table_check import check_table
+from swarmwire.metrics.table_faults import table_fault
 
 Agreement = Callable[[list[Path], Mapping[str, Any] | None], Verdict]
 TABLES: dict[str, Agreement] = {
@@ -77,10 +78,27 @@ def _table(folder: RunFolder, name: str, summary: dict[str, Any] | None) -> Find
         return Finding(name, State.MISSING, found.text) if expected else Finding(name, State.NOT_RECORDED, "")
     if not found.files:
         return Finding(name, found.state, found.text)
+    fault = _fault(folder, name, found.files)
+    if fault is not None:
+        return Finding(name, State.DAMAGED, fault)
     reach = "; ".join(part for part in (_reach(name, found.files), found.text) if part)
     verdict = TABLES[name](found.files, summary) if found.state is not State.DAMAGED else None
     state, text = verdict or (found.state, "")
     return Finding(name, state, f"{text}; {reach}" if text else reach)
+
+
+def _fault(folder: RunFolder, name: str, files: list[Path]) -> str | None:
+    """What cannot be in its readable files, in words."""
+    import polars as pl
+
+    try:
+        static = folder.static
+    except BadInput:  # which has a finding of its own
+        static = None
+    try:
+        return table_fault(name, pl.scan_parquet(files), static)
+    except pl.exceptions.PolarsError as error:  # parts of different types
+        return str(error).splitlines()[0]
 
 
 def _columns(name: str) -> Collection[str]:

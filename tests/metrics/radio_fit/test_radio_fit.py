@@ -157,7 +157,9 @@ def test_rows_without_rssi_and_gaps_say_the_same(tmp_path, fit):
 
 def test_what_a_log_is_too_small_for_is_left_out_and_named(tmp_path):
     path = tmp_path / "few.csv"
-    path.write_text("t_s,tx,rx,seq,rssi_dbm,distance_m\n" + "".join(f"{i},a,b,{i},-50,{1 + i}\n" for i in range(20)))
+    path.write_text(
+        "t_s,tx,rx,seq,rssi_dbm,distance_m\n" + "".join(f"{i},a,b,{i},{-50 - i},{1 + i}\n" for i in range(20))
+    )
     found = fit_radio(read_log(path))
     assert isinstance(found.path_loss, PathLossFit)
     assert found.shadowing == "needs positions of sender and receiver, of which distance_m tells too little"
@@ -216,3 +218,25 @@ def test_runs_of_lost_packets_are_as_long_as_those_that_the_emulator_makes():
     means = lost.sum(axis=0) / runs
     expected = float((expected_runs(bursts, 0.1, 200) * np.arange(1, 201)).sum())
     assert abs(means.mean() - expected) < STANDARD_ERRORS * means.std() / np.sqrt(len(means))
+
+
+@pytest.mark.parametrize(
+    ("slope_db", "way"),
+    [
+        (0.0, "does not fall"),
+        (1.0, "does not fall"),
+        (-1e-6, "does not fall"),
+        (-3.0, "falls too little"),
+        (-400.0, "falls too fast"),
+    ],
+)
+def test_a_line_that_no_medium_has_is_left_out(tmp_path, slope_db, way):
+    path = tmp_path / "flat.csv"
+    rows = [f"{i},a,b,{i},{-50 + slope_db * np.log10(1 + i)},{1 + i}\n" for i in range(20)]
+    path.write_text("t_s,tx,rx,seq,rssi_dbm,distance_m\n" + "".join(rows))
+    found = fit_radio(read_log(path))
+    assert isinstance(found.path_loss, str)
+    assert found.path_loss.startswith(f"RSSI {way} with distance: expected an exponent of 0.5 to 20, got ")
+    assert found.shadowing == "needs a fit of path loss"
+    assert not len(found.residual_db)
+    assert radio_table(found, Antenna()) == {"radio": {}}

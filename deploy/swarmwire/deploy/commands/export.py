@@ -23,6 +23,7 @@ USUAL_NAME = {"png": "picture.png", "gif": "film.gif", "mp4": "film.mp4", "pdr":
 USUAL_SIZE_PX = {"png": 1280, "gif": 480, "mp4": 960, "pdr": 1280}
 USUAL_FRAMES_PER_S = {"gif": 10.0, "mp4": 25.0}
 SUFFIXES = {"png": (".png", ".svg", ".pdf"), "gif": (".gif",), "mp4": (".mp4",), "pdr": (".png", ".svg", ".pdf")}
+OLD_CAPTURES = (".pcap", ".cap")  # which hold no comments
 PALETTE_SAMPLES = 8
 
 
@@ -92,6 +93,8 @@ def export_command(
         frames = export_traffic(run, to, arena, from_s, until_s)
         console.print(f"written: {to} ({frames} frames)", soft_wrap=True)
         return
+    if to is not None and to.suffix.lower() in OLD_CAPTURES:
+        raise BadInput(str(to), "", f"expected a file name that ends in {SUFFIX} for a capture")
     from swarmwire.metrics.drawing.film_figure import FilmFigure
     from swarmwire.metrics.drawing.whole_file import check_path
 
@@ -166,7 +169,9 @@ def _refuse_film_options(given: dict[str, float | None]) -> None:
 
 def _refuse_drawing_options(draws: bool, given: Mapping[str, object]) -> None:
     if draws:
-        raise BadInput("--to", "", f"expected a picture or a film of --png, --gif or --mp4; {SUFFIX} is neither")
+        raise BadInput(
+            "--to", "", f"expected a file name for --png, --gif, --mp4 or --pdr; {SUFFIX} is a capture, without these"
+        )
     for option, value in given.items():
         if value is not None:
             raise BadInput(option, "", f"expected a picture or a film with it; {SUFFIX} is neither")

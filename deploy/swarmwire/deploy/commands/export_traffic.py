@@ -5,6 +5,7 @@ from pathlib import Path
 from swarmwire.comms.errors import BadInput
 
 SUFFIX = ".pcapng"
+MOST_S = 1e9  # above all that a run may last; in ns it still is a number of 64 bits
 
 
 def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_s: float | None) -> int:
@@ -19,9 +20,15 @@ def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_
     from swarmwire.metrics.drawing.whole_file import check_path
     from swarmwire.metrics.record.names import SCENARIO
     from swarmwire.metrics.run_folder import RunFolder
+    from swarmwire.metrics.sound_table import sound_table
     from swarmwire.world.scenario_file import load_scenario
 
     check_path(to, (SUFFIX,))
+    for option, value_s in (("--from", from_s), ("--until", until_s)):
+        if value_s is not None and not 0.0 <= value_s <= MOST_S:
+            raise BadInput(option, "", f"expected a time of 0 to {MOST_S:g} s, got {value_s:g}")
+    if from_s is not None and until_s is not None and not from_s < until_s:
+        raise BadInput("--until", "", f"expected a time after --from {from_s:g}, got {until_s:g}")
     folder = RunFolder(run)
     if not 0 <= arena < folder.static.arenas:
         raise BadInput("--arena", "", f"expected 0 to {folder.static.arenas - 1}, got {arena}")
@@ -34,11 +41,12 @@ def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_
     link, names = link_of(radio), folder.static.robot_names
     if len(names) > link.most_robots:
         raise BadInput(str(run), "robots", f"expected at most {link.most_robots}, which have addresses of their own")
+    packets = sound_table(folder, "packets", folder.packets(arena))
     first_ns = 0 if from_s is None else to_ns(from_s)
     stop_ns = None if until_s is None else to_ns(until_s)
     frames = (
         frame
-        for frame in frames_on_air(folder.packets(arena), names)
+        for frame in frames_on_air(packets, names)
         if first_ns <= frame.on_air_at_ns and (stop_ns is None or frame.on_air_at_ns < stop_ns)
     )
     description = f"{folder.static.name}, seed {folder.static.seeds[arena]}: {radio.preset or radio.model}"

@@ -21,6 +21,7 @@ from swarmwire.metrics.drawing.looks import (
 )
 from swarmwire.metrics.drawing.plain_axes import plain_axes
 from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.sound_table import sound_table
 
 if TYPE_CHECKING:
     import polars as pl
@@ -34,7 +35,7 @@ def draw_distances(run: RunFolder, arena: int, to: Path, size_px: int) -> None:
     static = run.static
     if not 0 <= arena < static.arenas:
         raise BadInput("--arena", "", f"expected 0 to {static.arenas - 1}, got {arena}")
-    table = _shown(run.radio_distances(arena))
+    table = _shown(sound_table(run, "radio_distances", run.radio_distances(arena)))
     figure = new_figure(LONG_SIDE_IN, _HEIGHT_IN, size_px)
     title = static.name if static.arenas == 1 else f"{static.name}, seed {static.seeds[arena]}"
     figure.text(0.025, 0.945, title, fontsize=TITLE_PT, fontweight="bold", color=INK)

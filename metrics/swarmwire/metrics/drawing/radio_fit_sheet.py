@@ -28,6 +28,7 @@ from swarmwire.metrics.radio_fit.radio_fit import RadioFit
 from swarmwire.metrics.radio_fit.shadowing_fit import ShadowingFit
 
 _HEIGHT_IN = 4.6
+_DECADE = 10.0  # of the farthest distance over the nearest, from which on the axis is logarithmic
 _MOST_POINTS = 4000
 _LONGEST_SHARE = 0.999  # of bursts, that the axis reaches to
 _BAND = 1.645  # deviations: nine of ten packets
@@ -51,9 +52,14 @@ def _draw_rssi(axes: Any, fit: RadioFit) -> None:
         _say(axes, "no packet was received")
         return
     every = max(1, len(distance_m) // _MOST_POINTS)
-    axes.set_xscale("log")
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.xaxis.set_minor_formatter("{x:g}" if distance_m.max() < 10.0 * distance_m.min() else "")
+    if distance_m.max() >= _DECADE * distance_m.min():
+        from matplotlib.ticker import LogLocator
+
+        axes.set_xscale("log")
+        # Powers of ten alone would leave little more than a decade with a single label.
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter("")
     axes.plot(distance_m[::every], rssi_dbm[::every], ".", ms=2.5, mew=0, color=SOFT, alpha=0.4, label="packets")
     if isinstance(fit.path_loss, PathLossFit):
         ends_m = np.exp(np.linspace(math.log(distance_m.min()), math.log(distance_m.max()), 50))

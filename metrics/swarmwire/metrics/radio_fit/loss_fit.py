@@ -57,6 +57,8 @@ def fit_losses(sequences: LossSequences) -> LossFit | str:
     packets, lost = len(sequences.lost), int(sequences.lost.sum())
     if packets < LEAST_PACKETS:
         return f"needs {LEAST_PACKETS} packets, got {packets}"
+    if lost == packets:
+        return f"needs packets that were received; all {packets} were lost"
     share = lost / packets
     loss = Estimate(share, math.sqrt(share * (1.0 - share) / packets))
     sequences = sequences.thinned(MOST_PACKETS)

@@ -10,6 +10,8 @@ from swarmwire.metrics.radio_fit.estimate import Estimate
 LEAST_PACKETS = 10
 LEAST_SPAN = 1.5  # the farthest distance over the nearest: a slope over less would be that of the noise
 LEAST_CLUSTERS = 10
+# Along tunnels, which lead waves, it is near 1; below, range grows so fast with power that there is none.
+LEAST_EXPONENT, MOST_EXPONENT = 0.5, 20.0
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,16 @@ def why_not(distance_m: FloatArray) -> str | None:
     if span < LEAST_SPAN:
         return f"needs distances that span a factor of {LEAST_SPAN:g}, got {span:.2f}"
     return None
+
+
+def why_none(fit: PathLossFit) -> str | None:
+    """What is wrong with a line that no medium has; None if nothing."""
+    exponent = round(fit.exponent.value, 3) + 0.0  # what arithmetic leaves of none is none, and none is not -0
+    if LEAST_EXPONENT <= exponent <= MOST_EXPONENT:
+        return None
+    way = "does not fall" if exponent <= 0.0 else "falls too little" if exponent < LEAST_EXPONENT else "falls too fast"
+    bounds = f"{LEAST_EXPONENT:g} to {MOST_EXPONENT:g}"
+    return f"RSSI {way} with distance: expected an exponent of {bounds}, got {exponent:g}"
 
 
 def fit_path_loss(distance_m: FloatArray, rssi_dbm: FloatArray, cluster: IntArray) -> PathLossFit:

@@ -8,7 +8,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.metrics.radio_fit.estimate import Estimate
 from swarmwire.metrics.radio_fit.loss_fit import MOST_PACKETS, LossFit, fit_losses
 from swarmwire.metrics.radio_fit.loss_sequences import LossSequences, loss_sequences
-from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit, fit_path_loss, why_not
+from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit, fit_path_loss, why_none, why_not
 from swarmwire.metrics.radio_fit.places import places_of
 from swarmwire.metrics.radio_fit.radio_log import RadioLog
 from swarmwire.metrics.radio_fit.shadowing_fit import ShadowingFit, fit_shadowing
@@ -49,8 +49,7 @@ def fit_radio(log: RadioLog) -> RadioFit:
     """Fit what can be fitted; never raises for too little data."""
     sequences = loss_sequences(log)
     distance_m, rssi_dbm = log.distance_m[log.received], log.rssi_dbm[log.received]
-    lack = why_not(distance_m)
-    path_loss = lack or fit_path_loss(distance_m, rssi_dbm, _pairs(log)[log.received])
+    path_loss = _path_loss(log, distance_m, rssi_dbm)
     shadowing = _shadowing(log, path_loss)
     if isinstance(path_loss, PathLossFit) and isinstance(shadowing, ShadowingFit):
         # The fitted field knows better than clusters of packets how much the log tells of the line.
@@ -61,6 +60,14 @@ def fit_radio(log: RadioLog) -> RadioFit:
     losses = fit_losses(sequences)
     notes = _notes(log, losses, shadowing, len(sequences.lost))
     return RadioFit(log, path_loss, shadowing, losses, sequences, notes)
+
+
+def _path_loss(log: RadioLog, distance_m: FloatArray, rssi_dbm: FloatArray) -> PathLossFit | str:
+    lack = why_not(distance_m)
+    if lack is not None:
+        return lack
+    found = fit_path_loss(distance_m, rssi_dbm, _pairs(log)[log.received])
+    return why_none(found) or found
 
 
 def _shadowing(log: RadioLog, path_loss: PathLossFit | str) -> ShadowingFit | str:

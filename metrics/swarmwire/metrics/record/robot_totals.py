@@ -14,18 +14,16 @@ if TYPE_CHECKING:
     import polars as pl
 
 BITS_PER_BYTE = 8
-# Fates that are known for a receiver: the others are the sender's alone, or of receivers that are not listed.
-RECEIVERS_FATES = (
-    Fate.HEARD,
-    Fate.BLOCKED,
-    Fate.LOST,
-    Fate.RECEIVER_DEAD,
-    Fate.BLACKOUT,
-    Fate.PARTITIONED,
-    Fate.TOO_WEAK,
-    Fate.COLLIDED,
-    Fate.BURST,
-)
+# Decided before any receiver is: by the sender alone, or of receivers that are not listed.
+SENDERS_FATES = {
+    Fate.OUT_OF_RANGE,
+    Fate.QUEUE_FULL,
+    Fate.TOO_LARGE,
+    Fate.IN_FLIGHT,
+    Fate.SENDER_DEAD,
+    Fate.CHANNEL_BUSY,
+}
+RECEIVERS_FATES = tuple(fate for fate in Fate if fate not in SENDERS_FATES)
 
 
 class RobotTotals(TotalsRecorder):

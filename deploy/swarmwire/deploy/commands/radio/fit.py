@@ -8,6 +8,7 @@ import typer
 from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
+    from swarmwire.comms.air.propagation.parameters import Antenna
     from swarmwire.metrics.radio_fit.radio_fit import RadioFit
 
 USUAL_SIZE_PX = 1280
@@ -35,25 +36,29 @@ def fit_command(
     """Fit a radio's parameters to a log of real robots: path loss, shadowing, and losses, single or in bursts.
 
     A packet is lost if its row has no rssi_dbm, or if its number is missing between two rows of a link. Numbers count
-    what was sent on a link (or by a robot to all). The table fits into a scenario as it stands.
+    what was sent on a link (or by a robot to all). The table fits into a scenario as it stands; without path loss it
+    is for a radio that has a model or a range of its own.
     """
     from rich.console import Console
 
     from swarmwire.deploy.radio_fit_report import print_fit
+    from swarmwire.deploy.radio_fit_toml import radio_fit_toml
     from swarmwire.metrics.drawing.whole_file import check_path
 
     if write is not None:
         check_path(write, (".toml",))
     if to is not None:
         check_path(to, (".png", ".svg", ".pdf"))
+    antenna = _antenna(power_dbm, gain_dbi)
     fit = _fit(file, within)
+    text = radio_fit_toml(fit, antenna, file)
     print_fit(fit, str(file), Console(highlight=False))
     if to is not None:
         from swarmwire.metrics.drawing.radio_fit_sheet import draw_radio_fit
 
         draw_radio_fit(fit, file.name, to, size)
         typer.echo(f"written: {to}")
-    _write(_toml(fit, power_dbm, gain_dbi, file), write)
+    _write(text, write)
 
 
 def _fit(file: Path, within_m: float | None) -> "RadioFit":
@@ -68,14 +73,19 @@ def _fit(file: Path, within_m: float | None) -> "RadioFit":
     return fit_radio(log)
 
 
-def _toml(fit: "RadioFit", power_dbm: float, gain_dbi: float, file: Path) -> str:
-    import tomli_w
+def _antenna(power_dbm: float, gain_dbi: float) -> "Antenna":
+    """The antenna that the robots had; BadInput for one that no scenario takes."""
+    from dataclasses import fields
 
     from swarmwire.comms.air.propagation.parameters import Antenna
-    from swarmwire.metrics.radio_fit.radio_table import radio_table
+    from swarmwire.comms.parameters import fault_of, limits_of
 
-    table = radio_table(fit, Antenna(power_dbm, gain_dbi))
-    return f"# Fitted to {file.name} by swarmwire radio fit.\n{tomli_w.dumps(table)}"
+    antenna = Antenna(power_dbm, gain_dbi)
+    for of in fields(antenna):
+        fault = fault_of(getattr(antenna, of.name), limits_of(of))
+        if fault is not None:
+            raise BadInput(f"--{of.name.replace('_', '-')}", "", fault)
+    return antenna
 
 
 def _write(text: str, to: Path | None) -> None:
