@@ -140,6 +140,15 @@ def test_damaged_packets_are_refused_with_file_and_fault_and_verify_finds_them(f
     assert re.match(text, found.text)
 
 
+def test_packets_whose_arenas_are_no_numbers_are_refused_in_one_line_with_the_file(folders, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(folders["argos-rab"], folder)
+    file = folder / "packets.parquet"
+    pl.read_parquet(file).with_columns(pl.col("arena").cast(pl.String)).write_parquet(file)
+    with pytest.raises(BadInput, match=r"packets\.parquet: expected whole Parquet files [^\n]+$"):
+        exported(folder, tmp_path / "t.pcapng")
+
+
 def test_packets_of_an_older_record_without_addressees_are_captured(folders, tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(folders["argos-rab"], folder)

@@ -45,6 +45,15 @@ def test_it_is_the_mean_over_pairs_of_the_time_since_the_newest_heard_was_sent()
     assert np.isnan(found[:, 1]).all()
 
 
+def test_a_pair_that_went_out_of_reach_ages_on_as_the_metrics_help_says():
+    of, nothing = static(2), heard([], [], [])
+    apart = np.array([(0.0, 0.0, 0.0), (7.0, 0.0, 0.0)])  # the range is 2 m
+    seen = [truth(of, 1, finished=heard([0], [1], [50]))]
+    seen += [truth(of, tick, finished=nothing, pose=apart) for tick in (2, 3)]
+    assert ages(of, seen).ravel().tolist() == [pytest.approx(value) for value in (0.05, 0.15, 0.25)]
+    assert "out of reach now age on" in age_of_information.AgeOfInformation.help
+
+
 def test_what_was_overtaken_or_lost_changes_nothing_and_several_at_once_count_once():
     of = static(2)
     told = [

@@ -150,6 +150,11 @@ class RunFolder:
         whole = table_file(self.path, name)
         return [whole] if whole.exists() else parts_of(self.path, name)
 
+    def where(self, name: str) -> str:
+        """The path of a table's one file, or of the folder of its parts: for errors."""
+        files = self.files(name)
+        return str(files[0] if len(files) == 1 else self.path / name)
+
     def _checked(self, arena: int) -> int:
         if not 0 <= arena < self.static.arenas:
             raise BadInput(str(self.path), "arena", f"expected 0 to {self.static.arenas - 1}, got {arena}")
@@ -170,8 +175,9 @@ class RunFolder:
             except FileNotFoundError:
                 continue  # the run ended just now, and its parts were joined
             except pl.exceptions.PolarsError as error:
-                where = str(self.path / name)
-                raise BadInput(where, "", f"expected whole Parquet files ({error}); see swarmwire verify") from error
+                reason = str(error).splitlines()[0]
+                expected = f"expected whole Parquet files ({reason}); see swarmwire verify"
+                raise BadInput(self.where(name), "", expected) from error
         if name in SCHEMAS and (self.path / name).is_dir():  # a run that was killed before anything happened
             return pl.DataFrame(schema=SCHEMAS[name]())
         raise BadInput(str(self.path), name, "expected this table; the folder holds nothing of it")

@@ -15,6 +15,5 @@ def sound_table(run: RunFolder, name: str, table: "pl.DataFrame") -> "pl.DataFra
     fault = table_fault(name, table.lazy(), run.static)
     if fault is None:
         return table
-    files = run.files(name)
-    where = files[0] if len(files) == 1 else run.path / name
-    raise BadInput(str(where), "", f"expected a table as a run writes it, but {fault}; see swarmwire verify")
+    expected = f"expected a table as a run writes it, but {fault}; see swarmwire verify"
+    raise BadInput(run.where(name), "", expected)
