@@ -1,6 +1,14 @@
 """Settings for all tests: property tests draw the same examples in every run."""
 
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
-settings.register_profile("swarmwire", deadline=None, derandomize=True, database=None, print_blob=True)
+# The first example may wait for the compiler.
+settings.register_profile(
+    "swarmwire",
+    deadline=None,
+    derandomize=True,
+    database=None,
+    print_blob=True,
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile("swarmwire")
