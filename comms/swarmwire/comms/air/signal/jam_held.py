@@ -27,6 +27,9 @@ class JamHeld:
     def move(self, pose: FloatArray, around: Surroundings) -> None:
         """Robots stand at `pose` (rows, 3) from now on, and jammers are those of the disruption that holds."""
         self._jammers = self._medium.disruption.jammers
+        if not self.anything:
+            self._power_mw = np.empty((0, self._medium.robots))
+            return
         self._power_mw = powers_of(self._jammers, pose, self._medium.robots, self._medium.obstacles, around)
 
     def between(self, from_ns: int, until_ns: int) -> Jam:

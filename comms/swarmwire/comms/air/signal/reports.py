@@ -79,6 +79,8 @@ class Reports:
         """How many receivers in range packets would have that never went on air, (packets,)."""
         found = np.zeros(len(packets.sender), np.int64)
         tried = np.flatnonzero((packets.fate != HEARD) & (packets.fate != Fate.TOO_LARGE))
+        if not len(tried):
+            return found
         at, receiver = self._links.reached(packets.sender[tried])
         at = tried[at]
         to_all = packets.to[at] == BROADCAST

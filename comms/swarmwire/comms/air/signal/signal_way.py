@@ -96,9 +96,9 @@ class SignalWay(Way):
         self._poses = {hold: at for hold, at in self._poses.items() if hold in holds} | {self._hold: pose}
         if self._measured is not None:
             self._measured.move_to(self._now_ns)
-        antennas = self._antennas_now()
-        if not np.array_equal(antennas, self._antennas):
-            self._antennas = antennas
+        now = self._medium.disruption
+        if not all(map(np.array_equal, self._gains, (now.send_gain_db, now.receive_gain_db))):
+            self._antennas = self._antennas_now()
             self._links.tune(self._around(), levels_of(self._radio, self._rules))
         self._links.move(pose, self._robot, self._reception)
         self._jam.move(pose, self._links.around)
@@ -174,8 +174,9 @@ class SignalWay(Way):
     def _antennas_now(self) -> FloatArray:
         """What each robot radiates in dBm, and the gain in dBi with which it hears, under events too, (2, rows)."""
         antennas, antenna, now = self._medium.antennas, self._radio.antenna_or_default, self._medium.disruption
+        self._gains = now.send_gain_db.copy(), now.receive_gain_db.copy()
         own = np.stack([antennas.send_dbm(antenna), antennas.receive_dbi(antenna)])
-        return np.tile(own, len(self._medium.keys)) + np.stack([now.send_gain_db, now.receive_gain_db])
+        return np.tile(own, len(self._medium.keys)) + np.stack(self._gains)
 
     def _around(self) -> Surroundings:
         return surroundings_of(self._radio, self._medium.keys, self._radius_m, *self._antennas)
@@ -233,6 +234,8 @@ class SignalWay(Way):
 
 def _off(held: Disruption) -> IntArray:
     """What becomes of what each robot should send, (rows,): HEARD if its radio is on."""
+    if not held.anyone_out:
+        return np.full(len(held.alive), int(Fate.HEARD))
     off = np.select([held.backlog == ALL, held.backlog == NEWEST], [KEPT_ALL, KEPT_NEWEST], int(Fate.BLACKOUT))
     return np.where(held.alive, np.where(held.radio_on, int(Fate.HEARD), off), int(Fate.SENDER_DEAD))
 
