@@ -4,7 +4,7 @@ What is timed is all that a run asks of the air in a tick: time passes, poses ar
 graph is drawn. One thread.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,7 @@ CASES = {
     "air-disk-1000": Case("disk", 1000, 9.5, 20, ("radio.range_m=1.7",)),
     "air-wifi-80": Case("wifi-a-6M", 80, 600, 128),
 }
-SCALING = Case("ieee802154", 1000, 12, 20, ("radio.antenna.power_dbm=-20", *SHADOWED))
+SCALING = CASES["air-802154-1000"]
 SIZES = (100, 1000, 10_000)
 
 
@@ -109,12 +109,7 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
 
 def scaling() -> tuple[float, dict[str, Any]]:
     """The cost of a link among the most robots over that among the fewest, whichever is dearer on top."""
-    costs = [cost(case_of(robots), ticks=max(10, 20_000 // robots)) for robots in SIZES]
+    costs = [cost(replace(SCALING, robots=robots), ticks=max(10, 20_000 // robots)) for robots in SIZES]
     links_us = [1e6 * each.tick_s / each.told["robots"] / each.told["in_range"] for each in costs]
     told = {f"us_per_link_{robots}": round(us, 3) for robots, us in zip(SIZES, links_us, strict=True)}
     return max(links_us) / min(links_us), {**costs[-1].told, **told}
-
-
-def case_of(robots: int) -> Case:
-    """The scaling case with so many robots."""
-    return Case(SCALING.preset, robots, SCALING.in_range, SCALING.payload_bytes, SCALING.keys)
