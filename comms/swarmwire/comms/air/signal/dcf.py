@@ -11,10 +11,12 @@ import numpy as np
 
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import SEND, cancel, due_ns, schedule
+from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 
+DCF = METHODS.index("dcf")
 SLOTS, SLOTS_BEFORE = purpose("dcf slots"), purpose("dcf slots before sending")
 
 
@@ -31,15 +33,17 @@ def want(rules, state, queue, r, now_ns):
 
 
 @borrowing(inline="always")
-def has_changed(rules, reception):
-    """Whether the air at a robot has become busy, or free, since `change` was last called."""
-    is_busy = reception.is_deaf or reception.locked_to != NOBODY
-    is_busy = is_busy or reception.power_mw + reception.jam_mw >= rules.busy_mw
-    return is_busy != (reception.is_busy != 0)
+def sense(rules, state, queue, r, now_ns):
+    """What is on air at the robot may have changed; nothing to other methods."""
+    if rules.method == DCF:
+        it = state.reception[r]
+        is_busy = it.is_deaf or it.locked_to != NOBODY or it.power_mw + it.jam_mw >= rules.busy_mw
+        if is_busy != (it.is_busy != 0):
+            _change(rules, state, queue, r, now_ns)
 
 
 @borrowing()
-def change(rules, state, queue, r, now_ns):
+def _change(rules, state, queue, r, now_ns):
     """The air at the robot has become busy, or free."""
     me, reception = state.robot[r], state.reception[r]
     reception.is_busy = not reception.is_busy

@@ -5,12 +5,10 @@
 from swarmwire.comms.air.signal import dcf, jamming, on_air, service
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import ENTER, LISTENED, OFF_AIR, SEND, TIMER, cancel, schedule
-from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY, RECEIVING, SILENT
 from swarmwire.comms.fates import Fate
 
 SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_DEAD), int(Fate.BLACKOUT)
-DCF = METHODS.index("dcf")
 FEW = 64  # rows that any one event tells beyond a frame's links
 
 
@@ -90,5 +88,4 @@ def cut_off(rules, state, queue, alive, radio_on, now_ns):
             if state.link.now[i] == RECEIVING and not (alive[r] and radio_on[r]):
                 state.link.now[i] = BLACKOUT if alive[r] else RECEIVER_DEAD
                 on_air.let_go(state.reception[r])
-                if rules.method == DCF and dcf.has_changed(rules, state.reception[r]):
-                    dcf.change(rules, state, queue, r, now_ns)
+                dcf.sense(rules, state, queue, r, now_ns)

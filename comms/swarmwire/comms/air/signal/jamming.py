@@ -20,11 +20,8 @@ from swarmwire.comms.air.signal import dcf
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.link_table import Surroundings
 from swarmwire.comms.air.signal.on_air import count_chunk
-from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry import Obstacles, is_blocked
-
-DCF = METHODS.index("dcf")
 
 
 def powers_of(
@@ -86,5 +83,4 @@ def _refresh_arena(rules, state, queue, arena, now_ns):
         it = state.reception[r]
         count_chunk(rules, state.robot, it, now_ns)
         it.jam_mw = jam_mw
-        if rules.method == DCF and dcf.has_changed(rules, it):
-            dcf.change(rules, state, queue, r, now_ns)
+        dcf.sense(rules, state, queue, r, now_ns)

@@ -2,10 +2,10 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from swarmwire.comms.air.signal import service, telling
+from swarmwire.comms.air.signal import service
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import LISTENED, SEND, TIMER, cancel
-from swarmwire.comms.air.signal.tables import BACKING_OFF, HELD, KEPT_ALL, KEPT_NEWEST, NOTHING, SILENT, TURNING
+from swarmwire.comms.air.signal.tables import BACKING_OFF, HELD, KEPT_ALL, SILENT, TURNING
 
 
 @borrowing()
@@ -18,11 +18,7 @@ def switch(rules, state, queue, told, now_ns):
         me = state.robot[r]
         if state.off[r] <= KEPT_ALL:
             _hold_back(state, queue, r)
-            if state.off[r] == KEPT_NEWEST and me.waiting > 0:
-                telling.give_up_older(state, told, r, me.entry - 1, now_ns)
-                me.waiting = 1
-                if me.stage == NOTHING:
-                    service.serve(rules, state, queue, r, now_ns)
+            service.keep_newest(rules, state, queue, told, r, now_ns)
         elif me.stage == HELD:
             service.begin(rules, state, queue, r, now_ns)
 

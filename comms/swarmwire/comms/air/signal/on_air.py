@@ -20,7 +20,7 @@ from swarmwire.comms.fates import Fate
 
 HEARD, TOO_WEAK, COLLIDED, JAMMED = int(Fate.HEARD), int(Fate.TOO_WEAK), int(Fate.COLLIDED), int(Fate.JAMMED)
 HOPELESS = -50.0  # a logarithm below that of the least draw
-ALONE, DCF = METHODS.index("none"), METHODS.index("dcf")
+ALONE = METHODS.index("none")
 
 
 @borrowing()
@@ -36,9 +36,7 @@ def put_on_air(rules, state, queue, s, kind, now_ns, airtime_ns, bits):
             now[i] = RECEIVING if fate[i] == HEARD else fate[i]
         return
     turn_away(state, s)
-    is_dcf = rules.method == DCF
-    if is_dcf and dcf.has_changed(rules, reception[s]):
-        dcf.change(rules, state, queue, s, now_ns)
+    dcf.sense(rules, state, queue, s, now_ns)
     for i in range(me.first_link, me.weak_link):
         if fate[i] != HEARD:
             now[i] = fate[i]
@@ -46,14 +44,12 @@ def put_on_air(rules, state, queue, s, kind, now_ns, airtime_ns, bits):
         it = reception[receiver[i]]
         count_chunk(rules, robot, it, now_ns)
         _arrive(rules, robot, it, now, s, i, power_mw[i], now_ns)
-        if is_dcf and dcf.has_changed(rules, it):
-            dcf.change(rules, state, queue, receiver[i], now_ns)
+        dcf.sense(rules, state, queue, receiver[i], now_ns)
     for i in range(me.weak_link, me.stop_link):
         it = reception[receiver[i]]
         count_chunk(rules, robot, it, now_ns)
         _add(it, power_mw[i])
-        if is_dcf and dcf.has_changed(rules, it):
-            dcf.change(rules, state, queue, receiver[i], now_ns)
+        dcf.sense(rules, state, queue, receiver[i], now_ns)
 
 
 @borrowing()
@@ -68,9 +64,8 @@ def take_off_air(rules, bursts, state, queue, s, now_ns):
                 now[i] = outcome(rules, bursts, state, s, i, alone_log_success(rules, power_mw[i], me.bits))
         me.on_air = SILENT
         return
-    is_dcf = rules.method == DCF
     # Nothing but noise could take a frame.
-    is_sure = rules.loss == 0.0 and not bursts.is_on and me.on_air == DATA and len(bursts.traced.link) == 0
+    is_sure = rules.loss == 0.0 and not bursts.is_on and me.on_air == DATA and len(state.traced.link) == 0
     for i in range(me.first_link, me.weak_link):
         if fate[i] != HEARD:
             continue
@@ -84,18 +79,15 @@ def take_off_air(rules, bursts, state, queue, s, now_ns):
             else:
                 now[i] = outcome(rules, bursts, state, s, i, it.log_success)
             robot[receiver[i]].trust_from_ns = 0 if now[i] == HEARD else now_ns + rules.distrust_ns
-        if is_dcf and dcf.has_changed(rules, it):
-            dcf.change(rules, state, queue, receiver[i], now_ns)
+        dcf.sense(rules, state, queue, receiver[i], now_ns)
     for i in range(me.weak_link, me.stop_link):
         it = reception[receiver[i]]
         count_chunk(rules, robot, it, now_ns)
         _remove(it, power_mw[i])
-        if is_dcf and dcf.has_changed(rules, it):
-            dcf.change(rules, state, queue, receiver[i], now_ns)
+        dcf.sense(rules, state, queue, receiver[i], now_ns)
     me.on_air = SILENT
     reception[s].is_deaf = me.stage == TURNING
-    if is_dcf and dcf.has_changed(rules, reception[s]):
-        dcf.change(rules, state, queue, s, now_ns)
+    dcf.sense(rules, state, queue, s, now_ns)
 
 
 @borrowing()

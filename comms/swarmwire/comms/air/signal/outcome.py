@@ -52,8 +52,8 @@ def outcome(rules, bursts, state, s, i, log_right):
         return COLLIDED if u < alone else TOO_WEAK
     if rules.loss > 0.0 and uniform(key, a, b, sequence, fixed_loss + attempt) < rules.loss:
         return LOST
-    if len(bursts.traced.link) > 0:
-        ratio = _ratio(bursts.traced, a * rules.robots + b)
+    if len(state.traced.link) > 0:
+        ratio = _ratio(state.traced, a * rules.robots + b)
         if ratio < 1.0 and uniform(key, a, b, sequence, trace + attempt) >= ratio:
             return LOST
     if bursts.is_on and me.on_air == DATA:

@@ -28,7 +28,7 @@ from swarmwire.comms.outcomes import SendResult
 HEARD, QUEUE_FULL, CHANNEL_BUSY = int(Fate.HEARD), int(Fate.QUEUE_FULL), int(Fate.CHANNEL_BUSY)
 IS_ACKNOWLEDGED, FOUND_BUSY = int(SendResult.ACKNOWLEDGED), int(SendResult.CHANNEL_BUSY)
 FOUND_FULL = int(SendResult.QUEUE_FULL)
-CSMA, DCF = METHODS.index("csma-802154"), METHODS.index("dcf")
+CSMA = METHODS.index("csma-802154")
 
 
 @borrowing()
@@ -89,7 +89,7 @@ def begin(rules, state, queue, r, now_ns):
         me.stage = HELD
     elif rules.method == CSMA:
         csma.want(rules, state, queue, r, now_ns)
-    elif rules.method == DCF:
+    elif rules.method == dcf.DCF:
         dcf.want(rules, state, queue, r, now_ns)
     else:
         me.stage = BACKING_OFF
@@ -176,7 +176,7 @@ def sent(rules, bursts, state, queue, told, r, now_ns):
 def pause(rules, state, queue, r, pause_ns, now_ns):
     """A packet is over: silence, or new slots, then the next one."""
     me = state.robot[r]
-    if rules.method == DCF:
+    if rules.method == dcf.DCF:
         me.exponent = 0
         dcf.wait_after(rules, state, r)
     if pause_ns == 0:
@@ -196,14 +196,22 @@ def fail(rules, state, queue, told, r, now_ns):
         pause(rules, state, queue, r, packet.pause_ns, now_ns)
         return
     me.attempt += 1
-    if rules.method == DCF:
+    if rules.method == dcf.DCF:
         me.exponent += 1
         dcf.wait_after(rules, state, r)
     begin(rules, state, queue, r, now_ns)
+    keep_newest(rules, state, queue, told, r, now_ns)
+
+
+@borrowing()
+def keep_newest(rules, state, queue, told, r, now_ns):
+    """If the robot's radio is off and keeps the newest packet alone: what waits before it ends."""
+    me = state.robot[r]
     if state.off[r] == KEPT_NEWEST and me.waiting > 0:
         telling.give_up_older(state, told, r, me.entry - 1, now_ns)
         me.waiting = 1
-        serve(rules, state, queue, r, now_ns)
+        if me.stage == NOTHING:
+            serve(rules, state, queue, r, now_ns)
 
 
 @borrowing()

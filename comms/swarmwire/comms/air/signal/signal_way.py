@@ -202,6 +202,7 @@ class SignalWay(Way):
             order,
             _off(held),
             self._jam.between(self._now_ns, until_ns),
+            NOT_TRACED if self._measured is None else self._measured.traced,
         )
         return state, start
 
@@ -212,8 +213,7 @@ class SignalWay(Way):
             self._bursts.make_room(self._now_ns, len(self._links.link.receiver))
         link, at_ns, bad = self._bursts.table
         a, b, added = 1.0 / bursts.good_s, 1.0 / bursts.bad_s, np.zeros(1, np.int64)
-        traced = NOT_TRACED if self._measured is None else self._measured.traced
-        return Bursting(given is not None, link, at_ns, bad, added, a, b, bursts.loss_bad, bursts.loss_good, traced)
+        return Bursting(given is not None, link, at_ns, bad, added, a, b, bursts.loss_bad, bursts.loss_good)
 
     def _decided(self, parts: list[Told], lives: Lives) -> Decided:
         """What was told, as packets and links; packets that are done leave the queue."""

@@ -155,7 +155,6 @@ class Bursting(NamedTuple):
     b: float
     loss_bad: float
     loss_good: float
-    traced: Traced  # beside them, as it is asked for in the same place alone
 
 
 class LinkTable(NamedTuple):
@@ -214,6 +213,7 @@ class State(NamedTuple):
     order: IntArray  # packets by sender, in the order of sending
     off: IntArray  # (rows,) HEARD: the radio is on; else the fate of what it should send, or KEPT_ALL or KEPT_NEWEST
     jam: Jam
+    traced: Traced
 
 
 def told(capacity: int) -> Told:

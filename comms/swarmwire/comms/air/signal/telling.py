@@ -43,13 +43,13 @@ def report(rules, state, queue, told, r, now_ns):
     packet = state.packet[me.packet]
     me.last_fate, me.last_in_range, me.last_mw = NOBODY, 0, 0.0
     link, to, hold, index = state.link, packet.to, me.hold, me.packet
+    to_all = to == NOBODY
     for i in range(me.first_link, me.weak_link):
         receiver, fate, power_mw = link.receiver[i], np.int64(link.now[i]), link.power_mw[i]
-        is_meant = to == NOBODY or to == receiver  # noqa: PLR1714 - `in` would make a tuple
-        if not (is_meant and (link.is_listed[i] or fate == HEARD)):
+        if not ((to_all or to == receiver) and (link.is_listed[i] or fate == HEARD)):
             continue
         in_range = 0 if fate == BLOCKED else 1
-        if to == NOBODY:
+        if to_all:
             _tell(state, told, index, receiver, fate, in_range, now_ns, hold, power_mw)
             continue
         me.last_fate, me.last_in_range, me.last_mw = fate, in_range, power_mw
