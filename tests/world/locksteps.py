@@ -1,0 +1,80 @@
+"""Lockstep among two runners and eight robots, as tests play it."""
+
+from typing import Any
+
+import msgpack
+import numpy as np
+
+from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
+from swarmwire.world.lockstep import Lockstep
+from tests.agent.hosts import GIVES, assignment, group, senses
+
+GROUPS = {"flock", "scouts", "lone"}
+FLOCK, SCOUTS = [0, 1, 4, 5], [2, 6]  # rows of the two groups; robot 3 and 7 are a third
+
+
+def parts(owners: dict[int, int]) -> list[Assignment]:
+    """One assignment for each slot: which slot owns each row."""
+    groups = {"flock": FLOCK, "scouts": SCOUTS, "lone": [3, 7]}
+    own: list[Assignment] = []
+    for slot in sorted(set(owners.values())):
+        rows = {name: [row for row in all_rows if owners[row] == slot] for name, all_rows in groups.items()}
+        own.append(assignment(*(group("unused:Agent", mine, name) for name, mine in rows.items() if mine)))
+    return own
+
+
+def two_parts() -> list[Assignment]:
+    return parts({row: row // 4 for row in range(8)})
+
+
+def two() -> Lockstep:
+    return Lockstep(two_parts())
+
+
+def request(runner: Any, version: Any = frames.VERSION) -> bytes:
+    return msgpack.packb({"v": version, "runner": runner})
+
+
+def joined(lockstep: Lockstep, *names: str) -> Lockstep:
+    for name in names:
+        lockstep.join(request(name))
+    return lockstep
+
+
+def ready(lockstep: Lockstep, *names: str) -> Lockstep:
+    for name in names:
+        lockstep.answer(name, frames.encode("ready", -1, {}))
+    return lockstep
+
+
+def playing() -> Lockstep:
+    return ready(joined(two(), "a", "b"), "a", "b")
+
+
+def all_senses(tick: int = 0) -> Senses:
+    return {"flock": senses(tick, FLOCK), "scouts": senses(tick, SCOUTS), "lone": senses(tick, [3, 7])}
+
+
+def actions(rows: list[int]) -> Actions:
+    row = np.array(rows, np.int64)
+    payloads = Payloads.of([bytes([r, r, r]) for r in rows])
+    return Actions(row, row % 2 == 0, row * 0.1, row * -0.1, Sent(row, np.full(len(rows), BROADCAST), payloads))
+
+
+def rows_of(frame: bytes) -> list[int]:
+    found, *_ = decode_tick(frames.decode(frame), GIVES, GROUPS)
+    return [row for part in found.values() for row in part.rows.tolist()]
+
+
+def state(lockstep: Lockstep) -> Any:
+    slots = [(slot.runner, slot.state, slot.rows.tolist(), id(slot.actions)) for slot in lockstep._slots]
+    return slots, sorted(lockstep._by_runner), lockstep._tick
+
+
+def sound(name: str = "a") -> bytes:
+    rows = {"a": [0, 1, 2, 3], "b": [4, 5, 6, 7]}[name]
+    return encode_actions(4, actions(rows))
