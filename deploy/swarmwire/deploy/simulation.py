@@ -85,45 +85,29 @@ class Simulation:
     ) -> None:
         self._clock = WallClock()
         self._called_ns = self._clock.now_ns()
-        if isinstance(scenario, Scenario) and overrides:
-            raise BadInput("overrides", "", "expected a path of a scenario; a Scenario is complete as it is")
-        self.scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
-        factor, rate_hz = real_time_factor(realtime), self.scenario.time.rate_hz
+        self.scenario = _scenario_of(scenario, overrides)
+        factor = real_time_factor(realtime)
         self.agents = agent_specs(self.scenario)
-        needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
-        self.world = World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
+        self.world = self._new_world(seed, seeds)
         self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else _ticks(self.scenario)
         self.inputs = replay.inputs if replay else None
         self.runners = runner_count(runners, self.static.arenas * self.static.robots)
-        self.run_id = new_run_id()
-        self.interrupt = Interrupt()
-        self.metrics = Metrics()
-        what, may_drop = record or Recording(), factor is not None
+        what = record or Recording()
         what.check(self.static)
         if self.runners and socket is not None:
-            check_socket(socket)  # before there is a folder, which what is refused should not leave
+            check_socket(socket)
+        # Only now a folder: what is refused leaves none.
         self._record = RunRecord(None if out is None else Path(out), self._clock)
+        rate_hz = self.scenario.time.rate_hz
         self._pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
         self.controls = Controls(self._clock, rate_hz, self._pace)
-        recorders = self._record.observers(what, self.run_id, self.metrics, self.hashes, may_drop=may_drop)
+        self.run_id, self.interrupt, self.metrics = new_run_id(), Interrupt(), Metrics()
         self._observers: list[Guarded] = []
-        for observer in (*recorders, *observers):
+        for observer in (*self._recorders(what), *observers):
             self.watch(observer)
         self._losses: list[Loss] = []
-        self._crews = Crews(
-            scenario=self.scenario,
-            static=self.static,
-            agents=self.agents,
-            runners=self.runners,
-            run_id=self.run_id,
-            clock=self._clock,
-            pace=self._pace,
-            socket=socket,
-            stopped=self._stopped,
-            lost=self._losses.append,
-            say=self._record.say,
-        )
+        self._crews = self._new_crews(socket)
         self._crew: Crew | None = None
         self._loop: Loop | None = None
         self._result: Result | None = None
@@ -224,6 +208,32 @@ class Simulation:
         """How the runners are doing; None if there are none."""
         return self._crew.health() if isinstance(self._crew, RemoteCrew | RealTimeCrew) else None
 
+    def _new_world(self, seed: int | None, seeds: Sequence[int] | None) -> World:
+        """Every arena at its start, with the senses that its agents need."""
+        needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
+        return World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
+
+    def _recorders(self, what: Recording) -> Sequence[Observer]:
+        """Those that fill the run folder, which may drop something only where the run keeps to the wall clock."""
+        may_drop = self._pace is not None
+        return self._record.observers(what, self.run_id, self.metrics, self.hashes, may_drop=may_drop)
+
+    def _new_crews(self, socket: Path | None) -> Crews:
+        """How the agents will be started."""
+        return Crews(
+            scenario=self.scenario,
+            static=self.static,
+            agents=self.agents,
+            runners=self.runners,
+            run_id=self.run_id,
+            clock=self._clock,
+            pace=self._pace,
+            socket=socket,
+            stopped=self._stopped,
+            lost=self._losses.append,
+            say=self._record.say,
+        )
+
     def _air(self) -> Air | None:
         """A new air of the scenario's radio, if it has one."""
         static, radio = self.static, self.scenario.radio
@@ -268,6 +278,15 @@ class Simulation:
         if self.tick >= self.ticks:
             return "duration"
         return "interrupted" if self._stopped() else "left"
+
+
+def _scenario_of(given: Scenario | Path | str, overrides: Sequence[str]) -> Scenario:
+    """The scenario as checked; BadInput for overrides of one that is complete as it is."""
+    if not isinstance(given, Scenario):
+        return load_scenario(given, overrides)
+    if overrides:
+        raise BadInput("overrides", "", "expected a path of a scenario; a Scenario is complete as it is")
+    return given
 
 
 def _ticks(scenario: Scenario) -> int:
