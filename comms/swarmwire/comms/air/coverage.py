@@ -109,9 +109,10 @@ def _mean_dbm(curve, power_dbm, gain_dbi, waves, amplitude, obstacles, crossing_
     for i in range(len(start)):
         ax, ay = start[i]
         bx, by = end[i]
-        distance_m = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
-        walls = obstacles, 0, crossing_db, inside_db_per_m
-        loss = loss_between_db(curve, waves, amplitude, *walls, distance_m, ax, ay, bx, by)
+        apart_m = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
+        loss = loss_between_db(
+            curve, waves, amplitude, obstacles, 0, crossing_db, inside_db_per_m, apart_m, ax, ay, bx, by
+        )
         out_dbm[i] = rssi_dbm(power_dbm, gain_dbi, gain_dbi, loss)
     return out_dbm
 

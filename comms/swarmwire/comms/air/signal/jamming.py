@@ -37,15 +37,18 @@ def _powers(jammers, place, x, y, robots, obstacles, around):
     crossing_db, inside_db_per_m = (around.crossing_db, around.inside_db_per_m) if around.walls else (0.0, 0.0)
     for j in range(len(place)):
         arena, jx, jy = jammers.arena[j], place[j, 0], place[j, 1]
-        shadows, walls = (around.field[arena], amplitude_db), (obstacles, arena, crossing_db, inside_db_per_m)
+        curve, waves = around.curve, around.field[arena]
         for i in range(robots):
             r = arena * robots + i
             if r == jammers.carrier[j]:
                 continue
             if around.line_of_sight and is_blocked(obstacles, arena, jx, jy, x[r], y[r]):
                 continue
-            distance_m = math.hypot(x[r] - jx, y[r] - jy)
-            loss = loss_between_db(around.curve, *shadows, *walls, distance_m, jx, jy, x[r], y[r])
+            rx, ry = x[r], y[r]
+            apart_m = math.hypot(rx - jx, ry - jy)
+            loss = loss_between_db(
+                curve, waves, amplitude_db, obstacles, arena, crossing_db, inside_db_per_m, apart_m, jx, jy, rx, ry
+            )
             power_mw[j, i] = from_db(jammers.power_dbm[j] + around.receive_dbi[r] - loss)
     return power_mw
 
