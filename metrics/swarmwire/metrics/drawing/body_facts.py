@@ -37,6 +37,8 @@ def _told(sheet: Sheet) -> list[str]:
             return [f"error {_length(sheet.noise_m)}"]
         case Bumper():
             return ["the whole rim"]
+        case _:
+            return ["yes"]
 
 
 def _noise(half_width: float) -> list[str]:
