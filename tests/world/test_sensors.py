@@ -187,7 +187,7 @@ def test_wheels_roll_the_way_that_the_robot_drives(steps: int) -> None:
     left, right = rolled[:, 0], rolled[:, 1]
     assert left[0] == pytest.approx(right[0])
     assert left[0] == pytest.approx(np.hypot(*world.pose[0, :2]))
-    turned = (right - left) / EPUCK.drive.wheel_base_m
+    turned = (right - left) / EPUCK.wheels.wheel_base_m
     assert np.angle(np.exp(1j * (world.pose[:, 2] - [0.3, 1.0, 0.0] - turned))) == pytest.approx(np.zeros(3), abs=1e-9)
     # The last arc: chord = 2 (v/w) sin(turn / 2), where only the path while speeding up is not on it.
     arc_m, turn = 0.5 * (left + right)[2], turned[2]

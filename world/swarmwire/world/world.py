@@ -12,9 +12,10 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.truth import Group, Static
+from swarmwire.world.actuation.limits import limits_of, take_commands
+from swarmwire.world.actuation.noise import NoisyWheels
 from swarmwire.world.angles import wrapped
 from swarmwire.world.checks import bodies_of
-from swarmwire.world.drive import within_wheels
 from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
@@ -33,7 +34,7 @@ class World:
         keys: (arenas,) the key of each arena's draws, which depends on its seed alone.
         pose: (rows, 3) x, y in m, heading in rad in (-pi, pi], arena frame.
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
-        command: (rows, 2) applied, within the wheels' limits: forward m/s, left turn rad/s.
+        command: (rows, 3) within the drives' limits: forward m/s, left turn rad/s, to the left m/s.
         alive: (rows,).
         sensors: those that agents need, by group and sense; `Staged.failed` may be set.
         states: what each robot is at, as its agent named it.
@@ -69,7 +70,10 @@ class World:
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
         self.alive: BoolArray = np.ones(rows, np.bool_)
-        self.command: FloatArray = np.zeros((rows, 2))
+        self.command: FloatArray = np.zeros((rows, 3))
+        self._limits, self._noise = limits_of(groups), NoisyWheels(groups, self.keys)
+        self._target = np.zeros((self.static.arenas, self.static.robots, 3))  # what the engine is given
+        self._ticks = 0  # moved so far
         self.states = States(rows)
         self._clipped = self._not_finite = 0
         self._show()
@@ -106,23 +110,21 @@ class World:
         Returns:
             (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle.
         """
-        finite = np.isfinite(actions.linear_mps) & np.isfinite(actions.angular_radps)
-        self._not_finite += int(np.count_nonzero(actions.drive & ~finite))
-        given = actions.drive & finite & self.alive[actions.rows]
-        rows = actions.rows[given]
-        linear_mps, angular_radps = actions.linear_mps[given], actions.angular_radps[given]
-        index = rows % self.static.robots
-        within, clipped = within_wheels(self._physics.motors, index, linear_mps, angular_radps)
-        self._clipped += int(np.count_nonzero(clipped))
         self.command = self.command.copy()
-        self.command[rows] = within
+        asked = actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps
+        clipped, not_finite = take_commands(self._limits, self.alive, *asked, self.command)
+        self._clipped, self._not_finite = self._clipped + clipped, self._not_finite + not_finite
         self.states.take(actions.notes, self.alive)
-        onsets = self._physics.tick(self.command.reshape(self.static.arenas, self.static.robots, 2))
+        self._target[:] = self.command.reshape(self._target.shape)
+        if self._noise.any:
+            self._noise.act(self._ticks, self._target)
+        onsets = self._physics.tick(self._target)
+        self._ticks += 1
         self._show()
         return onsets
 
     def counts(self) -> dict[str, int]:
-        """Commands since the start that the wheels could not follow, or not finite and so dropped; states too many."""
+        """Commands since the start that drives could not follow, or not finite and so dropped; states too many."""
         states = {"states_over_limit": self.states.dropped} if self.states.dropped else {}
         return {"clipped_commands": self._clipped, "nan_commands": self._not_finite, **states}
 
