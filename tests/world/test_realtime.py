@@ -125,15 +125,16 @@ def test_leds_switched_in_answers_between_two_takes_are_all_switched_and_the_new
     assert len(runners.take().leds) == 0
 
 
-def test_a_speed_sideways_crosses_with_the_others_and_the_watchdog_ends_it() -> None:
+def test_a_speed_sideways_crosses_with_the_others_and_who_is_stopped_has_none() -> None:
     runners = playing()
     rows = np.array(OWN["a"], np.int64)
     some = np.full(len(rows), 0.5)
-    opened(runners, 0)
-    runners.answer("a", encode_actions(0, Actions(rows, some.astype(bool), some, some, 2.0 * some)))
-    assert runners.take().lateral_mps[rows].tolist() == (2.0 * some).tolist()
-    runners._stop(rows)
-    assert not runners.take().lateral_mps.any()
+    for tick, expected in ((0, 1.0), (1, 0.0)):
+        opened(runners, tick)
+        runners.answer("a", encode_actions(tick, Actions(rows, some.astype(bool), some, some, 2.0 * some)))
+        if tick:
+            runners._stop(rows)
+        assert runners.take().lateral_mps[rows].tolist() == [expected] * len(rows)
 
 
 @pytest.mark.parametrize("tick", [0, 1, 2, 4])
