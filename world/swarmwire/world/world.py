@@ -53,7 +53,7 @@ class World:
             seeds=tuple(seeds),
             rate_hz=scenario.time.rate_hz,
             arena_size_m=scenario.arena.size_m,
-            walled=scenario.arena.boundary == "walls",
+            boundary=scenario.arena.boundary,
             obstacles=obstacles,
             groups=groups,
             robot_names=scenario.robot_names(),
