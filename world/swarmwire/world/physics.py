@@ -68,7 +68,7 @@ class Physics:
         self._read()
 
     def tick(self, command: FloatArray) -> IntArray:
-        """Move by one tick under commands (arenas, robots, 2): forward m/s, left turn rad/s.
+        """Move by one tick under commands (arenas, robots, 3): forward m/s, left turn rad/s, to the left m/s.
 
         Returns:
             (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle. A contact begins if a pair
@@ -94,11 +94,16 @@ class Physics:
 def motors_of(groups: Sequence[Group]) -> Motors:
     """The motors of each robot index of an arena; a body's mass is spread evenly over its disc."""
     drives = [
-        (d.wheel_base_m, d.max_wheel_mps, d.max_force_n, d.max_torque_nm, b.mass_kg, 0.5 * b.mass_kg * b.radius_m**2)
+        (d.wheel_base_m, d.max_force_n, d.max_torque_nm, b.mass_kg, 0.5 * b.mass_kg * b.radius_m**2)
         for b, d in ((group.body, group.body.drive) for group in groups)
     ]
     columns = np.repeat(np.array(drives), [group.stop - group.start for group in groups], axis=0).T
     return Motors(*(np.ascontiguousarray(column) for column in columns))
+
+
+def max_wheel_of(groups: Sequence[Group]) -> FloatArray:
+    """The fastest speed of a wheel of each robot index of an arena."""
+    return np.repeat([g.body.drive.max_wheel_mps for g in groups], [group.stop - group.start for group in groups])
 
 
 def _walls(size_m: tuple[float, float], groups: Sequence[Group]) -> tuple[Obstacle, ...]:

@@ -15,7 +15,7 @@ from swarmwire.comms.truth import Group, Static
 from swarmwire.world.angles import wrapped
 from swarmwire.world.checks import bodies_of
 from swarmwire.world.drive import within_wheels
-from swarmwire.world.physics import Physics
+from swarmwire.world.physics import Physics, max_wheel_of
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.sensors import SENSORS, Accumulating, Scene, Sensor
@@ -63,6 +63,8 @@ class World:
         tick_s, steps = 1.0 / scenario.time.rate_hz, scenario.physics.steps
         self._physics = Physics(scenario.arena.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
         self._sensors = _sensors(scenario, self._scene(), groups, needs)
+        self._max_wheel_mps = max_wheel_of(groups)
+        self._target = np.zeros((self.static.arenas, self.static.robots, 3))  # what engines are given
         rows = self.static.arenas * self.static.robots
         self.alive: BoolArray = np.ones(rows, np.bool_)
         self.command: FloatArray = np.zeros((rows, 2))
@@ -109,12 +111,13 @@ class World:
         rows = actions.rows[given]
         linear_mps, angular_radps = actions.linear_mps[given], actions.angular_radps[given]
         index = rows % self.static.robots
-        within, clipped = within_wheels(self._physics.motors, index, linear_mps, angular_radps)
+        within, clipped = within_wheels(self._physics.motors, self._max_wheel_mps, index, linear_mps, angular_radps)
         self._clipped += int(np.count_nonzero(clipped))
         self.command = self.command.copy()
         self.command[rows] = within
         self.states.take(actions.notes, self.alive)
-        onsets = self._physics.tick(self.command.reshape(self.static.arenas, self.static.robots, 2))
+        self._target[:, :, :2] = self.command.reshape(self.static.arenas, self.static.robots, 2)
+        onsets = self._physics.tick(self._target)
         self._show()
         return onsets
 

@@ -1,0 +1,47 @@
+"""What every engine is, and what it is told about the arenas and the robots that it is to move."""
+
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.geometry import Obstacles
+from swarmwire.comms.truth import Boundary, Obstacle
+from swarmwire.world.drive import Motors
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """The arenas and the n robots of each that one engine moves, in the order of its rows."""
+
+    size_m: tuple[float, float]  # full extents of an arena; the origin is its centre
+    boundary: Boundary
+    standing: tuple[tuple[Obstacle, ...], ...]  # the obstacles of each arena, as they stand at the start
+    obstacles: Obstacles  # the same as arrays; what moves is kept up to date in them
+    radius_m: FloatArray  # (n,)
+    bottom_m: FloatArray  # (n,) how high the lower side of a robot is; an obstacle that ends there or below is passed
+    motors: Motors  # (n,) each
+    tick_s: float
+    steps: int  # physics steps in a tick
+
+
+class Engine(Protocol):
+    """Moves robots in all arenas. An arena moves bit for bit alike alone and beside others.
+
+    It is made by `Engine(setting, pose)`, at rest at `pose` (arenas, n, 3). The arrays are its own, written in place in
+    `tick`, and always show the present.
+    """
+
+    name: ClassVar[str]
+    state: FloatArray  # (arenas, n, 6) x, y in m, heading in rad (not wrapped), m/s, m/s, rad/s; arena frame
+    travel_m: FloatArray  # (arenas, n, 2) how far the left and right wheel have rolled since the start
+    touched: FloatArray  # (arenas, n) 1 for a robot that touched anything in the last tick, else 0
+    braked: BoolArray  # (arenas, n) motors that only resist, if their commands are 0; set from outside, in place
+
+    def tick(self, target: FloatArray) -> IntArray:
+        """Move by one tick towards targets (arenas, n, 3): forward m/s, left turn rad/s, to the left m/s.
+
+        Returns:
+            (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle. A contact begins if a pair
+            touches in this tick and did not in the one before; all walls and obstacles count as one thing.
+        """
+        ...
