@@ -8,12 +8,14 @@ differs only in that it may be asked for a speed across the body.
 
 # pyright: basic, reportUnknownMemberType=false
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.truth import Group
 
 
 class Motors(NamedTuple):
@@ -24,6 +26,16 @@ class Motors(NamedTuple):
     max_torque_nm: FloatArray
     mass_kg: FloatArray
     inertia_kgm2: FloatArray
+
+
+def motors_of(groups: Sequence[Group]) -> Motors:
+    """The motors of each robot of the groups in order; a body's mass is spread evenly over its disc."""
+    drives = [
+        (d.wheel_base_m, d.max_force_n, d.max_torque_nm, b.mass_kg, 0.5 * b.mass_kg * b.radius_m**2)
+        for b, d in ((group.body, group.body.drive) for group in groups)
+    ]
+    columns = np.repeat(np.array(drives), [group.stop - group.start for group in groups], axis=0).T
+    return Motors(*(np.ascontiguousarray(column) for column in columns))
 
 
 @njit(cache=True)

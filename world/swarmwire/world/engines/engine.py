@@ -19,6 +19,7 @@ class Setting:
     obstacles: Obstacles  # the same as arrays; what moves is kept up to date in them
     radius_m: FloatArray  # (n,)
     bottom_m: FloatArray  # (n,) how high the lower side of a robot is; an obstacle that ends there or below is passed
+    top_m: FloatArray  # (n,) how high its upper side is
     motors: Motors  # (n,) each
     tick_s: float
     steps: int  # physics steps in a tick
