@@ -8,8 +8,10 @@ from swarmwire.comms.air.radio_checks import check_radio
 from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
+from swarmwire.world.arena_tables import ObstacleTable
+from swarmwire.world.layout import read_layout
 from swarmwire.world.obstacles import extent, heading_of, obstacle_at
-from swarmwire.world.scenario import ObstacleTable, Scenario
+from swarmwire.world.scenario import Scenario
 
 MOST_OF_RADIUS = 0.25  # how far a robot at full speed may move in one physics step
 
@@ -18,8 +20,9 @@ def check(scenario: Scenario, where: str) -> None:
     """Raise BadInput for the first contradiction in a scenario."""
     bodies = bodies_of(scenario, where)
     _check_steps(scenario, bodies, where)
+    size_m = read_layout(scenario.arena, where).size_m
     for i, obstacle in enumerate(scenario.arena.obstacles):
-        _check_obstacle(scenario, obstacle, f"arena.obstacles.{i}", where)
+        _check_obstacle(size_m, obstacle, f"arena.obstacles.{i}", where)
     _check_send_offset(scenario, where)
     if scenario.radio is not None:
         check_radio(scenario.radio, where)
@@ -48,9 +51,9 @@ def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> Non
             raise BadInput(where, "physics.steps", f"expected at least {needed}, {text}; got {scenario.physics.steps}")
 
 
-def _check_obstacle(scenario: Scenario, table: ObstacleTable, key: str, where: str) -> None:
+def _check_obstacle(extents_m: tuple[float, float], table: ObstacleTable, key: str, where: str) -> None:
     """A fixed obstacle lies within the arena; a random one would fit into it somewhere at heading 0."""
-    size_m = np.array(scenario.arena.size_m)
+    size_m = np.array(extents_m)
     least, greatest = extent(obstacle_at(table, *(table.at or (0.0, 0.0)), heading_of(table) or 0.0))
     fits = np.all(greatest - least <= size_m + 2e-9)
     if not fits or (table.at and (np.any(greatest > 0.5 * size_m + 1e-9) or np.any(least < -0.5 * size_m - 1e-9))):

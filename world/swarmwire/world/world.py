@@ -1,4 +1,7 @@
-"""The world: every arena's bodies and senses, tick by tick. It does no I/O and knows neither agents nor the radio."""
+"""The world: every arena's bodies and senses, tick by tick. It knows neither agents nor the radio.
+
+It does no I/O but that it reads the pictures that a scenario names, when it is made.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -15,7 +18,8 @@ from swarmwire.comms.truth import Group, Static
 from swarmwire.world.angles import wrapped
 from swarmwire.world.checks import bodies_of
 from swarmwire.world.drive import within_wheels
-from swarmwire.world.physics import Physics, max_wheel_of
+from swarmwire.world.layout import read_layout
+from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.sensors import SENSORS, Accumulating, Scene, Sensor
@@ -46,22 +50,24 @@ class World:
             raise BadInput(scenario.source, "seed", "expected at least one seed")
         groups = _groups(scenario, bodies_of(scenario, scenario.source))
         self.keys: KeyArray = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
-        placed = [place(scenario, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
+        layout = read_layout(scenario.arena, scenario.source)
+        placed = [place(scenario, layout, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
         obstacles, pose = tuple(p.obstacles for p in placed), np.stack([p.pose for p in placed])
         self.static = Static(
             name=scenario.name,
             seeds=tuple(seeds),
             rate_hz=scenario.time.rate_hz,
-            arena_size_m=scenario.arena.size_m,
+            arena_size_m=layout.size_m,
             boundary=scenario.arena.boundary,
             obstacles=obstacles,
             groups=groups,
             robot_names=scenario.robot_names(),
             range_m=range_of(scenario.radio) if scenario.radio else None,
             lights=tuple(p.lights for p in placed),
+            floor=layout.floor,
         )
         tick_s, steps = 1.0 / scenario.time.rate_hz, scenario.physics.steps
-        self._physics = Physics(scenario.arena.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
+        self._physics = Physics(layout.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
         self._sensors = _sensors(scenario, self._scene(), groups, needs)
         self._max_wheel_mps = max_wheel_of(groups)
         self._target = np.zeros((self.static.arenas, self.static.robots, 3))  # what engines are given
