@@ -3,16 +3,15 @@
 Robots of different engines do not touch one another: those on the floor and those that fly pass.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import Obstacles
-from swarmwire.comms.truth import Boundary, Group, Obstacle
-from swarmwire.world.drive import motors_of
+from swarmwire.comms.truth import Static
 from swarmwire.world.engines.choice import EngineName
-from swarmwire.world.engines.engine import Engine, Setting
+from swarmwire.world.engines.engine import Engine, Setting, setting_of
 from swarmwire.world.engines.kinematic import KinematicEngine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
 
@@ -35,31 +34,20 @@ class Physics:
 
     def __init__(
         self,
-        size_m: tuple[float, float],
-        boundary: Boundary,
-        standing: tuple[tuple[Obstacle, ...], ...],
+        static: Static,
         obstacles: Obstacles,
-        groups: Sequence[Group],
         engines: Mapping[str, EngineName],
         pose: FloatArray,
-        tick_s: float,
         steps: int,
     ) -> None:
         """Bodies at rest at `pose` (arenas, robots, 3), moved by the engine that `engines` names for their group."""
-        self.names = tuple(name for name in ENGINES if name in engines.values())
+        self.names: tuple[EngineName, ...] = tuple(name for name in ENGINES if name in engines.values())
         self._engines: list[Engine] = []
         self._robots: list[IntArray] = []  # the robot index of each row of each engine
         for name in self.names:
-            moved = [group for group in groups if engines[group.name] == name]
+            moved = [group for group in static.groups if engines[group.name] == name]
             index = np.concatenate([np.arange(group.start, group.stop) for group in moved])
-            count = [group.stop - group.start for group in moved]
-            bodies = [group.body for group in moved]
-            radius_m = np.repeat([body.radius_m for body in bodies], count)
-            bottom_m = np.repeat([body.altitude_m for body in bodies], count)
-            top_m = bottom_m + np.repeat([body.height_m for body in bodies], count)
-            setting = Setting(
-                size_m, boundary, standing, obstacles, radius_m, bottom_m, top_m, motors_of(moved), tick_s, steps
-            )
+            setting = setting_of(static, obstacles, moved, steps)
             self._engines.append(ENGINES[name](setting, np.ascontiguousarray(pose[:, index])))
             self._robots.append(index)
         if len(self._engines) == 1:

@@ -13,7 +13,7 @@ EngineName = Literal["discs", "pymunk", "kinematic"]
 def engines_of(scenario: Scenario, bodies: Mapping[str, Body]) -> dict[str, EngineName]:
     """The engine of each group, by the group's name."""
     asked = scenario.physics.engine
-    floor: EngineName = asked if asked != "auto" else "pymunk" if movable_in(scenario) else "discs"
+    floor: EngineName = asked if asked != "auto" else "pymunk"
     return {name: floor if body.contacts and body.altitude_m == 0.0 else "kinematic" for name, body in bodies.items()}
 
 

@@ -47,7 +47,10 @@ def any_near(around, arena, x, y, reach_m, bottom_m):
 
 @njit(cache=True)
 def _within(around, circle, x, y, reach_m):
-    dx, dy = shortest(x - circle[0], around.half_x_m, around.wraps), shortest(y - circle[1], around.half_y_m, around.wraps)
+    dx, dy = (
+        shortest(x - circle[0], around.half_x_m, around.wraps),
+        shortest(y - circle[1], around.half_y_m, around.wraps),
+    )
     reach = reach_m + circle[2]
     return dx * dx + dy * dy < reach * reach
 
@@ -88,7 +91,9 @@ def _out_of_obstacles(around, arena, x, y, radius_m, bottom_m):
             cx, cy = obstacles.polygon[k, 0], obstacles.polygon[k, 1]
             px = cx + shortest(x - cx, around.half_x_m, around.wraps)
             py = cy + shortest(y - cy, around.half_y_m, around.wraps)
-            dx, dy = _out_of_polygon(obstacles.side, obstacles.side_start[k], obstacles.side_start[k + 1], px, py, radius_m)
+            dx, dy = _out_of_polygon(
+                obstacles.side, obstacles.side_start[k], obstacles.side_start[k + 1], px, py, radius_m
+            )
             x, y = x + dx, y + dy
     return x, y
 

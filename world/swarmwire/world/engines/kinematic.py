@@ -1,7 +1,8 @@
 """Bodies that go where they are told: no forces, and no contacts between robots. All arenas in one compiled call.
 
 A robot has its target's speed from the start of a tick on and runs the exact arc; masses and the drive's forces play no
-part. Walls, and obstacles that reach above its lower side, hold it back: it slides along them. Lower ones it flies over.
+part. Walls, and obstacles that reach above its lower side, hold it back: it slides along them; lower ones it flies
+over.
 Robots pass through one another; where two begin to overlap at the end of a tick, that counts as a contact that began.
 On a torus positions wrap, velocities go on.
 """
@@ -45,7 +46,7 @@ class KinematicEngine:
 
     def tick(self, target: FloatArray) -> IntArray:
         """Move by one tick at targets (arenas, n, 3), and count the contacts that began, (arenas, 2)."""
-        radius_m, bottom_m, top_m = self._disc
+        radius_m, bottom_m, _ = self._disc
         bodies = self._wheel_base_m, radius_m, bottom_m
         _move(self._around, *bodies, target, self._tick_s, self.state, self.travel_m, self._held)
         before, self._touching = self._touching, overlaps(self.state, *self._disc, self._held, self._around)
@@ -77,7 +78,10 @@ def _move(around, wheel_base_m, radius_m, bottom_m, target, tick_s, state, trave
                     nx, ny = x, y
                 rolled += forward * piece_s + (nx - x - dx) * cos + (ny - y - dy) * sin
                 heading += 2.0 * half
-                vx, vy = forward * np.cos(heading) - left * np.sin(heading), forward * np.sin(heading) + left * np.cos(heading)
+                vx, vy = (
+                    forward * np.cos(heading) - left * np.sin(heading),
+                    forward * np.sin(heading) + left * np.cos(heading),
+                )
                 if pushed:
                     vx, vy, stopped = (nx - x) / piece_s, (ny - y) / piece_s, True
                 x, y = nx, ny
