@@ -9,8 +9,10 @@ from swarmwire.comms.truth import Boundary
 from swarmwire.world.convex import counter_clockwise
 from swarmwire.world.place_tables import RegionTable
 from swarmwire.world.schema import UNFIT
-from swarmwire.world.tables import Corners, Extents, Gap, Heading, Length, Point, Shade, Table
+from swarmwire.world.tables import Corners, Extents, Gap, Heading, Length, Mass, Point, Shade, Table
 
+NEEDS_MASS = "is missing; expected the mass of what is movable (kg)"
+NO_MASS = "expected a mass only with movable = true"
 ImageFile = Annotated[str, StringConstraints(min_length=1)]
 
 
@@ -51,6 +53,18 @@ class _ObstacleTable(_StandingTable):
 
     height_m: Length | None = None
     """Its height; taller than anything if left out. What is above it neither touches nor sees it."""
+    movable: bool = False
+    """Whether robots can push it; it slides on the floor with friction. Only the pymunk engine moves obstacles."""
+    mass_kg: Mass | None = None
+    """Its mass; only of a movable obstacle, which needs one."""
+
+    @model_validator(mode="after")
+    def _weighs_something(self) -> "_ObstacleTable":
+        if self.movable and self.mass_kg is None:
+            raise PydanticCustomError(UNFIT, "{expected}", {"key": "mass_kg", "expected": NEEDS_MASS})
+        if self.mass_kg is not None and not self.movable:
+            raise PydanticCustomError(UNFIT, "{expected}", {"key": "mass_kg", "expected": NO_MASS})
+        return self
 
 
 class CylinderTable(_ObstacleTable):

@@ -9,6 +9,7 @@ from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
 from swarmwire.world.arena_tables import ObstacleTable
+from swarmwire.world.engines.choice import check_engines, engines_of
 from swarmwire.world.layout import read_layout
 from swarmwire.world.obstacles import extent, heading_of, obstacle_at
 from swarmwire.world.scenario import Scenario
@@ -19,6 +20,7 @@ MOST_OF_RADIUS = 0.25  # how far a robot at full speed may move in one physics s
 def check(scenario: Scenario, where: str) -> None:
     """Raise BadInput for the first contradiction in a scenario."""
     bodies = bodies_of(scenario, where)
+    check_engines(scenario, bodies, where)
     _check_steps(scenario, bodies, where)
     size_m = read_layout(scenario.arena, where).size_m
     for i, obstacle in enumerate(scenario.arena.obstacles):
@@ -43,10 +45,11 @@ def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
 
 
 def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> None:
-    for group, body in bodies.items():
+    for group, engine in engines_of(scenario, bodies).items():
+        body = bodies[group]
         tick_m = body.max_linear_mps / scenario.time.rate_hz
         needed = math.ceil(tick_m / (MOST_OF_RADIUS * body.radius_m) - 1e-9)
-        if scenario.physics.steps < needed:
+        if engine != "kinematic" and scenario.physics.steps < needed:
             text = f"so that a robot of {group} at full speed moves at most a quarter of its radius in one step"
             raise BadInput(where, "physics.steps", f"expected at least {needed}, {text}; got {scenario.physics.steps}")
 

@@ -30,10 +30,12 @@ class TimeTable(Table):
 class PhysicsTable(Table):
     """[physics]: how bodies move and touch."""
 
-    engine: Literal["pymunk"] = "pymunk"
-    """The engine that moves the bodies."""
+    engine: Literal["auto", "discs", "pymunk", "kinematic"] = "auto"
+    """What moves bodies that have contacts: discs, or pymunk, which also moves obstacles; "auto" takes discs unless an
+    obstacle is movable. Bodies without contacts, and such as fly, are kinematic; "kinematic" makes all of them so."""
     steps: int = Field(default=5, ge=1, le=1000)
-    """Physics steps per tick; refused if a robot at full speed would move over a quarter of its radius in one."""
+    """Physics steps per tick; refused if a robot with contacts at full speed would move over a quarter of its radius in
+    one."""
 
 
 class RobotsTable(Table):

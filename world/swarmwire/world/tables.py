@@ -19,6 +19,7 @@ Extents = Annotated[tuple[Length, Length], Field(strict=False)]
 Heading = Annotated[float, Field(ge=-7, le=7, json_schema_extra={"unit": "rad"})]
 Pose = Annotated[tuple[Coordinate, Coordinate, Heading], Field(strict=False)]
 Corners = Annotated[tuple[Point, ...], Field(strict=False, json_schema_extra={"unit": "m"})]
+Mass = Annotated[float, Field(gt=0, le=10_000, json_schema_extra={"unit": "kg"})]
 Shade = Annotated[float, Field(ge=0, le=1)]
 
 

@@ -18,6 +18,7 @@ from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.angles import wrapped
 from swarmwire.world.checks import bodies_of
+from swarmwire.world.engines.choice import engines_of
 from swarmwire.world.layout import read_layout
 from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
@@ -50,7 +51,8 @@ class World:
         """
         if not seeds:
             raise BadInput(scenario.source, "seed", "expected at least one seed")
-        groups = _groups(scenario, bodies_of(scenario, scenario.source))
+        bodies = bodies_of(scenario, scenario.source)
+        groups = _groups(scenario, bodies)
         self.keys: KeyArray = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
         layout = read_layout(scenario.arena, scenario.source)
         placed = [place(scenario, layout, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
@@ -68,10 +70,11 @@ class World:
             lights=tuple(p.lights for p in placed),
             floor=layout.floor,
         )
-        tick_s, steps = 1.0 / scenario.time.rate_hz, scenario.physics.steps
-        self._physics = Physics(layout.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
+        self.obstacles = obstacle_arrays(obstacles)
+        engines = engines_of(scenario, bodies)
+        self._physics = Physics(self.static, self.obstacles, engines, pose, scenario.physics.steps)
         self.actuators = Actuators(groups, self.keys)
-        self.sensors = _sensors(scenario, self._scene(tick_s), groups, needs)
+        self.sensors = _sensors(scenario, self._scene(1.0 / scenario.time.rate_hz), groups, needs)
         rows = self.static.arenas * self.static.robots
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
@@ -84,7 +87,7 @@ class World:
         self.states.forget(alive & ~self.alive)  # a robot that is revived starts afresh
         self.alive = alive.copy()
         self.actuators.stop(~alive)
-        self._physics.braked = ~alive.reshape(self.static.arenas, self.static.robots)
+        self._physics.braked[:] = ~alive.reshape(self.static.arenas, self.static.robots)
 
     def sense(self, tick: int) -> Senses:
         """What the robots alive that act in a tick sense, by group: rows rising, and the fields that are needed."""
@@ -143,7 +146,7 @@ class World:
             keys=self.keys,
             size_m=static.arena_size_m,
             walled=static.walled,
-            obstacles=obstacle_arrays(static.obstacles),
+            obstacles=self.obstacles,
             lights=static.lights,
             tick_s=tick_s,
             radius_m=radius_m,
