@@ -219,5 +219,5 @@ def test_unreadable_files_are_bad_input_too(tmp_path: Path) -> None:
 def test_a_scenario_cannot_be_changed() -> None:
     scenario = scenario_from(SAMPLE, "f")
     with pytest.raises(ValueError, match="frozen"):
-        scenario.seed = 4  # pyright: ignore
+        scenario.seed = 4  # pyright: ignore[reportAttributeAccessIssue] - frozen: that is what is tested
     assert isinstance(scenario, Scenario)
