@@ -1,4 +1,7 @@
-"""The world: every arena's bodies and senses, tick by tick. It does no I/O and knows neither agents nor the radio."""
+"""The world: every arena's bodies and senses, tick by tick. It knows neither agents nor the radio.
+
+It does no I/O but that it reads the pictures that a scenario names, when it is made.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -15,6 +18,8 @@ from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.angles import wrapped
 from swarmwire.world.checks import bodies_of
+from swarmwire.world.engines.choice import engines_of
+from swarmwire.world.layout import read_layout
 from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
@@ -46,26 +51,30 @@ class World:
         """
         if not seeds:
             raise BadInput(scenario.source, "seed", "expected at least one seed")
-        groups = _groups(scenario, bodies_of(scenario, scenario.source))
+        bodies = bodies_of(scenario, scenario.source)
+        groups = _groups(scenario, bodies)
         self.keys: KeyArray = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
-        placed = [place(scenario, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
+        layout = read_layout(scenario.arena, scenario.source)
+        placed = [place(scenario, layout, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
         obstacles, pose = tuple(p.obstacles for p in placed), np.stack([p.pose for p in placed])
         self.static = Static(
             name=scenario.name,
             seeds=tuple(seeds),
             rate_hz=scenario.time.rate_hz,
-            arena_size_m=scenario.arena.size_m,
-            walled=scenario.arena.boundary == "walls",
+            arena_size_m=layout.size_m,
+            boundary=scenario.arena.boundary,
             obstacles=obstacles,
             groups=groups,
             robot_names=scenario.robot_names(),
             range_m=range_of(scenario.radio) if scenario.radio else None,
             lights=tuple(p.lights for p in placed),
+            floor=layout.floor,
         )
-        tick_s, steps = 1.0 / scenario.time.rate_hz, scenario.physics.steps
-        self._physics = Physics(scenario.arena.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
+        self.obstacles = obstacle_arrays(obstacles)
+        engines = engines_of(scenario, bodies)
+        self._physics = Physics(self.static, self.obstacles, engines, pose, scenario.physics.steps)
         self.actuators = Actuators(groups, self.keys)
-        self.sensors = _sensors(scenario, self._scene(tick_s), groups, needs)
+        self.sensors = _sensors(scenario, self._scene(1.0 / scenario.time.rate_hz), groups, needs)
         rows = self.static.arenas * self.static.robots
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
@@ -78,7 +87,7 @@ class World:
         self.states.forget(alive & ~self.alive)  # a robot that is revived starts afresh
         self.alive = alive.copy()
         self.actuators.stop(~alive)
-        self._physics.braked = ~alive.reshape(self.static.arenas, self.static.robots)
+        self._physics.braked[:] = ~alive.reshape(self.static.arenas, self.static.robots)
 
     def sense(self, tick: int) -> Senses:
         """What the robots alive that act in a tick sense, by group: rows rising, and the fields that are needed."""
@@ -137,7 +146,7 @@ class World:
             keys=self.keys,
             size_m=static.arena_size_m,
             walled=static.walled,
-            obstacles=obstacle_arrays(static.obstacles),
+            obstacles=self.obstacles,
             lights=static.lights,
             tick_s=tick_s,
             radius_m=radius_m,
