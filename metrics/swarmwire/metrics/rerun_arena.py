@@ -10,6 +10,7 @@ from swarmwire.metrics.rerun_colors import LIGHT, WALL
 from swarmwire.metrics.rerun_lost import begin_lost, log_lost
 from swarmwire.metrics.rerun_robots import RerunRobots
 from swarmwire.metrics.rerun_selected import RerunSelected
+from swarmwire.metrics.shortest import link_lines
 
 LINKS_EVERY_TICK_UP_TO = 200  # robots; links are most of a recording's bytes and time
 THINNED_LINKS_EVERY_TICKS = 10
@@ -57,7 +58,8 @@ class RerunArena:
 
         if truth.edges is not None:
             ends = self._edges(truth.edges)
-            rec.log("world/links", rr.LineStrips2D.from_fields(strips=position_m[ends].astype(np.float32)))
+            lines = link_lines(position_m, ends, self._static)
+            rec.log("world/links", rr.LineStrips2D.from_fields(strips=lines.astype(np.float32)))
         if truth.finished is not None:
             log_lost(rec, truth.finished, self._arena, position_m)
 
