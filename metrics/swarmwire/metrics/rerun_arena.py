@@ -7,6 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.truth import Obstacle, Static, Truth
 from swarmwire.metrics.rerun_colors import LIGHT, WALL
+from swarmwire.metrics.rerun_floor import log_floor
 from swarmwire.metrics.rerun_lost import begin_lost, log_lost
 from swarmwire.metrics.rerun_robots import RerunRobots
 from swarmwire.metrics.rerun_selected import RerunSelected
@@ -38,6 +39,7 @@ class RerunArena:
         import rerun as rr
 
         rec.log("world", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
+        log_floor(rec, self._static)
         self._log_fixed(rec)
         links = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(0.5), colors=_LINK_COLOR, draw_order=_LINKS)
         rec.log("world/links", links, static=True)
