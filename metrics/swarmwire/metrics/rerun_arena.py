@@ -1,4 +1,4 @@
-"""The arena of a recording: boundary, obstacles and lights once; robots, radio links and lost packets per tick."""
+"""The arena of a recording: boundary, obstacles, lights once; robots, their LEDs, links and lost packets per tick."""
 
 from typing import Any
 
@@ -8,6 +8,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.truth import Obstacle, Static, Truth
 from swarmwire.metrics.rerun_colors import LIGHT, WALL
 from swarmwire.metrics.rerun_floor import log_floor
+from swarmwire.metrics.rerun_leds import RerunLeds
 from swarmwire.metrics.rerun_lost import begin_lost, log_lost
 from swarmwire.metrics.rerun_robots import RerunRobots
 from swarmwire.metrics.rerun_selected import RerunSelected
@@ -31,6 +32,7 @@ class RerunArena:
         self._static, self._arena = static, arena
         self._rows = slice(arena * static.robots, (arena + 1) * static.robots)
         self._robots = RerunRobots(static)
+        self._leds = RerunLeds(static)
         self._selected = RerunSelected(static, arena, selected, self._robots.radius_m, self._robots.heading_m)
         self.links_every_ticks = 1 if static.robots <= LINKS_EVERY_TICK_UP_TO else THINNED_LINKS_EVERY_TICKS
 
@@ -51,6 +53,7 @@ class RerunArena:
         """Log one tick."""
         full = truth.tick % self.links_every_ticks == 0
         self._robots.log(rec, truth, self._rows, trails=full)
+        self._leds.log(rec, truth.leds[self._rows], truth.pose[self._rows])
         self._selected.log(rec, truth, full=full)
         if full:
             self._log_radio(rec, truth, truth.pose[self._rows, :2])

@@ -18,6 +18,8 @@ def facts_of(body: Body) -> list[tuple[str, str]]:
         ("turns", f"{math.degrees(body.max_angular_radps):.0f} degrees/s"),
         ("drive", f"{drive.max_force_n:g} N, {drive.max_torque_nm:g} N m"),
     ]
+    if body.leds:
+        facts.append(("LEDs", f"{body.led_count}{', the last a beacon' if body.leds.beacon_height_m else ''}"))
     for name, sheet in body.senses.items():
         facts.extend(zip((name, *[""] * 9), _told(sheet), strict=False))
     return facts
