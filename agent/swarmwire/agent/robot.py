@@ -10,8 +10,10 @@ from swarmwire.agent.handle import Handle
 from swarmwire.agent.outcome import Outcome
 from swarmwire.agent.packet import Packet, Packets
 from swarmwire.agent.readings import (
+    BatteryReading,
     BumperReading,
     CompassReading,
+    ImuReading,
     LightReading,
     OdometryReading,
     PositioningReading,
@@ -67,6 +69,19 @@ class Robot(Handle):
         """Position in the arena's frame."""
         x, y = self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m")
         return PositioningReading(float(x[self._row]), float(y[self._row]))
+
+    @property
+    def imu(self) -> ImuReading:
+        """Acceleration and turn rate in the body's frame."""
+        turn, row = self._turn, self._row
+        names = "forward_mps2", "left_mps2", "turn_radps"
+        return ImuReading(*(float(turn.field("imu", name)[row]) for name in names))
+
+    @property
+    def battery(self) -> BatteryReading:
+        """Charge, 1 full and 0 empty, and voltage."""
+        charge, voltage = self._turn.field("battery", "charge"), self._turn.field("battery", "voltage_v")
+        return BatteryReading(float(charge[self._row]), float(voltage[self._row]))
 
     def drive(self, linear_mps: float, angular_radps: float, lateral_mps: float = 0.0) -> None:
         """Wanted forward speed and turn rate (positive to the left); they hold until the next call.

@@ -9,8 +9,10 @@ from swarmwire.agent.draw import Draws
 from swarmwire.agent.handle import Handle
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.readings import (
+    BatteryReadings,
     BumperReadings,
     CompassReadings,
+    ImuReadings,
     LightReadings,
     OdometryReadings,
     PositioningReadings,
@@ -70,6 +72,16 @@ class Robots(Handle):
     def positioning(self) -> PositioningReadings:
         """Positions in the arena's frame: x_m and y_m (n,)."""
         return PositioningReadings(self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m"))
+
+    @property
+    def imu(self) -> ImuReadings:
+        """Accelerations and turn rates in the bodies' frames: forward_mps2, left_mps2 and turn_radps (n,)."""
+        return ImuReadings(*(self._turn.field("imu", name) for name in ("forward_mps2", "left_mps2", "turn_radps")))
+
+    @property
+    def battery(self) -> BatteryReadings:
+        """Batteries: charge, 1 full and 0 empty, and voltage_v (n,)."""
+        return BatteryReadings(self._turn.field("battery", "charge"), self._turn.field("battery", "voltage_v"))
 
     def drive(
         self,

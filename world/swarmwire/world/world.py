@@ -12,6 +12,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.truth import Group, Static
+from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.actuation.limits import limits_of, take_commands
 from swarmwire.world.actuation.noise import NoisyWheels
 from swarmwire.world.angles import wrapped
@@ -36,6 +37,7 @@ class World:
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
         command: (rows, 3) within the drives' limits: forward m/s, left turn rad/s, to the left m/s.
         alive: (rows,).
+        batteries: of all robots; `charge` may be written to.
         sensors: those that agents need, by group and sense; `Staged.failed` may be set.
         states: what each robot is at, as its agent named it.
     """
@@ -65,14 +67,16 @@ class World:
         )
         tick_s, steps = 1.0 / scenario.time.rate_hz, scenario.physics.steps
         self._physics = Physics(scenario.arena.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
-        self.sensors = _sensors(scenario, self._scene(tick_s), groups, needs)
+        self._limits, self._noise = limits_of(groups), NoisyWheels(groups, self.keys)
+        self._target = np.zeros((self.static.arenas, self.static.robots, 3))  # what the engine is given
+        self.batteries = Batteries(groups, self._limits, self.static.arenas, tick_s)
+        self._scene = self._make_scene(tick_s)
+        self.sensors = _sensors(scenario, self._scene, groups, needs)
         rows = self.static.arenas * self.static.robots
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
         self.alive: BoolArray = np.ones(rows, np.bool_)
         self.command: FloatArray = np.zeros((rows, 3))
-        self._limits, self._noise = limits_of(groups), NoisyWheels(groups, self.keys)
-        self._target = np.zeros((self.static.arenas, self.static.robots, 3))  # what the engine is given
         self._ticks = 0  # moved so far
         self.states = States(rows)
         self._clipped = self._not_finite = 0
@@ -118,6 +122,8 @@ class World:
         self._target[:] = self.command.reshape(self._target.shape)
         if self._noise.any:
             self._noise.act(self._ticks, self._target)
+        if self.batteries.any:
+            self.batteries.drain(self.alive, self._scene.leds, self._target, self._physics.braked)
         onsets = self._physics.tick(self._target)
         self._ticks += 1
         self._show()
@@ -134,10 +140,11 @@ class World:
         self.pose[:, 2] = wrapped(self.pose[:, 2])
         self.velocity: FloatArray = state[:, 3:].copy()
 
-    def _scene(self, tick_s: float) -> Scene:
+    def _make_scene(self, tick_s: float) -> Scene:
         static, physics = self.static, self._physics
         counts = [group.stop - group.start for group in static.groups]
         radius_m = np.repeat([group.body.radius_m for group in static.groups], counts)
+        bottom_m = np.repeat([group.body.altitude_m for group in static.groups], counts)
         height_m = np.repeat([group.body.height_m for group in static.groups], counts)
         return Scene(
             keys=self.keys,
@@ -147,12 +154,13 @@ class World:
             lights=static.lights,
             tick_s=tick_s,
             radius_m=radius_m,
-            bottom_m=np.zeros(len(radius_m)),
-            top_m=height_m,
+            bottom_m=bottom_m,
+            top_m=bottom_m + height_m,
             state=physics.state,
             travel_m=physics.travel_m,
             touched=physics.touched,
-            target=np.zeros((static.arenas, static.robots, 2)),
+            target=self._target,
+            charge=self.batteries.charge,
             leds=np.zeros((static.arenas, static.robots, 0), np.int64),
         )
 
