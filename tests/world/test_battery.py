@@ -10,7 +10,6 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sheets import Battery
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.batteries import Batteries
-from swarmwire.world.actuation.limits import limits_of
 from tests.world.scenes import read, scene
 
 EPUCK = load_body("epuck")
@@ -32,27 +31,26 @@ def with_battery(sheet: Battery) -> Body:
 
 def batteries(*bodies: Body, arenas: int = 1) -> Batteries:
     groups = [Group(str(i), body, i, i + 1) for i, body in enumerate(bodies)]
-    return Batteries(groups, limits_of(groups), arenas, 0.1)
+    return Batteries(groups, arenas, 0.1)
 
 
 def drained(of: Batteries, target, leds=None, alive=None):
-    """What targets (robots, 3) become in a tick of one arena, and who brakes."""
-    robots = of.charge.shape[1]
-    given, braked = np.array([target], np.float64), np.zeros((1, robots), bool)
+    """What targets (robots, 3) become in a tick of one arena, and whether somebody became empty, or not so."""
+    robots, given = of.charge.shape[1], np.array([target], np.float64)
     lights = np.zeros((1, robots, 2), np.int64) if leds is None else np.array([leds])
-    of.drain(np.ones(robots, bool) if alive is None else np.array(alive), lights, given, braked)
-    return given[0], braked[0]
+    changed = of.drain(np.ones(robots, bool) if alive is None else np.array(alive), lights, given)
+    return given[0], changed
 
 
 def test_what_is_used_is_power_times_time() -> None:
     of = batteries(with_battery(SHEET), with_battery(SHEET), EPUCK, with_battery(SHEET))
     base_m = EPUCK.wheels.wheel_base_m
     targets = [[0.1, 0.0, 0.0], [0.0, 2.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]]
-    given, braked = drained(of, targets, [[0, 0], [0, 0], [5, 5], [0xFF0000, 1]])
+    given, changed = drained(of, targets, [[0, 0], [0, 0], [5, 5], [0xFF0000, 1]])
     watts = np.array([1.0 + 20.0 * 0.1, 1.0 + 20.0 * base_m, 0.0, 1.0 + 2 * 0.5])
     assert of.charge[0] == pytest.approx(1.0 - watts * 0.1 / 3600.0 / 0.01)
     assert np.array_equal(given, targets)
-    assert not braked.any()
+    assert not changed
     moving = batteries(HOLONOMIC)
     drained(moving, [[0.3, 1.0, -0.4]])
     assert moving.charge[0, 0] == pytest.approx(1.0 - 20.0 * 0.5 * 0.1 / 3600.0 / 0.01)
@@ -61,23 +59,25 @@ def test_what_is_used_is_power_times_time() -> None:
 def test_an_empty_battery_stops_the_motors_and_stays_empty() -> None:
     of = batteries(with_battery(replace(SHEET, start=0.01)), EPUCK)
     targets = [[0.1, 1.0, 0.0]] * 2
-    for _ in range(5):
+    for _ in range(2):
         given, _ = drained(of, targets)
     assert of.charge[0].tolist() == [0.0, 1.0]
-    given, braked = drained(of, targets)
+    given, changed = drained(of, targets)
     assert given.tolist() == [[0.0, 0.0, 0.0], targets[1]]
-    assert braked.tolist() == [True, False]
+    assert changed
+    assert of.empty.tolist() == [[True, False]]
+    assert not drained(of, targets)[1]
     of.charge[0, 0] = 0.5  # charged from outside
-    given, braked = drained(of, targets)
+    given, changed = drained(of, targets)
     assert given.tolist() == targets
-    assert not braked.any()
+    assert changed
+    assert not of.empty.any()
 
 
-def test_a_dead_robot_draws_nothing_and_brakes() -> None:
+def test_a_dead_robot_draws_nothing() -> None:
     of = batteries(with_battery(SHEET), with_battery(SHEET))
-    _, braked = drained(of, np.zeros((2, 3)), alive=[False, True])
+    drained(of, np.zeros((2, 3)), alive=[False, True])
     assert of.charge[0, 0] == 1.0 > of.charge[0, 1]
-    assert braked.tolist() == [True, False]
 
 
 def test_only_bodies_with_a_battery_have_any() -> None:
