@@ -15,6 +15,7 @@ from swarmwire.agent.readings import (
     ImuReadings,
     LightReadings,
     OdometryReadings,
+    OwnReading,
     PositioningReadings,
     ProximityReadings,
 )
@@ -84,6 +85,10 @@ class Robots(Handle):
         """Batteries: charge, 1 full and 0 empty, and voltage_v (n,)."""
         return BatteryReadings(self._turn.field("battery", "charge"), self._turn.field("battery", "voltage_v"))
 
+    def sense(self, name: str) -> OwnReading:
+        """What a sense of your own reads: each field as an attribute, (n,) or (n, width)."""
+        return OwnReading(name, self._turn.fields(name))
+
     def drive(
         self,
         linear_mps: ArrayLike,
@@ -122,6 +127,18 @@ class Robots(Handle):
         """
         here = True if rows is None else rows[:, None]
         np.copyto(self._turn.leds(which), rgb_of(red, green, blue)[..., None], where=here)
+
+    def actuate(self, name: str, values: ArrayLike, rows: BoolArray | None = None) -> None:
+        """Set an actuator of your own of the robots of the mask `rows`, or of all.
+
+        To one number, (n,), or (n, width): of robots outside the mask they do not count. What they do, and for how
+        long, is the actuator's to know. NotFitted if the bodies have none of this name, ValueError if the numbers do
+        not fit or are not finite.
+        """
+        if rows is None:
+            self._turn.actuate(name, values, slice(None))
+        else:
+            self._turn.actuate(name, _of(rows, values), rows)
 
     def note(self, state: str, rows: BoolArray | None = None) -> None:
         """Name what the robots of the mask `rows`, or all, are at; for recordings and pictures, until the next call."""

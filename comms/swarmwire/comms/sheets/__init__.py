@@ -9,6 +9,7 @@ from swarmwire.comms.sheets.compass import Compass
 from swarmwire.comms.sheets.imu import Imu
 from swarmwire.comms.sheets.light import Light
 from swarmwire.comms.sheets.odometry import Odometry
+from swarmwire.comms.sheets.own import OwnSheet
 from swarmwire.comms.sheets.positioning import Positioning
 from swarmwire.comms.sheets.proximity import Proximity, ResponseCurve
 from swarmwire.comms.sheets.ring import Ring
@@ -33,6 +34,7 @@ __all__ = [
     "Imu",
     "Light",
     "Odometry",
+    "OwnSheet",
     "Positioning",
     "Proximity",
     "RangedSheet",

@@ -1,6 +1,7 @@
 """What sensors look at."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
 from swarmwire.comms.geometry import Obstacles
@@ -26,3 +27,4 @@ class Scene:
     target: FloatArray  # (arenas, robots, 3) what the engine was given in the tick before
     charge: FloatArray  # (arenas, robots) of the battery, 1 full, 0 empty
     leds: IntArray  # (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0 dark
+    own: dict[str, Any] = field(default_factory=dict[str, Any])  # for own senses and actuators, to share what they like
