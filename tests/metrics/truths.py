@@ -24,7 +24,7 @@ def static(
         seeds=tuple(range(1, arenas + 1)),
         rate_hz=10,
         arena_size_m=(8.0, 6.0),
-        walled=True,
+        boundary="walls",
         obstacles=(tuple(obstacles),) * arenas,
         groups=(Group("flock", load_body("epuck"), 0, robots),),
         robot_names=tuple(f"flock-{i}" for i in range(robots)),

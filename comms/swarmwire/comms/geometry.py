@@ -23,6 +23,8 @@ class Obstacles(NamedTuple):
     polygon: FloatArray  # (polygons, 3) x, y, radius in m of a circle around it
     side_start: IntArray  # (polygons + 1,) polygon k has the sides side_start[k] to side_start[k + 1] - 1
     side: FloatArray  # (sides, 5) as `sides_of` has them
+    circle_top_m: FloatArray  # (circles,) from the floor; inf: taller than anything
+    polygon_top_m: FloatArray  # (polygons,) likewise
 
 
 @njit(cache=True)
@@ -45,9 +47,11 @@ def sides_of(corners):
 def obstacle_arrays(arenas: tuple[tuple[Obstacle, ...], ...]) -> Obstacles:
     """The obstacles of each arena as arrays."""
     circles, polygons, sides = [], [], []
+    tops = {True: [], False: []}  # of cylinders, of all else
     circle_start, polygon_start, side_start = [0], [0], [0]
     for obstacles in arenas:
         for o in obstacles:
+            tops[o.shape == "cylinder"].append(o.height_m)
             if o.shape == "cylinder":
                 circles.append((o.x_m, o.y_m, o.radius_m))
                 continue
@@ -65,6 +69,8 @@ def obstacle_arrays(arenas: tuple[tuple[Obstacle, ...], ...]) -> Obstacles:
         np.array(polygons, np.float64).reshape(-1, 3),
         np.array(side_start, np.int64),
         np.concatenate([np.empty((0, 5)), *sides]),
+        np.array(tops[True], np.float64),
+        np.array(tops[False], np.float64),
     )
 
 

@@ -1,13 +1,18 @@
 """Ground truth for observers: `Static` once, `Truth` per tick. It never crosses to a runner."""
 
 from dataclasses import dataclass
+from math import inf
+from typing import Literal
 
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.body import Body
+from swarmwire.comms.floor import Floor
 from swarmwire.comms.packets import Payloads
 from swarmwire.comms.senses import Senses
+
+Boundary = Literal["walls", "open", "torus"]  # walls, nothing at all, or the opposite side
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +26,13 @@ class Obstacle:
     radius_m: float = 0.0
     size_m: tuple[float, float] = (0.0, 0.0)
     points_m: tuple[tuple[float, float], ...] = ()  # convex, counter-clockwise, around (x_m, y_m) at heading 0
+    height_m: float = inf  # from the floor to its top; inf: taller than anything
+    mass_kg: float | None = None  # of one that robots can push; None: it is fixed
+
+    @property
+    def movable(self) -> bool:
+        """Whether robots can push it."""
+        return self.mass_kg is not None
 
     @property
     def corners_m(self) -> FloatArray:
@@ -61,12 +73,18 @@ class Static:
     seeds: tuple[int, ...]  # of each arena
     rate_hz: int
     arena_size_m: tuple[float, float]  # full extents; the origin is the centre
-    walled: bool
+    boundary: Boundary
     obstacles: tuple[tuple[Obstacle, ...], ...]  # of each arena
     groups: tuple[Group, ...]
     robot_names: tuple[str, ...]  # of each index within an arena
     range_m: float | None = None  # of the radio, where there is one
     lights: tuple[tuple[Light, ...], ...] = ()  # of each arena
+    floor: Floor | None = None  # of all arenas; None: white
+
+    @property
+    def walled(self) -> bool:
+        """Whether walls stand around each arena."""
+        return self.boundary == "walls"
 
     @property
     def arenas(self) -> int:

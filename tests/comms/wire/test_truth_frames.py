@@ -12,6 +12,7 @@ from hypothesis.extra import numpy as npst
 from swarmwire.comms.body import load_body
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.floor import Floor, FloorImage, Patch, packed_image
 from swarmwire.comms.glimpse import Glimpse, Scene, Series
 from swarmwire.comms.one_arena import static_of, truth_of
 from swarmwire.comms.senses import GroupSenses
@@ -23,18 +24,24 @@ from swarmwire.comms.wire.truth_frames import decode_truth, encode_truth
 ROBOTS, ARENAS = 3, 2
 NOT_SENT = ("rssi_dbm", "payload", "payloads")  # as columns of numbers
 ROWS = ROBOTS * ARENAS
-OBSTACLES = (Obstacle("box", 1.0, 0.5, 0.2, size_m=(1.0, 2.0)), Obstacle("polygon", 0, 0, points_m=((0, 0), (1, 0))))
+OBSTACLES = (
+    Obstacle("box", 1.0, 0.5, 0.2, size_m=(1.0, 2.0), height_m=0.3),
+    Obstacle("polygon", 0, 0, points_m=((0, 0), (1, 0))),
+)
+PATCHES = (Patch("disc", 1.0, 0.0, 0.5, 0.2), Patch("polygon", 0.0, 0.0, 0.1, points_m=((0, 0), (1, 0), (0, 1))))
+FLOOR = Floor(0.9, PATCHES, packed_image(np.arange(6, dtype=np.uint8).reshape(2, 3)))
 STATIC = Static(
     name="two groups",
     seeds=(4, 9),
     rate_hz=10,
     arena_size_m=(8.0, 6.0),
-    walled=True,
+    boundary="walls",
     obstacles=(OBSTACLES, ()),
     groups=(Group("a", load_body("epuck"), 0, 2), Group("b", load_body("footbot"), 2, 3, act_every_ticks=5)),
     robot_names=("a-0", "a-1", "b-0"),
     range_m=2.0,
     lights=((Light(0.5, 0.5, 2.0),), ()),
+    floor=FLOOR,
 )
 SCENE = Scene(STATIC, (Series("order", "", (0.0, 1.0)), Series("min_gap", "m", (None, None))), STATIC.robot_names[1])
 I64 = np.iinfo(np.int64)
@@ -205,6 +212,11 @@ def test_a_frame_is_not_taken_for_one_of_another_kind():
         ({"rate_hz": 10.5}, "scene.static.rate_hz"),
         ({"arena_size_m": (8.0, 0.0)}, "arena_size_m"),
         ({"arena_size_m": (8.0, float("nan"))}, r"scene.static.arena_size_m\[1\]"),
+        ({"arena_size_m": (8.0, float("inf"))}, r"scene.static.arena_size_m\[1\]"),
+        ({"boundary": "sea"}, "scene.static.boundary"),
+        ({"floor": replace(FLOOR, image=FloorImage(2, 3, "AAAA"))}, "floor.image"),
+        ({"floor": replace(FLOOR, image=replace(FLOOR.image, rows=3))}, "floor.image"),
+        ({"floor": replace(FLOOR, image=replace(FLOOR.image, rows=-2))}, "floor.image"),
         ({"arena_size_m": (8.0,)}, "expected 2 values"),
         ({"obstacles": ((),)}, "obstacles"),
         ({"lights": ((),)}, "lights"),
