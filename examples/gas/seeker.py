@@ -4,22 +4,25 @@ from swarmwire.agent import Agent, Robot
 
 
 class Seeker(Agent):
-    """Straight on while it smells stronger, and turning while it does not; at the leak, stand and seal."""
+    """Straight on while it smells stronger, and turning while it does not; at the leak, stand and seal it."""
 
     needs = ("gas", "proximity")
     speed_mps: float = 0.08
     turn_radps: float = 2.0
-    # concentration from which on the leak is near enough to be sealed
+    # concentration at which the leak is near enough to be sealed, and below which it is sealed
     near: float = 0.8
+    gone: float = 0.02
 
     def __init__(self) -> None:
         self.before = 0.0
+        self.sealing = False
 
     def step(self, robot: Robot) -> None:
         """Compare with the step before."""
         smelled = robot.sense("gas").concentration
         x, y = robot.proximity.vector_sum()
-        if smelled >= self.near:
+        self.sealing = smelled >= (self.gone if self.sealing else self.near)
+        if self.sealing:
             robot.drive(0.0, 0.0)
             robot.actuate("sealer", 1.0)
             robot.note("sealing")
