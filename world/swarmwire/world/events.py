@@ -28,6 +28,7 @@ class Events:
         self._swarm = Swarm(groups, static.robots, keys, np.zeros((rows, 3)))
         self._radio = self._tuned = radio
         self._conditions = Conditions(self._swarm.rows)
+        self._evolving: list[int] = []  # places in the scenario of events that go on changing things
         due = [(to_ns(event.at_s), True, serial) for serial, event in enumerate(events)]
         for (at_ns, _, serial), event in zip(tuple(due), events, strict=True):
             if event.lasts_s is not None:
@@ -41,8 +42,11 @@ class Events:
         while self._coming and self._coming[0][0] <= start_ns:
             _, begins, serial = self._coming.popleft()
             happened.append(self._happen(serial, begins))
+        for serial in self._evolving:
+            happened.extend(self._go_on(serial, start_ns))
         if happened:
             world.live(self._conditions.alive)
+            world.fail(self._conditions.failed_parts)
             if air:
                 air.disrupt(self._conditions.disruption())
         if air and self._radio:
@@ -56,5 +60,13 @@ class Events:
 
     def _happen(self, serial: int, begins: bool) -> Happened:
         event, conditions = self._events[serial], self._conditions
+        if event.evolves:
+            self._evolving.append(serial)
         changed = event.begin(serial, self._swarm, conditions) if begins else event.end(serial, conditions)
         return Happened(serial, event.at_s, event.do, not begins, changed)
+
+    def _go_on(self, serial: int, start_ns: int) -> list[Happened]:
+        event = self._events[serial]
+        began, ended = event.go_on(serial, start_ns, self._swarm, self._conditions)
+        told = ((began, False), (ended, True))
+        return [Happened(serial, event.at_s, event.do, over, rows) for rows, over in told if rows.any()]
