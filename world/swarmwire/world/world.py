@@ -12,6 +12,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.truth import Group, Static
+from swarmwire.world.actuation.failures import FailedDrives
 from swarmwire.world.actuation.limits import limits_of, take_commands
 from swarmwire.world.actuation.noise import NoisyWheels
 from swarmwire.world.angles import wrapped
@@ -72,6 +73,7 @@ class World:
         self.alive: BoolArray = np.ones(rows, np.bool_)
         self.command: FloatArray = np.zeros((rows, 3))
         self._limits, self._noise = limits_of(groups), NoisyWheels(groups, self.keys)
+        self._failed = FailedDrives(groups, self.static.arenas)
         self._target = np.zeros((self.static.arenas, self.static.robots, 3))  # what the engine is given
         self._ticks = 0  # moved so far
         self.states = States(rows)
@@ -83,7 +85,24 @@ class World:
         self.states.forget(alive & ~self.alive)  # a robot that is revived starts afresh
         self.alive, self.command = alive.copy(), self.command.copy()
         self.command[~alive] = 0.0
-        self._physics.braked = ~alive.reshape(self.static.arenas, self.static.robots)
+        self._brake()
+
+    def fail(self, failed: Mapping[str, BoolArray]) -> None:
+        """From now on these parts of robots (rows,) do not work, by name: motors, wheels, senses; all others do."""
+        self._failed.fail(failed)
+        self._brake()
+        for group in self.static.groups:
+            for name, sensor in self.sensors[group.name].items():
+                mask = (
+                    failed[name].reshape(self._target.shape[:2])[:, group.start : group.stop]
+                    if name in failed
+                    else None
+                )
+                sensor.failed = mask if mask is not None and mask.any() else None
+
+    def _brake(self) -> None:
+        """The motors of robots that are dead, or whose motors failed, do not drive: they only resist."""
+        self._physics.braked = ~self.alive.reshape(self.static.arenas, self.static.robots) | self._failed.motors
 
     def sense(self, tick: int) -> Senses:
         """What the robots alive that act in a tick sense, by group: rows rising, and the fields that are needed."""
@@ -118,6 +137,8 @@ class World:
         self._target[:] = self.command.reshape(self._target.shape)
         if self._noise.any:
             self._noise.act(self._ticks, self._target)
+        if self._failed.any:
+            self._failed.act(self._target)
         onsets = self._physics.tick(self._target)
         self._ticks += 1
         self._show()

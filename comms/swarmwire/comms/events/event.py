@@ -51,9 +51,7 @@ class Event(ABC):
         """Whether `go_on` is to be called in every tick after `begin`."""
         return False
 
-    def go_on(
-        self, serial: int, now_ns: int, swarm: Swarm, conditions: Conditions
-    ) -> tuple[BoolArray, BoolArray]:
+    def go_on(self, serial: int, now_ns: int, swarm: Swarm, conditions: Conditions) -> tuple[BoolArray, BoolArray]:
         """Change `conditions` as time passes; only called if it evolves.
 
         Returns:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.body import Body
 from swarmwire.comms.clock import to_ns
+from swarmwire.comms.drives import Holonomic
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.event import LastingEvent
@@ -51,9 +52,11 @@ class Fail(LastingEvent):
         """Raise BadInput for a part that a body of these robots does not have."""
         for group in self.robots.groups(groups):
             body = bodies[group]
-            has = [BATTERY, MOTORS, *(WHEELS if body.drive.wheel_base_m else ()), *body.senses]
+            has = [BATTERY, MOTORS, *(() if isinstance(body.drive, Holonomic) else WHEELS), *body.senses]
             if self.part not in has:
-                raise BadInput("", "part", f"expected one of {', '.join(has)} of the body {body.name}; got {self.part!r}")
+                raise BadInput(
+                    "", "part", f"expected one of {', '.join(has)} of the body {body.name}; got {self.part!r}"
+                )
 
     def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
         """Let the part fail, now or at the rate; changed are those whose part worked."""
@@ -68,9 +71,7 @@ class Fail(LastingEvent):
             conditions.kills[serial] = failing.failed.copy()
         return conditions.failed(self.part) & ~before
 
-    def go_on(
-        self, serial: int, now_ns: int, swarm: Swarm, conditions: Conditions
-    ) -> tuple[BoolArray, BoolArray]:
+    def go_on(self, serial: int, now_ns: int, swarm: Swarm, conditions: Conditions) -> tuple[BoolArray, BoolArray]:
         """Let fail and be mended what is due by now; returns whose part failed, and whose works again, (rows,) each."""
         before = conditions.failed(self.part)
         self._lifetimes(serial, swarm).go_on(conditions.failures[serial], now_ns)

@@ -12,14 +12,19 @@ NEVER_NS = np.iinfo(np.int64).max
 HOUR_NS = 3600 * 10**9
 
 
-@dataclass
 class Failing:
-    """A part of some robots. Of one that fails at a rate, `next_ns` tells when each robot's state changes next."""
+    """A part of some robots that does not work.
 
-    part: str
-    failed: BoolArray  # (rows,) written in place
-    next_ns: IntArray | None = None  # (rows,) NEVER_NS: it stays as it is; None: nothing changes by itself
-    lives: IntArray | None = None  # (rows,) how many lifetimes were drawn
+    Attributes:
+        failed: (rows,) written in place.
+        next_ns: (rows,) when each robot's part fails or works again by itself; NEVER_NS: it stays as it is.
+        lives: (rows,) how many times to failure were drawn.
+    """
+
+    def __init__(self, part: str, failed: BoolArray) -> None:
+        self.part, self.failed = part, failed
+        self.next_ns: IntArray = np.full(len(failed), NEVER_NS)
+        self.lives: IntArray = np.zeros(len(failed), np.int64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +41,13 @@ class Lifetimes:
 
     def begun(self, part: str, chosen: BoolArray, now_ns: int) -> Failing:
         """The robots chosen (rows,), all of them working."""
-        lives = np.zeros(len(chosen), np.int64)
-        failing = Failing(part, np.zeros(len(chosen), np.bool_), np.full(len(chosen), NEVER_NS), lives)
+        failing = Failing(part, np.zeros(len(chosen), np.bool_))
         self._live(failing, chosen, np.full(len(chosen), now_ns))
         return failing
 
     def go_on(self, failing: Failing, now_ns: int) -> None:
         """Let fail and be mended whatever is due by now."""
         next_ns = failing.next_ns
-        assert next_ns is not None, "this fails at once, not at a rate"
         while (due := next_ns <= now_ns).any():
             at_ns = next_ns.copy()
             falls, mended = due & ~failing.failed, due & failing.failed
@@ -54,7 +57,6 @@ class Lifetimes:
 
     def _live(self, failing: Failing, rows: BoolArray, from_ns: IntArray) -> None:
         """Draw the next lifetime of these robots."""
-        assert failing.next_ns is not None and failing.lives is not None
         row = np.flatnonzero(rows)
         robots = len(rows) // len(self.keys)
         share = uniform(self.keys[row // robots], row % robots, self.serial, failing.lives[row], LIFETIME)
