@@ -8,13 +8,15 @@ import numpy as np
 
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.arrays import KeyArray
-from swarmwire.comms.clock import to_ns
+from swarmwire.comms.arrays import BoolArray, KeyArray
+from swarmwire.comms.clock import to_ns, to_s
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.swarm import Swarm
 from swarmwire.comms.truth import Happened, Static
 from swarmwire.world.world import World
+
+RUN_DOWN = -1  # in place of an event's place in the scenario: batteries that are empty
 
 
 class Events:
@@ -44,6 +46,8 @@ class Events:
             happened.append(self._happen(serial, begins))
         for serial in self._evolving:
             happened.extend(self._go_on(serial, start_ns))
+        if world.batteries.any:
+            happened.extend(self._run_down(start_ns, world.batteries.empty))
         if happened:
             world.live(self._conditions.alive)
             world.fail(self._conditions.failed_parts)
@@ -64,6 +68,15 @@ class Events:
             self._evolving.append(serial)
         changed = event.begin(serial, self._swarm, conditions) if begins else event.end(serial, conditions)
         return Happened(serial, event.at_s, event.do, not begins, changed)
+
+    def _run_down(self, start_ns: int, empty: BoolArray) -> list[Happened]:
+        """Robots (rows,) whose battery is empty are dead, from the first tick on that begins so."""
+        known = self._conditions.kills.get(RUN_DOWN, np.zeros_like(empty))
+        fell = empty & ~known
+        if not fell.any():
+            return []
+        self._conditions.kills[RUN_DOWN] = known | fell
+        return [Happened(RUN_DOWN, to_s(start_ns), "run_down", False, fell)]
 
     def _go_on(self, serial: int, start_ns: int) -> list[Happened]:
         event = self._events[serial]
