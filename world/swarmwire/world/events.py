@@ -40,14 +40,14 @@ class Events:
     def apply(self, start_ns: int, world: World, air: Air | None) -> tuple[Happened, ...]:
         """Let happen what is due by the start of a tick, in ns; world and air go on under what holds after that."""
         happened: list[Happened] = []
+        if world.batteries.any:  # first, so that who is revived in this tick is not found empty
+            happened.extend(self._run_down(start_ns, world.batteries.empty))
         self._swarm = replace(self._swarm, pose=world.pose)
         while self._coming and self._coming[0][0] <= start_ns:
             _, begins, serial = self._coming.popleft()
             happened.append(self._happen(serial, begins))
         for serial in self._evolving:
             happened.extend(self._go_on(serial, start_ns))
-        if world.batteries.any:
-            happened.extend(self._run_down(start_ns, world.batteries.empty))
         if happened:
             world.live(self._conditions.alive)
             world.fail(self._conditions.failed_parts)
