@@ -178,7 +178,7 @@ class Truth:
     alive: BoolArray  # (rows,)
     pose: FloatArray  # (rows, 3) x, y in m, heading in rad, arena frame
     velocity: FloatArray  # (rows, 3) m/s, m/s, rad/s, arena frame
-    command: FloatArray  # (rows, 2) applied: forward m/s, left turn rad/s
+    command: FloatArray  # (rows, 3) within the drive's limits: forward m/s, left turn rad/s, to the left m/s
     state: IntArray  # (rows,) what the agent says it is at, a place in `states`; 0: it has said nothing
     states: tuple[str, ...]  # named so far, in that order; the first is empty
     senses: Senses  # by group, of the robots that act in this tick: what they sensed at its start

@@ -12,14 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.arrays import FloatArray
 
 
 class Motors(NamedTuple):
     """What drives each robot index of an arena, (robots,) each."""
 
-    wheel_base_m: FloatArray
-    max_wheel_mps: FloatArray
+    wheel_base_m: FloatArray  # 0: it has no wheels
     max_force_n: FloatArray
     max_torque_nm: FloatArray
     mass_kg: FloatArray
@@ -48,7 +47,7 @@ def push(
 
     Args:
         motors: of each robot index.
-        command: (arenas, robots, 2) forward m/s, left turn rad/s, within the wheels' limits.
+        command: (arenas, robots, 3) forward m/s, left turn rad/s, to the left m/s.
         state: (arenas, robots, 6) x, y in m, heading in rad, velocity in m/s, m/s, rad/s, arena frame.
         dt_s: length of a physics step.
         force: (arenas, robots + 1, 3) set: N, N, N m, arena frame; the last row is the static body's.
@@ -76,18 +75,3 @@ def push(
             size = np.sqrt(fx * fx + fy * fy)
             share = motors.max_force_n[i] / size if size > motors.max_force_n[i] else 1.0
             force[arena, i, 0], force[arena, i, 1], force[arena, i, 2] = fx * share, fy * share, torque
-
-
-def within_wheels(
-    motors: Motors, index: IntArray, linear_mps: FloatArray, angular_radps: FloatArray
-) -> tuple[FloatArray, BoolArray]:
-    """Commands (n,) of robots with these indices as their wheels can follow them, and which of them were too fast.
-
-    Both speeds shrink by one factor, so that the curve stays the same.
-    """
-    half_base = 0.5 * motors.wheel_base_m[index]
-    most = motors.max_wheel_mps[index]
-    fastest = np.abs(linear_mps) + np.abs(angular_radps) * half_base
-    clipped = fastest > most * (1.0 + 1e-9)  # not a command that asks for exactly the limit and was rounded
-    share = np.where(clipped, most / np.maximum(fastest, most), 1.0)
-    return np.stack([linear_mps * share, angular_radps * share], axis=1), clipped

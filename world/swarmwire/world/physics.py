@@ -18,6 +18,7 @@ import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.drives import Drive, Holonomic
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.contacts import count_began, mark, pairs_of
 from swarmwire.world.drive import Motors, push
@@ -68,7 +69,7 @@ class Physics:
         self._read()
 
     def tick(self, command: FloatArray) -> IntArray:
-        """Move by one tick under commands (arenas, robots, 2): forward m/s, left turn rad/s.
+        """Move by one tick under commands (arenas, robots, 3): forward m/s, left turn rad/s, to the left m/s.
 
         Returns:
             (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle. A contact begins if a pair
@@ -94,11 +95,16 @@ class Physics:
 def motors_of(groups: Sequence[Group]) -> Motors:
     """The motors of each robot index of an arena; a body's mass is spread evenly over its disc."""
     drives = [
-        (d.wheel_base_m, d.max_wheel_mps, d.max_force_n, d.max_torque_nm, b.mass_kg, 0.5 * b.mass_kg * b.radius_m**2)
+        (base_m(d), d.max_force_n, d.max_torque_nm, b.mass_kg, 0.5 * b.mass_kg * b.radius_m**2)
         for b, d in ((group.body, group.body.drive) for group in groups)
     ]
     columns = np.repeat(np.array(drives), [group.stop - group.start for group in groups], axis=0).T
     return Motors(*(np.ascontiguousarray(column) for column in columns))
+
+
+def base_m(drive: Drive) -> float:
+    """The distance between the wheels; 0 without any."""
+    return 0.0 if isinstance(drive, Holonomic) else drive.wheel_base_m
 
 
 def _walls(size_m: tuple[float, float], groups: Sequence[Group]) -> tuple[Obstacle, ...]:
