@@ -10,6 +10,7 @@ from swarmwire.comms.body import Body
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.ground import ground_of
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.limits import limits_of, take_commands
@@ -142,9 +143,10 @@ class World:
         return Scene(
             keys=self.keys,
             size_m=static.arena_size_m,
-            walled=static.walled,
+            boundary=static.boundary,
             obstacles=obstacle_arrays(static.obstacles),
             lights=static.lights,
+            ground=ground_of(static.floor, static.arena_size_m, static.boundary),
             tick_s=tick_s,
             radius_m=radius_m,
             bottom_m=np.zeros(len(radius_m)),

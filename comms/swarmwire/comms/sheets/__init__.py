@@ -5,10 +5,12 @@ A file per sense. A new one: its sheet in a file here, and its line in `SHEETS`.
 
 from swarmwire.comms.sheets.bumper import Bumper
 from swarmwire.comms.sheets.compass import Compass
+from swarmwire.comms.sheets.infrared import Infrared
 from swarmwire.comms.sheets.light import Light
 from swarmwire.comms.sheets.odometry import Odometry
 from swarmwire.comms.sheets.positioning import Positioning
-from swarmwire.comms.sheets.proximity import Proximity, ResponseCurve
+from swarmwire.comms.sheets.proximity import Proximity
+from swarmwire.comms.sheets.rim import ResponseCurve, Rim
 from swarmwire.comms.sheets.ring import Ring
 from swarmwire.comms.sheets.sheet import RangedSheet, Sheet
 
@@ -19,18 +21,21 @@ SHEETS: dict[str, type[Sheet]] = {
     "light": Light,
     "bumper": Bumper,
     "positioning": Positioning,
+    "infrared": Infrared,
 }
 
 __all__ = [
     "SHEETS",
     "Bumper",
     "Compass",
+    "Infrared",
     "Light",
     "Odometry",
     "Positioning",
     "Proximity",
     "RangedSheet",
     "ResponseCurve",
+    "Rim",
     "Ring",
     "Sheet",
 ]

@@ -9,6 +9,7 @@ from typing import Any
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.bumper import BumperSensor
 from swarmwire.world.sensors.compass import CompassSensor
+from swarmwire.world.sensors.infrared import InfraredSensor
 from swarmwire.world.sensors.light import LightSensor
 from swarmwire.world.sensors.odometry import OdometrySensor
 from swarmwire.world.sensors.positioning import PositioningSensor
@@ -23,6 +24,7 @@ SENSORS: dict[str, Callable[[Scene, Group, Any], TrueSense]] = {
     "light": LightSensor,
     "bumper": BumperSensor,
     "positioning": PositioningSensor,
+    "infrared": InfraredSensor,
 }
 
 __all__ = ["SENSORS", "Scene"]

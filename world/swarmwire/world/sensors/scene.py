@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
 from swarmwire.comms.geometry import Obstacles
-from swarmwire.comms.truth import Light
+from swarmwire.comms.ground import Ground
+from swarmwire.comms.truth import Boundary, Light
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,9 +14,10 @@ class Scene:
 
     keys: KeyArray  # (arenas,)
     size_m: tuple[float, float]  # full extents of an arena
-    walled: bool
+    boundary: Boundary
     obstacles: Obstacles
     lights: tuple[tuple[Light, ...], ...]  # of each arena
+    ground: Ground  # the floor of all arenas
     tick_s: float
     radius_m: FloatArray  # (robots,) of each robot index
     bottom_m: FloatArray  # (robots,) height above the floor of the lower end of the body
