@@ -7,9 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 from swarmwire.comms.truth import Group
+from swarmwire.world.sensors.battery import BatterySensor
 from swarmwire.world.sensors.bumper import BumperSensor
 from swarmwire.world.sensors.compass import CompassSensor
 from swarmwire.world.sensors.infrared import InfraredSensor
+from swarmwire.world.sensors.imu import ImuSensor
 from swarmwire.world.sensors.light import LightSensor
 from swarmwire.world.sensors.odometry import OdometrySensor
 from swarmwire.world.sensors.positioning import PositioningSensor
@@ -25,6 +27,8 @@ SENSORS: dict[str, Callable[[Scene, Group, Any], TrueSense]] = {
     "bumper": BumperSensor,
     "positioning": PositioningSensor,
     "infrared": InfraredSensor,
+    "imu": ImuSensor,
+    "battery": BatterySensor,
 }
 
 __all__ = ["SENSORS", "Scene"]

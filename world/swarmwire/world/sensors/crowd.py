@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.cells import Cells, cells_over, column_of, row_of
 from swarmwire.world.sensors.scene import Scene
 
-ROBOTS_PER_CELL = 1.0
+ROBOTS_PER_CELL = 0.5
 
 
 class Crowd(NamedTuple):
