@@ -124,7 +124,12 @@ def body_from(sheet: Mapping[str, Any], where: str) -> Body:
         rest["drive"] = _drive(rest["drive"], where)
     if rest.get("leds") is not None:  # None: a sheet written down as a mapping
         rest["leds"] = built(Leds, rest["leds"], where, "leds")
-    return built(Body, rest, where, "")
+    body: Body = built(Body, rest, where, "")
+    for name, sheet_of in body.senses.items():
+        fault = sheet_of.fault(body.radius_m)
+        if fault:
+            raise BadInput(where, f"senses.{name}.{fault[0]}", fault[1])
+    return body
 
 
 def _kind_of(sheet: Mapping[str, Any], otherwise: object = "wheels") -> object:

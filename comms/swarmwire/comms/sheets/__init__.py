@@ -14,6 +14,7 @@ from swarmwire.comms.sheets.positioning import Positioning
 from swarmwire.comms.sheets.proximity import Proximity
 from swarmwire.comms.sheets.rim import ResponseCurve, Rim
 from swarmwire.comms.sheets.ring import Ring
+from swarmwire.comms.sheets.scan import Scan
 from swarmwire.comms.sheets.sheet import RangedSheet, Sheet
 
 SHEETS: dict[str, type[Sheet]] = {
@@ -24,6 +25,7 @@ SHEETS: dict[str, type[Sheet]] = {
     "bumper": Bumper,
     "positioning": Positioning,
     "infrared": Infrared,
+    "scan": Scan,
     "imu": Imu,
     "battery": Battery,
 }
@@ -43,5 +45,6 @@ __all__ = [
     "ResponseCurve",
     "Rim",
     "Ring",
+    "Scan",
     "Sheet",
 ]

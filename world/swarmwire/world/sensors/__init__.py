@@ -16,6 +16,7 @@ from swarmwire.world.sensors.light import LightSensor
 from swarmwire.world.sensors.odometry import OdometrySensor
 from swarmwire.world.sensors.positioning import PositioningSensor
 from swarmwire.world.sensors.proximity import ProximitySensor
+from swarmwire.world.sensors.scan import ScanSensor
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import TrueSense
 
@@ -27,6 +28,7 @@ SENSORS: dict[str, Callable[[Scene, Group, Any], TrueSense]] = {
     "bumper": BumperSensor,
     "positioning": PositioningSensor,
     "infrared": InfraredSensor,
+    "scan": ScanSensor,
     "imu": ImuSensor,
     "battery": BatterySensor,
 }
