@@ -11,6 +11,7 @@ from swarmwire.comms.ground import ground_of
 from swarmwire.comms.sheets import Sheet
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.sensors import SENSORS, Scene
+from swarmwire.world.sensors.scene import led_places_m
 from swarmwire.world.sensors.staged import Staged
 
 
@@ -36,7 +37,8 @@ def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: 
         touched=np.zeros((1, robots)),
         target=np.zeros((1, robots, 3)),
         charge=np.ones((1, robots)),
-        leds=np.zeros((1, robots, 0), np.int64),
+        leds=np.full((1, robots, body.led_count), more.get("colour", 0)),
+        led_places_m=led_places_m((Group("a", body, 0, robots),), body.led_count),
     )
 
 

@@ -29,8 +29,13 @@ class Things(NamedTuple):
     cells: Cells
 
 
-def things_within(obstacles: Obstacles, size_m: tuple[float, float], reach_m: float, torus: bool) -> Things:
-    """The obstacles of arenas of this size by cell, for looking `reach_m` far; on a torus at most over its edges."""
+def things_within(
+    obstacles: Obstacles, size_m: tuple[float, float], reach_m: float, torus: bool, images_m: float | None = None
+) -> Things:
+    """The obstacles of arenas of this size by cell, for looking `reach_m` far.
+
+    On a torus their images are among them that are within `images_m` of the arena, which is the reach if left out.
+    """
     arenas = len(obstacles.circle_start) - 1
     shape = np.concatenate(
         [
@@ -41,7 +46,7 @@ def things_within(obstacles: Obstacles, size_m: tuple[float, float], reach_m: fl
     starts = obstacles.circle_start, obstacles.polygon_start
     arena = np.concatenate([np.repeat(np.arange(arenas), np.diff(start)) for start in starts])
     sides = np.concatenate([np.zeros(len(obstacles.circle), np.int64), np.diff(obstacles.side_start)])
-    shape, arena, sides, side = _with_images(shape, arena, sides, obstacles.side, size_m, reach_m, torus)
+    shape, arena, sides, side = _with_images(shape, arena, sides, obstacles.side, size_m, images_m or reach_m, torus)
     side_start = np.concatenate([[0], np.cumsum(sides)])
     per_obstacle_m = np.sqrt(size_m[0] * size_m[1] * arenas / (CELLS_PER_OBSTACLE * max(len(shape), 1)))
     cell_m = max(0.5 * reach_m, float(per_obstacle_m)) if len(shape) else max(size_m)

@@ -21,6 +21,7 @@ from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.sensors import SENSORS, Scene
+from swarmwire.world.sensors.scene import led_places_m
 from swarmwire.world.sensors.staged import Staged
 from swarmwire.world.states import States
 
@@ -160,6 +161,7 @@ class World:
             target=self.actuators.target,
             charge=self.batteries.charge,
             leds=self.actuators.leds.rgb,
+            led_places_m=led_places_m(static.groups, self.actuators.leds.rgb.shape[2]),
         )
 
 

@@ -5,7 +5,9 @@ A file per sense. A new one: its sheet in a file here, and its line in `SHEETS`.
 
 from swarmwire.comms.sheets.battery import Battery
 from swarmwire.comms.sheets.bumper import Bumper
+from swarmwire.comms.sheets.camera import Camera
 from swarmwire.comms.sheets.compass import Compass
+from swarmwire.comms.sheets.ground import GroundColour
 from swarmwire.comms.sheets.infrared import Infrared
 from swarmwire.comms.sheets.imu import Imu
 from swarmwire.comms.sheets.light import Light
@@ -26,6 +28,8 @@ SHEETS: dict[str, type[Sheet]] = {
     "positioning": Positioning,
     "infrared": Infrared,
     "scan": Scan,
+    "ground": GroundColour,
+    "camera": Camera,
     "imu": Imu,
     "battery": Battery,
 }
@@ -34,7 +38,9 @@ __all__ = [
     "SHEETS",
     "Battery",
     "Bumper",
+    "Camera",
     "Compass",
+    "GroundColour",
     "Infrared",
     "Imu",
     "Light",

@@ -9,7 +9,9 @@ from typing import Any
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.battery import BatterySensor
 from swarmwire.world.sensors.bumper import BumperSensor
+from swarmwire.world.sensors.camera import CameraSensor
 from swarmwire.world.sensors.compass import CompassSensor
+from swarmwire.world.sensors.ground import GroundSensor
 from swarmwire.world.sensors.infrared import InfraredSensor
 from swarmwire.world.sensors.imu import ImuSensor
 from swarmwire.world.sensors.light import LightSensor
@@ -29,6 +31,8 @@ SENSORS: dict[str, Callable[[Scene, Group, Any], TrueSense]] = {
     "positioning": PositioningSensor,
     "infrared": InfraredSensor,
     "scan": ScanSensor,
+    "ground": GroundSensor,
+    "camera": CameraSensor,
     "imu": ImuSensor,
     "battery": BatterySensor,
 }

@@ -91,10 +91,11 @@ def _look(value, crowd, things, fan, active, answers):
             y = nearest(0.0, crowd.state[arena, own, 1], crowd.wrap_y, crowd.per_wrap_y)
             rim = crowd.radius_m[own]
             reach = rim + fan.range_m
-            robots = near_robots(crowd, arena, own, x, y, reach)
+            low, high = crowd.bottom_m[own], crowd.top_m[own]
+            robots = near_robots(crowd, arena, own, x, y, reach, low, high)
             if not active and robots == 0:
                 continue
-            count = near_things(fan.found, things, arena, x, y, reach, crowd.bottom_m[own])
+            count = near_things(fan.found, things, arena, x, y, reach, low)
             at_wall = abs(x) + reach >= fan.half_x or abs(y) + reach >= fan.half_y
             if robots == 0 and count == 0 and not at_wall:
                 continue

@@ -77,7 +77,7 @@ def _scan(near, crowd, things, laser):
         for i in range(near.shape[1]):
             own, rays = laser.first + i, near[arena, i]
             heading = crowd.state[arena, own, 2]
-            c, s = np.cos(heading), np.sin(heading)
+            c, s, low, high = np.cos(heading), np.sin(heading), crowd.bottom_m[own], crowd.top_m[own]
             x = crowd.state[arena, own, 0] + laser.at_m * c
             y = crowd.state[arena, own, 1] + laser.at_m * s
             x = nearest(0.0, x, crowd.wrap_x, crowd.per_wrap_x)
@@ -87,13 +87,13 @@ def _scan(near, crowd, things, laser):
                 laser.dy[ray] = s * laser.cos[ray] + c * laser.sin[ray]
                 rays[ray] = np.inf
             _meet_walls(rays, x, y, laser)
-            for at in range(near_things(laser.found, things, arena, x, y, laser.range_m, crowd.bottom_m[own])):
+            for at in range(near_things(laser.found, things, arena, x, y, laser.range_m, low)):
                 k = laser.found[at]
                 if things.side_start[k] == things.side_start[k + 1]:
                     _meet_disc(rays, x, y, heading, laser, things.shape[k, 0], things.shape[k, 1], things.shape[k, 2])
                 else:
                     _meet_polygon(rays, x, y, heading, laser, things, k)
-            for at in range(near_robots(crowd, arena, own, x, y, laser.range_m)):
+            for at in range(near_robots(crowd, arena, own, x, y, laser.range_m, low, high)):
                 radius = crowd.radius_m[crowd.found[at]]
                 _meet_disc(rays, x, y, heading, laser, crowd.found_at[at, 0], crowd.found_at[at, 1], radius)
             for ray in range(len(rays)):
