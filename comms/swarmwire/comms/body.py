@@ -17,7 +17,7 @@ from swarmwire.comms.drives import DRIVES, Drive, Holonomic, Twist, Wheels
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.leds import Leds
 from swarmwire.comms.parameters import parameter
-from swarmwire.comms.sheets import SHEETS, Compass, Light, Odometry, Proximity, Sheet
+from swarmwire.comms.sheets import SHEETS, Compass, Infrared, Light, Odometry, Proximity, Scan, Sheet
 from swarmwire.comms.tables import built, mapping_of
 
 S = TypeVar("S", bound=Sheet)
@@ -61,6 +61,16 @@ class Body:
     def light(self) -> Light | None:
         """The photocells' sheet."""
         return self._sheet(Light)
+
+    @cached_property
+    def infrared(self) -> Infrared | None:
+        """The passive infrared sensor's sheet."""
+        return self._sheet(Infrared)
+
+    @cached_property
+    def scan(self) -> Scan | None:
+        """The laser scanner's sheet."""
+        return self._sheet(Scan)
 
     def _sheet(self, kind: type[S]) -> S | None:
         return next((sheet for sheet in self.senses.values() if isinstance(sheet, kind)), None)

@@ -67,10 +67,10 @@ def _with_images(shape, arena, sides, side, size_m, reach_m, torus):
     offsets = (-1, 0, 1) if torus else (0,)
     for i, j in ((i, j) for i in offsets for j in offsets if i or j):
         shift_x, shift_y = i * size_m[0], j * size_m[1]
-        moved = shape + [shift_x, shift_y, 0.0, 0.0]
+        moved = shape + np.array([shift_x, shift_y, 0.0, 0.0])
         beyond = np.abs(moved[:, :2]) - moved[:, 2:3] - 0.5 * np.array(size_m)
         near = (beyond < reach_m + MARGIN_M).all(axis=1)
-        moved_side = side + [shift_x, shift_y, 0.0, 0.0, 0.0]
+        moved_side = side + np.array([shift_x, shift_y, 0.0, 0.0, 0.0])
         moved_side[:, 4] += side[:, 2] * shift_x + side[:, 3] * shift_y
         parts.append((moved[near], arena[near], sides[near], moved_side[near[owner]]))
     return tuple(np.concatenate(column) for column in zip(*parts, strict=True))

@@ -8,8 +8,8 @@ from swarmwire.comms.sheets.bumper import Bumper
 from swarmwire.comms.sheets.camera import Camera
 from swarmwire.comms.sheets.compass import Compass
 from swarmwire.comms.sheets.ground import GroundColour
-from swarmwire.comms.sheets.infrared import Infrared
 from swarmwire.comms.sheets.imu import Imu
+from swarmwire.comms.sheets.infrared import Infrared
 from swarmwire.comms.sheets.light import Light
 from swarmwire.comms.sheets.odometry import Odometry
 from swarmwire.comms.sheets.positioning import Positioning
@@ -41,8 +41,8 @@ __all__ = [
     "Camera",
     "Compass",
     "GroundColour",
-    "Infrared",
     "Imu",
+    "Infrared",
     "Light",
     "Odometry",
     "Positioning",

@@ -18,13 +18,11 @@ class Scan(RangedSheet):
 
     rays: int = parameter(help="how many rays", at_least=1)
     range_m: float = parameter(help="length of a ray from the scanner", unit="m", above=0)
-    range_min_m: float = parameter(
-        0.0, help="what is nearer than this reads as if it were there", unit="m", at_least=0
-    )
+    range_min_m: float = parameter(0.0, help="what is nearer than this reads as if it were there", unit="m", at_least=0)
     first_deg: float = parameter(0.0, help="where the first ray looks, counter-clockwise from ahead", unit="deg")
     span_deg: float = parameter(
         FULL_DEG,
-        help="angle from the first ray to the last; 360: all around, the last as far from the first as from its other neighbour",
+        help="angle from the first ray to the last; 360: rays all around, the last one step before the first",
         unit="deg",
         above=0,
         at_most=FULL_DEG,

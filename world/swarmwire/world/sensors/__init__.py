@@ -12,8 +12,8 @@ from swarmwire.world.sensors.bumper import BumperSensor
 from swarmwire.world.sensors.camera import CameraSensor
 from swarmwire.world.sensors.compass import CompassSensor
 from swarmwire.world.sensors.ground import GroundSensor
-from swarmwire.world.sensors.infrared import InfraredSensor
 from swarmwire.world.sensors.imu import ImuSensor
+from swarmwire.world.sensors.infrared import InfraredSensor
 from swarmwire.world.sensors.light import LightSensor
 from swarmwire.world.sensors.odometry import OdometrySensor
 from swarmwire.world.sensors.positioning import PositioningSensor

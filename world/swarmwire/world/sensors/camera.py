@@ -1,8 +1,8 @@
 """Omnidirectional camera: LEDs of other robots within its cone that nothing hides from its mirror. Compiled.
 
 A mirror at height h with the aperture a sees the floor within h tan a (ARGoS 3, `colored_blob_omnidirectional_camera`).
-A LED within that distance is seen if it is lower than the mirror and the straight line to it, in space, passes through no
-obstacle and no body but the camera's own: a far LED may well be seen above a low body.
+A LED within that distance is seen if it is lower than the mirror and the straight line to it, in space, passes through
+no obstacle and no body but the camera's own: a far LED may well be seen above a low body.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -20,7 +20,7 @@ from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import Field, Noise
-from swarmwire.world.sensors.sight_lines import SightLine, through_disc, through_polygon, is_cut
+from swarmwire.world.sensors.sight_lines import SightLine, is_cut, through_disc, through_polygon
 
 
 class Mirror(NamedTuple):

@@ -63,7 +63,9 @@ class FanSight:
             curve.c,
             curve.full_m,
             curve.reach_m,
-            *np.empty((3, self._shape[2])),
+            np.empty(self._shape[2]),
+            np.empty(self._shape[2]),
+            np.empty(self._shape[2]),
             np.empty(len(self._things.shape), np.int64),
         )
 

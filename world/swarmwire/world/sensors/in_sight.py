@@ -48,13 +48,13 @@ def robots_between(crowd, widest_m, arena, own, x, y, to_x, to_y):
             c = (arena * cells.ny + row % cells.ny) * cells.nx + column % cells.nx
             for at in range(cells.start[c], cells.start[c + 1]):
                 other = cells.item[at]
-                if other == own or crowd.bottom_m[other] >= crowd.top_m[own]:
+                beside = crowd.bottom_m[other] < crowd.top_m[own] and crowd.bottom_m[own] < crowd.top_m[other]
+                if other == own or not beside:
                     continue
                 cx = nearest(middle_x, crowd.state[arena, other, 0], crowd.wrap_x, crowd.per_wrap_x)
                 cy = nearest(middle_y, crowd.state[arena, other, 1], crowd.wrap_y, crowd.per_wrap_y)
                 if ray_to_circle(x, y, dx, dy, cx, cy, crowd.radius_m[other]) <= apart:
-                    if crowd.bottom_m[own] < crowd.top_m[other]:
-                        return True
+                    return True
     return False
 
 

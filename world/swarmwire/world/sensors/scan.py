@@ -43,8 +43,9 @@ class ScanSensor:
 
     def __init__(self, scene: Scene, group: Group, sheet: Scan) -> None:
         noise = Noise("normal", sheet.noise_m, sheet.noise_relative)
-        limits = {"low": sheet.range_min_m, "high": sheet.range_m}
-        self.fields = (Field("range_m", sheet.rays, noise, sheet.step, **limits, blank=np.inf),)
+        self.fields = (
+            Field("range_m", sheet.rays, noise, sheet.step, low=sheet.range_min_m, high=sheet.range_m, blank=np.inf),
+        )
         self._shape = len(scene.keys), group.stop - group.start, sheet.rays
         self._crowd = crowd_of(scene, sheet.range_m + float(scene.radius_m.max()))
         self._things = things_within(scene.obstacles, scene.size_m, sheet.range_m, scene.boundary == "torus")
@@ -58,7 +59,8 @@ class ScanSensor:
             sheet.at_m,
             0.5 * width if walled else np.inf,
             0.5 * height if walled else np.inf,
-            *np.empty((2, sheet.rays)),
+            np.empty(sheet.rays),
+            np.empty(sheet.rays),
             np.empty(len(self._things.shape), np.int64),
         )
 
