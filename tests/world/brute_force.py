@@ -104,7 +104,12 @@ class Sample:
         if self.scene.boundary != "walls":
             return inf
         width, height = self.scene.size_m
-        corners = ((-width / 2, -height / 2), (width / 2, -height / 2), (width / 2, height / 2), (-width / 2, height / 2))
+        corners = (
+            (-width / 2, -height / 2),
+            (width / 2, -height / 2),
+            (width / 2, height / 2),
+            (-width / 2, height / 2),
+        )
         inside = Thing(0.0, 0.0, 0.0, corners, 0.0, inf).stretch(x, y, cos(angle), sin(angle))
         return max(inside[1], 0.0) if inside else 0.0
 
@@ -216,7 +221,9 @@ def blobs(of: Sample, arena: int, robot: int, reach_m: float, height_m: float) -
     for other in (j for j in range(len(scene.radius_m)) if j != robot):
         ox, oy, turn = scene.state[arena, other, :3].tolist()
         dx, dy = _shortest(of, ox - x, oy - y)
-        for (ahead, left, up), rgb in zip(scene.led_places_m[other].tolist(), scene.leds[arena, other].tolist(), strict=True):
+        for (ahead, left, up), rgb in zip(
+            scene.led_places_m[other].tolist(), scene.leds[arena, other].tolist(), strict=True
+        ):
             lx, ly = dx + ahead * cos(turn) - left * sin(turn), dy + ahead * sin(turn) + left * cos(turn)
             z = float(scene.bottom_m[other]) + up
             d = sqrt(lx * lx + ly * ly)

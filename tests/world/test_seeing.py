@@ -83,6 +83,8 @@ def test_a_camera_sees_the_leds_within_its_cone_that_no_body_hides(height_m: flo
         expected = brute_force.blobs(of, arena, robot, sheet.reach_m(group.body.altitude_m), height_m)
         count = len(expected)
         assert np.isfinite(seen[0][row]).tolist() == [True] * count + [False] * (200 - count)
-        assert np.column_stack([field[row, :count] for field in seen]) == pytest.approx(np.array(expected).reshape(-1, 3))
+        assert np.column_stack([field[row, :count] for field in seen]) == pytest.approx(
+            np.array(expected).reshape(-1, 3)
+        )
         hidden += count == 0
     assert 0 < hidden < len(rows) // 2
