@@ -14,13 +14,14 @@ import numpy as np
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.cells import sort
-from swarmwire.comms.obstacle_cells import near_things, things_within
+from swarmwire.comms.obstacle_cells import near_things
 from swarmwire.comms.sheets import Camera
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import Field, Noise
 from swarmwire.world.sensors.sight_lines import SightLine, is_cut, through_disc, through_polygon
+from swarmwire.world.sensors.standing import Standing
 
 
 class Mirror(NamedTuple):
@@ -48,15 +49,15 @@ class CameraSensor:
         ring_m = np.hypot(scene.led_places_m[..., 0], scene.led_places_m[..., 1])
         overhang_m = float(np.max(ring_m - scene.radius_m[:, None], initial=0.0))
         self._crowd = crowd_of(scene, reach_m + overhang_m + float(scene.radius_m.max()))
-        self._things = things_within(scene.obstacles, scene.size_m, reach_m, scene.boundary == "torus")
-        found = np.empty(len(self._things.shape), np.int64)
+        self._standing = Standing(scene, reach_m)
+        found = np.empty(len(self._standing.now().shape), np.int64)
         self._mirror = Mirror(group.start, sheet.height_m, reach_m, overhang_m, found)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The blobs that every robot of the group sees."""
         blobs = tuple(np.full(self._shape, np.nan) for _ in range(3))
         scene = self._scene
-        _watch(blobs, self._crowd, self._things, self._mirror, scene.leds, scene.led_places_m)
+        _watch(blobs, self._crowd, self._standing.now(), self._mirror, scene.leds, scene.led_places_m)
         return blobs
 
 

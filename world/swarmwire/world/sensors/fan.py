@@ -10,11 +10,12 @@ from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.cells import sort
 from swarmwire.comms.geometry import ray_to_circle
-from swarmwire.comms.obstacle_cells import near_things, ray_to_thing, things_within
+from swarmwire.comms.obstacle_cells import near_things, ray_to_thing
 from swarmwire.comms.sheets import Rim
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest
 from swarmwire.world.sensors.scene import Scene
+from swarmwire.world.sensors.standing import Standing
 
 MARGIN_M = 1e-9  # a disc farther than that from a ray is missed, however numbers are rounded
 
@@ -48,7 +49,7 @@ class FanSight:
         self._shape = len(scene.keys), group.stop - group.start, len(sheet.angle_rad)
         self._active, curve = active, sheet.response
         self._crowd = crowd_of(scene, reach_m + float(scene.radius_m.max()))
-        self._things = things_within(scene.obstacles, scene.size_m, reach_m, scene.boundary == "torus")
+        self._standing = Standing(scene, reach_m)
         walled, (width, height) = scene.boundary == "walls", scene.size_m
         self._fan = Fan(
             group.start,
@@ -66,19 +67,19 @@ class FanSight:
             np.empty(self._shape[2]),
             np.empty(self._shape[2]),
             np.empty(self._shape[2]),
-            np.empty(len(self._things.shape), np.int64),
+            np.empty(len(self._standing.now().shape), np.int64),
         )
 
     def answer(self) -> FloatArray:
         """What an ideal sensor answers to what each ray meets, (arenas, n, rays), 0 to 1."""
         value = np.zeros(self._shape)
-        _look(value, self._crowd, self._things, self._fan, self._active, True)
+        _look(value, self._crowd, self._standing.now(), self._fan, self._active, True)
         return value
 
     def distance_m(self) -> FloatArray:
         """The distance along each ray from the rim, (arenas, n, rays) in m; inf where nothing is within the range."""
         near = np.full(self._shape, np.inf)
-        _look(near, self._crowd, self._things, self._fan, self._active, False)
+        _look(near, self._crowd, self._standing.now(), self._fan, self._active, False)
         return near
 
 

@@ -16,13 +16,13 @@ import numpy as np
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.cells import sort
-from swarmwire.comms.obstacle_cells import things_within
 from swarmwire.comms.sheets import Light
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, nearest
 from swarmwire.world.sensors.in_sight import robots_between, things_between
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import Field, Noise
+from swarmwire.world.sensors.standing import Standing
 
 REACH = 2.5  # a light is dark beyond that many of its intensities
 TURN_RAD = 2.0 * np.pi
@@ -40,14 +40,13 @@ class LightSensor:
         self._light = np.array([(of.x_m, of.y_m, of.intensity_m) for _, of in lights], np.float64).reshape(-1, 3)
         self._widest_m = float(scene.radius_m.max())
         self._crowd = crowd_of(scene, 2.0 * self._widest_m)
-        torus, half_m = scene.boundary == "torus", 0.5 * max(scene.size_m)
-        self._things = things_within(scene.obstacles, scene.size_m, 0.0, torus, images_m=half_m)
+        self._standing = Standing(scene, 0.0, images_m=0.5 * max(scene.size_m))  # no light is farther on a torus
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """What every photocell of every robot of the group answers, without noise; more than 1 where lights add up."""
         scene, group, angle = self._scene, self._group, self._sheet.angle_rad
         value = np.zeros((len(scene.keys), group.stop - group.start, len(angle)))
-        around = self._crowd, self._widest_m, self._things
+        around = self._crowd, self._widest_m, self._standing.now()
         _shine(value, group.start, angle, *around, self._arena, self._light)
         return (value,)
 

@@ -10,12 +10,13 @@ from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.cells import sort
 from swarmwire.comms.geometry import ray_to_circle, ray_to_polygon
-from swarmwire.comms.obstacle_cells import near_things, things_within
+from swarmwire.comms.obstacle_cells import near_things
 from swarmwire.comms.sheets import Scan
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import Field, Noise
+from swarmwire.world.sensors.standing import Standing
 
 TURN_RAD = 2.0 * np.pi
 SLACK = 1e-6  # of the angle between two rays: a ray that grazes a thing is tested, however numbers are rounded
@@ -48,7 +49,7 @@ class ScanSensor:
         )
         self._shape = len(scene.keys), group.stop - group.start, sheet.rays
         self._crowd = crowd_of(scene, sheet.range_m + float(scene.radius_m.max()))
-        self._things = things_within(scene.obstacles, scene.size_m, sheet.range_m, scene.boundary == "torus")
+        self._standing = Standing(scene, sheet.range_m)
         walled, (width, height) = scene.boundary == "walls", scene.size_m
         self._laser = Laser(
             group.start,
@@ -61,13 +62,13 @@ class ScanSensor:
             0.5 * height if walled else np.inf,
             np.empty(sheet.rays),
             np.empty(sheet.rays),
-            np.empty(len(self._things.shape), np.int64),
+            np.empty(len(self._standing.now().shape), np.int64),
         )
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The distance along every ray of every robot of the group."""
         near = np.empty(self._shape)
-        _scan(near, self._crowd, self._things, self._laser)
+        _scan(near, self._crowd, self._standing.now(), self._laser)
         return (near,)
 
 

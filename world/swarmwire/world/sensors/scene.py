@@ -32,6 +32,7 @@ class Scene:
     charge: FloatArray  # (arenas, robots) of the battery, 1 full, 0 empty
     leds: IntArray  # (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0 dark
     led_places_m: FloatArray  # (robots, most LEDs of a robot, 3) x ahead, y to the left, z above the body's lower side
+    obstacles_move: bool = False  # some can be pushed: `obstacles` is written to in each tick
     own: dict[str, Any] = field(default_factory=dict[str, Any])  # for own senses and actuators, to share what they like
 
 
