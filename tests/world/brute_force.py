@@ -1,6 +1,6 @@
-"""What sensors should see, worked out thing by thing and without cells: slow, plain, and written apart from the kernels.
+"""What sensors should see, worked out thing by thing and without cells: slow, plain, written apart from the kernels.
 
-Things are upright: a disc or a convex polygon, from one height to another. On a torus all nine copies of each are there.
+Things are upright: a disc or a convex polygon, from one height to another. On a torus there are nine copies of each.
 """
 
 from collections.abc import Iterator
@@ -115,7 +115,7 @@ class Sample:
 
 
 def sample(seed: int, boundary: Boundary, each: int = 12) -> Sample:
-    """Two crowded arenas of 3 x 2.4 m, with robots on the floor, taller ones and flying ones, and things of all kinds."""
+    """Two crowded arenas of 3 x 2.4 m: robots on the floor, taller ones and flying ones, and things of all kinds."""
     random, size_m = np.random.default_rng(seed), (3.0, 2.4)
     groups = tuple(Group(b.name, b, k * each, (k + 1) * each) for k, b in enumerate((EPUCK, FOOTBOT, DRONE)))
     bodies: list[Body] = [group.body for group in groups for _ in range(each)]
@@ -174,7 +174,7 @@ def rim_rays(of: Sample, active: bool, angle_rad: FloatArray, range_m: float) ->
         robots, fixed = of.beside(robots, robot), of.beside(fixed, robot)
         for ray, angle in enumerate(heading + angle_rad):
             px, py = x + rim * cos(angle), y + rim * sin(angle)
-            solid = min(min(t.distance(px, py, angle) for t in fixed), of.wall(px, py, angle))
+            solid = min([t.distance(px, py, angle) for t in fixed] + [of.wall(px, py, angle)])
             near = min(t.distance(px, py, angle) for t in robots)
             if active:
                 near = min(near, solid)
@@ -190,7 +190,7 @@ def scanned(of: Sample, angle_rad: FloatArray, range_m: float, at_m: float) -> F
         x, y = x + at_m * cos(heading), y + at_m * sin(heading)
         things = of.beside(of.fixed(arena) + of.robots(arena, robot), robot)
         for ray, angle in enumerate(heading + angle_rad):
-            near = min(min(t.distance(x, y, angle) for t in things), of.wall(x, y, angle))
+            near = min([t.distance(x, y, angle) for t in things] + [of.wall(x, y, angle)])
             found[row, ray] = near if near <= range_m else inf
     return found
 
