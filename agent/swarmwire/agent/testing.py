@@ -158,6 +158,11 @@ def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatA
         if isinstance(sheet, OwnSheet):
             for field, width in sheet.fields.items():
                 fields[f"{name}.{field}"] = _uniform(key, tick, f"{name}.{field}", (n, width) if width else (n,))
+    if body.infrared is not None:
+        value = _uniform(key, tick, "infrared", (n, len(body.infrared.angles_deg)))
+        fields["infrared.value"] = np.maximum(value * 2.0 - 1.0, 0.0)
+    if body.scan is not None:
+        fields["scan.range_m"] = _uniform(key, tick, "scan", (n, body.scan.rays)) * body.scan.range_m
     return fields
 
 

@@ -19,7 +19,7 @@ from swarmwire.comms.drives import DRIVES, Drive, Holonomic, Twist, Wheels
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.leds import Leds
 from swarmwire.comms.parameters import parameter
-from swarmwire.comms.sheets import SHEETS, Compass, Light, Odometry, OwnSheet, Proximity, Sheet
+from swarmwire.comms.sheets import SHEETS, Compass, Infrared, Light, Odometry, OwnSheet, Proximity, Scan, Sheet
 from swarmwire.comms.sheets.own import own_sheet
 from swarmwire.comms.tables import built, mapping_of
 
@@ -66,6 +66,16 @@ class Body:
     def light(self) -> Light | None:
         """The photocells' sheet."""
         return self._sheet(Light)
+
+    @cached_property
+    def infrared(self) -> Infrared | None:
+        """The passive infrared sensor's sheet."""
+        return self._sheet(Infrared)
+
+    @cached_property
+    def scan(self) -> Scan | None:
+        """The laser scanner's sheet."""
+        return self._sheet(Scan)
 
     @cached_property
     def actuator_places(self) -> dict[str, slice]:
@@ -148,7 +158,12 @@ def body_from(sheet: Mapping[str, Any], where: str, beside: Path = HERE) -> Body
         rest["drive"] = _drive(rest["drive"], where)
     if rest.get("leds") is not None:  # None: a sheet written down as a mapping
         rest["leds"] = built(Leds, rest["leds"], where, "leds")
-    return built(Body, rest, where, "")
+    body: Body = built(Body, rest, where, "")
+    for name, sheet_of in body.senses.items():
+        fault = sheet_of.fault(body.radius_m)
+        if fault:
+            raise BadInput(where, f"senses.{name}.{fault[0]}", fault[1])
+    return body
 
 
 def _sense(name: str, table: object, where: str, beside: Path) -> Sheet:

@@ -54,6 +54,8 @@ def _value(hint: Any, value: object, where: str, key: str) -> Any:
         if not isinstance(value, list | tuple) or not value:
             raise BadInput(where, key, f"expected a list, got {value!r}")
         items = cast("list[object]", value)
+        if get_args(hint)[-1] is not Ellipsis and len(items) != len(get_args(hint)):
+            raise BadInput(where, key, f"expected {len(get_args(hint))} values, got {value!r}")
         return tuple(_value(get_args(hint)[0], item, where, f"{key}[{i}]") for i, item in enumerate(items))
     if hint is str and not isinstance(value, str):
         raise BadInput(where, key, f"expected a text, got {value!r}")

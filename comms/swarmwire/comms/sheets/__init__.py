@@ -5,14 +5,19 @@ A file per sense. A new one: its sheet in a file here, and its line in `SHEETS`.
 
 from swarmwire.comms.sheets.battery import Battery
 from swarmwire.comms.sheets.bumper import Bumper
+from swarmwire.comms.sheets.camera import Camera
 from swarmwire.comms.sheets.compass import Compass
+from swarmwire.comms.sheets.ground import GroundColour
 from swarmwire.comms.sheets.imu import Imu
+from swarmwire.comms.sheets.infrared import Infrared
 from swarmwire.comms.sheets.light import Light
 from swarmwire.comms.sheets.odometry import Odometry
 from swarmwire.comms.sheets.own import OwnSheet
 from swarmwire.comms.sheets.positioning import Positioning
-from swarmwire.comms.sheets.proximity import Proximity, ResponseCurve
+from swarmwire.comms.sheets.proximity import Proximity
+from swarmwire.comms.sheets.rim import ResponseCurve, Rim
 from swarmwire.comms.sheets.ring import Ring
+from swarmwire.comms.sheets.scan import Scan
 from swarmwire.comms.sheets.sheet import RangedSheet, Sheet
 
 SHEETS: dict[str, type[Sheet]] = {
@@ -22,6 +27,10 @@ SHEETS: dict[str, type[Sheet]] = {
     "light": Light,
     "bumper": Bumper,
     "positioning": Positioning,
+    "infrared": Infrared,
+    "scan": Scan,
+    "ground": GroundColour,
+    "camera": Camera,
     "imu": Imu,
     "battery": Battery,
 }
@@ -30,8 +39,11 @@ __all__ = [
     "SHEETS",
     "Battery",
     "Bumper",
+    "Camera",
     "Compass",
+    "GroundColour",
     "Imu",
+    "Infrared",
     "Light",
     "Odometry",
     "OwnSheet",
@@ -39,6 +51,8 @@ __all__ = [
     "Proximity",
     "RangedSheet",
     "ResponseCurve",
+    "Rim",
     "Ring",
+    "Scan",
     "Sheet",
 ]
