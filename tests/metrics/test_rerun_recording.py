@@ -6,6 +6,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.floor import Floor, Patch
 from swarmwire.comms.truth import Finished, Group, Happened, Light, Obstacle
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.rerun_colors import DEAD, FATES, packed
@@ -295,6 +296,18 @@ def test_obstacles_and_lights_are_drawn_once_where_they_are(tmp_path):
     dark = static(2)
     record(tmp_path / "dark.rrd", dark, moving(dark, 2))
     assert column(tmp_path / "dark.rrd", "/world/lights", "Points2D:positions") == {}
+
+
+def test_the_floor_is_one_picture_below_all_else(tmp_path):
+    of = replace(static(2), floor=Floor(1.0, (Patch("disc", 4.0, 3.0, 0.0, radius_m=1.0),)))
+    record(tmp_path / "run.rrd", of, moving(of, 2))
+    (buffer,) = column(tmp_path / "run.rrd", "/world/floor", "Image:buffer").values()
+    grey = np.array(buffer).reshape(384, 512)
+    assert (grey[0, 0], grey[-1, -1], grey.min(), grey.max()) == (90, 30, 30, 90)  # the first row is the lowest
+    assert np.mean(grey == 30) == pytest.approx(np.pi / 4 / 48, rel=0.02)
+    bare = static(2)
+    record(tmp_path / "bare.rrd", bare, moving(bare, 2))
+    assert column(tmp_path / "bare.rrd", "/world/floor", "Image:buffer") == {}
 
 
 def test_an_arena_that_is_not_there_is_refused(tmp_path):
