@@ -67,7 +67,7 @@ class Payloads:
     def joined(cls, parts: "list[Payloads]") -> "Payloads":
         """The rows of all parts, one after the other."""
         if not parts:
-            return cls.of([])
+            return _NO_PAYLOADS
         data = np.concatenate([part.data for part in parts])
         return cls(data, offsets(np.concatenate([part.sizes for part in parts])))
 
@@ -77,6 +77,10 @@ def offsets(sizes: IntArray) -> IntArray:
     out = np.zeros(len(sizes) + 1, np.int64)
     np.cumsum(sizes, out=out[1:])
     return out
+
+
+_NOTHING = np.empty(0, np.int64)
+_NO_PAYLOADS = Payloads.of([])
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +108,7 @@ class Sent:
     @classmethod
     def none(cls) -> "Sent":
         """No packets."""
-        nothing = np.empty(0, np.int64)
-        return cls(nothing, nothing, Payloads.of([]))
+        return cls(_NOTHING, _NOTHING, _NO_PAYLOADS)
 
     @classmethod
     def joined(cls, parts: "list[Sent]") -> "Sent":
@@ -142,9 +145,8 @@ class Heard:
     @classmethod
     def none(cls, gives: tuple[str, ...] = ()) -> "Heard":
         """Nothing heard over a medium that gives the named columns."""
-        nothing = np.empty(0, np.int64)
         given = {name: np.empty(0, np.float64) for name in gives}
-        return cls(nothing, nothing, nothing, nothing, given, nothing, Payloads.of([]))
+        return cls(_NOTHING, _NOTHING, _NOTHING, _NOTHING, given, _NOTHING, _NO_PAYLOADS)
 
     def select(self, index: IntArray) -> "Heard":
         """The rows of `index`; the payload table stays shared."""

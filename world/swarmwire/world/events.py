@@ -37,7 +37,8 @@ class Events:
     def apply(self, start_ns: int, world: World, air: Air | None) -> tuple[Happened, ...]:
         """Let happen what is due by the start of a tick, in ns; world and air go on under what holds after that."""
         happened: list[Happened] = []
-        self._swarm = replace(self._swarm, pose=world.pose)
+        if self._coming and self._coming[0][0] <= start_ns:
+            self._swarm = replace(self._swarm, pose=world.pose)
         while self._coming and self._coming[0][0] <= start_ns:
             _, begins, serial = self._coming.popleft()
             happened.append(self._happen(serial, begins))
@@ -50,7 +51,7 @@ class Events:
         return tuple(happened)
 
     def _tune(self, air: Air, radio: Radio) -> None:
-        if radio != self._tuned:
+        if radio is not self._tuned and radio != self._tuned:  # as most often it is the same, which costs nothing
             air.tune(radio)
             self._tuned = radio
 

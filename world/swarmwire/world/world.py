@@ -12,13 +12,13 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.truth import Group, Static
-from swarmwire.world.angles import wrapped
 from swarmwire.world.checks import bodies_of
 from swarmwire.world.drive import within_wheels
 from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.sensors import SENSORS, Accumulating, Scene, Sensor
+from swarmwire.world.snapshot import snapshot
 from swarmwire.world.states import States
 
 
@@ -124,10 +124,7 @@ class World:
         return {"clipped_commands": self._clipped, "nan_commands": self._not_finite, **states}
 
     def _show(self) -> None:
-        state = self._physics.state.reshape(-1, 6)
-        self.pose: FloatArray = state[:, :3].copy()
-        self.pose[:, 2] = wrapped(self.pose[:, 2])
-        self.velocity: FloatArray = state[:, 3:].copy()
+        self.pose, self.velocity = snapshot(self._physics.state)
 
     def _scene(self) -> Scene:
         radius_m = np.concatenate([np.full(g.stop - g.start, g.body.radius_m) for g in self.static.groups])
