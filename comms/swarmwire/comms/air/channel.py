@@ -4,7 +4,7 @@ import numpy as np
 
 from swarmwire.comms.air.links import HEARD, THE_REST, Links
 from swarmwire.comms.air.lives import Lives
-from swarmwire.comms.air.reach import links_in_range
+from swarmwire.comms.air.reach import links_in_range, pairs_in_range
 from swarmwire.comms.air.stage import Medium
 from swarmwire.comms.air.stages import chain
 from swarmwire.comms.air.transmissions import Transmissions
@@ -65,17 +65,17 @@ class Channel:
 
     def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
         """Pairs of robot rows a < b joined in the radio graph at a time, sorted, (e, 2)."""
-        senders = np.flatnonzero(alive)
-        found, b = self._reach(pose, alive, senders, np.full(len(senders), BROADCAST))
-        rising = senders[found] < b
-        a, b = senders[found][rising], b[rising]
-        zero = np.zeros(len(a), np.int64)
-        links = Links.under_way(zero, a, b, zero, np.full(len(a), at_ns), 0)
-        probability = np.ones(len(a))
+        assert self._radio.range_m is not None  # `Air` has refused a disk without
+        pair = pairs_in_range(pose, alive, self._arenas, self._size_m, self._radio.range_m)
+        if not self._stages:
+            return pair
+        zero = np.zeros(len(pair), np.int64)
+        a, b = np.ascontiguousarray(pair.T)
+        links = Links.under_way(zero, a, b, zero, np.full(len(pair), at_ns), 0)
+        probability = np.ones(len(pair))
         for stage in self._stages:
             probability *= stage.delivery(links, pose)
-        pair = (a * len(pose) + b)[probability >= self._radio.min_delivery - ROUNDING]
-        return np.stack(np.divmod(np.sort(pair), len(pose)), axis=1)
+        return pair[probability >= self._radio.min_delivery - ROUNDING]
 
     def _reach(self, pose: FloatArray, alive: BoolArray, sender: IntArray, to: IntArray) -> tuple[IntArray, IntArray]:
         assert self._radio.range_m is not None  # `Air` has refused a disk without

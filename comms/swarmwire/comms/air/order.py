@@ -11,10 +11,12 @@ MANY = 40  # for sorting by insertion
 
 
 @njit(cache=True)
-def by_receiver(receiver: IntArray, heard_at_ns: IntArray, sender: IntArray, rows: int) -> IntArray:
-    """The order by (receiver, heard_at, sender) that keeps ties as they stand, (k,); robots are rows."""
+def by_receiver(
+    index: IntArray, receiver: IntArray, heard_at_ns: IntArray, sender: IntArray, rows: int
+) -> IntArray:
+    """The rows of `index` (k,) by (receiver, heard_at, sender), ties as they stand, (k,); robots are rows."""
     # Counting sorts by robot leave only the packets of one receiver to compare.
-    order, _ = _counting_sort(np.arange(len(sender)), sender, rows)
+    order, _ = _counting_sort(index, sender, rows)
     order, start = _counting_sort(order, receiver, rows)
     for row in range(rows):
         own = order[start[row] : start[row + 1]]
