@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from swarmwire.agent import Message, Robots, State, f8
+from swarmwire.agent import Agent, Message, Robot, Robots, State, f8
 from swarmwire.agent.behaviours import Diffusion
 
 
@@ -22,3 +22,16 @@ class TalkingDiffusion(Diffusion):
         super().step(robots, state)
         heard = robots.radio.heard(Ping)
         robots.radio.send(Ping, number=heard.sum(heard.message.number * 0.5))
+
+
+class Listener(Agent):
+    """One robot that does nothing of its own: it reads its rays and every packet, and drives."""
+
+    needs: ClassVar[tuple[str, ...]] = ("proximity", "radio.range")
+
+    def step(self, robot: Robot) -> None:
+        """Read, and drive."""
+        near = robot.proximity.value
+        for packet in robot.radio.heard(Ping):
+            _ = packet.message.number, packet.range_m
+        robot.drive(float(near[0]), 0.0)
