@@ -4,7 +4,7 @@ import numpy as np
 
 from swarmwire.comms.air.links import HEARD, THE_REST, Links
 from swarmwire.comms.air.lives import Lives
-from swarmwire.comms.air.reach import links_in_range, pairs_in_range
+from swarmwire.comms.air.reach import Reach, links_in_reach, pairs_in_reach, reach
 from swarmwire.comms.air.stage import Medium
 from swarmwire.comms.air.stages import chain
 from swarmwire.comms.air.transmissions import Transmissions
@@ -17,17 +17,18 @@ ROUNDING = 1e-9
 
 
 class Channel:
-    """Decides what becomes of packets at robots that stand at given poses."""
+    """Decides what becomes of packets at robots that stand at given poses: arrays that nobody writes to any more."""
 
     def __init__(self, medium: Medium, size_m: tuple[float, float]) -> None:
         self._radio, self._arenas, self._size_m = medium.radio, len(medium.keys), size_m
         self._columns = len(medium.radio.gives.columns)
         self._stages = chain(medium)
+        self._known_pose: FloatArray | None = None  # for which it is known who is in range
 
     def tune(self, at_ns: int, medium: Medium) -> None:
         """The medium's radio has other numbers from `at_ns` on; stages keep what they remember."""
         before = {type(stage): stage for stage in self._stages if stage.remembers}
-        self._radio, self._stages = medium.radio, chain(medium)
+        self._radio, self._stages, self._known_pose = medium.radio, chain(medium), None
         for stage in self._stages:
             if type(stage) in before:
                 stage.go_on_from(before[type(stage)], at_ns)
@@ -36,13 +37,15 @@ class Channel:
         """What becomes of packets that go on air, or are refused, while robots stand at `pose`."""
         # No geometry for what is too large; for a full queue it tells how many it would have reached.
         tried = np.flatnonzero(packets.fate != Fate.TOO_LARGE)
-        everyone = np.ones(len(pose), np.bool_)  # some that are dead by now were meant, some alive by now were not
-        found, receiver = self._reach(pose, everyone, packets.sender[tried], packets.to[tried])
-        packet = tried[found]
+        # Alive or not: some that are dead by now were meant, some alive by now were not.
+        robots, sender, to = len(pose) // self._arenas, packets.sender.take(tried), packets.to.take(tried)
+        found, receiver = links_in_reach(self._reach(pose), robots, sender, to)
+        packet = tried.take(found)
         if lives.any_dead:
             meant = lives.intended(packets.epoch[packet], receiver) | (packets.to[packet] != BROADCAST)
             packet, receiver = packet[meant], receiver[meant]
-        sender, sequence, end_ns = packets.sender[packet], packets.sequence[packet], packets.off_air_at_ns[packet]
+        columns = packets.sender, packets.sequence, packets.off_air_at_ns
+        sender, sequence, end_ns = (column.take(packet) for column in columns)
         links = Links.under_way(packet, sender, receiver, sequence, end_ns, self._columns)
         refused = packets.fate != HEARD
         in_range = np.zeros(len(packets.sender), np.int64)
@@ -65,8 +68,7 @@ class Channel:
 
     def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
         """Pairs of robot rows a < b joined in the radio graph at a time, sorted, (e, 2)."""
-        assert self._radio.range_m is not None  # `Air` has refused a disk without
-        pair = pairs_in_range(pose, alive, self._arenas, self._size_m, self._radio.range_m)
+        pair = pairs_in_reach(self._reach(pose), alive)
         if not self._stages:
             return pair
         zero = np.zeros(len(pair), np.int64)
@@ -77,9 +79,13 @@ class Channel:
             probability *= stage.delivery(links, pose)
         return pair[probability >= self._radio.min_delivery - ROUNDING]
 
-    def _reach(self, pose: FloatArray, alive: BoolArray, sender: IntArray, to: IntArray) -> tuple[IntArray, IntArray]:
-        assert self._radio.range_m is not None  # `Air` has refused a disk without
-        return links_in_range(pose, alive, self._arenas, self._size_m, self._radio.range_m, sender, to)
+    def _reach(self, pose: FloatArray) -> Reach:
+        """Who is in range of whom; the poses of a tick serve its radio graph and the packets that go on air in it."""
+        if pose is not self._known_pose:
+            assert self._radio.range_m is not None  # `Air` has refused a disk without
+            self._known = reach(pose, self._arenas, self._size_m, self._radio.range_m)
+            self._known_pose = pose
+        return self._known
 
 
 def with_the_rest(links: Links, packets: Transmissions, in_range: IntArray, columns: int) -> Links:
