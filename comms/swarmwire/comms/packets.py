@@ -41,10 +41,12 @@ class Payloads:
 
     def rows(self, index: IntArray) -> "Payloads":
         """The rows of `index`, in its order; a row may be taken more than once."""
-        sizes = self.sizes[index]
+        sizes = self.sizes
+        if len(index) and (sizes == sizes[0]).all():  # as most often: whole rows at a time
+            data = self.data.reshape(len(self), sizes[0]).take(index, axis=0)
+            return Payloads(data.reshape(-1), np.arange(len(index) + 1) * sizes[0])
+        sizes = sizes[index]
         offset = offsets(sizes)
-        if len(index) and (self.sizes == sizes[0]).all():  # as most often: whole rows at a time
-            return Payloads(self.data.reshape(len(self), sizes[0])[index].reshape(-1), offset)
         first = np.repeat(self.offset[index] - offset[:-1], sizes)
         return Payloads(self.data[first + np.arange(offset[-1])], offset)
 

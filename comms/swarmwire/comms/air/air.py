@@ -205,6 +205,9 @@ class Air:
 
     def _keep(self, index: IntArray) -> None:
         """Keep these links and their packets only."""
+        if not len(index):
+            self._links, self._on_air = Links.none(len(self.radio.gives.columns)), Transmissions.none()
+            return
         kept, packet = news.compacted(self._links.packet[index], len(self._on_air.sender))
         self._links = self._links.select(index)._replace(packet=packet)
         self._on_air = self._on_air.select(kept)

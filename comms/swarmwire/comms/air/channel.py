@@ -77,7 +77,8 @@ class Channel:
         probability = np.ones(len(pair))
         for stage in self._stages:
             probability *= stage.delivery(links, pose)
-        return pair[probability >= self._radio.min_delivery - ROUNDING]
+        joined = probability >= self._radio.min_delivery - ROUNDING
+        return pair if joined.all() else pair[joined]
 
     def _reach(self, pose: FloatArray) -> Reach:
         """Who is in range of whom; the poses of a tick serve its radio graph and the packets that go on air in it."""

@@ -63,17 +63,18 @@ def in_arena(row: IntArray, robots: int) -> IntArray:
 def departed(ended: Links, packets: Transmissions, robots: int) -> Departed:
     """The packets that left their sender's radio: each has one row for the rest of its receivers."""
     index = np.flatnonzero(ended.receiver == THE_REST)
-    packet, sender = ended.packet[index], ended.sender[index]
+    packet, row = ended.packet.take(index), ended.sender.take(index)
+    arena = row // robots
     return Departed(
-        arena=sender // robots,
-        sender=in_arena(sender, robots),
-        to=packets.to[packet],
-        sequence=ended.sequence[index],
-        intended=packets.intended[packet],
-        out_of_range=np.where(ended.fate[index] == Fate.OUT_OF_RANGE, ended.receivers[index], 0),
-        fate=packets.fate[packet],
-        on_air_at_ns=packets.on_air_at_ns[packet],
-        off_air_at_ns=packets.off_air_at_ns[packet],
+        arena=arena,
+        sender=row - arena * robots,
+        to=packets.to.take(packet),
+        sequence=ended.sequence.take(index),
+        intended=packets.intended.take(packet),
+        out_of_range=np.where(ended.fate.take(index) == OUT_OF_RANGE, ended.receivers.take(index), 0),
+        fate=packets.fate.take(packet),
+        on_air_at_ns=packets.on_air_at_ns.take(packet),
+        off_air_at_ns=packets.off_air_at_ns.take(packet),
     )
 
 

@@ -20,18 +20,18 @@ def by_receiver(index: IntArray, receiver: IntArray, heard_at_ns: IntArray, send
             order, _ = _counting_sort(index, sender, rows)
             break
     order, start = _counting_sort(order, receiver, rows)
+    at_ns = heard_at_ns[order]
     for row in range(rows):
         first, stop = start[row], start[row + 1]
         if stop - first > MANY:
-            own = order[first:stop]
-            own[:] = own[np.argsort(heard_at_ns[own], kind="mergesort")]
+            order[first:stop] = order[first:stop][np.argsort(at_ns[first:stop], kind="mergesort")]
             continue
         for k in range(first + 1, stop):
-            moved, place = order[k], k
-            while place > first and heard_at_ns[order[place - 1]] > heard_at_ns[moved]:
-                order[place] = order[place - 1]
+            moved, moved_ns, place = order[k], at_ns[k], k
+            while place > first and at_ns[place - 1] > moved_ns:
+                order[place], at_ns[place] = order[place - 1], at_ns[place - 1]
                 place -= 1
-            order[place] = moved
+            order[place], at_ns[place] = moved, moved_ns
     return order
 
 
