@@ -110,7 +110,7 @@ class Sent:
     @classmethod
     def none(cls) -> "Sent":
         """No packets."""
-        return cls(_NOTHING, _NOTHING, _NO_PAYLOADS)
+        return _NO_PACKETS
 
     @classmethod
     def joined(cls, parts: "list[Sent]") -> "Sent":
@@ -127,6 +127,9 @@ class Sent:
             if any(part.outcome_id is not None for part in parts)
             else None,
         )
+
+
+_NO_PACKETS = Sent(_NOTHING, _NOTHING, _NO_PAYLOADS)
 
 
 @dataclass(frozen=True, slots=True)

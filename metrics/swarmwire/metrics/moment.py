@@ -3,7 +3,6 @@
 # pyright: basic, reportUnknownMemberType=false
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -30,6 +29,7 @@ class Moment:
         velocity: (arenas, robots, 3) m/s, m/s, rad/s, arena frame, of the dead too.
         alive: (arenas, robots).
         robots_alive: (arenas,) how many.
+        components: of the radio graph; None without a radio.
         per_robot_alive: (arenas,) what to divide a sum over the robots alive by for their mean; NaN if none is.
     """
 
@@ -42,6 +42,8 @@ class Moment:
         self.robots_alive: IntArray
         self.per_robot_alive: FloatArray
         self.robots_alive, self.per_robot_alive, everyone = _count(self.alive)
+        edges = truth.edges
+        self.components = None if edges is None else Components(*_components(edges, self.alive))
         self._counted = True if everyone else self.alive  # a mask costs numpy as much as the sum
 
     @property
@@ -62,12 +64,6 @@ class Moment:
     def sum_alive(self, values: FloatArray) -> FloatArray:
         """The sum of `values` (arenas, robots) over the robots alive of each arena, (arenas,)."""
         return np.add.reduce(values, 1, where=self._counted)
-
-    @cached_property
-    def components(self) -> Components | None:
-        """The radio graph's components; None without a radio. One pass over all arenas, O(rows + edges)."""
-        edges = self.truth.edges
-        return None if edges is None else Components(*_components(edges, self.alive))
 
 
 @njit(cache=True)

@@ -28,7 +28,7 @@ class TrajectoryHash:
 
     def _add(self, table: AnyArray, first: list[int]) -> None:
         """The rows first[a] to first[a + 1] - 1 of a table go into the hash of arena a."""
-        row_bytes, view = table.shape[1] * table.itemsize, memoryview(table).cast("B")
+        row_bytes, view = table.shape[1] * table.itemsize, table.data.cast("B")
         for digest, start, stop in zip(self._hashes, first[:-1], first[1:], strict=True):
             digest.update(view[start * row_bytes : stop * row_bytes])
 
