@@ -34,8 +34,8 @@ pictures: sync ## draw the pictures under docs/ anew; needs a Vulkan driver
 	@docs/pictures/draw.sh
 
 .PHONY: bench
-bench: sync ## measure; ONLY=name for one of them
-	$(RUN) python -m benchmarks $(ONLY)
+bench: sync ## measure; ONLY=name for one of them, ENGINE=pymunk for the figures of that engine
+	$(RUN) python -m benchmarks $(if $(ENGINE),--engine $(ENGINE)) $(ONLY)
 
 .PHONY: sync
 sync: # the locked packages, exactly

@@ -1,13 +1,14 @@
 """Run benchmarks and print one JSON object a line: name, value, unit, and the whole configuration.
 
-`python -m benchmarks [NAME …]`. Every run is what a user's run is: the full loop with trajectory hash and all metrics,
-without a run folder. The value is the median of a few runs; the machine's noise shows in their spread, printed with it.
+`python -m benchmarks [--engine ENGINE] [NAME …]`. Every run is what a user's run is: the full loop with trajectory hash
+and all metrics, without a run folder. The value is the median of a few runs; the machine's noise shows in their spread,
+printed with it.
 """
 
-import json
 import statistics
-import sys
+from argparse import ArgumentParser
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,16 +16,19 @@ from typing import Any
 import psutil
 
 from benchmarks import air, scenes
+from benchmarks.agent_overhead import overhead
+from benchmarks.lines import print_line, report, spread
 from benchmarks.record_cost import compared
+from benchmarks.robot_steps import CASES, D1, robot_steps, start
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.deploy import Result, run
-from swarmwire.deploy.machine import cpu
+from swarmwire.deploy import run
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.rerun_recording import RerunRecording
 from swarmwire.world.scenario_file import scenario_from
 
 REPEATS = 3
+PACKETS = 10  # that a robot reads in a step
 
 
 class OwnMemory:
@@ -48,23 +52,6 @@ class OwnMemory:
         return {}
 
 
-def in_process(name: str, *, robots: int, steps: int, ticks: int, radio: bool, runners: int | None = None) -> None:
-    """Robot-steps per second of diffusing foot-bots."""
-    scenario = scenario_from(scenes.diffusion(robots, steps, ticks / 10, radio=radio), name)
-    warm_up = scenario.model_copy(update={"duration_s": 2.0})
-    run(warm_up, runners=runners)
-    results = [run(scenario, runners=runners) for _ in range(REPEATS)]
-    speeds = [robots * result.ticks / result.wall_time_s for result in results]
-    config = {
-        "physics_steps": steps,
-        "density_per_m2": scenes.DENSITY_PER_M2,
-        "speed_mps": scenes.SPEED_MPS,
-        "body": "footbot",
-        "rays": 24,
-    }
-    report(name, statistics.median(speeds), "robot-steps/s", results[0], {**config, **spread(speeds)})
-
-
 def processes(name: str, *, robots: int, ticks: int) -> None:
     """Real-time factor of a flock with a process per robot; its start, and what each process costs."""
     scenario = scenario_from(scenes.flocking(robots, ticks / 10), name)
@@ -81,11 +68,11 @@ def processes(name: str, *, robots: int, ticks: int) -> None:
 
 def record_cost(name: str, *, robots: int, ticks: int) -> None:
     """Time of a run that is recorded over that of one that is not, its tables joined; and their size."""
-    scenario = scenario_from(scenes.diffusion(robots, 5, ticks / 10, radio=False), name)
+    scenario = scenario_from(scenes.diffusion(robots, ticks / 10), name)
     compared(scenario.model_copy(update={"duration_s": 2.0}), 1)
     without, recorded, sizes_mb, result = compared(scenario, REPEATS)
     ratios = [with_s / plain_s for plain_s, with_s in zip(without, recorded, strict=True)]
-    config = {"body": "footbot", "physics_steps": 5, "density_per_m2": scenes.DENSITY_PER_M2}
+    config = {"body": "footbot", "physics_steps": 5, "density_per_m2": 1.0}
     report(name, statistics.median(ratios), "x the run without", result, {**config, **spread(ratios)})
     report(f"{name}-size", sum(sizes_mb.values()), "MB", result, {**config, "tables_mb": sizes_mb})
 
@@ -126,13 +113,13 @@ class Timed:
         return [100.0 * s / (w - o - s) for s, o, w in zip(spent_ns, own_ns, whole_ns, strict=True)]
 
 
-def view_cost(name: str, *, robots: int, ticks: int, radio: bool) -> None:
+def view_cost(name: str, *, robots: int, ticks: int, neighbours: float) -> None:
     """What recording for the viewer adds to a run, in percent, and the size of the recording.
 
     Both parts are timed in the same runs, second by second, so that what else the machine does falls on both; rerun's
     own threads, which compress and write, are not in it while there is a core for them.
     """
-    scenario = scenario_from(scenes.diffusion(robots, 5, ticks / 10, radio=radio), name)
+    scenario = scenario_from(scenes.diffusion(robots, ticks / 10, neighbours=neighbours), name)
     run(scenario.model_copy(update={"duration_s": 2.0}))
     with TemporaryDirectory() as folder:
         rrd = Path(folder, "run.rrd")
@@ -142,7 +129,7 @@ def view_cost(name: str, *, robots: int, ticks: int, radio: bool) -> None:
     if any(result.counts.get("observer_failed_Timed") for result in results):
         raise RuntimeError("the recording failed: its cost says nothing")
     costs = [statistics.median(observer.costs_percent()) for observer in timed]
-    config = {"body": "footbot", "rays": 24, "physics_steps": 5, "density_per_m2": scenes.DENSITY_PER_M2}
+    config = {"body": "footbot", "rays": 24, "physics_steps": 5, "density_per_m2": 1.0}
     report(name, statistics.median(costs), "% of the run without", results[0], {**config, **spread(costs)})
     report(f"{name}-size", size_mb, "MB", results[0], config)
 
@@ -160,56 +147,43 @@ def air_scaling(name: str) -> None:
     print_line(name, ratio, "dearest over cheapest", told)
 
 
-def report(name: str, value: float, unit: str, result: Result, config: dict[str, Any]) -> None:
-    """Print one line."""
-    radio = result.radio
-    told = {
-        "robots": result.robots,
-        "runners": result.runners,
-        "ticks": result.ticks,
-        "rate_hz": 10,
-        **config,
-        "packets_heard_per_robot_tick": round(radio.fates["heard"] / result.robots / result.ticks, 2) if radio else 0,
-        "collisions": result.metrics["collisions"].final,
-    }
-    print_line(name, value, unit, told)
+def agent_overhead(name: str) -> None:
+    """What the framework costs a robot's step, where one robot is all and where there are many, and a packet read."""
+    told = {"body": "footbot", "rays": 24, "packets_per_step": PACKETS}
+    for robots, ticks in ((1, 5000), (100, 100)):
+        overhead(WallClock(), robots, PACKETS, ticks // 10)
+        found = [overhead(WallClock(), robots, PACKETS, ticks) for _ in range(REPEATS)]
+        for part, values in (("step", [one.step_us for one in found]), ("packet", [one.packet_us for one in found])):
+            line = {"robots": robots, **told, **spread(values)}
+            print_line(f"{name}-{part}", statistics.median(values), f"µs per {part}", line)
 
 
-def print_line(name: str, value: float, unit: str, told: dict[str, Any]) -> None:
-    """Print a value with all that it was measured under."""
-    line = {"name": name, "value": round(value, 3), "unit": unit, **told, "cpu": cpu()}
-    print(json.dumps(line), flush=True)
-
-
-def spread(values: list[float]) -> dict[str, float]:
-    """Lowest and highest of the repeats."""
-    return {"lowest": round(min(values), 3), "highest": round(max(values), 3)}
-
-
-BENCHMARKS: dict[str, Callable[[str], None]] = {
-    "inprocess-1000-d1": lambda name: in_process(name, robots=1000, steps=5, ticks=200, radio=False),
-    "inprocess-1000-d1-10steps": lambda name: in_process(name, robots=1000, steps=10, ticks=200, radio=False),
-    "inprocess-1000-d1-radio": lambda name: in_process(name, robots=1000, steps=5, ticks=200, radio=True),
-    "wire-1000x2": lambda name: in_process(name, robots=1000, steps=5, ticks=200, radio=True, runners=2),
+OTHERS: dict[str, Callable[[str], None]] = {
+    "agent-overhead": agent_overhead,
     "record-cost": lambda name: record_cost(name, robots=1000, ticks=600),
-    "view-cost": lambda name: view_cost(name, robots=1000, ticks=600, radio=False),
-    "view-cost-radio": lambda name: view_cost(name, robots=1000, ticks=600, radio=True),
+    "view-cost": lambda name: view_cost(name, robots=1000, ticks=600, neighbours=0.0),
+    "view-cost-radio": lambda name: view_cost(name, robots=1000, ticks=600, neighbours=D1),
     **dict.fromkeys(air.CASES, air_cost),
     "air-scaling": air_scaling,
     "processes-100": lambda name: processes(name, robots=100, ticks=300),
 }
 
 
-def main(names: list[str]) -> int:
+def main() -> None:
     """Run the named benchmarks, or all."""
-    unknown = [name for name in names if name not in BENCHMARKS]
-    if unknown:
-        print(f"no benchmark {unknown[0]!r}; there are {', '.join(BENCHMARKS)}", file=sys.stderr)
-        return 2
-    for name in names or BENCHMARKS:
-        BENCHMARKS[name](name)
-    return 0
+    parser = ArgumentParser(prog="python -m benchmarks")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="all if left out")
+    parser.add_argument("--engine", help="[physics] engine of inprocess, single, replicas, laser, wire and start")
+    given = parser.parse_args()
+    of_engine = {**dict.fromkeys(CASES, robot_steps), "start-1000": start}
+    chosen = {name: partial(measure, engine=given.engine, repeats=REPEATS) for name, measure in of_engine.items()}
+    runs: dict[str, Callable[[str], None]] = {**chosen, **OTHERS}
+    for name in given.names:
+        if name not in runs:
+            parser.error(f"no benchmark {name!r}; there are {', '.join(runs)}")
+    for name in given.names or runs:
+        runs[name](name)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    main()

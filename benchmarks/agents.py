@@ -2,7 +2,9 @@
 
 from typing import ClassVar
 
-from swarmwire.agent import Message, Robots, State, f8
+import numpy as np
+
+from swarmwire.agent import Agent, Message, Robot, Robots, State, VectorAgent, f8
 from swarmwire.agent.behaviours import Diffusion
 
 
@@ -22,3 +24,35 @@ class TalkingDiffusion(Diffusion):
         super().step(robots, state)
         heard = robots.radio.heard(Ping)
         robots.radio.send(Ping, number=heard.sum(heard.message.number * 0.5))
+
+
+class ScanDiffusion(VectorAgent):
+    """Straight on until the laser scan sees something ahead, then turn on the spot, away from the nearer side."""
+
+    needs: ClassVar[tuple[str, ...]] = ("scan",)
+    speed_mps: float = 0.05
+    turn_radps: float = 0.5
+    clear_m: float = 0.3  # from the scanner
+
+    def step(self, robots: Robots, state: State) -> None:
+        """Straight, or turn."""
+        ahead = np.abs(robots.scan.angle_rad) < 0.5
+        left = robots.scan.angle_rad[ahead] > 0.0
+        range_m = robots.scan.range_m[:, ahead]
+        left_m, right_m = np.min(range_m[:, left], axis=1), np.min(range_m[:, ~left], axis=1)
+        blocked = np.minimum(left_m, right_m) < self.clear_m
+        turn_radps = np.where(left_m < right_m, -self.turn_radps, self.turn_radps)
+        robots.drive(np.where(blocked, 0.0, self.speed_mps), np.where(blocked, turn_radps, 0.0))
+
+
+class Listener(Agent):
+    """One robot that does nothing of its own: it reads its rays and every packet, and drives."""
+
+    needs: ClassVar[tuple[str, ...]] = ("proximity", "radio.range")
+
+    def step(self, robot: Robot) -> None:
+        """Read, and drive."""
+        near = robot.proximity.value
+        for packet in robot.radio.heard(Ping):
+            _ = packet.message.number, packet.range_m
+        robot.drive(float(near[0]), 0.0)

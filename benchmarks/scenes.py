@@ -3,35 +3,47 @@
 import math
 from typing import Any
 
-NEIGHBOURS = 9.0
-DENSITY_PER_M2 = 1.0
 SPEED_MPS = 0.05
+BURGER = "turtlebot3-burger"
 
 
-def diffusion(robots: int, steps: int, duration_s: float, *, radio: bool) -> dict[str, Any]:
-    """Foot-bots with 24 rays and ARGoS's diffusion rule, one per square metre; with radio, a broadcast a tick."""
-    side_m = math.sqrt(robots / DENSITY_PER_M2)
-    agent = "benchmarks.agents:TalkingDiffusion" if radio else "swarmwire.agent.behaviours:Diffusion"
+def diffusion(
+    robots: int,
+    duration_s: float,
+    *,
+    steps: int = 5,
+    density_per_m2: float = 1.0,
+    neighbours: float = 0.0,
+    body: str = "footbot",
+    engine: str | None = None,
+) -> dict[str, Any]:
+    """Robots that diffuse: foot-bots with 24 rays by ARGoS's rule, TurtleBots by their scans.
+
+    With `neighbours` every robot broadcasts in each tick, and so many are in reach of it, far from walls. Without
+    `engine` it is the scenario's default.
+    """
+    side_m = math.sqrt(robots / density_per_m2)
+    talking = "benchmarks.agents:TalkingDiffusion" if neighbours else "swarmwire.agent.behaviours:Diffusion"
     scenario: dict[str, Any] = {
         "format": 1,
         "name": "diffusion",
         "seed": 1,
         "duration_s": duration_s,
         "time": {"rate_hz": 10},
-        "physics": {"engine": "pymunk", "steps": steps},
+        "physics": {"steps": steps} if engine is None else {"engine": engine, "steps": steps},
         "arena": {"size_m": [side_m, side_m], "boundary": "walls"},
         "robots": {
             "bots": {
-                "body": "footbot",
+                "body": body,
                 "count": robots,
                 "place": {"how": "arena"},
-                "agent": agent,
+                "agent": "benchmarks.agents:ScanDiffusion" if body == BURGER else talking,
                 "params": {"speed_mps": SPEED_MPS},
             }
         },
     }
-    if radio:
-        range_m = math.sqrt(NEIGHBOURS / (math.pi * DENSITY_PER_M2))
+    if neighbours:
+        range_m = math.sqrt(neighbours / (math.pi * density_per_m2))
         scenario["radio"] = {"model": "disk", "range_m": range_m, "bit_rate_bps": 250_000}
     return scenario
 
@@ -45,7 +57,7 @@ def flocking(robots: int, duration_s: float) -> dict[str, Any]:
         "seed": 1,
         "duration_s": duration_s,
         "time": {"rate_hz": 10},
-        "physics": {"engine": "pymunk", "steps": 5},
+        "physics": {"steps": 5},
         "arena": {"size_m": [side_m, side_m], "boundary": "walls"},
         "robots": {
             "flock": {

@@ -157,7 +157,9 @@ def hosted(group: GroupAssignment, kind: AgentClass) -> Hosted:
 
 def _own(heard: Heard, rows: IntArray) -> Heard:
     """What the robots `rows` heard, with the receiver as a place in `rows`."""
-    if not len(heard) or not len(rows):
+    if not len(heard):
+        return heard
+    if not len(rows):
         return heard.select(np.empty(0, np.int64))
     place = np.searchsorted(rows, heard.receiver)
     if place[-1] == len(rows) or not (rows[place] == heard.receiver).all():  # some is for robots of other groups

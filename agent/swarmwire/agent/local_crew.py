@@ -51,6 +51,8 @@ def _read_only(senses: Senses) -> Senses:
 
 
 def _heard_read_only(heard: Heard) -> Heard:
+    if not len(heard):
+        return heard
     return Heard(
         _frozen(heard.receiver),
         _frozen(heard.sender),

@@ -1,6 +1,6 @@
 """Robot: the handle through which an Agent's step sees and moves its one robot."""
 
-from collections.abc import Iterator
+from functools import cached_property
 from typing import Any, TypeVar, overload
 
 import numpy as np
@@ -43,7 +43,11 @@ class Robot(Handle):
         super().__init__(turn)
         self._row = row
         self.radio = RadioPort(turn, row)
-        self.draw = Draw(turn.keys[row : row + 1], turn.tick)
+
+    @cached_property
+    def draw(self) -> Draw:
+        """Random draws of the robot's own."""
+        return Draw(self._turn.keys[self._row : self._row + 1], self._turn.tick)
 
     @property
     def proximity(self) -> ProximityReading:
@@ -163,16 +167,19 @@ class RadioPort:
         """The packets of a message class (or `dict`) heard since the robot's last step, by time."""
         if issubclass(kind, Message):
             packets = self._turn.packets(kind)
-            columns = {name: getattr(packets.message, name) for name in kind.ranges}
+            span = self._span(packets.row)
+            columns = {name: getattr(packets.message, name)[span.start : span.stop].tolist() for name in kind.ranges}
             return [
-                Packet(packets, at, kind(**{name: float(column[at]) for name, column in columns.items()}))
-                for at in self._mine(packets)
+                Packet(packets, at, kind(**{name: column[place] for name, column in columns.items()}))
+                for place, at in enumerate(span)
             ]
         if not issubclass(kind, dict):
             raise TypeError(f"expected a class of Message, or dict, got {kind}")
         table = self._turn.tagged(DICT_TAG)
         dicts = Packets[dict[str, Any]](self._turn.n, table, {}, self._turn.needs)
-        return [Packet(dicts, at, decode_dict(table.payloads.row(int(table.payload[at])))) for at in self._mine(dicts)]
+        return [
+            Packet(dicts, at, decode_dict(table.payloads.row(int(table.payload[at])))) for at in self._span(dicts.row)
+        ]
 
     def send(self, message: Message | dict[str, Any], to: int | None = None) -> int:
         """Send to all who hear it, or to the robot with index `to` in the arena; returns the packet's id."""
@@ -186,9 +193,7 @@ class RadioPort:
         ids, results = table.id.tolist(), table.result.tolist()
         return [Outcome(ids[at], SendResult(results[at])) for at in self._span(table.row)]
 
-    def _mine(self, packets: Packets[Any]) -> Iterator[int]:
-        return iter(self._span(packets.row))
-
     def _span(self, row: IntArray) -> range:
-        first, last = np.searchsorted(row, [self._row, self._row + 1])
-        return range(int(first), int(last))
+        if not len(row):
+            return range(0)
+        return range(int(row.searchsorted(self._row)), int(row.searchsorted(self._row + 1)))

@@ -24,8 +24,7 @@ class Notes:
     @classmethod
     def none(cls) -> "Notes":
         """Nobody named a state."""
-        nothing = np.empty(0, np.int64)
-        return cls(nothing, nothing)
+        return _NO_NOTES
 
     @classmethod
     def joined(cls, parts: "list[Notes]") -> "Notes":
@@ -37,6 +36,9 @@ class Notes:
         place = {name: code for code, name in enumerate(names)}
         codes = [np.array([place[name] for name in part.names])[part.code] for part in parts]
         return cls(np.concatenate([part.rows for part in parts]), np.concatenate(codes), names)
+
+
+_NO_NOTES = Notes(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 def checked_state(state: object) -> str:

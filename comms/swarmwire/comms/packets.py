@@ -41,10 +41,12 @@ class Payloads:
 
     def rows(self, index: IntArray) -> "Payloads":
         """The rows of `index`, in its order; a row may be taken more than once."""
-        sizes = self.sizes[index]
+        sizes = self.sizes
+        if len(index) and (sizes == sizes[0]).all():  # as most often: whole rows at a time
+            data = self.data.reshape(len(self), sizes[0]).take(index, axis=0)
+            return Payloads(data.reshape(-1), np.arange(len(index) + 1) * sizes[0])
+        sizes = sizes[index]
         offset = offsets(sizes)
-        if len(index) and (self.sizes == sizes[0]).all():  # as most often: whole rows at a time
-            return Payloads(self.data.reshape(len(self), sizes[0])[index].reshape(-1), offset)
         first = np.repeat(self.offset[index] - offset[:-1], sizes)
         return Payloads(self.data[first + np.arange(offset[-1])], offset)
 
@@ -67,7 +69,7 @@ class Payloads:
     def joined(cls, parts: "list[Payloads]") -> "Payloads":
         """The rows of all parts, one after the other."""
         if not parts:
-            return cls.of([])
+            return _NO_PAYLOADS
         data = np.concatenate([part.data for part in parts])
         return cls(data, offsets(np.concatenate([part.sizes for part in parts])))
 
@@ -77,6 +79,10 @@ def offsets(sizes: IntArray) -> IntArray:
     out = np.zeros(len(sizes) + 1, np.int64)
     np.cumsum(sizes, out=out[1:])
     return out
+
+
+_NOTHING = np.empty(0, np.int64)
+_NO_PAYLOADS = Payloads.of([])
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +110,7 @@ class Sent:
     @classmethod
     def none(cls) -> "Sent":
         """No packets."""
-        nothing = np.empty(0, np.int64)
-        return cls(nothing, nothing, Payloads.of([]))
+        return _NO_PACKETS
 
     @classmethod
     def joined(cls, parts: "list[Sent]") -> "Sent":
@@ -122,6 +127,9 @@ class Sent:
             if any(part.outcome_id is not None for part in parts)
             else None,
         )
+
+
+_NO_PACKETS = Sent(_NOTHING, _NOTHING, _NO_PAYLOADS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,9 +150,8 @@ class Heard:
     @classmethod
     def none(cls, gives: tuple[str, ...] = ()) -> "Heard":
         """Nothing heard over a medium that gives the named columns."""
-        nothing = np.empty(0, np.int64)
         given = {name: np.empty(0, np.float64) for name in gives}
-        return cls(nothing, nothing, nothing, nothing, given, nothing, Payloads.of([]))
+        return cls(_NOTHING, _NOTHING, _NOTHING, _NOTHING, given, _NOTHING, _NO_PAYLOADS)
 
     def select(self, index: IntArray) -> "Heard":
         """The rows of `index`; the payload table stays shared."""

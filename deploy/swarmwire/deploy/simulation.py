@@ -23,6 +23,7 @@ from swarmwire.deploy.endpoint import check_socket, new_run_id
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.inputs import ReplayedCrew
 from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.kept_memory import keep_memory
 from swarmwire.deploy.link_trace_file import scenario_traces
 from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.recording import Recording
@@ -149,6 +150,7 @@ class Simulation:
         """Start the agents; AgentFailed or RunnerLost if that fails."""
         if self._loop is not None:
             raise RuntimeError("a simulation runs once; make another one")
+        keep_memory()
         rows, realtime = self.static.arenas * self.static.robots, self._pace.factor if self._pace else None
         self._origin = self._record.begin(
             self.scenario, self.code, self.static.seeds, ticks=self.ticks, runners=self.runners, realtime=realtime

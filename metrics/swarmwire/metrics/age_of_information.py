@@ -15,7 +15,7 @@ from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
 
 MOST_PAIRS = 2**18  # of an arena: 2 MB
-NEVER = -1
+NEVER = NOT_COUNTED = -1
 HEARD = int(Fate.HEARD)
 
 
@@ -60,6 +60,8 @@ class Newest:
         arenas, robots = static.arenas, static.robots
         self._every = -(-robots * robots // MOST_PAIRS)  # robots from one receiver to the next
         receivers = -(-robots // self._every)
+        index = np.arange(robots)
+        self._place: IntArray = np.where(index % self._every == 0, index // self._every, NOT_COUNTED)  # as a receiver
         self._sent_at_ns: IntArray = np.full((arenas, receivers, robots), NEVER, np.int64)
         self._alive: BoolArray = np.ones((arenas, robots), np.bool_)
         self._pairs: IntArray = np.zeros(arenas, np.int64)
@@ -69,7 +71,7 @@ class Newest:
         """Take in what was heard; `alive` (arenas, robots) are the robots that count from now on."""
         gained_ns = np.zeros(len(self._pairs), np.int64)
         links = ended.fate, ended.arena, ended.receiver, ended.sender, ended.sent_at_ns
-        _take(*links, self._every, alive, self._sent_at_ns, self._pairs, gained_ns)
+        _take(*links, self._place, alive, self._sent_at_ns, self._pairs, gained_ns)
         if not np.array_equal(alive, self._alive):
             self._alive = alive.copy()
             self._count_again()
@@ -93,16 +95,16 @@ class Newest:
 
 
 @njit(cache=True)
-def _take(fate, arena, receiver, sender, sent_at_ns, every, alive, newest_ns, pairs, gained_ns):
+def _take(fate, arena, receiver, sender, sent_at_ns, place, alive, newest_ns, pairs, gained_ns):
     """Put in what was heard; add to the pairs alive that ever heard, (arenas,), and to the sum of their times."""
     for i in range(len(fate)):
-        a, r, s = arena[i], receiver[i], sender[i]
-        if fate[i] != HEARD or r % every:
+        if fate[i] != HEARD or place[receiver[i]] == NOT_COUNTED:
             continue
-        before_ns = newest_ns[a, r // every, s]
+        a, r, s = arena[i], receiver[i], sender[i]
+        before_ns = newest_ns[a, place[r], s]
         if sent_at_ns[i] <= before_ns:
             continue
-        newest_ns[a, r // every, s] = sent_at_ns[i]
+        newest_ns[a, place[r], s] = sent_at_ns[i]
         if alive[a, r] and alive[a, s]:
             pairs[a] += before_ns == NEVER
             gained_ns[a] += sent_at_ns[i] - (0 if before_ns == NEVER else before_ns)

@@ -54,13 +54,12 @@ class Fragmentation:
         self._since_ns: IntArray = np.full(arenas, NEVER, np.int64)  # start of the present split
         self._event: BoolArray = np.zeros(arenas, np.bool_)  # it was counted
 
-    def see(self, moment: Moment) -> IntArray:
-        """How many events, 0 or 1, are counted in this tick, (arenas,)."""
-        counted, found = np.zeros_like(self.started), moment.components
-        self.rejoined_now = []
+    def see(self, moment: Moment) -> IntArray | None:
+        """How many events, 0 or 1, are counted in this tick, (arenas,); None without a radio."""
+        self.rejoined_now, found = [], moment.components
         if found is None:
-            return counted
-        lasted_ns = np.full_like(self.started, NEVER)
+            return None
+        counted, lasted_ns = np.zeros_like(self.started), np.full_like(self.started, NEVER)
         state = self._was_whole, self._since_ns, self._event
         if _follow(found.pieces, moment.truth.time_ns, self._hold_ns, *state, counted, lasted_ns):
             self.rejoined_now = np.flatnonzero(lasted_ns != NEVER).tolist()

@@ -29,6 +29,6 @@ class Fragmentations(OfFragmentation):
 
         def measure(moment: Moment) -> FloatArray | float:
             counted = events.see(moment)
-            return np.nan if moment.components is None else counted.astype(np.float64)
+            return np.nan if counted is None else counted.astype(np.float64)
 
         return measure

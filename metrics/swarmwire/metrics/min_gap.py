@@ -36,7 +36,7 @@ class MinGap(Metric):
         def measure(moment: Moment) -> FloatArray:
             nonlocal order
             if order is None:
-                order = np.argsort(moment.position_m[:, :, 0], axis=1)
+                order = np.argsort(moment.pose[:, :, 0], axis=1)
             return smallest_gap_m(moment.truth.pose, radius_m, moment.truth.alive, order, wrap_m)
 
         return measure

@@ -3,7 +3,6 @@
 # pyright: basic, reportUnknownMemberType=false
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -21,56 +20,76 @@ class Components:
 
 
 class Moment:
-    """The truth of one tick with its rows folded to (arenas, robots)."""
+    """The truth of one tick with its rows folded to (arenas, robots).
+
+    Attributes:
+        static: what does not change.
+        truth: as observers see it.
+        pose: (arenas, robots, 3) x, y in m, heading in rad, arena frame, of the dead too.
+        velocity: (arenas, robots, 3) m/s, m/s, rad/s, arena frame, of the dead too.
+        alive: (arenas, robots).
+        robots_alive: (arenas,) how many.
+        components: of the radio graph; None without a radio.
+        per_robot_alive: (arenas,) what to divide a sum over the robots alive by for their mean; NaN if none is.
+    """
 
     def __init__(self, static: Static, truth: Truth) -> None:
         self.static, self.truth = static, truth
-        self._shape = static.arenas, static.robots
+        arenas, robots = static.arenas, static.robots
+        self.pose: FloatArray = truth.pose.reshape(arenas, robots, 3)
+        self.velocity: FloatArray = truth.velocity.reshape(arenas, robots, 3)
+        self.alive: BoolArray = truth.alive.reshape(arenas, robots)
+        self.robots_alive: IntArray
+        self.per_robot_alive: FloatArray
+        self.robots_alive, self.per_robot_alive, everyone = _count(self.alive)
+        edges = truth.edges
+        self.components = None if edges is None else Components(*_components(edges, self.alive))
+        self._counted = True if everyone else self.alive  # a mask costs numpy as much as the sum
 
-    @cached_property
-    def alive(self) -> BoolArray:
-        """Which robots are alive, (arenas, robots)."""
-        return self.truth.alive.reshape(self._shape)
+    @property
+    def position_m(self) -> FloatArray:
+        """Where robots stand in the arena's frame, (arenas, robots, 2), the dead too."""
+        return self.pose[:, :, :2]
 
-    @cached_property
-    def robots_alive(self) -> IntArray:
-        """How many robots of each arena are alive, (arenas,)."""
-        return np.add.reduce(self.alive, 1, np.int64)
+    @property
+    def heading_rad(self) -> FloatArray:
+        """Headings in the arena's frame, (arenas, robots), of the dead too."""
+        return self.pose[:, :, 2]
 
-    @cached_property
-    def per_robot_alive(self) -> FloatArray:
-        """What to divide a sum over robots by for their mean, (arenas,); NaN if none is alive."""
-        return np.where(self.robots_alive > 0, self.robots_alive, np.nan)
+    @property
+    def velocity_mps(self) -> FloatArray:
+        """Velocities in the arena's frame, (arenas, robots, 2), of the dead too."""
+        return self.velocity[:, :, :2]
 
     def sum_alive(self, values: FloatArray) -> FloatArray:
         """The sum of `values` (arenas, robots) over the robots alive of each arena, (arenas,)."""
         return np.add.reduce(values, 1, where=self._counted)
 
-    @cached_property
-    def heading_rad(self) -> FloatArray:
-        """Headings in the arena's frame, (arenas, robots), of the dead too."""
-        return self.truth.pose[:, 2].reshape(self._shape)
 
-    @property
-    def position_m(self) -> FloatArray:
-        """Where robots stand in the arena's frame, (arenas, robots, 2), the dead too."""
-        return self.truth.pose[:, :2].reshape(*self._shape, 2)
+@njit(cache=True)
+def agreement(x: FloatArray, y: FloatArray, most: FloatArray, robots_alive: IntArray) -> FloatArray:
+    """How near sums of vectors, |(x, y)|, come to the most they can be, 0 to 1, (arenas,); NaN if nobody is alive."""
+    share = np.full(len(x), np.nan)
+    for arena in range(len(x)):
+        if robots_alive[arena]:
+            # Rounding may carry the sum of equal vectors just past that of their lengths.
+            length = np.hypot(x[arena], y[arena])
+            share[arena] = min(length / most[arena], 1.0) if most[arena] > 0.0 else 0.0
+    return share
 
-    @property
-    def velocity_mps(self) -> FloatArray:
-        """Velocities in the arena's frame, (arenas, robots, 2), of the dead too."""
-        return self.truth.velocity[:, :2].reshape(*self._shape, 2)
 
-    @cached_property
-    def components(self) -> Components | None:
-        """The radio graph's components; None without a radio. One pass over all arenas, O(rows + edges)."""
-        edges = self.truth.edges
-        return None if edges is None else Components(*_components(edges, self.alive))
-
-    @cached_property
-    def _counted(self) -> BoolArray | bool:
-        """A mask costs numpy as much as the sum: as most often all are alive, none is needed."""
-        return self.alive if np.minimum.reduce(self.truth.alive) == 0 else True
+@njit(cache=True)
+def _count(alive):
+    """How many robots of each arena are alive, the same with NaN for none, and whether all are."""
+    arenas, robots = alive.shape
+    count, divisor, everyone = np.zeros(arenas, np.int64), np.full(arenas, np.nan), True
+    for arena in range(arenas):
+        for i in range(robots):
+            count[arena] += alive[arena, i]
+        if count[arena]:
+            divisor[arena] = count[arena]
+        everyone = everyone and count[arena] == robots
+    return count, divisor, everyone
 
 
 @njit(cache=True)

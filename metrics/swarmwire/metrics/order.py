@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.moment import Moment, agreement
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,6 @@ class Order(Metric):
 
 
 def _order(moment: Moment) -> FloatArray:
-    x, y = moment.sum_alive(np.cos(moment.heading_rad)), moment.sum_alive(np.sin(moment.heading_rad))
-    # Rounding may carry the sum of n equal unit vectors just past n.
-    return np.minimum(np.hypot(x, y) / moment.per_robot_alive, 1.0)
+    heading_rad = moment.heading_rad
+    x, y = moment.sum_alive(np.cos(heading_rad)), moment.sum_alive(np.sin(heading_rad))
+    return agreement(x, y, moment.per_robot_alive, moment.robots_alive)

@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.moment import Moment, agreement
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,6 @@ class OrderVelocity(Metric):
 
 
 def _order_velocity(moment: Moment) -> FloatArray:
-    vx, vy = moment.velocity_mps[:, :, 0], moment.velocity_mps[:, :, 1]
-    together = np.hypot(moment.sum_alive(vx), moment.sum_alive(vy))
+    vx, vy = moment.velocity[:, :, 0], moment.velocity[:, :, 1]
     speeds = moment.sum_alive(np.hypot(vx, vy))
-    # Rounding may carry the sum of equal velocities just past that of their speeds.
-    order = np.minimum(together / np.where(speeds > 0.0, speeds, 1.0), 1.0)
-    return np.where(moment.robots_alive > 0, order, np.nan)
+    return agreement(moment.sum_alive(vx), moment.sum_alive(vy), speeds, moment.robots_alive)

@@ -27,8 +27,7 @@ class Unrejoined(OfFragmentation):
         events = Fragmentation(static, self.hold_s)
 
         def measure(moment: Moment) -> FloatArray | float:
-            events.see(moment)
-            if moment.components is None:
+            if events.see(moment) is None:
                 return np.nan
             return (events.started - events.rejoined) / np.where(events.started > 0, events.started, np.nan)
 

@@ -42,7 +42,8 @@ class Events:
         happened: list[Happened] = []
         if world.batteries.any:  # first, so that who is revived in this tick is not found empty
             happened.extend(self._run_down(start_ns, world.batteries.empty))
-        self._swarm = replace(self._swarm, pose=world.pose)
+        if self._coming and self._coming[0][0] <= start_ns:
+            self._swarm = replace(self._swarm, pose=world.pose)
         while self._coming and self._coming[0][0] <= start_ns:
             _, begins, serial = self._coming.popleft()
             happened.append(self._happen(serial, begins))
@@ -58,7 +59,7 @@ class Events:
         return tuple(happened)
 
     def _tune(self, air: Air, radio: Radio) -> None:
-        if radio != self._tuned:
+        if radio is not self._tuned and radio != self._tuned:  # as most often it is the same, which costs nothing
             air.tune(radio)
             self._tuned = radio
 

@@ -4,7 +4,7 @@ import hashlib
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.packets import Heard
 
 
@@ -14,17 +14,23 @@ class TrajectoryHash:
     def __init__(self, arenas: int, robots: int) -> None:
         self._robots = robots
         self._hashes = [hashlib.sha256() for _ in range(arenas)]
+        self._first_row = [arena * robots for arena in range(arenas + 1)]
 
     def add(self, pose: FloatArray, velocity: FloatArray, command: FloatArray, heard: Heard) -> None:
         """One tick; tables have a row per robot of all arenas, `heard` is sorted by receiver."""
-        state = np.concatenate([pose, velocity, command], axis=1)
-        index = heard.receiver % self._robots
-        packets = np.stack([index, heard.sender, heard.sequence, heard.heard_at_ns], axis=1)
-        first_row = np.arange(len(self._hashes) + 1) * self._robots
-        first_packet = np.searchsorted(heard.receiver, first_row)
-        for arena, digest in enumerate(self._hashes):
-            digest.update(state[first_row[arena] : first_row[arena + 1]].data)
-            digest.update(packets[first_packet[arena] : first_packet[arena + 1]].data)
+        self._add(np.concatenate([pose, velocity, command], axis=1), self._first_row)
+        if len(heard):
+            packets = np.empty((len(heard), 4), np.int64)
+            arena = heard.receiver // self._robots
+            packets[:, 0] = heard.receiver - arena * self._robots
+            packets[:, 1], packets[:, 2], packets[:, 3] = heard.sender, heard.sequence, heard.heard_at_ns
+            self._add(packets, np.searchsorted(arena, np.arange(len(self._hashes) + 1)).tolist())
+
+    def _add(self, table: AnyArray, first: list[int]) -> None:
+        """The rows first[a] to first[a + 1] - 1 of a table go into the hash of arena a."""
+        row_bytes, view = table.shape[1] * table.itemsize, table.data.cast("B")
+        for digest, start, stop in zip(self._hashes, first[:-1], first[1:], strict=True):
+            digest.update(view[start * row_bytes : stop * row_bytes])
 
     def hexdigests(self) -> list[str]:
         """The hash of each arena so far."""

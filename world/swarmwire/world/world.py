@@ -20,7 +20,6 @@ from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.actuation.own_actuators import OwnActuators
-from swarmwire.world.angles import wrapped
 from swarmwire.world.bodies import bodies_of
 from swarmwire.world.engines.choice import engines_of
 from swarmwire.world.layout import read_layout
@@ -33,6 +32,7 @@ from swarmwire.world.sensors import SENSORS, Scene
 from swarmwire.world.sensors.scene import led_places_m
 from swarmwire.world.sensors.sensor import TrueSense
 from swarmwire.world.sensors.staged import Staged
+from swarmwire.world.snapshot import snapshot
 from swarmwire.world.states import States
 
 
@@ -167,10 +167,7 @@ class World:
         return {**self.actuators.counts(), **own, **states}
 
     def _show(self) -> None:
-        state = self._physics.state.reshape(-1, 6)
-        self.pose: FloatArray = state[:, :3].copy()
-        self.pose[:, 2] = wrapped(self.pose[:, 2])
-        self.velocity: FloatArray = state[:, 3:].copy()
+        self.pose, self.velocity = snapshot(self._physics.state)
 
     def _scene_of(self, tick_s: float) -> Scene:
         static, physics = self.static, self._physics

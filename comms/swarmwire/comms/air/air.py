@@ -101,14 +101,17 @@ class Air:
         self._links = Links.none(len(radio.gives.columns))
 
     def hold(self, pose: FloatArray, alive: BoolArray) -> None:
-        """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive."""
+        """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive.
+
+        Nobody may write to `pose` after.
+        """
         self._lives.now(alive)
         self._held.become(self._coming)
         self._held.alive = alive.copy()
         if self._coming_radio is not self.radio:
             self.radio = self._coming_radio
             self._way.tune(self._now_ns, self.radio)
-        self._way.hold(pose.copy())
+        self._way.hold(pose)
         in_arena = alive.reshape(-1, self._robots).sum(axis=1)
         self._others_alive = np.repeat(in_arena, self._robots) - alive
 
@@ -202,6 +205,9 @@ class Air:
 
     def _keep(self, index: IntArray) -> None:
         """Keep these links and their packets only."""
+        if not len(index):
+            self._links, self._on_air = Links.none(len(self.radio.gives.columns)), Transmissions.none()
+            return
         kept, packet = news.compacted(self._links.packet[index], len(self._on_air.sender))
         self._links = self._links.select(index)._replace(packet=packet)
         self._on_air = self._on_air.select(kept)

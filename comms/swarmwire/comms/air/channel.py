@@ -4,8 +4,8 @@ import numpy as np
 
 from swarmwire.comms.air.links import HEARD, THE_REST, Links
 from swarmwire.comms.air.lives import Lives
-from swarmwire.comms.air.reach import links_in_range
-from swarmwire.comms.air.reach_torus import links_in_range_on_torus
+from swarmwire.comms.air.reach import Reach, links_in_reach, pairs_in_reach, reach
+from swarmwire.comms.air.reach_torus import reach_on_torus
 from swarmwire.comms.air.stage import Medium
 from swarmwire.comms.air.stages import chain
 from swarmwire.comms.air.transmissions import Transmissions
@@ -18,18 +18,19 @@ ROUNDING = 1e-9
 
 
 class Channel:
-    """Decides what becomes of packets at robots that stand at given poses."""
+    """Decides what becomes of packets at robots that stand at given poses: arrays that nobody writes to any more."""
 
     def __init__(self, medium: Medium) -> None:
         self._radio, self._arenas, self._size_m = medium.radio, len(medium.keys), medium.size_m
-        self._links_in_range = links_in_range_on_torus if medium.is_torus else links_in_range
+        self._find_reach = reach_on_torus if medium.is_torus else reach
         self._columns = len(medium.radio.gives.columns)
         self._stages = chain(medium)
+        self._known_pose: FloatArray | None = None  # for which it is known who is in range
 
     def tune(self, at_ns: int, medium: Medium) -> None:
         """The medium's radio has other numbers from `at_ns` on; stages keep what they remember."""
         before = {type(stage): stage for stage in self._stages if stage.remembers}
-        self._radio, self._stages = medium.radio, chain(medium)
+        self._radio, self._stages, self._known_pose = medium.radio, chain(medium), None
         for stage in self._stages:
             if type(stage) in before:
                 stage.go_on_from(before[type(stage)], at_ns)
@@ -38,13 +39,15 @@ class Channel:
         """What becomes of packets that go on air, or are refused, while robots stand at `pose`."""
         # No geometry for what is too large; for a full queue it tells how many it would have reached.
         tried = np.flatnonzero(packets.fate != Fate.TOO_LARGE)
-        everyone = np.ones(len(pose), np.bool_)  # some that are dead by now were meant, some alive by now were not
-        found, receiver = self._reach(pose, everyone, packets.sender[tried], packets.to[tried])
-        packet = tried[found]
+        # Alive or not: some that are dead by now were meant, some alive by now were not.
+        robots, sender, to = len(pose) // self._arenas, packets.sender.take(tried), packets.to.take(tried)
+        found, receiver = links_in_reach(self._reach(pose), robots, sender, to)
+        packet = tried.take(found)
         if lives.any_dead:
             meant = lives.intended(packets.epoch[packet], receiver) | (packets.to[packet] != BROADCAST)
             packet, receiver = packet[meant], receiver[meant]
-        sender, sequence, end_ns = packets.sender[packet], packets.sequence[packet], packets.off_air_at_ns[packet]
+        columns = packets.sender, packets.sequence, packets.off_air_at_ns
+        sender, sequence, end_ns = (column.take(packet) for column in columns)
         links = Links.under_way(packet, sender, receiver, sequence, end_ns, self._columns)
         refused = packets.fate != HEARD
         in_range = np.zeros(len(packets.sender), np.int64)
@@ -67,21 +70,25 @@ class Channel:
 
     def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
         """Pairs of robot rows a < b joined in the radio graph at a time, sorted, (e, 2)."""
-        senders = np.flatnonzero(alive)
-        found, b = self._reach(pose, alive, senders, np.full(len(senders), BROADCAST))
-        rising = senders[found] < b
-        a, b = senders[found][rising], b[rising]
-        zero = np.zeros(len(a), np.int64)
-        links = Links.under_way(zero, a, b, zero, np.full(len(a), at_ns), 0)
-        probability = np.ones(len(a))
+        pair = pairs_in_reach(self._reach(pose), alive)
+        if not self._stages:
+            return pair
+        zero = np.zeros(len(pair), np.int64)
+        a, b = np.ascontiguousarray(pair.T)
+        links = Links.under_way(zero, a, b, zero, np.full(len(pair), at_ns), 0)
+        probability = np.ones(len(pair))
         for stage in self._stages:
             probability *= stage.delivery(links, pose)
-        pair = (a * len(pose) + b)[probability >= self._radio.min_delivery - ROUNDING]
-        return np.stack(np.divmod(np.sort(pair), len(pose)), axis=1)
+        joined = probability >= self._radio.min_delivery - ROUNDING
+        return pair if joined.all() else pair[joined]
 
-    def _reach(self, pose: FloatArray, alive: BoolArray, sender: IntArray, to: IntArray) -> tuple[IntArray, IntArray]:
-        assert self._radio.range_m is not None  # `Air` has refused a disk without
-        return self._links_in_range(pose, alive, self._arenas, self._size_m, self._radio.range_m, sender, to)
+    def _reach(self, pose: FloatArray) -> Reach:
+        """Who is in range of whom; the poses of a tick serve its radio graph and the packets that go on air in it."""
+        if pose is not self._known_pose:
+            assert self._radio.range_m is not None  # `Air` has refused a disk without
+            self._known = self._find_reach(pose, self._arenas, self._size_m, self._radio.range_m)
+            self._known_pose = pose
+        return self._known
 
 
 def with_the_rest(links: Links, packets: Transmissions, in_range: IntArray, columns: int) -> Links:

@@ -11,29 +11,28 @@ MANY = 40  # for sorting by insertion
 
 
 @njit(cache=True)
-def by_receiver(receiver: IntArray, heard_at_ns: IntArray, sender: IntArray, rows: int) -> IntArray:
-    """The order by (receiver, heard_at, sender) that keeps ties as they stand, (k,); robots are rows."""
+def by_receiver(index: IntArray, receiver: IntArray, heard_at_ns: IntArray, sender: IntArray, rows: int) -> IntArray:
+    """The rows of `index` (k,) by (receiver, heard_at, sender), ties as they stand, (k,); robots are rows."""
     # Counting sorts by robot leave only the packets of one receiver to compare.
-    order, _ = _counting_sort(np.arange(len(sender)), sender, rows)
+    order = index
+    for k in range(1, len(index)):
+        if sender[index[k]] < sender[index[k - 1]]:  # seldom: packets of a tick stand by sender
+            order, _ = _counting_sort(index, sender, rows)
+            break
     order, start = _counting_sort(order, receiver, rows)
+    at_ns = heard_at_ns[order]
     for row in range(rows):
-        own = order[start[row] : start[row + 1]]
-        if len(own) > MANY:
-            own[:] = own[np.argsort(heard_at_ns[own], kind="mergesort")]
-        else:
-            _insertion_sort(own, heard_at_ns)
+        first, stop = start[row], start[row + 1]
+        if stop - first > MANY:
+            order[first:stop] = order[first:stop][np.argsort(at_ns[first:stop], kind="mergesort")]
+            continue
+        for k in range(first + 1, stop):
+            moved, moved_ns, place = order[k], at_ns[k], k
+            while place > first and at_ns[place - 1] > moved_ns:
+                order[place], at_ns[place] = order[place - 1], at_ns[place - 1]
+                place -= 1
+            order[place], at_ns[place] = moved, moved_ns
     return order
-
-
-@njit(cache=True)
-def _insertion_sort(order, at_ns):
-    """Sort a few indices by time, in place; ties stay as they stand."""
-    for k in range(1, len(order)):
-        moved, place = order[k], k
-        while place > 0 and at_ns[order[place - 1]] > at_ns[moved]:
-            order[place] = order[place - 1]
-            place -= 1
-        order[place] = moved
 
 
 @njit(cache=True)

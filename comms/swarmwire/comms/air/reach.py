@@ -2,6 +2,8 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -13,49 +15,85 @@ from swarmwire.comms.packets import BROADCAST
 CELL_SLACK = 1.0 + 1e-9
 
 
-def links_in_range(
-    pose: FloatArray,
-    alive: BoolArray,
-    arenas: int,
-    size_m: tuple[float, float],
-    range_m: float,
-    sender: IntArray,
-    to: IntArray,
-) -> tuple[IntArray, IntArray]:
-    """The row of each packet and the robot row of each live robot within `range_m` of its sender, centre to centre.
+class Reach(NamedTuple):
+    """All robots in range of each: those of robot row r are other[first[r]:first[r + 1]], in the order of the grid."""
 
-    `sender` (k,) are robot rows, `to` (k,) the index in the arena of the one receiver, or BROADCAST.
-    Packets come in their order; the receivers of one in the order of the grid.
-    """
+    first: IntArray  # (rows + 1,)
+    other: IntArray  # robot rows
+
+
+def reach(pose: FloatArray, arenas: int, size_m: tuple[float, float], range_m: float) -> Reach:
+    """The robots within `range_m` of each other in the same arena, centre to centre, alive or not."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     cells = grid.build(x, y, arenas, size_m, range_m * CELL_SLACK)
-    return _within(x, y, alive, len(x) // arenas, cells, range_m, sender, to)
+    return Reach(*_within(x, y, len(x) // arenas, cells, range_m))
 
 
 @njit(cache=True)
-def _within(x, y, alive, robots, cells, range_m, sender, to):
+def links_in_reach(near: Reach, robots: int, sender: IntArray, to: IntArray) -> tuple[IntArray, IntArray]:
+    """The row of each packet and the robot row of each robot in range of its sender, packet by packet.
+
+    `sender` (k,) are robot rows, `to` (k,) the index in the arena of the one receiver, or BROADCAST.
+    """
     most = 0
-    for p in range(len(sender)):
-        for j in range(-1, 2):
-            first, stop = strip(x[sender[p]], y[sender[p]], sender[p] // robots, cells, j)
-            most += stop - first
+    for s in sender:
+        most += near.first[s + 1] - near.first[s]
     packet, receiver = np.empty(most, np.int64), np.empty(most, np.int64)
     found = 0
     for p in range(len(sender)):
         s = sender[p]
-        if to[p] != BROADCAST:
-            r = s - s % robots + to[p]
-            packet[found], receiver[found] = p, r
-            found += _joined(x, y, alive, range_m, s, r)
-            continue
-        for j in range(-1, 2):
-            first, stop = strip(x[s], y[s], s // robots, cells, j)
-            for k in range(first, stop):
-                r = cells.order[k]
+        for k in range(near.first[s], near.first[s + 1]):
+            packet[found], receiver[found] = p, near.other[k]
+            found += to[p] == BROADCAST or near.other[k] == s - s % robots + to[p]
+    return packet[:found], receiver[:found]
+
+
+@njit(cache=True)
+def pairs_in_reach(near: Reach, alive: BoolArray) -> IntArray:
+    """Robot rows a < b of all pairs alive in range of each other, sorted, (e, 2)."""
+    pair = np.empty((len(near.other) // 2, 2), np.int64)
+    found = 0
+    for a in range(len(alive)):
+        of_a = found
+        for k in range(near.first[a], near.first[a + 1] if alive[a] else near.first[a]):
+            b = near.other[k]
+            if b > a and alive[b]:
+                place = found
+                while place > of_a and pair[place - 1, 1] > b:  # a few: sorted by insertion
+                    pair[place, 1] = pair[place - 1, 1]
+                    place -= 1
+                pair[found, 0], pair[place, 1] = a, b
+                found += 1
+    return pair[:found]
+
+
+@njit(cache=True)
+def _within(x, y, robots, cells, range_m):
+    # In the grid's order, so that the strips around a robot are read from end to end.
+    order, there_x, there_y = cells.order, x[cells.order], y[cells.order]
+    begin, stop = _strips(x, y, robots, cells)
+    first, other = np.zeros(len(x) + 1, np.int64), np.empty((stop - begin).sum(), np.int64)
+    found, square_m2 = 0, range_m * range_m
+    for s in range(len(x)):
+        own_x, own_y = x[s], y[s]
+        for j in range(3):
+            for k in range(begin[s, j], stop[s, j]):
+                dx, dy, r = there_x[k] - own_x, there_y[k] - own_y, order[k]
                 # Written first and kept if it counts: a branch would be guessed wrong a third of the time.
-                packet[found], receiver[found] = p, r
-                found += _joined(x, y, alive, range_m, s, r)
-    return packet[:found].copy(), receiver[:found].copy()
+                other[found] = r
+                found += (r != s) & (dx * dx + dy * dy <= square_m2)
+        first[s + 1] = found
+    return first, other[:found].copy()
+
+
+@njit(cache=True)
+def _strips(x, y, robots, cells):
+    """The strips below, at and above each robot row: first and stop, (rows, 3) each."""
+    first, stop = np.empty((len(x), 3), np.int64), np.empty((len(x), 3), np.int64)
+    for row in range(len(x)):
+        for j in range(3):
+            first[row, j], stop[row, j] = strip(x[row], y[row], row // robots, cells, j - 1)
+    return first, stop
 
 
 @njit(cache=True)

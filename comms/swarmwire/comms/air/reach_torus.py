@@ -1,4 +1,4 @@
-"""Which robots a packet might reach on a torus: as `reach`, with the shortest distances."""
+"""Which robots are in reach on a torus: as `reach`, with the shortest distances."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -6,50 +6,37 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms import grid
-from swarmwire.comms.air.reach import CELL_SLACK
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.air.reach import CELL_SLACK, Reach
+from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry import to_nearest
-from swarmwire.comms.packets import BROADCAST
 
 CELLS = 5  # in a row that hold all within reach: the last cell at a seam may be cut, and then two do what one would
 
 
-def links_in_range_on_torus(
-    pose: FloatArray,
-    alive: BoolArray,
-    arenas: int,
-    size_m: tuple[float, float],
-    range_m: float,
-    sender: IntArray,
-    to: IntArray,
-) -> tuple[IntArray, IntArray]:
-    """As `reach.links_in_range`, where opposite sides of each arena meet."""
+def reach_on_torus(pose: FloatArray, arenas: int, size_m: tuple[float, float], range_m: float) -> Reach:
+    """As `reach.reach`, where opposite sides of each arena meet."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     cells = grid.build(x, y, arenas, size_m, range_m * CELL_SLACK)
-    return _within(x, y, alive, len(x) // arenas, cells, size_m, range_m, sender, to)
+    return Reach(*_within(x, y, len(x) // arenas, cells, size_m, range_m))
 
 
 @njit(cache=True)
-def _within(x, y, alive, robots, cells, size_m, range_m, sender, to):
-    most = len(sender)
-    for p in range(len(sender)):
-        most += _near(cells, x, y, robots, sender[p], np.empty(0, np.int64))
-    packet, receiver = np.empty(most, np.int64), np.empty(most, np.int64)
+def _within(x, y, robots, cells, size_m, range_m):
+    most = 0
+    for s in range(len(x)):
+        most += _near(cells, x, y, robots, s, np.empty(0, np.int64))
+    first, other = np.zeros(len(x) + 1, np.int64), np.empty(most, np.int64)
     near = np.empty(robots, np.int64)
     found = 0
-    for p in range(len(sender)):
-        s = sender[p]
-        if to[p] == BROADCAST:
-            count = _near(cells, x, y, robots, s, near)
-        else:
-            near[0], count = s - s % robots + to[p], 1
-        for k in range(count):
+    for s in range(len(x)):
+        for k in range(_near(cells, x, y, robots, s, near)):
             r = near[k]
             dx, dy = x[r] - x[s], y[r] - y[s]
             dx, dy = dx + to_nearest(dx, size_m[0]), dy + to_nearest(dy, size_m[1])
-            packet[found], receiver[found] = p, r
-            found += (r != s) & alive[r] & (dx * dx + dy * dy <= range_m * range_m)
-    return packet[:found].copy(), receiver[:found].copy()
+            other[found] = r
+            found += (r != s) & (dx * dx + dy * dy <= range_m * range_m)
+        first[s + 1] = found
+    return first, other[:found].copy()
 
 
 @njit(cache=True)

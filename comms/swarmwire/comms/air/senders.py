@@ -77,8 +77,7 @@ class Senders:
         return packets._replace(fate=fate, on_air_at_ns=at, off_air_at_ns=at)
 
     def _taken(self, due: BoolArray) -> Transmissions:
-        packets = self.queued.select(np.flatnonzero(due))
-        self.queued = self.queued.select(np.flatnonzero(~due))
+        packets, self.queued = self.queued.parted(due)
         return packets
 
     def _access(self, sent_at_ns: IntArray, sender: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray, IntArray]:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.packets import Payloads
 
 
@@ -30,16 +30,24 @@ class Transmissions(NamedTuple):
     @classmethod
     def none(cls) -> "Transmissions":
         """No packets."""
-        return cls._make([*[np.empty(0, np.int64)] * 11, Payloads.of([])])
+        return cls._make([*[np.empty(0, np.int64)] * 11, Payloads.joined([])])
 
     def __bool__(self) -> bool:
         return len(self.sender) > 0
 
     def select(self, index: IntArray) -> "Transmissions":
         """The packets of `index`, in its order."""
-        if len(index) == len(self.sender) and np.array_equal(index, np.arange(len(index))):
+        if len(index) == len(self.sender) and (index[1:] > index[:-1]).all():  # then it is all of them, in order
             return self
         return Transmissions._make([*(column.take(index) for column in self[:-1]), self.payloads.rows(index)])
+
+    def parted(self, which: BoolArray) -> "tuple[Transmissions, Transmissions]":
+        """Those of the packets `which` (k,), and the others."""
+        if which.all():
+            return self, Transmissions.none()
+        if not which.any():
+            return Transmissions.none(), self
+        return self.select(np.flatnonzero(which)), self.select(np.flatnonzero(~which))
 
     def followed_by(self, later: "Transmissions") -> "Transmissions":
         """These packets and then the later ones."""

@@ -1,0 +1,57 @@
+"""What the framework costs a single-robot `Agent` in process: per step, and per packet that it reads."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.agents import Ping
+from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.comms.assignment import Assignment, GroupAssignment
+from swarmwire.comms.body import load_body
+from swarmwire.comms.clock import Clock
+from swarmwire.comms.messages import encode_rows
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.senses import GroupSenses
+
+RAYS = 24
+
+
+@dataclass(frozen=True)
+class Overhead:
+    """Times of one robot's step, in µs."""
+
+    step_us: float  # with nothing heard
+    packet_us: float  # more, for each packet that it reads
+
+
+def overhead(clock: Clock, robots: int, packets: int, ticks: int) -> Overhead:
+    """The overhead for so many robots in a process, each of which reads so many packets a step, or none."""
+    crew = LocalCrew(_assignment(robots))
+    crew.start()
+    nothing, all_heard = Heard.none(("range_m",)), _heard(robots, packets)
+    silent_us = _step_us(clock, crew, robots, nothing, ticks)
+    return Overhead(silent_us, (_step_us(clock, crew, robots, all_heard, ticks) - silent_us) / packets)
+
+
+def _step_us(clock: Clock, crew: LocalCrew, robots: int, heard: Heard, ticks: int) -> float:
+    senses = {"bots": GroupSenses(np.arange(robots), {"proximity.value": np.zeros((robots, RAYS))})}
+    start_ns = clock.now_ns()
+    for tick in range(ticks):
+        crew.act(tick, senses, heard)
+    return (clock.now_ns() - start_ns) / 1e3 / ticks / robots
+
+
+def _assignment(robots: int) -> Assignment:
+    names, keys = tuple(f"bots-{row}" for row in range(robots)), np.arange(robots, dtype=np.uint64)
+    body, rows = load_body("footbot"), np.arange(robots)
+    return Assignment(
+        (GroupAssignment("bots", "benchmarks.agents:Listener", {}, body, rows, names, keys),), 10, ("range_m",)
+    )
+
+
+def _heard(robots: int, packets: int) -> Heard:
+    """As many packets for each robot, each from another sender."""
+    receiver, payload = np.repeat(np.arange(robots), packets), np.arange(robots * packets)
+    sent = encode_rows(Ping, len(payload), {"number": 0.5})
+    zero, range_m = np.zeros(len(payload), np.int64), np.ones(len(payload))
+    return Heard(receiver, np.tile(np.arange(packets), robots), zero, zero, {"range_m": range_m}, payload, sent)
