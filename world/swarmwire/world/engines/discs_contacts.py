@@ -35,44 +35,34 @@ def find_contacts(robots, state, dt_s, pairs, things, half_size_m, circle, side_
     count = 0
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
-        ahead = _ahead(robots[i], state[i], dt_s) + _ahead(robots[j], state[j], dt_s)
-        dx, dy = state[j, 0] - state[i, 0], state[j, 1] - state[i, 1]
-        most = robots[i].radius_m + robots[j].radius_m + ahead
-        if dx * dx + dy * dy <= most * most:
-            gap_m, nx, ny = gap_to_circle(
-                state[i, 0], state[i, 1], robots[i].radius_m, state[j, 0], state[j, 1], robots[j].radius_m
-            )
+        one, other = robots[i], robots[j]
+        x, y, other_x, other_y = state[i, 0], state[i, 1], state[j, 0], state[j, 1]
+        dx, dy = other_x - x, other_y - y
+        most_m = one.radius_m + other.radius_m + _ahead_m(one, state[i], dt_s) + _ahead_m(other, state[j], dt_s)
+        if dx * dx + dy * dy <= most_m * most_m:
+            gap_m, nx, ny = gap_to_circle(x, y, one.radius_m, other_x, other_y, other.radius_m)
             _begin(contacts[count], i, j, k, gap_m, nx, ny, dt_s)
-            _weigh(contacts[count], robots[i].per_kg + robots[j].per_kg, _turning(robots[i]) + _turning(robots[j]))
+            _weigh(contacts[count], one.per_kg + other.per_kg, _turning_per_kg(one) + _turning_per_kg(other))
             count += 1
     for k in range(len(things)):
-        i = things[k, 0]
-        gap_m, nx, ny = gap_to_fixed(
-            things[k, 1],
-            things[k, 2],
-            state[i, 0],
-            state[i, 1],
-            robots[i].radius_m,
-            half_size_m,
-            circle,
-            side_start,
-            side,
-        )
-        if gap_m <= _ahead(robots[i], state[i], dt_s):
+        i, kind, which = things[k, 0], things[k, 1], things[k, 2]
+        one, x, y = robots[i], state[i, 0], state[i, 1]
+        gap_m, nx, ny = gap_to_fixed(kind, which, x, y, one.radius_m, half_size_m, circle, side_start, side)
+        if gap_m <= _ahead_m(one, state[i], dt_s):
             _begin(contacts[count], i, -1, -1, gap_m, nx, ny, dt_s)
-            _weigh(contacts[count], robots[i].per_kg, _turning(robots[i]))
+            _weigh(contacts[count], one.per_kg, _turning_per_kg(one))
             count += 1
     return count
 
 
 @njit(cache=True)
-def _ahead(robot, now, dt_s):
+def _ahead_m(robot, now, dt_s):
     return dt_s * np.sqrt(now[3] * now[3] + now[4] * now[4]) + LOOK_AHEAD * robot.radius_m
 
 
 @njit(cache=True)
-def _turning(robot):
-    """What a robot's turning adds to how easily its rim gives way along the tangent, in 1/kg."""
+def _turning_per_kg(robot):
+    """What a robot's turning adds to how easily its rim gives way along the tangent."""
     return robot.radius_m * robot.radius_m * robot.per_kgm2
 
 
@@ -90,39 +80,38 @@ def _weigh(contact, per_kg, turning_per_kg):
 
 
 @njit(cache=True)
-def note_touches(contacts, count, pairs, against_fixed, touched, per_arena, onsets):
-    """Note who touched what in a step, and add to onsets (arenas, 2) what began with it.
+def note_touches(contacts, robots, pairs, touched, per_arena, onsets):
+    """Note who touched what in a step, and add to `onsets` what began with it.
 
     Args:
-        contacts: of the step, solved; the first `count`.
-        pairs: listed, their bits are set.
-        against_fixed: (rows,) the same bits for touching anything fixed.
+        contacts: of the step, solved.
+        robots: (rows,) whose bits of touching anything fixed are set.
+        pairs: listed, whose bits of touch are set.
         touched: (rows,) set to 1 for who touched.
         per_arena: robots of an arena.
-        onsets: robot with robot, robot with something fixed.
+        onsets: (arenas, 2) robot with robot, robot with something fixed.
     """
-    for k in range(count):
+    for k in range(len(contacts)):
         contact = contacts[k]
         if contact.push_ns <= 0.0 and contact.gap_m > TOUCH_M:
             continue
-        touched[contact.first] = 1.0
-        arena = contact.first // per_arena
-        if contact.second < 0:
-            if against_fixed[contact.first] == 0:
-                onsets[arena, 1] += 1
-            against_fixed[contact.first] |= NOW
-            continue
-        touched[contact.second] = 1.0
-        if pairs[contact.pair, 2] == 0:
-            onsets[arena, 0] += 1
-        pairs[contact.pair, 2] |= NOW
+        first, second = contact.first, contact.second
+        arena = first // per_arena
+        touched[first] = 1.0
+        if second < 0:
+            onsets[arena, 1] += robots[first].against_fixed == 0
+            robots[first].against_fixed |= NOW
+        else:
+            touched[second] = 1.0
+            onsets[arena, 0] += pairs[contact.pair, 2] == 0
+            pairs[contact.pair, 2] |= NOW
 
 
 @njit(cache=True)
-def begin_tick(pairs, against_fixed, touched):
+def begin_tick(robots, pairs, touched):
     """What touched in the tick that ends did so before, and nothing has touched yet."""
     for k in range(len(pairs)):
         pairs[k, 2] = BEFORE if pairs[k, 2] & NOW else 0
-    for row in range(len(touched)):
-        against_fixed[row] = BEFORE if against_fixed[row] & NOW else 0
+    for row in range(len(robots)):
+        robots[row].against_fixed = BEFORE if robots[row].against_fixed & NOW else 0
         touched[row] = 0.0

@@ -12,44 +12,48 @@ from numba import njit
 
 
 @njit(cache=True)
-def driven(robot, target, braked, dt_s, now, unhindered_radps):
-    """Velocity of a robot after its motors pushed.
+def drive(robot, now, target, braked, dt_s):
+    """Let the motors of a robot push its velocity towards its target for a step.
 
     What contacts took from the turn rate in the last step is made up for in this one, so that a robot pushed off its
     centre keeps its heading as long as its torque lasts; one that is braked slows a turn down but does not undo it.
 
     Args:
         robot: its ROBOT.
+        now: (6,) its state.
         target: (3,) forward m/s, left turn rad/s, to the left m/s.
         braked: whether its motors only resist.
         dt_s: length of a step.
-        now: (6,) its state.
-        unhindered_radps: the turn rate that its motors gave it in the step before.
-
-    Returns:
-        m/s, m/s, rad/s, and the cosine and sine of the heading in the middle of the step.
     """
     turn = now[5]
-    taken = 0.0 if braked else unhindered_radps - turn
+    taken = 0.0 if braked else robot.unhindered_radps - turn
     turn += min(max(target[1] - turn + taken, -robot.most_radps), robot.most_radps)
-    middle = now[2] + 0.5 * dt_s * turn
-    cos, sin = np.cos(middle), np.sin(middle)
-    vx, vy = now[3], now[4]
-    dx, dy = target[0] * cos - target[2] * sin - vx, target[0] * sin + target[2] * cos - vy
+    now[5] = robot.unhindered_radps = turn
+    look_along(robot, now, dt_s)
+    cos, sin = robot.cos, robot.sin
+    dx, dy = target[0] * cos - target[2] * sin - now[3], target[0] * sin + target[2] * cos - now[4]
     size2 = dx * dx + dy * dy
     if size2 > robot.most_mps * robot.most_mps:
         share = robot.most_mps / np.sqrt(size2)
         dx, dy = dx * share, dy * share
-    return vx + dx, vy + dy, turn, cos, sin
+    now[3] += dx
+    now[4] += dy
 
 
 @njit(cache=True)
-def move(robot, dt_s, now, travel_m, cos, sin):
-    """Move state (6,) by one step of its velocity and add to travel (2,) what its wheels roll.
+def look_along(robot, now, dt_s):
+    """Set `cos` and `sin` of a robot to those of its heading in the middle of the step to come."""
+    middle = now[2] + 0.5 * dt_s * now[5]
+    if middle != robot.middle_rad:  # one that drives straight on is spared half of the cost of a step
+        robot.middle_rad, robot.cos, robot.sin = middle, np.cos(middle), np.sin(middle)
 
-    `cos` and `sin` are of the heading in the middle of the step.
-    """
-    rolled = dt_s * (now[3] * cos + now[4] * sin)
+
+@njit(cache=True)
+def move(robot, now, travel_m, dt_s):
+    """Move state (6,) by one step of its velocity and add to travel (2,) what its wheels roll."""
+    if now[5] != robot.unhindered_radps:
+        look_along(robot, now, dt_s)
+    rolled = dt_s * (now[3] * robot.cos + now[4] * robot.sin)
     apart = dt_s * now[5] * robot.half_base_m
     travel_m[0] += rolled - apart
     travel_m[1] += rolled + apart
@@ -59,11 +63,9 @@ def move(robot, dt_s, now, travel_m, cos, sin):
 
 
 @njit(cache=True)
-def follow_targets(rows, steps, dt_s, robots, target, braked, state, travel_m, unhindered):
-    """Move robots that nothing is near by some steps, one after the other."""
+def follow_targets(rows, steps, dt_s, robots, state, target, braked, travel_m):
+    """Move robots that nothing is near by some steps, one robot after the other."""
     for row in rows:
-        robot, now = robots[row], state[row]
         for _ in range(steps):
-            vx, vy, turn, cos, sin = driven(robot, target[row], braked[row], dt_s, now, unhindered[row])
-            now[3], now[4], now[5], unhindered[row] = vx, vy, turn, turn
-            move(robot, dt_s, now, travel_m[row], cos, sin)
+            drive(robots[row], state[row], target[row], braked[row], dt_s)
+            move(robots[row], state[row], travel_m[row], dt_s)

@@ -4,9 +4,9 @@ E. Catto (2005), Iterative dynamics with temporal coherence, and (2006), Fast an
 impulses, Game Developers Conference. Contacts may be speculative: two things with a gap may approach by that gap within
 the step, no more, so that they meet and do not overlap.
 
-Impulses start from nothing in each step. Each of them then lowers (kinetic energy + impulse x allowed closing speed), of
-which the second is never negative; so contacts only ever take energy, however far the iterations get. Impulses kept
-from the step before (warm starts) would lose that.
+Impulses start from nothing in each step. Each of them then lowers kinetic energy + impulse x allowed closing speed, of
+which the second is never negative; so contacts only ever take energy, however far the sweeps get. Impulses kept from
+the step before (warm starts) would lose that.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -21,11 +21,11 @@ STILL_M = 1e-7  # an overlap below is left
 
 
 @njit(cache=True)
-def solve(contacts, count, robots, state):
-    """Change the velocities in `state` (rows, 6) so that the first `count` contacts neither close too fast nor slide."""
+def solve(contacts, robots, state):
+    """Change the velocities in `state` (rows, 6) so that contacts neither close faster than allowed nor slide."""
     for _ in range(SWEEPS):
         still = True
-        for k in range(count):
+        for k in range(len(contacts)):
             contact = contacts[k]
             i, j = contact.first, contact.second
             vx, vy, spin = -state[i, 3], -state[i, 4], state[i, 5] * robots[i].radius_m
@@ -34,23 +34,31 @@ def solve(contacts, count, robots, state):
             excess = -(vx * contact.nx + vy * contact.ny) - contact.closing_mps
             if contact.push_ns == 0.0 and excess <= STILL_MPS:
                 continue
-            push = max(contact.push_ns + excess * contact.mass_kg, 0.0) if abs(excess) > STILL_MPS else contact.push_ns
-            sliding = vy * contact.nx - vx * contact.ny - spin
-            bound = FRICTION * push
-            rub = min(max(contact.rub_ns - sliding * contact.rubbing_kg, -bound), bound)
-            more, across = push - contact.push_ns, rub - contact.rub_ns
-            if abs(sliding) <= STILL_MPS and abs(contact.rub_ns) <= bound:
-                across = 0.0
+            # Of discs, what is pushed along the normal changes nothing along the tangent: both are worked out at once.
+            more, across = _impulses(contact, excess, vy * contact.nx - vx * contact.ny - spin)
             if more == 0.0 and across == 0.0:
                 continue
             still = False
-            contact.push_ns, contact.rub_ns = push, contact.rub_ns + across
+            contact.push_ns += more
+            contact.rub_ns += across
             px, py = more * contact.nx - across * contact.ny, more * contact.ny + across * contact.nx
             _kick(robots[i], state[i], -px, -py, -across)
             if j >= 0:
                 _kick(robots[j], state[j], px, py, -across)
         if still:
             break
+
+
+@njit(cache=True)
+def _impulses(contact, excess_mps, sliding_mps):
+    """What to add to a contact's impulses along the normal and along the tangent."""
+    push, rub = contact.push_ns, contact.rub_ns
+    if abs(excess_mps) > STILL_MPS:
+        push = max(push + excess_mps * contact.mass_kg, 0.0)
+    if abs(sliding_mps) > STILL_MPS:
+        rub -= sliding_mps * contact.rubbing_kg
+    most = FRICTION * push
+    return push - contact.push_ns, min(max(rub, -most), most) - contact.rub_ns
 
 
 @njit(cache=True)
@@ -61,41 +69,45 @@ def _kick(robot, now, px, py, across):
 
 
 @njit(cache=True)
-def separate(contacts, count, robots, state, dt_s, shift_m):
-    """Shift places in `state` (rows, 6) so that nothing overlaps after the step that follows; velocities stay.
+def separate(contacts, robots, state, dt_s):
+    """Shift places in `state` (rows, 6) so that nothing overlaps after the move that follows; velocities stay.
 
-    That undoes overlap and what the impulses left of approach. `shift_m` (rows, 2) is zero before and after.
+    That undoes overlap, and what the impulses left of approach.
     """
-    for sweep in range(SEPARATIONS):
+    shifted = False
+    for _ in range(SEPARATIONS):
         apart = True
-        for k in range(count):
+        for k in range(len(contacts)):
             contact = contacts[k]
             i, j = contact.first, contact.second
-            x, y = -dt_s * state[i, 3] - shift_m[i, 0], -dt_s * state[i, 4] - shift_m[i, 1]
+            x, y = -dt_s * state[i, 3] - robots[i].shift_x_m, -dt_s * state[i, 4] - robots[i].shift_y_m
             if j >= 0:
-                x, y = x + dt_s * state[j, 3] + shift_m[j, 0], y + dt_s * state[j, 4] + shift_m[j, 1]
+                x, y = x + dt_s * state[j, 3] + robots[j].shift_x_m, y + dt_s * state[j, 4] + robots[j].shift_y_m
             overlap_m = -(contact.gap_m + x * contact.nx + y * contact.ny)
-            if overlap_m <= STILL_M:
-                continue
-            apart = False
-            lever = overlap_m * contact.mass_kg
-            shift_m[i, 0] -= lever * robots[i].per_kg * contact.nx
-            shift_m[i, 1] -= lever * robots[i].per_kg * contact.ny
-            if j >= 0:
-                shift_m[j, 0] += lever * robots[j].per_kg * contact.nx
-                shift_m[j, 1] += lever * robots[j].per_kg * contact.ny
+            if overlap_m > STILL_M:
+                apart = False
+                _part(robots[i], contact, -overlap_m)
+                if j >= 0:
+                    _part(robots[j], contact, overlap_m)
         if apart:
             break
-    if sweep == 0:
-        return
-    for k in range(count):
-        _shift(state, shift_m, contacts[k].first)
-        if contacts[k].second >= 0:
-            _shift(state, shift_m, contacts[k].second)
+        shifted = True
+    if shifted:
+        _shift(contacts, robots, state)
 
 
 @njit(cache=True)
-def _shift(state, shift_m, row):
-    state[row, 0] += shift_m[row, 0]
-    state[row, 1] += shift_m[row, 1]
-    shift_m[row, 0] = shift_m[row, 1] = 0.0
+def _part(robot, contact, overlap_m):
+    share_m = overlap_m * contact.mass_kg * robot.per_kg
+    robot.shift_x_m += share_m * contact.nx
+    robot.shift_y_m += share_m * contact.ny
+
+
+@njit(cache=True)
+def _shift(contacts, robots, state):
+    for k in range(len(contacts)):
+        for row in (contacts[k].first, contacts[k].second):
+            if row >= 0:
+                state[row, 0] += robots[row].shift_x_m
+                state[row, 1] += robots[row].shift_y_m
+                robots[row].shift_x_m = robots[row].shift_y_m = 0.0
