@@ -41,7 +41,7 @@ def truth(of: Static, tick: int = 0, **given: Any) -> Truth:
         "alive": np.ones(rows, np.bool_),
         "pose": np.zeros((rows, 3)),
         "velocity": np.zeros((rows, 3)),
-        "command": np.zeros((rows, 2)),
+        "command": np.zeros((rows, 3)),
         "state": np.zeros(rows, np.int64),
         "states": ("",),
         "senses": {},

@@ -51,7 +51,9 @@ def said(runner: str, tick: int, speed: float, drive: bool = True) -> bytes:
     rows = np.array(OWN[runner], np.int64)
     sent = Sent(rows, np.full(len(rows), BROADCAST), Payloads.of([bytes([0, 0, tick])] * len(rows)))
     n = len(rows)
-    return encode_actions(tick, Actions(rows, np.full(n, drive), np.full(n, speed), np.full(n, -speed), sent))
+    return encode_actions(
+        tick, Actions(rows, np.full(n, drive), np.full(n, speed), np.full(n, -speed), np.zeros(n), sent)
+    )
 
 
 def taken(runners: RealTime) -> tuple[dict[int, float], list[int]]:

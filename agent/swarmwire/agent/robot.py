@@ -17,7 +17,7 @@ from swarmwire.agent.readings import (
     PositioningReading,
     ProximityReading,
 )
-from swarmwire.agent.robots import had
+from swarmwire.agent.robots import forward_and_turn, had
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.messages import DICT_TAG, Message, decode_dict, encode_dict
@@ -68,11 +68,19 @@ class Robot(Handle):
         x, y = self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m")
         return PositioningReading(float(x[self._row]), float(y[self._row]))
 
-    def drive(self, linear_mps: float, angular_radps: float) -> None:
-        """Wanted forward speed and turn rate (positive to the left); it holds until the next call."""
+    def drive(self, linear_mps: float, angular_radps: float, lateral_mps: float = 0.0) -> None:
+        """Wanted forward speed and turn rate (positive to the left); they hold until the next call.
+
+        A body with a holonomic drive can also move sideways, positive to the left.
+        """
         self._turn.drive[self._row] = True
         self._turn.linear_mps[self._row] = linear_mps
         self._turn.angular_radps[self._row] = angular_radps
+        self._turn.lateral_mps[self._row] = lateral_mps
+
+    def wheels(self, left_mps: float, right_mps: float) -> None:
+        """Wanted speeds of the two wheels, until the next call of this or `drive`; NotFitted if the body has none."""
+        self.drive(*forward_and_turn(left_mps, right_mps, self.body.wheels.wheel_base_m))
 
     def note(self, state: str) -> None:
         """Name what the robot is at ("search", "wait"), for recordings and pictures; it holds until the next call."""

@@ -24,6 +24,7 @@ from swarmwire.comms.sheets import Ring
 
 M = TypeVar("M", bound=Message)
 S = TypeVar("S", bound=Ring)
+N = TypeVar("N", float, FloatArray)
 
 
 class Robots(Handle):
@@ -70,13 +71,28 @@ class Robots(Handle):
         """Positions in the arena's frame: x_m and y_m (n,)."""
         return PositioningReadings(self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m"))
 
-    def drive(self, linear_mps: ArrayLike, angular_radps: ArrayLike, rows: BoolArray | None = None) -> None:
-        """Wanted forward speed and turn rate, (n,) or one number; outside the mask `rows` the last ones hold."""
+    def drive(
+        self,
+        linear_mps: ArrayLike,
+        angular_radps: ArrayLike,
+        lateral_mps: ArrayLike = 0.0,
+        rows: BoolArray | None = None,
+    ) -> None:
+        """Wanted forward speed and turn rate, (n,) or one number; outside the mask `rows` the last ones hold.
+
+        Bodies with a holonomic drive can also move sideways, positive to the left.
+        """
         turn = self._turn
         moved = True if rows is None else rows
         np.copyto(turn.drive, True, where=moved)
         np.copyto(turn.linear_mps, linear_mps, where=moved)
         np.copyto(turn.angular_radps, angular_radps, where=moved)
+        np.copyto(turn.lateral_mps, lateral_mps, where=moved)
+
+    def wheels(self, left_mps: ArrayLike, right_mps: ArrayLike, rows: BoolArray | None = None) -> None:
+        """Wanted speeds of the two wheels, (n,) or one number; NotFitted if the bodies have none."""
+        left, right = np.asarray(left_mps, np.float64), np.asarray(right_mps, np.float64)
+        self.drive(*forward_and_turn(left, right, self.body.wheels.wheel_base_m), rows=rows)
 
     def note(self, state: str, rows: BoolArray | None = None) -> None:
         """Name what the robots of the mask `rows`, or all, are at; for recordings and pictures, until the next call."""
@@ -122,6 +138,11 @@ class RadioRows:
 def _of(rows: BoolArray, value: Any) -> Any:
     """The values of the rows of a mask; one number serves them all."""
     return value if np.ndim(value) == 0 else np.asarray(value)[rows]
+
+
+def forward_and_turn(left_mps: N, right_mps: N, wheel_base_m: float) -> tuple[N, N]:
+    """Forward speed and turn rate (positive to the left) of a body whose wheels roll so fast."""
+    return 0.5 * (left_mps + right_mps), (right_mps - left_mps) / wheel_base_m
 
 
 def had(sheet: S | None) -> S:

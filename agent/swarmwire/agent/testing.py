@@ -159,7 +159,7 @@ def _only(row: int, given: _Given) -> _Given:
 
 
 def _assert_same(first: Actions, second: Actions, text: str) -> None:
-    for name in ("rows", "drive", "linear_mps", "angular_radps"):
+    for name in ("rows", "drive", "linear_mps", "angular_radps", "lateral_mps"):
         one, other = getattr(first, name), getattr(second, name)
         if not np.array_equal(one, other, equal_nan=name not in ("rows", "drive")):
             raise AssertionError(f"{text}: {name}\n{one}\n{other}")

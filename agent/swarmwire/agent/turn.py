@@ -38,7 +38,7 @@ class Turn:
         self.keys = keys  # (n,) of the robots' draws
         self.n = len(senses.rows)
         self.drive = np.zeros(self.n, np.bool_)
-        self.linear_mps, self.angular_radps = np.zeros((2, self.n))
+        self.linear_mps, self.angular_radps, self.lateral_mps = np.zeros((3, self.n))
         self._sent_before = sent_before  # (n,) packets that each robot has sent up to now; written to
         self._outbox: list[Sent] = []
         self._states: dict[str, int] = {}  # that were named in this tick, by code
@@ -101,7 +101,8 @@ class Turn:
     def actions(self) -> Actions:
         """What the robots did."""
         sent = Sent.joined(self._outbox)
-        return Actions(self.senses.rows, self.drive, self.linear_mps, self.angular_radps, sent, self._notes())
+        command = self.linear_mps, self.angular_radps, self.lateral_mps
+        return Actions(self.senses.rows, self.drive, *command, sent, self._notes())
 
     def _require(self, need: str) -> None:
         if need not in self.needs:

@@ -27,6 +27,12 @@ class Obstacle:
     size_m: tuple[float, float] = (0.0, 0.0)
     points_m: tuple[tuple[float, float], ...] = ()  # convex, counter-clockwise, around (x_m, y_m) at heading 0
     height_m: float = inf  # from the floor to its top; inf: taller than anything
+    mass_kg: float | None = None  # of one that robots can push; None: it is fixed
+
+    @property
+    def movable(self) -> bool:
+        """Whether robots can push it."""
+        return self.mass_kg is not None
 
     @property
     def corners_m(self) -> FloatArray:
@@ -178,7 +184,7 @@ class Truth:
     alive: BoolArray  # (rows,)
     pose: FloatArray  # (rows, 3) x, y in m, heading in rad, arena frame
     velocity: FloatArray  # (rows, 3) m/s, m/s, rad/s, arena frame
-    command: FloatArray  # (rows, 2) applied: forward m/s, left turn rad/s
+    command: FloatArray  # (rows, 3) within the drive's limits: forward m/s, left turn rad/s, to the left m/s
     state: IntArray  # (rows,) what the agent says it is at, a place in `states`; 0: it has said nothing
     states: tuple[str, ...]  # named so far, in that order; the first is empty
     senses: Senses  # by group, of the robots that act in this tick: what they sensed at its start

@@ -114,11 +114,11 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
     drive = data.draw(npst.arrays(np.bool_, 3))
     ids = np.where(to == BROADCAST, UNTOLD, data.draw(npst.arrays(np.int64, k, elements=st.integers(UNTOLD, I64.max))))
     sent = Sent(sender, to, Payloads.of(payloads), data.draw(st.sampled_from([None, ids])))
-    actions = Actions(ROWS, drive, data.draw(floats(3)), data.draw(floats(3)), sent)
+    actions = Actions(ROWS, drive, *(data.draw(floats(3)) for _ in range(3)), sent)
     frame = frames.decode(encode_actions(8, actions))
     assert (frame.kind, frame.tick) == ("actions", 8)
     got = decode_actions(frame, ROWS)
-    for column in ("rows", "drive", "linear_mps", "angular_radps"):
+    for column in ("rows", "drive", "linear_mps", "angular_radps", "lateral_mps"):
         assert same(getattr(got, column), getattr(actions, column))
     assert same(got.sent.sender, sender)
     assert same(got.sent.to, to)
@@ -129,7 +129,7 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
 
 def sound() -> Actions:
     sent = Sent(np.array([4, 9, 9]), np.array([BROADCAST, 0, 2]), Payloads.of([b"ab", b"", b"cde"]))
-    return Actions(ROWS, np.array([True, False, True]), np.ones(3), np.zeros(3), sent)
+    return Actions(ROWS, np.array([True, False, True]), np.ones(3), np.zeros(3), np.zeros(3), sent)
 
 
 def refused(**changes: Any) -> None:

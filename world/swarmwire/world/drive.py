@@ -8,12 +8,15 @@ differs only in that it may be asked for a speed across the body.
 
 # pyright: basic, reportUnknownMemberType=false
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.drives import Drive, Holonomic
+from swarmwire.comms.truth import Group
 
 
 class Motors(NamedTuple):
@@ -24,6 +27,20 @@ class Motors(NamedTuple):
     max_torque_nm: FloatArray
     mass_kg: FloatArray
     inertia_kgm2: FloatArray
+
+
+def motors_of(groups: Sequence[Group]) -> Motors:
+    """The motors of each robot of the groups in order; a body's mass is spread evenly over its disc."""
+    drives = [
+        (_wheel_base_m(d), d.max_force_n, d.max_torque_nm, b.mass_kg, 0.5 * b.mass_kg * b.radius_m**2)
+        for b, d in ((group.body, group.body.drive) for group in groups)
+    ]
+    columns = np.repeat(np.array(drives), [group.stop - group.start for group in groups], axis=0).T
+    return Motors(*(np.ascontiguousarray(column) for column in columns))
+
+
+def _wheel_base_m(drive: Drive) -> float:
+    return 0.0 if isinstance(drive, Holonomic) else drive.wheel_base_m
 
 
 @njit(cache=True)
@@ -77,18 +94,3 @@ def push(
             size = np.sqrt(fx * fx + fy * fy)
             share = motors.max_force_n[i] / size if size > motors.max_force_n[i] else 1.0
             force[arena, i, 0], force[arena, i, 1], force[arena, i, 2] = fx * share, fy * share, torque
-
-
-def within_wheels(
-    motors: Motors, max_wheel_mps: FloatArray, index: IntArray, linear_mps: FloatArray, angular_radps: FloatArray
-) -> tuple[FloatArray, BoolArray]:
-    """Commands (n,) of robots with these indices as their wheels can follow them, and which of them were too fast.
-
-    Both speeds shrink by one factor, so that the curve stays the same.
-    """
-    half_base = 0.5 * motors.wheel_base_m[index]
-    most = max_wheel_mps[index]
-    fastest = np.abs(linear_mps) + np.abs(angular_radps) * half_base
-    clipped = fastest > most * (1.0 + 1e-9)  # not a command that asks for exactly the limit and was rounded
-    share = np.where(clipped, most / np.maximum(fastest, most), 1.0)
-    return np.stack([linear_mps * share, angular_radps * share], axis=1), clipped

@@ -71,7 +71,7 @@ class RealTime(Roster[_Slot]):
         self._watchdog_ns, self._timeout_ns = to_ns(watchdog_s), to_ns(timeout_s)
         self._asked_ns = np.full(rows, ANSWERED, np.int64)  # simulated time of the first question without an answer
         self._stopped = np.zeros(rows, np.bool_)
-        self._drive, self._command = np.zeros(rows, np.bool_), np.zeros((2, rows))
+        self._drive, self._command = np.zeros(rows, np.bool_), np.zeros((3, rows))
         self._sent: list[Sent] = []
         self._notes: list[Notes] = []
         self.late, self.watchdog_stops = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
@@ -118,9 +118,9 @@ class RealTime(Roster[_Slot]):
         self.watchdog_stops += overdue
         self._stop(np.flatnonzero(overdue))
         rows = np.arange(len(self._drive))
-        linear_mps, angular_radps = self._command
+        linear_mps, angular_radps, lateral_mps = self._command
         sent, notes = Sent.joined(self._sent), self._latest_notes()
-        actions = Actions(rows, self._drive, linear_mps, angular_radps, sent, notes)
+        actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, notes)
         self._drive, self._command = np.zeros_like(self._drive), np.zeros_like(self._command)
         self._sent, self._notes = [], []
         return actions
@@ -137,7 +137,7 @@ class RealTime(Roster[_Slot]):
         self._asked_ns[asked.rows], self._stopped[asked.rows] = ANSWERED, False
         given = actions.rows[actions.drive]
         self._drive[given] = True
-        command: FloatArray = np.array((actions.linear_mps, actions.angular_radps))
+        command: FloatArray = np.array((actions.linear_mps, actions.angular_radps, actions.lateral_mps))
         self._command[:, given] = command[:, actions.drive]
         self._sent.append(actions.sent)
         self._notes.append(actions.notes)

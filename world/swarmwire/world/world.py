@@ -1,4 +1,7 @@
-"""The world: every arena's bodies and senses, tick by tick. It does no I/O and knows neither agents nor the radio."""
+"""The world: every arena's bodies and senses, tick by tick. It knows neither agents nor the radio.
+
+It does no I/O but that it reads the pictures that a scenario names, when it is made.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,13 +15,17 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.truth import Group, Static
+from swarmwire.world.actuation.limits import limits_of, take_commands
+from swarmwire.world.actuation.noise import NoisyWheels
 from swarmwire.world.angles import wrapped
 from swarmwire.world.checks import bodies_of
-from swarmwire.world.drive import within_wheels
-from swarmwire.world.physics import Physics, max_wheel_of
+from swarmwire.world.engines.choice import engines_of
+from swarmwire.world.layout import read_layout
+from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
-from swarmwire.world.sensors import SENSORS, Accumulating, Scene, Sensor
+from swarmwire.world.sensors import SENSORS, Scene
+from swarmwire.world.sensors.staged import Staged
 from swarmwire.world.states import States
 
 
@@ -32,8 +39,9 @@ class World:
         keys: (arenas,) the key of each arena's draws, which depends on its seed alone.
         pose: (rows, 3) x, y in m, heading in rad in (-pi, pi], arena frame.
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
-        command: (rows, 2) applied, within the wheels' limits: forward m/s, left turn rad/s.
+        command: (rows, 3) within the drives' limits: forward m/s, left turn rad/s, to the left m/s.
         alive: (rows,).
+        sensors: those that agents need, by group and sense; `Staged.failed` may be set.
         states: what each robot is at, as its agent named it.
     """
 
@@ -44,30 +52,37 @@ class World:
         """
         if not seeds:
             raise BadInput(scenario.source, "seed", "expected at least one seed")
-        groups = _groups(scenario, bodies_of(scenario, scenario.source))
+        bodies = bodies_of(scenario, scenario.source)
+        groups = _groups(scenario, bodies)
         self.keys: KeyArray = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
-        placed = [place(scenario, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
+        layout = read_layout(scenario.arena, scenario.source)
+        placed = [place(scenario, layout, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
         obstacles, pose = tuple(p.obstacles for p in placed), np.stack([p.pose for p in placed])
         self.static = Static(
             name=scenario.name,
             seeds=tuple(seeds),
             rate_hz=scenario.time.rate_hz,
-            arena_size_m=scenario.arena.size_m,
+            arena_size_m=layout.size_m,
             boundary=scenario.arena.boundary,
             obstacles=obstacles,
             groups=groups,
             robot_names=scenario.robot_names(),
             range_m=range_of(scenario.radio) if scenario.radio else None,
             lights=tuple(p.lights for p in placed),
+            floor=layout.floor,
         )
-        tick_s, steps = 1.0 / scenario.time.rate_hz, scenario.physics.steps
-        self._physics = Physics(scenario.arena.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
-        self._sensors = _sensors(scenario, self._scene(), groups, needs)
-        self._max_wheel_mps = max_wheel_of(groups)
-        self._target = np.zeros((self.static.arenas, self.static.robots, 3))  # what engines are given
+        self.obstacles = obstacle_arrays(obstacles)
+        engines = engines_of(scenario, bodies)
+        self._physics = Physics(self.static, self.obstacles, engines, pose, scenario.physics.steps)
+        self.sensors = _sensors(scenario, self._scene(1.0 / scenario.time.rate_hz), groups, needs)
         rows = self.static.arenas * self.static.robots
+        starts = np.arange(self.static.arenas)[:, None] * self.static.robots
+        self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
         self.alive: BoolArray = np.ones(rows, np.bool_)
-        self.command: FloatArray = np.zeros((rows, 2))
+        self.command: FloatArray = np.zeros((rows, 3))
+        self._limits, self._noise = limits_of(groups), NoisyWheels(groups, self.keys)
+        self._target = np.zeros((self.static.arenas, self.static.robots, 3))  # what the engine is given
+        self._ticks = 0  # moved so far
         self.states = States(rows)
         self._clipped = self._not_finite = 0
         self._show()
@@ -77,24 +92,23 @@ class World:
         self.states.forget(alive & ~self.alive)  # a robot that is revived starts afresh
         self.alive, self.command = alive.copy(), self.command.copy()
         self.command[~alive] = 0.0
-        self._physics.braked = ~alive.reshape(self.static.arenas, self.static.robots)
+        self._physics.braked[:] = ~alive.reshape(self.static.arenas, self.static.robots)
 
     def sense(self, tick: int) -> Senses:
         """What the robots alive that act in a tick sense, by group: rows rising, and the fields that are needed."""
         senses: Senses = {}
+        every_row_alive = bool(self.alive.all())
         for group in self.static.groups:
+            sensors = self.sensors[group.name].values()
             if tick % group.act_every_ticks:
-                for sensor in self._sensors[group.name]:
-                    if isinstance(sensor, Accumulating):
-                        sensor.follow(tick)
+                for sensor in sensors:
+                    sensor.follow(tick)
                 continue
-            index = np.arange(group.start, group.stop)
-            rows = (np.arange(self.static.arenas)[:, None] * self.static.robots + index).ravel()
-            fields: dict[str, FloatArray] = {}
-            for sensor in self._sensors[group.name]:
+            rows, fields = self._rows[group.name], dict[str, FloatArray]()
+            for sensor in sensors:
                 fields.update(sensor.read(tick))
-            here = self.alive[rows]
-            if not here.all():
+            if not every_row_alive:
+                here = self.alive[rows]
                 rows, fields = rows[here], {name: values[here] for name, values in fields.items()}
             senses[group.name] = GroupSenses(rows, fields)
         return senses
@@ -105,24 +119,21 @@ class World:
         Returns:
             (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle.
         """
-        finite = np.isfinite(actions.linear_mps) & np.isfinite(actions.angular_radps)
-        self._not_finite += int(np.count_nonzero(actions.drive & ~finite))
-        given = actions.drive & finite & self.alive[actions.rows]
-        rows = actions.rows[given]
-        linear_mps, angular_radps = actions.linear_mps[given], actions.angular_radps[given]
-        index = rows % self.static.robots
-        within, clipped = within_wheels(self._physics.motors, self._max_wheel_mps, index, linear_mps, angular_radps)
-        self._clipped += int(np.count_nonzero(clipped))
         self.command = self.command.copy()
-        self.command[rows] = within
+        asked = actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps
+        clipped, not_finite = take_commands(self._limits, self.alive, *asked, self.command)
+        self._clipped, self._not_finite = self._clipped + clipped, self._not_finite + not_finite
         self.states.take(actions.notes, self.alive)
-        self._target[:, :, :2] = self.command.reshape(self.static.arenas, self.static.robots, 2)
+        self._target[:] = self.command.reshape(self._target.shape)
+        if self._noise.any:
+            self._noise.act(self._ticks, self._target)
         onsets = self._physics.tick(self._target)
+        self._ticks += 1
         self._show()
         return onsets
 
     def counts(self) -> dict[str, int]:
-        """Commands since the start that the wheels could not follow, or not finite and so dropped; states too many."""
+        """Commands since the start that drives could not follow, or not finite and so dropped; states too many."""
         states = {"states_over_limit": self.states.dropped} if self.states.dropped else {}
         return {"clipped_commands": self._clipped, "nan_commands": self._not_finite, **states}
 
@@ -132,20 +143,27 @@ class World:
         self.pose[:, 2] = wrapped(self.pose[:, 2])
         self.velocity: FloatArray = state[:, 3:].copy()
 
-    def _scene(self) -> Scene:
-        radius_m = np.concatenate([np.full(g.stop - g.start, g.body.radius_m) for g in self.static.groups])
-        obstacles = obstacle_arrays(self.static.obstacles)
+    def _scene(self, tick_s: float) -> Scene:
         static, physics = self.static, self._physics
+        counts = [group.stop - group.start for group in static.groups]
+        radius_m = np.repeat([group.body.radius_m for group in static.groups], counts)
+        bottom_m = np.repeat([group.body.altitude_m for group in static.groups], counts)
+        height_m = np.repeat([group.body.height_m for group in static.groups], counts)
         return Scene(
             keys=self.keys,
             size_m=static.arena_size_m,
             walled=static.walled,
-            obstacles=obstacles,
+            obstacles=self.obstacles,
             lights=static.lights,
+            tick_s=tick_s,
             radius_m=radius_m,
+            bottom_m=bottom_m,
+            top_m=bottom_m + height_m,
             state=physics.state,
             travel_m=physics.travel_m,
             touched=physics.touched,
+            target=np.zeros((static.arenas, static.robots, 2)),
+            leds=np.zeros((static.arenas, static.robots, 0), np.int64),
         )
 
 
@@ -160,16 +178,18 @@ def _groups(scenario: Scenario, bodies: Mapping[str, Body]) -> tuple[Group, ...]
 
 def _sensors(
     scenario: Scenario, scene: Scene, groups: Sequence[Group], needs: Mapping[str, Sequence[str]]
-) -> dict[str, list[Sensor]]:
-    """The sensors of each group that its agents need."""
-    made: dict[str, list[Sensor]] = {group.name: [] for group in groups}
+) -> dict[str, dict[str, Staged]]:
+    """The sensors of each group that its agents need, by group and sense."""
+    made: dict[str, dict[str, Staged]] = {group.name: {} for group in groups}
     for group in groups:
-        for need in dict.fromkeys(needs.get(group.name, ())):
-            if need.startswith("radio."):
+        for need in needs.get(group.name, ()):
+            if need.startswith("radio.") or need in made[group.name]:
                 continue
             if need not in group.body.senses:
                 has = ", ".join(group.body.senses) or "none"
                 expected = f"the agent needs the sense {need!r}; the body {group.body.name} has {has}"
                 raise BadInput(scenario.source, f"robots.{group.name}.agent", expected)
-            made[group.name].append(SENSORS[need](scene, group, group.body.senses[need]))
+            sheet = group.body.senses[need]
+            truth = SENSORS[need](scene, group, sheet)
+            made[group.name][need] = Staged(need, truth, sheet, scene.keys, group, scene.tick_s)
     return made

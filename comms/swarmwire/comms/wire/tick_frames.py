@@ -73,7 +73,7 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
     """An `actions` frame: what a runner's robots do and send, and how many frames to it were none that it could use."""
     arrays: dict[str, AnyArray] = {
         "rows": actions.rows,
-        "command": np.array((actions.drive, actions.linear_mps, actions.angular_radps)),
+        "command": np.array((actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps)),
     }
     if len(actions.sent):
         arrays["sent"] = np.array((actions.sent.sender, actions.sent.to))
@@ -93,10 +93,10 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     n = len(rows)
     if (checked_array(frame, "rows", "<i8", (n,)) != rows).any():
         raise BadFrame("malformed", "rows: expected the runner's own robots")
-    drive, linear_mps, angular_radps = checked_array(frame, "command", "<f8", (3, n))
+    drive, linear_mps, angular_radps, lateral_mps = checked_array(frame, "command", "<f8", (4, n))
     sent = _sent(frame, rows) if "sent" in frame.arrays else Sent.none()
     notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
-    return Actions(rows, drive != 0.0, linear_mps, angular_radps, sent, notes)
+    return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes)
 
 
 def _sent(frame: Frame, rows: IntArray) -> Sent:

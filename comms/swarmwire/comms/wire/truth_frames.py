@@ -73,7 +73,7 @@ def decode_truth(frame: Frame, scene: Scene) -> Glimpse:
         alive=checked_array(frame, "alive", "|b1", (n,)),
         pose=checked_array(frame, "pose", "<f8", (n, 3)),
         velocity=checked_array(frame, "velocity", "<f8", (n, 3)),
-        command=checked_array(frame, "command", "<f8", (n, 2)),
+        command=checked_array(frame, "command", "<f8", (n, 3)),
         state=state,
         states=states,
         senses=_senses(frame, static),

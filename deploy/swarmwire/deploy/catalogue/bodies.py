@@ -3,7 +3,7 @@
 from dataclasses import asdict, replace
 from typing import Any
 
-from swarmwire.comms.body import Body, DifferentialDrive, body_names, load_body
+from swarmwire.comms.body import Body, body_names, load_body
 from swarmwire.comms.sheets import SHEETS
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
@@ -32,7 +32,7 @@ def _body(body: Body) -> Entry:
         ),
         tables=(
             ParameterTable("geometry", tuple(_with_values(geometry, sheet)), "value"),
-            _sheet("drive", DifferentialDrive, sheet["drive"]),
+            _sheet("drive", type(body.drive), sheet["drive"]),
             *senses,
         ),
     )

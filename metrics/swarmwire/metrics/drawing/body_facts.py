@@ -3,6 +3,7 @@
 import math
 
 from swarmwire.comms.body import Body
+from swarmwire.comms.drives import Holonomic, Twist, Wheels
 from swarmwire.comms.sheets import Bumper, Compass, Light, Odometry, Positioning, Proximity, Sheet
 
 
@@ -12,7 +13,7 @@ def facts_of(body: Body) -> list[tuple[str, str]]:
     facts = [
         ("size", f"{_length(2.0 * body.radius_m)} across, {_length(body.height_m)} high"),
         ("mass", f"{body.mass_kg:g} kg"),
-        ("wheels", f"{_length(drive.wheel_base_m)} apart"),
+        ("wheels", "none: it moves in every direction" if isinstance(drive, Holonomic) else _apart(drive)),
         ("top speed", f"{body.max_linear_mps:.3g} m/s"),
         ("turns", f"{math.degrees(body.max_angular_radps):.0f} degrees/s"),
         ("drive", f"{drive.max_force_n:g} N, {drive.max_torque_nm:g} N m"),
@@ -37,6 +38,12 @@ def _told(sheet: Sheet) -> list[str]:
             return [f"error {_length(sheet.noise_m)}"]
         case Bumper():
             return ["the whole rim"]
+        case _:
+            return ["yes"]
+
+
+def _apart(drive: Wheels | Twist) -> str:
+    return f"{_length(drive.wheel_base_m)} apart"
 
 
 def _noise(half_width: float) -> list[str]:

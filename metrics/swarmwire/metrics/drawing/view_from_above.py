@@ -7,6 +7,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.body import Body
+from swarmwire.comms.drives import Holonomic
 from swarmwire.comms.sheets import Bumper, Light, Proximity
 from swarmwire.metrics.drawing.looks import (
     CURVE,
@@ -40,7 +41,8 @@ def draw_from_above(axes: Any, body: Body) -> None:
     axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal")
     axes.set_axis_off()
     _draw_disc(axes, body)
-    _draw_wheels(axes, body)
+    if not isinstance(body.drive, Holonomic):
+        _draw_wheels(axes, body.radius_m, body.drive.wheel_base_m)
     for sheet in body.senses.values():
         match sheet:
             case Proximity():
@@ -75,10 +77,10 @@ def _draw_disc(axes: Any, body: Body) -> None:
     axes.add_patch(Circle((0.0, 0.0), body.radius_m, **look))
 
 
-def _draw_wheels(axes: Any, body: Body) -> None:
+def _draw_wheels(axes: Any, radius_m: float, wheel_base_m: float) -> None:
     from matplotlib.patches import FancyBboxPatch
 
-    half_m, long_m, wide_m = body.drive.wheel_base_m / 2, 0.62 * body.radius_m, 0.13 * body.radius_m
+    half_m, long_m, wide_m = wheel_base_m / 2, 0.62 * radius_m, 0.13 * radius_m
     axes.plot([-half_m, half_m], [0.0, 0.0], color=INK, lw=1.0, zorder=4)
     for x in (-half_m, half_m):
         style = f"round,pad=0,rounding_size={0.4 * wide_m}"

@@ -67,7 +67,7 @@ class TickColumns:
         self._tick[at], self._time_s[at] = truth.tick, to_s(truth.time_ns)
         self._pose[at] = truth.pose.reshape(*shape, -1)
         self._velocity[at] = truth.velocity.reshape(*shape, -1)
-        self._command[at] = truth.command.reshape(*shape, -1)
+        self._command[at] = truth.command.reshape(*shape, -1)[..., : len(COMMAND)]
         self._alive[at] = truth.alive.reshape(shape)
         self._state[at] = truth.state.reshape(shape)
         self._states = truth.states  # it only grows

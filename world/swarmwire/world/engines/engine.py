@@ -1,12 +1,15 @@
 """What every engine is, and what it is told about the arenas and the robots that it is to move."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
+import numpy as np
+
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import Obstacles
-from swarmwire.comms.truth import Boundary, Obstacle
-from swarmwire.world.drive import Motors
+from swarmwire.comms.truth import Boundary, Group, Obstacle, Static
+from swarmwire.world.drive import Motors, motors_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,9 +22,31 @@ class Setting:
     obstacles: Obstacles  # the same as arrays; what moves is kept up to date in them
     radius_m: FloatArray  # (n,)
     bottom_m: FloatArray  # (n,) how high the lower side of a robot is; an obstacle that ends there or below is passed
+    top_m: FloatArray  # (n,) how high its upper side is
     motors: Motors  # (n,) each
     tick_s: float
     steps: int  # physics steps in a tick
+
+
+def setting_of(static: Static, obstacles: Obstacles, groups: Sequence[Group], steps: int) -> Setting:
+    """What an engine is told that is to move these of an arena's groups, in this order."""
+    count = [group.stop - group.start for group in groups]
+    radius_m, bottom_m, height_m = (
+        np.repeat(column, count)
+        for column in zip(*((g.body.radius_m, g.body.altitude_m, g.body.height_m) for g in groups), strict=True)
+    )
+    return Setting(
+        size_m=static.arena_size_m,
+        boundary=static.boundary,
+        standing=static.obstacles,
+        obstacles=obstacles,
+        radius_m=radius_m,
+        bottom_m=bottom_m,
+        top_m=bottom_m + height_m,
+        motors=motors_of(groups),
+        tick_s=1.0 / static.rate_hz,
+        steps=steps,
+    )
 
 
 class Engine(Protocol):

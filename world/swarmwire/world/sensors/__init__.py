@@ -1,4 +1,7 @@
-"""What robots sense, a file per sensor. A new one: a sheet in `swarmwire.comms.sheets`, a file here, a line below."""
+"""What robots sense, a file per sensor: the truth (`sensor.TrueSense`), of which `staged.Staged` makes readings.
+
+A new one: a sheet in `swarmwire.comms.sheets`, a file here, a line below.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -10,9 +13,10 @@ from swarmwire.world.sensors.light import LightSensor
 from swarmwire.world.sensors.odometry import OdometrySensor
 from swarmwire.world.sensors.positioning import PositioningSensor
 from swarmwire.world.sensors.proximity import ProximitySensor
-from swarmwire.world.sensors.scene import Accumulating, Scene, Sensor
+from swarmwire.world.sensors.scene import Scene
+from swarmwire.world.sensors.sensor import TrueSense
 
-SENSORS: dict[str, Callable[[Scene, Group, Any], Sensor]] = {
+SENSORS: dict[str, Callable[[Scene, Group, Any], TrueSense]] = {
     "proximity": ProximitySensor,
     "compass": CompassSensor,
     "odometry": OdometrySensor,
@@ -21,4 +25,4 @@ SENSORS: dict[str, Callable[[Scene, Group, Any], Sensor]] = {
     "positioning": PositioningSensor,
 }
 
-__all__ = ["SENSORS", "Accumulating", "Scene", "Sensor"]
+__all__ = ["SENSORS", "Scene"]

@@ -15,24 +15,24 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.geometry import is_blocked, ray_to_circle
 from swarmwire.comms.grid import build, cell_of
 from swarmwire.comms.sheets import Light
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene
+from swarmwire.world.sensors.sensor import Field, Noise
 
-NOISE = purpose("light noise")
 REACH = 2.5  # a light is dark beyond that many of its intensities
 TURN_RAD = 2.0 * np.pi
 
 
 class LightSensor:
-    """Sense `light`: value (n, sensors), 0 dark to 1. Noise is uniform and new in every tick."""
+    """Sense `light`: value (n, sensors), 0 dark to 1. Noise is uniform, and new in every reading."""
 
     def __init__(self, scene: Scene, group: Group, sheet: Light) -> None:
         self._scene, self._group, self._sheet = scene, group, sheet
+        noise = Noise("uniform", sheet.noise)
+        self.fields = (Field("value", len(sheet.angle_rad), noise, sheet.step, low=0.0, high=1.0, blank=0.0),)
         lights = [(a, light) for a, some in enumerate(scene.lights) for light in some]
         self._arena = np.array([a for a, _ in lights], np.int64)
         self._light = np.array([(of.x_m, of.y_m, of.intensity_m) for _, of in lights], np.float64).reshape(-1, 3)
@@ -40,16 +40,15 @@ class LightSensor:
         per_robot_m = np.sqrt(width * height / len(scene.radius_m))  # about a robot in each cell
         self._cell_m = max(2.0 * float(scene.radius_m.max()), float(per_robot_m))
 
-    def read(self, tick: int) -> dict[str, FloatArray]:
-        """What every photocell of every robot of the group answers in a tick."""
+    def truth(self, tick: int) -> tuple[FloatArray, ...]:
+        """What every photocell of every robot of the group answers, without noise; more than 1 where lights add up."""
         scene, group, sheet = self._scene, self._group, self._sheet
         x, y = scene.state[:, :, 0].ravel(), scene.state[:, :, 1].ravel()
         grid = build(x, y, len(scene.keys), scene.size_m, self._cell_m)
         value = np.zeros((len(scene.keys), group.stop - group.start, len(sheet.angle_rad)))
         angle = sheet.angle_rad
         _shine(value, scene.state, group.start, scene.radius_m, angle, grid, scene.obstacles, self._arena, self._light)
-        _answer(value, sheet.noise, scene.keys, group.start, tick)
-        return {"light.value": value.reshape(-1, value.shape[2])}
+        return (value,)
 
 
 @njit(cache=True)
@@ -113,14 +112,3 @@ def _rows(grid, column, widest, x, y, lx, ly):
         cell_of(low, grid.bottom_m, grid.cell_m, grid.ny),
         cell_of(high, grid.bottom_m, grid.cell_m, grid.ny),
     )
-
-
-@njit(cache=True)
-def _answer(value, noise, keys, start, tick):
-    for arena in range(value.shape[0]):
-        for i in range(value.shape[1]):
-            for cell in range(value.shape[2]):
-                if noise > 0.0:
-                    draw = 2.0 * uniform(keys[arena], start + i, tick, cell, NOISE) - 1.0
-                    value[arena, i, cell] += noise * draw
-                value[arena, i, cell] = min(max(value[arena, i, cell], 0.0), 1.0)

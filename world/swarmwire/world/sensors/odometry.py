@@ -11,12 +11,18 @@ from swarmwire.comms.draws_compiled import normal
 from swarmwire.comms.sheets import Odometry
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene
+from swarmwire.world.sensors.sensor import Field
 
 SLIP = purpose("odometry slip")
 
 
 class OdometrySensor:
-    """Sense `odometry`: left_m, right_m (n,), travel since the start, rounded down to whole encoder steps."""
+    """Sense `odometry`: left_m, right_m (n,), travel since the start, rounded down to whole encoder steps.
+
+    Slip is a property of each tick's travel, so it is part of what is counted, not of a reading.
+    """
+
+    fields = (Field("left_m"), Field("right_m"))
 
     def __init__(self, scene: Scene, group: Group, sheet: Odometry) -> None:
         self._scene, self._group, self._sheet = scene, group, sheet
@@ -33,13 +39,12 @@ class OdometrySensor:
         _add_travel(self._told_m, new_m, keys, self._group.start, tick, self._sheet.slip)
         self._rolled_m = rolled_m
 
-    def read(self, tick: int) -> dict[str, FloatArray]:
+    def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The travel that the encoders of every robot show."""
         self.follow(tick)
         step_m = self._sheet.step_m
         shown = np.floor(self._told_m / step_m) * step_m if step_m > 0.0 else self._told_m
-        left, right = (np.ascontiguousarray(shown[:, :, wheel]).reshape(-1) for wheel in (0, 1))
-        return {"odometry.left_m": left, "odometry.right_m": right}
+        return shown[:, :, 0].copy(), shown[:, :, 1].copy()
 
 
 @njit(cache=True)

@@ -8,15 +8,12 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.geometry import ray_to_circle, ray_to_polygon
 from swarmwire.comms.grid import build, cell_of
 from swarmwire.comms.sheets import Proximity
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene
-
-NOISE = purpose("proximity noise")
+from swarmwire.world.sensors.sensor import Field, Noise
 
 
 class Eyes(NamedTuple):
@@ -31,25 +28,25 @@ class Eyes(NamedTuple):
     c: float
     full_m: float
     reach_m: float
-    noise: float
 
 
 class ProximitySensor:
-    """Sense `proximity`: value (n, rays), the sensors' answers, 0 to 1. Noise is uniform and new in every tick."""
+    """Sense `proximity`: value (n, rays), the sensors' answers, 0 to 1. Noise is uniform, and new in every reading."""
 
     def __init__(self, scene: Scene, group: Group, sheet: Proximity) -> None:
         self._scene, self._group, curve = scene, group, sheet.response
         direction = np.cos(sheet.angle_rad), np.sin(sheet.angle_rad)
         numbers = curve.a, curve.b, curve.c, curve.full_m, curve.reach_m
-        self._eyes = Eyes(*direction, sheet.range_m, curve.kind == "rational", *numbers, sheet.noise)
+        self._eyes = Eyes(*direction, sheet.range_m, curve.kind == "rational", *numbers)
+        noise = Noise("uniform", sheet.noise)
+        self.fields = (Field("value", len(sheet.angle_rad), noise, sheet.step, low=0.0, high=1.0, blank=0.0),)
         self._reach_m = group.body.radius_m + sheet.range_m + float(scene.radius_m.max())
 
-    def read(self, tick: int) -> dict[str, FloatArray]:
-        """What every ray of every robot of the group answers in a tick."""
-        scene, group = self._scene, self._group
+    def truth(self, tick: int) -> tuple[FloatArray, ...]:
+        """What every ray of every robot of the group would answer without noise."""
         near = self.distance_m()
-        _answer(near, self._eyes, scene.keys, group.start, tick)
-        return {"proximity.value": near.reshape(-1, near.shape[2])}
+        _answer(near, self._eyes)
+        return (near,)
 
     def distance_m(self) -> FloatArray:
         """The true distance along each ray, (arenas, n, rays) in m; inf where nothing is within the range."""
@@ -134,8 +131,8 @@ def _meet_circle(rays, x, y, rim, dx, dy, range_m, cx, cy, radius):
 
 
 @njit(cache=True)
-def _answer(near, eyes, keys, start, tick):
-    """Replace distances by what the sensors answer to them (`ResponseCurve.value`, then noise, then clipping)."""
+def _answer(near, eyes):
+    """Replace distances by what the sensors answer to them (`ResponseCurve.value`)."""
     for arena in range(near.shape[0]):
         for i in range(near.shape[1]):
             for ray in range(near.shape[2]):
@@ -148,7 +145,4 @@ def _answer(near, eyes, keys, start, tick):
                         value = 1.0
                     else:
                         value = eyes.a / (d + eyes.b)
-                if eyes.noise > 0.0:
-                    value = min(max(value, 0.0), 1.0)
-                    value += eyes.noise * (2.0 * uniform(keys[arena], start + i, tick, ray, NOISE) - 1.0)
                 near[arena, i, ray] = min(max(value, 0.0), 1.0)

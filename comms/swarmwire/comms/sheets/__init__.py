@@ -1,0 +1,36 @@
+"""Data sheets of the senses a body may have: what agents may know of their own sensors, and the world emulates.
+
+A file per sense. A new one: its sheet in a file here, and its line in `SHEETS`.
+"""
+
+from swarmwire.comms.sheets.bumper import Bumper
+from swarmwire.comms.sheets.compass import Compass
+from swarmwire.comms.sheets.light import Light
+from swarmwire.comms.sheets.odometry import Odometry
+from swarmwire.comms.sheets.positioning import Positioning
+from swarmwire.comms.sheets.proximity import Proximity, ResponseCurve
+from swarmwire.comms.sheets.ring import Ring
+from swarmwire.comms.sheets.sheet import RangedSheet, Sheet
+
+SHEETS: dict[str, type[Sheet]] = {
+    "proximity": Proximity,
+    "compass": Compass,
+    "odometry": Odometry,
+    "light": Light,
+    "bumper": Bumper,
+    "positioning": Positioning,
+}
+
+__all__ = [
+    "SHEETS",
+    "Bumper",
+    "Compass",
+    "Light",
+    "Odometry",
+    "Positioning",
+    "Proximity",
+    "RangedSheet",
+    "ResponseCurve",
+    "Ring",
+    "Sheet",
+]
