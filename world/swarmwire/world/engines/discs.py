@@ -21,7 +21,7 @@ from swarmwire.world.engines.engine import Setting
 MARGIN = 0.3
 
 
-class Discs:
+class DiscsEngine:
     """An `Engine` for robots against robots, walls, and obstacles that stand still."""
 
     name: ClassVar[str] = "discs"
