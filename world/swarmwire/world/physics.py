@@ -11,11 +11,13 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import Obstacles
 from swarmwire.comms.truth import Static
 from swarmwire.world.engines.choice import EngineName
+from swarmwire.world.engines.discs import DiscsEngine
 from swarmwire.world.engines.engine import Engine, Setting, setting_of
 from swarmwire.world.engines.kinematic import KinematicEngine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
 
 ENGINES: dict[EngineName, Callable[[Setting, FloatArray], Engine]] = {
+    "discs": DiscsEngine,
     "pymunk": PymunkEngine,
     "kinematic": KinematicEngine,
 }

@@ -1,0 +1,133 @@
+"""Which things a robot may touch soon (Verlet lists): listed with a margin, and anew once a robot has moved that far.
+
+What moves does not depend on the margin: contacts are found among the listed things by what is near at the time, in an
+order that the lists keep: pairs by the lower and then by the higher row, fixed things by row.
+
+L. Verlet (1967), Computer "experiments" on classical fluids, Phys. Rev. 159, 98.
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.grid import cell_of
+from swarmwire.world.engines.discs_fixed import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, gap_to_fixed, gap_to_wall
+
+BEFORE, NOW = 1, 2  # bits of a pair's third column: it touched in the tick before, it touched in this one
+
+
+@njit(cache=True)
+def list_pairs(robots, state, arenas, grid, widest_m, margin_m, old):
+    """Pairs of robots with a gap of up to twice the margin, (pairs, 3): lower row, higher row, bits of touch.
+
+    The bits come from the list `old`, which is in the same order.
+    """
+    rows = len(state)
+    per_arena = rows // arenas
+    pairs = np.empty((2 * rows + 16, 3), np.int64)
+    count = 0
+    farthest_m = 2.0 * (widest_m + margin_m)
+    for row in range(rows):
+        x, y = state[row, 0], state[row, 1]
+        i = cell_of(x, grid.left_m, grid.cell_m, grid.nx)
+        j = cell_of(y, grid.bottom_m, grid.cell_m, grid.ny)
+        begin = count
+        for beside in range(max(j - 1, 0), min(j + 2, grid.ny)):
+            c = ((row // per_arena) * grid.ny + beside) * grid.nx
+            for k in range(grid.start[c + max(i - 1, 0)], grid.start[c + min(i + 2, grid.nx)]):
+                other = grid.order[k]
+                dx, dy = state[other, 0] - x, state[other, 1] - y
+                apart2 = dx * dx + dy * dy
+                if apart2 > farthest_m * farthest_m or other <= row:
+                    continue
+                if apart2 > (robots[row].radius_m + robots[other].radius_m + 2.0 * margin_m) ** 2:
+                    continue
+                if count == len(pairs):
+                    pairs = np.concatenate((pairs, np.empty_like(pairs)))
+                _insert(pairs, begin, count, row, other)
+                count += 1
+    pairs = pairs[:count].copy()
+    _keep_bits(pairs, old)
+    return pairs
+
+
+@njit(cache=True)
+def _insert(pairs, begin, count, row, other):
+    """Put a pair among those of the same row, pairs[begin:count], so that they rise."""
+    place = count
+    while place > begin and pairs[place - 1, 1] > other:
+        pairs[place, 0], pairs[place, 1] = pairs[place - 1, 0], pairs[place - 1, 1]
+        place -= 1
+    pairs[place, 0], pairs[place, 1] = row, other
+
+
+@njit(cache=True)
+def _keep_bits(pairs, old):
+    at = 0
+    for k in range(len(pairs)):
+        row, other = pairs[k, 0], pairs[k, 1]
+        while at < len(old) and (old[at, 0] < row or (old[at, 0] == row and old[at, 1] < other)):
+            at += 1
+        same = at < len(old) and old[at, 0] == row and old[at, 1] == other
+        pairs[k, 2] = old[at, 2] if same else 0
+
+
+@njit(cache=True)
+def list_fixed(robots, state, size_m, walled, obstacles, cells, margin_m):
+    """Fixed things with a gap of up to the margin, (things, 3): row, kind, number of the circle or polygon.
+
+    An obstacle that ends where a robot begins, or lower, is none to it.
+    """
+    rows = len(state)
+    per_arena = rows // (len(obstacles.circle_start) - 1)
+    half_size_m = (0.5 * size_m[0], 0.5 * size_m[1])
+    width_m, height_m = size_m[0] / cells.per_side, size_m[1] / cells.per_side
+    things = np.empty((rows + 16, 3), np.int64)
+    count = 0
+    for row in range(rows):
+        robot, x, y = robots[row], state[row, 0], state[row, 1]
+        i = cell_of(x, -half_size_m[0], width_m, cells.per_side)
+        j = cell_of(y, -half_size_m[1], height_m, cells.per_side)
+        c = ((row // per_arena) * cells.per_side + j) * cells.per_side + i
+        first, end = cells.start[c], cells.start[c + 1]
+        while count + 4 + end - first > len(things):
+            things = np.concatenate((things, np.empty_like(things)))
+        reach_m = robot.radius_m + margin_m
+        if walled and (abs(x) + reach_m >= half_size_m[0] or abs(y) + reach_m >= half_size_m[1]):
+            for wall in (LEFT, RIGHT, BOTTOM, TOP):
+                if gap_to_wall(wall, x, y, robot.radius_m, half_size_m)[0] <= margin_m:
+                    things[count, 0], things[count, 1], things[count, 2] = row, wall, 0
+                    count += 1
+        for k in range(first, end):
+            kind, which, top_m = _told(obstacles, cells.which[k])
+            if top_m > robot.bottom_m and _gap_m(kind, which, x, y, robot, half_size_m, obstacles) <= margin_m:
+                things[count, 0], things[count, 1], things[count, 2] = row, kind, which
+                count += 1
+    return things[:count].copy()
+
+
+@njit(cache=True)
+def _told(obstacles, obstacle):
+    """The kind of an obstacle that the cells list, its number among its kind, and its height in m."""
+    polygon = obstacle - len(obstacles.circle)
+    if polygon < 0:
+        return CIRCLE, obstacle, obstacles.circle_top_m[obstacle]
+    return POLYGON, polygon, obstacles.polygon_top_m[polygon]
+
+
+@njit(cache=True)
+def _gap_m(kind, which, x, y, robot, half_size_m, obstacles):
+    circle, side_start, side = obstacles.circle, obstacles.side_start, obstacles.side
+    return gap_to_fixed(kind, which, x, y, robot.radius_m, half_size_m, circle, side_start, side)[0]
+
+
+@njit(cache=True)
+def split(rows, pairs, things):
+    """The rows near which something is listed, and the others; both rising."""
+    crowded = np.zeros(rows, np.bool_)
+    for k in range(len(pairs)):
+        crowded[pairs[k, 0]] = crowded[pairs[k, 1]] = True
+    for k in range(len(things)):
+        crowded[things[k, 0]] = True
+    return np.flatnonzero(crowded), np.flatnonzero(~crowded)
