@@ -40,6 +40,7 @@ class World:
         pose: (rows, 3) x, y in m, heading in rad in (-pi, pi], arena frame.
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
         command: (rows, 3) within the drives' limits: forward m/s, left turn rad/s, to the left m/s.
+        movable: (arenas, movable obstacles, 3) x, y in m, heading in rad; None: there are none.
         alive: (rows,).
         sensors: those that agents need, by group and sense; `Staged.failed` may be set.
         states: what each robot is at, as its agent named it.
@@ -86,6 +87,11 @@ class World:
         self.states = States(rows)
         self._clipped = self._not_finite = 0
         self._show()
+
+    @property
+    def engines(self) -> tuple[str, ...]:
+        """The names of the engines that move the robots."""
+        return self._physics.names
 
     def live(self, alive: BoolArray) -> None:
         """These robots (rows,) are alive from now on; the others brake, and resist whatever pushes them."""
@@ -142,6 +148,7 @@ class World:
         self.pose: FloatArray = state[:, :3].copy()
         self.pose[:, 2] = wrapped(self.pose[:, 2])
         self.velocity: FloatArray = state[:, 3:].copy()
+        self.movable: FloatArray | None = self._physics.movable.copy() if self.static.movable else None
 
     def _scene(self, tick_s: float) -> Scene:
         static, physics = self.static, self._physics

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
-from pymunk.constraints import GearJoint, PivotJoint
+from pymunk.constraints import PivotJoint
 
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.truth import Obstacle
@@ -94,7 +94,10 @@ class ArenaSpace:
         self._space.add(shape)
 
     def _add_load(self, load: Load) -> pymunk.Body:
-        """A movable obstacle; joints of bounded strength to the floor are its friction, inside the solver."""
+        """A movable obstacle on four feet, which joints of bounded strength hold on the floor: friction in the solver.
+
+        With all of them at the mean distance of its area, sliding, turning and both together cost what they should.
+        """
         corners = [(x, y) for x, y in load.corners_m.tolist()]
         if load.radius_m:
             body = pymunk.Body(load.mass_kg, pymunk.moment_for_circle(load.mass_kg, 0.0, load.radius_m))
@@ -104,13 +107,13 @@ class ArenaSpace:
             shape = pymunk.Poly(body, corners)
         body.position, body.angle = (load.x_m, load.y_m), load.heading_rad
         shape.friction = FRICTION
-        floor = self._space.static_body
-        slide = PivotJoint(floor, body, (load.x_m, load.y_m), (0.0, 0.0))
-        turn = GearJoint(floor, body, 0.0, 1.0)
-        slide.max_bias = turn.max_bias = 0.0  # they hold on to no place
-        slide.max_force = FLOOR_FRICTION * load.mass_kg * GRAVITY_MPS2
-        turn.max_force = slide.max_force * load.reach_m
-        self._space.add(body, shape, slide, turn)
+        self._space.add(body, shape)
+        reach_m = load.reach_m
+        for foot in ((reach_m, 0.0), (0.0, reach_m), (-reach_m, 0.0), (0.0, -reach_m)):
+            grip = PivotJoint(self._space.static_body, body, (0.0, 0.0), foot)
+            grip.max_bias = 0.0  # it holds on to no place
+            grip.max_force = 0.25 * FLOOR_FRICTION * load.mass_kg * GRAVITY_MPS2
+            self._space.add(grip)
         return body
 
     def _check_order(self, ids: list[int]) -> None:
