@@ -243,6 +243,7 @@ class Simulation:
             radius_m,
             self._traces,
             antennas,
+            static.boundary,
         )
 
     def _from_outside(self, tick: int) -> bool:

@@ -34,9 +34,12 @@ def pose_of(world: World, which: int = 0) -> np.ndarray:
 def test_a_robot_pushes_what_it_has_the_force_for(shape: dict[str, Any]) -> None:
     world = world_with({**shape, "at": [0.0, 0.0]}, poses=[[-0.5, 0.02, 0.0]])
     start = pose_of(world).copy()
-    onsets = sum(world.move(commanded(world, 0.1, 0.0)) for _ in range(100))
-    assert world.pose[0, 0] > 0.3
-    assert pose_of(world)[0] > start[0] + 0.3
+    onsets = np.zeros((1, 2), np.int64)
+    for _ in range(70):
+        onsets += world.move(commanded(world, 0.1, 0.0))
+        if shape is CYLINDER:
+            assert np.hypot(*(pose_of(world)[:2] - world.pose[0, :2])) > 0.1 + 0.98 * EPUCK.radius_m
+    assert pose_of(world)[0] > start[0] + 0.15
     assert np.array_equal(onsets, [[0, 1]])
     assert world.engines == ("pymunk",)
 
@@ -115,7 +118,8 @@ def test_a_robot_senses_the_obstacle_that_another_pushes_towards_it() -> None:
     for _ in range(120):
         world.move(commanded(world, [0.1, 0.0], 0.0))
     after = world.sense(1)["a"].fields["proximity.value"][1].max()
-    assert before < 0.2 < 0.5 < after
+    assert before < 0.2
+    assert after > 0.5
 
 
 def test_friction_turns_by_the_mean_distance_of_the_area() -> None:
