@@ -50,7 +50,7 @@ def test_an_engine_that_is_asked_for_is_taken(engine: str) -> None:
         (
             {},
             {"boundary": "torus"},
-            "arena.boundary: expected walls or open: on a torus robots have no contacts, and epuck (robots.a) has; "
+            "arena.boundary: expected walls or open: on a torus no robot has contacts, and epuck (robots.a) does; "
             'physics.engine = "kinematic" takes them all off the floor',
         ),
         (

@@ -99,7 +99,8 @@ class RunFolder:
 
     def metrics(self, arena: int = 0) -> "pl.DataFrame":
         """A row per tick of one arena: tick, time_s, each metric, and the radio's counts."""
-        return self._read("ticks", self._checked(arena), [*ROBOT_COLUMNS, *MOVABLE, "arena", "seed"])
+        movable = MOVABLE if self.static.movable else ()
+        return self._read("ticks", self._checked(arena), [*ROBOT_COLUMNS, *movable, "arena", "seed"])
 
     def packets(self, arena: int | None = None) -> "pl.DataFrame":
         """A row per (packet, receiver within reach), of one arena or of all; BadInput if none were recorded.

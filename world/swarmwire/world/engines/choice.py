@@ -35,7 +35,7 @@ def check_engines(scenario: Scenario, bodies: Mapping[str, Body], where: str) ->
     stuck = [group for group, engine in engines.items() if engine != "kinematic"]
     if scenario.arena.boundary == "torus" and stuck:
         body = bodies[stuck[0]].name
-        expected = f"expected walls or open: on a torus robots have no contacts, and {body} (robots.{stuck[0]}) has"
+        expected = f"expected walls or open: on a torus no robot has contacts, and {body} (robots.{stuck[0]}) does"
         raise BadInput(
             where, "arena.boundary", f'{expected}; physics.engine = "kinematic" takes them all off the floor'
         )
