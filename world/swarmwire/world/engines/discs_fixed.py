@@ -5,7 +5,7 @@
 import numpy as np
 from numba import njit
 
-LEFT, RIGHT, BOTTOM, TOP, CIRCLE, POLYGON = range(6)
+ROBOT, LEFT, RIGHT, BOTTOM, TOP, CIRCLE, POLYGON = range(7)  # kinds of things that a disc may meet
 
 
 @njit(cache=True)

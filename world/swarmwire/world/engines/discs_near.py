@@ -14,18 +14,13 @@ from numba import njit
 from swarmwire.comms.grid import cell_of
 from swarmwire.world.engines.discs_fixed import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, gap_to_fixed, gap_to_wall
 
-BEFORE, NOW = 1, 2  # bits of a pair's third column: it touched in the tick before, it touched in this one
-
 
 @njit(cache=True)
-def list_pairs(robots, state, arenas, grid, widest_m, margin_m, old):
-    """Pairs of robots with a gap of up to twice the margin, (pairs, 3): lower row, higher row, bits of touch.
-
-    The bits come from the list `old`, which is in the same order.
-    """
+def list_pairs(robots, state, arenas, grid, widest_m, margin_m):
+    """Pairs of robots with a gap of up to twice the margin, (pairs, 2): lower row, higher row."""
     rows = len(state)
     per_arena = rows // arenas
-    pairs = np.empty((2 * rows + 16, 3), np.int64)
+    pairs = np.empty((2 * rows + 16, 2), np.int64)
     count = 0
     farthest_m = 2.0 * (widest_m + margin_m)
     for row in range(rows):
@@ -47,9 +42,7 @@ def list_pairs(robots, state, arenas, grid, widest_m, margin_m, old):
                     pairs = np.concatenate((pairs, np.empty_like(pairs)))
                 _insert(pairs, begin, count, row, other)
                 count += 1
-    pairs = pairs[:count].copy()
-    _keep_bits(pairs, old)
-    return pairs
+    return pairs[:count].copy()
 
 
 @njit(cache=True)
@@ -60,17 +53,6 @@ def _insert(pairs, begin, count, row, other):
         pairs[place, 0], pairs[place, 1] = pairs[place - 1, 0], pairs[place - 1, 1]
         place -= 1
     pairs[place, 0], pairs[place, 1] = row, other
-
-
-@njit(cache=True)
-def _keep_bits(pairs, old):
-    at = 0
-    for k in range(len(pairs)):
-        row, other = pairs[k, 0], pairs[k, 1]
-        while at < len(old) and (old[at, 0] < row or (old[at, 0] == row and old[at, 1] < other)):
-            at += 1
-        same = at < len(old) and old[at, 0] == row and old[at, 1] == other
-        pairs[k, 2] = old[at, 2] if same else 0
 
 
 @njit(cache=True)
@@ -120,14 +102,3 @@ def _told(obstacles, obstacle):
 def _gap_m(kind, which, x, y, robot, half_size_m, obstacles):
     circle, side_start, side = obstacles.circle, obstacles.side_start, obstacles.side
     return gap_to_fixed(kind, which, x, y, robot.radius_m, half_size_m, circle, side_start, side)[0]
-
-
-@njit(cache=True)
-def split(rows, pairs, things):
-    """The rows near which something is listed, and the others; both rising."""
-    crowded = np.zeros(rows, np.bool_)
-    for k in range(len(pairs)):
-        crowded[pairs[k, 0]] = crowded[pairs[k, 1]] = True
-    for k in range(len(things)):
-        crowded[things[k, 0]] = True
-    return np.flatnonzero(crowded), np.flatnonzero(~crowded)
