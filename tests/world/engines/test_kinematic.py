@@ -77,9 +77,7 @@ def clear_m(obstacle: Obstacle, xy: FloatArray) -> float:
         return float(np.hypot(*(xy - [obstacle.x_m, obstacle.y_m]))) - obstacle.radius_m
     corners = obstacle.corners_m
     share = np.linspace(0.0, 1.0, 2001)[:, None]
-    rim = np.concatenate(
-        [a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
-    )
+    rim = np.concatenate([a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
     return float(np.hypot(*(rim - xy).T).min())
 
 
@@ -157,7 +155,9 @@ def test_overlaps_are_those_that_brute_force_finds(boundary: str, n: int) -> Non
     moved = engine(pose, boundary=boundary)
     before: set[tuple[int, int, int]] = set()
     for _ in range(30):
-        onsets = moved.tick(np.concatenate([rng.uniform(-1, 1, (3, n, 1)), rng.uniform(-3, 3, (3, n, 1)), np.zeros((3, n, 1))], 2))
+        onsets = moved.tick(
+            np.concatenate([rng.uniform(-1, 1, (3, n, 1)), rng.uniform(-3, 3, (3, n, 1)), np.zeros((3, n, 1))], 2)
+        )
         apart = moved.state[:, :, None, :2] - moved.state[:, None, :, :2]
         if boundary == "torus":
             apart -= 4.0 * np.round(apart / 4.0)

@@ -5,6 +5,7 @@
 import numpy as np
 from numba import njit
 
+from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.world.engines.discs_fixed import ROBOT, gap_to_circle, gap_to_fixed
 
 # Robots look ahead for what their speed may reach in a step and this share of their radius, since others may push them.
@@ -81,7 +82,7 @@ def crowd_of(rows, contacts):
     return np.flatnonzero(crowded), np.flatnonzero(~crowded)
 
 
-@njit(cache=True)
+@borrowing()
 def find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, circle, side_start, side):
     """Put the places of the contacts that may meet in this step into `met`, in order; returns how many.
 
@@ -115,6 +116,6 @@ def find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, 
     return count
 
 
-@njit(cache=True)
+@borrowing()
 def _speed_mps(now):
     return np.sqrt(now[3] * now[3] + now[4] * now[4])

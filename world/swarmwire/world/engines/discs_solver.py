@@ -10,8 +10,7 @@ impulses, Game Developers Conference.
 
 # pyright: basic, reportUnknownMemberType=false
 
-from numba import njit
-
+from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.world.engines.discs_fixed import ROBOT
 
 SWEEPS = 10
@@ -21,7 +20,7 @@ SEPARATIONS = 20
 STILL_M = 1e-7  # an overlap below is left
 
 
-@njit(cache=True)
+@borrowing()
 def solve(contacts, met, robots, state):
     """Change the velocities in `state` (rows, 6) so that contacts neither close faster than allowed nor slide.
 
@@ -53,7 +52,7 @@ def solve(contacts, met, robots, state):
             break
 
 
-@njit(cache=True)
+@borrowing()
 def _impulses(contact, excess_mps, sliding_mps):
     """What to add to a contact's impulses along the normal and along the tangent."""
     push, rub = contact.push_ns, contact.rub_ns
@@ -65,7 +64,7 @@ def _impulses(contact, excess_mps, sliding_mps):
     return push - contact.push_ns, min(max(rub, -most), most) - contact.rub_ns
 
 
-@njit(cache=True)
+@borrowing()
 def _kick(contact, robots, state, push, rub):
     """Give impulses to both sides of a contact; the tangent is the normal turned left."""
     px, py = push * contact.nx - rub * contact.ny, push * contact.ny + rub * contact.nx
@@ -74,14 +73,14 @@ def _kick(contact, robots, state, push, rub):
         _change(robots[contact.which], state[contact.which], px, py, -rub)
 
 
-@njit(cache=True)
+@borrowing()
 def _change(robot, now, px, py, rub):
     now[3] += px * robot.per_kg
     now[4] += py * robot.per_kg
     now[5] += rub * robot.radius_m * robot.per_kgm2
 
 
-@njit(cache=True)
+@borrowing()
 def separate(contacts, met, robots, state, dt_s):
     """Shift places in `state` (rows, 6) so that nothing overlaps after the move that follows; velocities stay.
 
@@ -112,14 +111,14 @@ def separate(contacts, met, robots, state, dt_s):
                 _shift(robots, state, contacts[k].which)
 
 
-@njit(cache=True)
+@borrowing()
 def _part(robot, contact, overlap_m):
     share_m = overlap_m * contact.mass_kg * robot.per_kg
     robot.shift_x_m += share_m * contact.nx
     robot.shift_y_m += share_m * contact.ny
 
 
-@njit(cache=True)
+@borrowing()
 def _shift(robots, state, row):
     state[row, 0] += robots[row].shift_x_m
     state[row, 1] += robots[row].shift_y_m

@@ -3,21 +3,21 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
+from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.world.engines.discs_contacts import LOOK_AHEAD, find_contacts
 from swarmwire.world.engines.discs_motion import drive, follow_targets, move
 from swarmwire.world.engines.discs_solver import separate, solve
 from swarmwire.world.engines.discs_touches import begin_tick, note_touches
 
 
-@njit(cache=True)
+@borrowing()
 def needed_margin_m(fastest_mps, widest_m, dt_s, steps):
     """How far robots may get in so many steps, and look ahead after them."""
     return (steps + 1) * dt_s * fastest_mps + LOOK_AHEAD * widest_m
 
 
-@njit(cache=True)
+@borrowing()
 def advance(
     step, steps, dt_s, margin_m, widest_m, half_size_m, per_arena, robots, state, travel_m, touched, braked, target,
     spread, contacts, met, crowd, loners, circle, side_start, side, onsets,
@@ -55,7 +55,7 @@ def advance(
     return step
 
 
-@njit(cache=True)
+@borrowing()
 def _fastest_mps(target):
     fastest2 = 0.0
     for row in range(len(target)):
@@ -63,7 +63,7 @@ def _fastest_mps(target):
     return np.sqrt(fastest2)
 
 
-@njit(cache=True)
+@borrowing()
 def _note_spread(rows, robots, state, spread):
     """Raise `spread` to the greatest distance of these rows from where they were listed, and their greatest speed."""
     far2, fast2 = spread[0] * spread[0], spread[1] * spread[1]

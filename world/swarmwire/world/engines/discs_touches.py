@@ -5,13 +5,12 @@ All that is fixed counts as one thing.
 
 # pyright: basic, reportUnknownMemberType=false
 
-from numba import njit
-
+from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.world.engines.discs_contacts import BEFORE, NOW, TOUCH_M
 from swarmwire.world.engines.discs_fixed import ROBOT
 
 
-@njit(cache=True)
+@borrowing()
 def begin_tick(contacts, robots, touched):
     """What touched in the tick that ends did so before, and nothing has touched yet."""
     for k in range(len(contacts)):
@@ -21,7 +20,7 @@ def begin_tick(contacts, robots, touched):
         touched[row] = 0.0
 
 
-@njit(cache=True)
+@borrowing()
 def note_touches(contacts, met, robots, touched, per_arena, onsets):
     """Note what touched in a step: it was pushed, or its gap was next to nothing.
 
