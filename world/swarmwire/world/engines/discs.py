@@ -9,9 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.grid import build
 from swarmwire.world.engines.discs_contacts import CONTACT, contacts_of, crowd_of
-from swarmwire.world.engines.discs_near import list_fixed, list_pairs
+from swarmwire.world.engines.discs_near import fixed_near, pairs_near
 from swarmwire.world.engines.discs_obstacle_cells import obstacle_cells
 from swarmwire.world.engines.discs_robots import robots_of
 from swarmwire.world.engines.discs_tick import advance, needed_margin_m
@@ -73,13 +72,9 @@ class DiscsEngine:
         if needed_m > self._margin_m:
             self._set_margin(1.5 * needed_m)
         robots, state, margin_m = self._robots, self.state.reshape(arenas * per_arena, 6), self._margin_m
-        # About a robot in each cell, if they are spread evenly.
-        spacing_m = float(np.sqrt(setting.size_m[0] * setting.size_m[1] / max(per_arena, 1)))
-        reach_m = max(2.0 * (self._widest_m + margin_m), spacing_m)
-        grid = build(state[:, 0], state[:, 1], arenas, setting.size_m, reach_m)
-        pairs = list_pairs(robots, state, arenas, grid, self._widest_m, margin_m)
+        pairs = pairs_near(robots, state, arenas, setting.size_m, self._widest_m, margin_m)
         walled = setting.boundary == "walls"
-        things = list_fixed(robots, state, setting.size_m, walled, setting.obstacles, self._cells, margin_m)
+        things = fixed_near(robots, state, setting.size_m, walled, setting.obstacles, self._cells, margin_m)
         old, self._contacts = self._contacts, np.zeros(len(pairs) + len(things), CONTACT)
         contacts_of(self._contacts, robots, pairs, things, old)
         self._met = np.zeros(len(self._contacts), np.int64)

@@ -31,7 +31,7 @@ CONTACT = np.dtype(
 )
 
 
-@njit(cache=True)
+@borrowing()
 def contacts_of(contacts, robots, pairs, things, old):
     """Fill records (pairs + things,) for what is listed; touch and impulses are carried over from the `old` ones."""
     at = 0
@@ -42,9 +42,9 @@ def contacts_of(contacts, robots, pairs, things, old):
             one, other = robots[contact.row], robots[contact.which]
             per_kg, turning_per_kg = one.per_kg + other.per_kg, _turning_per_kg(one) + _turning_per_kg(other)
         else:
-            row, kind, which = things[k - len(pairs)]
-            contact.row, contact.kind, contact.which = row, kind, which
-            per_kg, turning_per_kg = robots[row].per_kg, _turning_per_kg(robots[row])
+            thing = k - len(pairs)
+            contact.row, contact.kind, contact.which = things[thing, 0], things[thing, 1], things[thing, 2]
+            per_kg, turning_per_kg = robots[contact.row].per_kg, _turning_per_kg(robots[contact.row])
         contact.mass_kg, contact.rubbing_kg = 1.0 / per_kg, 1.0 / (per_kg + turning_per_kg)
         while at < len(old) and _is_before(old[at], contact):
             at += 1
@@ -53,13 +53,13 @@ def contacts_of(contacts, robots, pairs, things, old):
         contact.push_ns, contact.rub_ns = (old[at].push_ns, old[at].rub_ns) if same else (0.0, 0.0)
 
 
-@njit(cache=True)
+@borrowing()
 def _turning_per_kg(robot):
     """What a robot's turning adds to how easily its rim gives way along the tangent."""
     return robot.radius_m * robot.radius_m * robot.per_kgm2
 
 
-@njit(cache=True)
+@borrowing()
 def _is_before(one, other):
     """Whether a contact stands before another one: robots before fixed things, then by row, kind and number."""
     if (one.kind == ROBOT) != (other.kind == ROBOT):

@@ -1,4 +1,4 @@
-"""Sine and cosine at once, by + - * alone: equal bit for bit on every machine, in a third of the library's time. Compiled.
+"""Sine and cosine at once, by + - * alone: equal bit for bit on every machine, and quicker than the library. Compiled.
 
 The angle is brought to within an eighth of a turn by taking off quarters (Cody and Waite), where polynomials are right
 to the last bit or two: S. Moshier, Cephes mathematical library (1984-2000), sin.c and cos.c.
