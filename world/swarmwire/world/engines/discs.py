@@ -9,9 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.grid import build
-from swarmwire.world.engines.discs_contacts import CONTACT
-from swarmwire.world.engines.discs_near import list_fixed, list_pairs, split
+from swarmwire.world.engines.discs_contacts import CONTACT, contacts_of, crowd_of
+from swarmwire.world.engines.discs_near import fixed_near, pairs_near
 from swarmwire.world.engines.discs_obstacle_cells import obstacle_cells
 from swarmwire.world.engines.discs_robots import robots_of
 from swarmwire.world.engines.discs_tick import advance, needed_margin_m
@@ -37,7 +36,7 @@ class DiscsEngine:
         self._robots = robots_of(setting, arenas)
         self._widest_m = float(setting.radius_m.max(initial=0.0))
         self._spread = np.zeros(2)
-        self._pairs: IntArray = np.empty((0, 3), np.int64)
+        self._contacts = np.zeros(0, CONTACT)
         self._set_margin(MARGIN * self._widest_m)
         self._list_near()
 
@@ -52,8 +51,8 @@ class DiscsEngine:
             step = advance(
                 step, setting.steps, step_s, self._margin_m, self._widest_m, half_size_m, per_arena,
                 self._robots, self.state.reshape(rows, 6), self.travel_m.reshape(rows, 2), self.touched.reshape(rows),
-                self.braked.reshape(rows), target.reshape(rows, 3), self._spread, self._pairs, self._things,
-                self._crowd, self._loners, self._contacts, obstacles.circle, obstacles.side_start, obstacles.side,
+                self.braked.reshape(rows), target.reshape(rows, 3), self._spread, self._contacts, self._met,
+                self._crowd, self._loners, obstacles.circle, obstacles.side_start, obstacles.side,
                 onsets,
             )  # fmt: skip
             if step == setting.steps:
@@ -73,14 +72,12 @@ class DiscsEngine:
         if needed_m > self._margin_m:
             self._set_margin(1.5 * needed_m)
         robots, state, margin_m = self._robots, self.state.reshape(arenas * per_arena, 6), self._margin_m
-        # About a robot in each cell, if they are spread evenly.
-        spacing_m = float(np.sqrt(setting.size_m[0] * setting.size_m[1] / max(per_arena, 1)))
-        reach_m = max(2.0 * (self._widest_m + margin_m), spacing_m)
-        grid = build(state[:, 0], state[:, 1], arenas, setting.size_m, reach_m)
-        self._pairs = list_pairs(robots, state, arenas, grid, self._widest_m, margin_m, self._pairs)
+        pairs = pairs_near(robots, state, arenas, setting.size_m, self._widest_m, margin_m)
         walled = setting.boundary == "walls"
-        self._things = list_fixed(robots, state, setting.size_m, walled, setting.obstacles, self._cells, margin_m)
-        self._crowd, self._loners = split(len(state), self._pairs, self._things)
-        self._contacts = np.zeros(len(self._pairs) + len(self._things), CONTACT)
+        things = fixed_near(robots, state, setting.size_m, walled, setting.obstacles, self._cells, margin_m)
+        old, self._contacts = self._contacts, np.zeros(len(pairs) + len(things), CONTACT)
+        contacts_of(self._contacts, robots, pairs, things, old)
+        self._met = np.zeros(len(self._contacts), np.int64)
+        self._crowd, self._loners = crowd_of(len(state), self._contacts)
         robots["listed_x_m"], robots["listed_y_m"] = state[:, 0], state[:, 1]
         self._spread[0] = 0.0

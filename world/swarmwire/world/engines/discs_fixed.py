@@ -3,12 +3,13 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
-LEFT, RIGHT, BOTTOM, TOP, CIRCLE, POLYGON = range(6)
+from swarmwire.comms.air.signal.borrowing import borrowing
+
+ROBOT, LEFT, RIGHT, BOTTOM, TOP, CIRCLE, POLYGON = range(7)  # kinds of things that a disc may meet
 
 
-@njit(cache=True)
+@borrowing()
 def gap_to_wall(wall, x, y, radius_m, half_size_m):
     """Gap in m from a disc to a wall of the arena, negative if they overlap, and the unit vector towards the wall."""
     if wall == LEFT:
@@ -20,7 +21,7 @@ def gap_to_wall(wall, x, y, radius_m, half_size_m):
     return half_size_m[1] - y - radius_m, 0.0, 1.0
 
 
-@njit(cache=True)
+@borrowing()
 def gap_to_circle(x, y, radius_m, circle_x, circle_y, circle_radius_m):
     """As `gap_to_wall`, to a circle. Two with one centre part along x."""
     dx, dy = circle_x - x, circle_y - y
@@ -30,7 +31,7 @@ def gap_to_circle(x, y, radius_m, circle_x, circle_y, circle_radius_m):
     return apart - radius_m - circle_radius_m, dx / apart, dy / apart
 
 
-@njit(cache=True)
+@borrowing()
 def gap_to_polygon(x, y, radius_m, polygon, side_start, side):
     """As `gap_to_wall`, to the side or corner of a convex polygon that is nearest to the disc's centre.
 
@@ -54,7 +55,7 @@ def gap_to_polygon(x, y, radius_m, polygon, side_start, side):
     return outside - radius_m, -nx, -ny
 
 
-@njit(cache=True)
+@borrowing()
 def gap_to_fixed(kind, which, x, y, radius_m, half_size_m, circle, side_start, side):
     """As `gap_to_wall`, to any thing: circle or polygon number `which`, or a wall."""
     if kind == CIRCLE:

@@ -8,10 +8,12 @@ turning robot is made of chords of its arc.
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
+
+from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.world.engines.sine_cosine import sine_cosine
 
 
-@njit(cache=True)
+@borrowing()
 def drive(robot, now, target, braked, dt_s):
     """Let the motors of a robot push its velocity towards its target for a step.
 
@@ -40,15 +42,16 @@ def drive(robot, now, target, braked, dt_s):
     now[4] += dy
 
 
-@njit(cache=True)
+@borrowing()
 def look_along(robot, now, dt_s):
     """Set `cos` and `sin` of a robot to those of its heading in the middle of the step to come."""
     middle = now[2] + 0.5 * dt_s * now[5]
     if middle != robot.middle_rad:  # one that drives straight on is spared half of the cost of a step
-        robot.middle_rad, robot.cos, robot.sin = middle, np.cos(middle), np.sin(middle)
+        robot.middle_rad = middle
+        robot.sin, robot.cos = sine_cosine(middle)
 
 
-@njit(cache=True)
+@borrowing()
 def move(robot, now, travel_m, dt_s):
     """Move state (6,) by one step of its velocity and add to travel (2,) what its wheels roll."""
     if now[5] != robot.unhindered_radps:
@@ -62,7 +65,7 @@ def move(robot, now, travel_m, dt_s):
     now[2] += dt_s * now[5]
 
 
-@njit(cache=True)
+@borrowing()
 def follow_targets(rows, steps, dt_s, robots, state, target, braked, travel_m):
     """Move robots that nothing is near by some steps, one robot after the other."""
     for row in rows:

@@ -9,26 +9,69 @@ L. Verlet (1967), Computer "experiments" on classical fluids, Phys. Rev. 159, 98
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
-from swarmwire.comms.grid import cell_of
+from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.geometry import Obstacles
+from swarmwire.comms.grid import build, cell_of
 from swarmwire.world.engines.discs_fixed import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, gap_to_fixed, gap_to_wall
+from swarmwire.world.engines.discs_obstacle_cells import ObstacleCells
 
-BEFORE, NOW = 1, 2  # bits of a pair's third column: it touched in the tick before, it touched in this one
 
+def pairs_near(
+    robots: AnyArray, state: FloatArray, arenas: int, size_m: tuple[float, float], widest_m: float, margin_m: float
+) -> IntArray:
+    """Pairs of robots with a gap of up to twice the margin, (pairs, 2): lower row, higher row.
 
-@njit(cache=True)
-def list_pairs(robots, state, arenas, grid, widest_m, margin_m, old):
-    """Pairs of robots with a gap of up to twice the margin, (pairs, 3): lower row, higher row, bits of touch.
-
-    The bits come from the list `old`, which is in the same order.
+    Args:
+        robots: (rows,) ROBOT records.
+        state: (rows, 6) x, y in m first.
+        arenas: how many there are.
+        size_m: of an arena.
+        widest_m: the greatest radius.
+        margin_m: the margin of each robot.
     """
     rows = len(state)
     per_arena = rows // arenas
-    pairs = np.empty((2 * rows + 16, 3), np.int64)
+    # About a robot in each cell, if they are spread evenly.
+    spacing_m = float(np.sqrt(size_m[0] * size_m[1] / max(per_arena, 1)))
+    grid = build(state[:, 0], state[:, 1], arenas, size_m, max(2.0 * (widest_m + margin_m), spacing_m))
+    pairs = np.empty((2 * rows + 16, 2), np.int64)
+    count = _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs)
+    if count > len(pairs):
+        pairs = np.empty((count, 2), np.int64)
+        _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs)
+    return pairs[:count]
+
+
+def fixed_near(
+    robots: AnyArray,
+    state: FloatArray,
+    size_m: tuple[float, float],
+    walled: bool,
+    obstacles: Obstacles,
+    cells: ObstacleCells,
+    margin_m: float,
+) -> IntArray:
+    """Fixed things with a gap of up to the margin, (things, 3): row, kind, number of the circle or polygon.
+
+    An obstacle that ends where a robot begins, or lower, is none to it.
+    """
+    per_arena = len(state) // (len(obstacles.circle_start) - 1)
+    things = np.empty((len(state) + 16, 3), np.int64)
+    count = _list_fixed(robots, state, per_arena, size_m, walled, obstacles, cells, margin_m, things)
+    if count > len(things):
+        things = np.empty((count, 3), np.int64)
+        _list_fixed(robots, state, per_arena, size_m, walled, obstacles, cells, margin_m, things)
+    return things[:count]
+
+
+@borrowing()
+def _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs):
+    """Fill `pairs`, and return how many there are, whether there is room for them or not."""
     count = 0
     farthest_m = 2.0 * (widest_m + margin_m)
-    for row in range(rows):
+    for row in range(len(state)):
         x, y = state[row, 0], state[row, 1]
         i = cell_of(x, grid.left_m, grid.cell_m, grid.nx)
         j = cell_of(y, grid.bottom_m, grid.cell_m, grid.ny)
@@ -41,18 +84,14 @@ def list_pairs(robots, state, arenas, grid, widest_m, margin_m, old):
                 apart2 = dx * dx + dy * dy
                 if apart2 > farthest_m * farthest_m or other <= row:
                     continue
-                if apart2 > (robots[row].radius_m + robots[other].radius_m + 2.0 * margin_m) ** 2:
-                    continue
-                if count == len(pairs):
-                    pairs = np.concatenate((pairs, np.empty_like(pairs)))
-                _insert(pairs, begin, count, row, other)
-                count += 1
-    pairs = pairs[:count].copy()
-    _keep_bits(pairs, old)
-    return pairs
+                if apart2 <= (robots[row].radius_m + robots[other].radius_m + 2.0 * margin_m) ** 2:
+                    if count < len(pairs):
+                        _insert(pairs, begin, count, row, other)
+                    count += 1
+    return count
 
 
-@njit(cache=True)
+@borrowing()
 def _insert(pairs, begin, count, row, other):
     """Put a pair among those of the same row, pairs[begin:count], so that they rise."""
     place = count
@@ -62,52 +101,38 @@ def _insert(pairs, begin, count, row, other):
     pairs[place, 0], pairs[place, 1] = row, other
 
 
-@njit(cache=True)
-def _keep_bits(pairs, old):
-    at = 0
-    for k in range(len(pairs)):
-        row, other = pairs[k, 0], pairs[k, 1]
-        while at < len(old) and (old[at, 0] < row or (old[at, 0] == row and old[at, 1] < other)):
-            at += 1
-        same = at < len(old) and old[at, 0] == row and old[at, 1] == other
-        pairs[k, 2] = old[at, 2] if same else 0
-
-
-@njit(cache=True)
-def list_fixed(robots, state, size_m, walled, obstacles, cells, margin_m):
-    """Fixed things with a gap of up to the margin, (things, 3): row, kind, number of the circle or polygon.
-
-    An obstacle that ends where a robot begins, or lower, is none to it.
-    """
-    rows = len(state)
-    per_arena = rows // (len(obstacles.circle_start) - 1)
+@borrowing()
+def _list_fixed(robots, state, per_arena, size_m, walled, obstacles, cells, margin_m, things):
+    """Fill `things`, and return how many there are, whether there is room for them or not."""
     half_size_m = (0.5 * size_m[0], 0.5 * size_m[1])
     width_m, height_m = size_m[0] / cells.per_side, size_m[1] / cells.per_side
-    things = np.empty((rows + 16, 3), np.int64)
     count = 0
-    for row in range(rows):
+    for row in range(len(state)):
         robot, x, y = robots[row], state[row, 0], state[row, 1]
-        i = cell_of(x, -half_size_m[0], width_m, cells.per_side)
-        j = cell_of(y, -half_size_m[1], height_m, cells.per_side)
-        c = ((row // per_arena) * cells.per_side + j) * cells.per_side + i
-        first, end = cells.start[c], cells.start[c + 1]
-        while count + 4 + end - first > len(things):
-            things = np.concatenate((things, np.empty_like(things)))
         reach_m = robot.radius_m + margin_m
         if walled and (abs(x) + reach_m >= half_size_m[0] or abs(y) + reach_m >= half_size_m[1]):
             for wall in (LEFT, RIGHT, BOTTOM, TOP):
                 if gap_to_wall(wall, x, y, robot.radius_m, half_size_m)[0] <= margin_m:
-                    things[count, 0], things[count, 1], things[count, 2] = row, wall, 0
+                    _put(things, count, row, wall, 0)
                     count += 1
-        for k in range(first, end):
+        i = cell_of(x, -half_size_m[0], width_m, cells.per_side)
+        j = cell_of(y, -half_size_m[1], height_m, cells.per_side)
+        c = ((row // per_arena) * cells.per_side + j) * cells.per_side + i
+        for k in range(cells.start[c], cells.start[c + 1]):
             kind, which, top_m = _told(obstacles, cells.which[k])
             if top_m > robot.bottom_m and _gap_m(kind, which, x, y, robot, half_size_m, obstacles) <= margin_m:
-                things[count, 0], things[count, 1], things[count, 2] = row, kind, which
+                _put(things, count, row, kind, which)
                 count += 1
-    return things[:count].copy()
+    return count
 
 
-@njit(cache=True)
+@borrowing()
+def _put(things, place, row, kind, which):
+    if place < len(things):
+        things[place, 0], things[place, 1], things[place, 2] = row, kind, which
+
+
+@borrowing()
 def _told(obstacles, obstacle):
     """The kind of an obstacle that the cells list, its number among its kind, and its height in m."""
     polygon = obstacle - len(obstacles.circle)
@@ -116,18 +141,7 @@ def _told(obstacles, obstacle):
     return POLYGON, polygon, obstacles.polygon_top_m[polygon]
 
 
-@njit(cache=True)
+@borrowing()
 def _gap_m(kind, which, x, y, robot, half_size_m, obstacles):
     circle, side_start, side = obstacles.circle, obstacles.side_start, obstacles.side
     return gap_to_fixed(kind, which, x, y, robot.radius_m, half_size_m, circle, side_start, side)[0]
-
-
-@njit(cache=True)
-def split(rows, pairs, things):
-    """The rows near which something is listed, and the others; both rising."""
-    crowded = np.zeros(rows, np.bool_)
-    for k in range(len(pairs)):
-        crowded[pairs[k, 0]] = crowded[pairs[k, 1]] = True
-    for k in range(len(things)):
-        crowded[things[k, 0]] = True
-    return np.flatnonzero(crowded), np.flatnonzero(~crowded)

@@ -24,7 +24,7 @@ ROBOT = np.dtype(
         ("shift_y_m", np.float64),
         ("listed_x_m", np.float64),  # where it was when near things were listed
         ("listed_y_m", np.float64),
-        ("against_fixed", np.int64),  # whether it touches anything fixed: bits as of a pair in `discs_near`
+        ("against_fixed", np.int64),  # whether it touches anything fixed: bits as of a contact
     ]
 )
 
