@@ -20,6 +20,7 @@ COMMAND = ("command_forward_mps", "command_turn_radps")  # as applied
 SIDEWAYS = "command_left_mps"  # as applied; only where a robot can move so
 MOTION = (*POSE, *VELOCITY, *COMMAND, SIDEWAYS)  # lists with a number per robot, float32
 ROBOT_COLUMNS = (*POSE, *VELOCITY, *COMMAND, "alive", "state")  # lists with an item per robot, in every record
+MOVABLE = ("movable_x_m", "movable_y_m", "movable_heading_rad")  # lists with a number per movable obstacle, if any
 RADIO = ("sent", "heard", "in_range")  # packets; receivers; receivers: since the tick before
 KEYS = ("tick", "time_s", "arena", "seed")
 BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 2
@@ -31,8 +32,13 @@ def robot_columns(static: Static) -> tuple[str, ...]:
     return (*ROBOT_COLUMNS, SIDEWAYS) if sideways else ROBOT_COLUMNS
 
 
+def movable_columns(static: Static) -> tuple[str, ...]:
+    """The columns that are lists with an item per movable obstacle."""
+    return MOVABLE if static.movable else ()
+
+
 def tick_schema(static: Static, metrics: Sequence[str]) -> "dict[str, Any]":
-    """The type of each column, for a run of these robots with these metrics."""
+    """The type of each column, for a run of these robots and movable obstacles with these metrics."""
     import polars as pl
 
     robots = static.robots
@@ -45,6 +51,7 @@ def tick_schema(static: Static, metrics: Sequence[str]) -> "dict[str, Any]":
         **dict.fromkeys(motion, pl.Array(pl.Float32, robots)),
         "alive": pl.Array(pl.Boolean, robots),
         "state": pl.Array(pl.String, robots),
+        **dict.fromkeys(movable_columns(static), pl.Array(pl.Float32, static.movable)),
         **dict.fromkeys(metrics, pl.Float64),
         **dict.fromkeys(RADIO, pl.Int64),
     }
@@ -64,6 +71,7 @@ class TickColumns:
         self._pose: AnyArray = np.empty((*of_robots, len(POSE)), np.float32)
         self._velocity: AnyArray = np.empty((*of_robots, len(VELOCITY)), np.float32)
         self._command: AnyArray = np.empty((*of_robots, len(COMMAND) + 1), np.float32)
+        self._movable: AnyArray = np.empty((*shape, static.movable, len(MOVABLE)), np.float32)
         self._alive: AnyArray = np.empty(of_robots, np.bool_)
         self._state: AnyArray = np.empty(of_robots, np.uint16)
         self._states: tuple[str, ...] = ("",)
@@ -78,6 +86,8 @@ class TickColumns:
         self._pose[at] = truth.pose.reshape(*shape, -1)
         self._velocity[at] = truth.velocity.reshape(*shape, -1)
         self._command[at] = truth.command.reshape(*shape, -1)
+        if truth.movable is not None:
+            self._movable[at] = truth.movable
         self._alive[at] = truth.alive.reshape(shape)
         self._state[at] = truth.state.reshape(shape)
         self._states = truth.states  # it only grows
@@ -107,6 +117,9 @@ class TickColumns:
                 columns[name] = np.ascontiguousarray(values[:ticks, ..., place]).reshape(per_robot)
         columns["alive"] = self._alive[:ticks].reshape(per_robot)
         columns["state"] = pl.Series(self._states).gather(self._state[:ticks].reshape(-1)).reshape(per_robot)
+        if movable := self._static.movable:
+            for place, name in enumerate(MOVABLE):
+                columns[name] = np.ascontiguousarray(self._movable[:ticks, ..., place]).reshape(-1, movable)
         measured = {name: self._measured[row, :ticks].reshape(-1) for row, name in enumerate(self._metrics)}
         columns |= {name: pl.Series(values).fill_nan(None) for name, values in measured.items()}
         no_radio = pl.Series(np.repeat(~self._has_radio[:ticks], arenas))

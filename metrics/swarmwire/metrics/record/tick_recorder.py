@@ -9,7 +9,15 @@ from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.chunk_limit import ChunkLimit
 from swarmwire.metrics.record.table_writer import Chunk, TableWriter
-from swarmwire.metrics.record.tick_columns import BYTES_PER_ROBOT, KEYS, RADIO, TickColumns, robot_columns, tick_schema
+from swarmwire.metrics.record.tick_columns import (
+    BYTES_PER_ROBOT,
+    KEYS,
+    RADIO,
+    TickColumns,
+    movable_columns,
+    robot_columns,
+    tick_schema,
+)
 
 CHUNK_BYTES = 2_000_000
 MOST_TICKS = 4096  # in a chunk, however small the swarm
@@ -31,7 +39,7 @@ class TickRecorder:
         """Open the table; BadInput if a metric is named like another column."""
         self._names = [metric.name for metric in self._metrics.metrics]
         for name in self._names:
-            if name in (*KEYS, *robot_columns(static), *RADIO):
+            if name in (*KEYS, *robot_columns(static), *movable_columns(static), *RADIO):
                 raise BadInput("", f"metrics.{name}", "expected another name: ticks.parquet has a column of this name")
         self._static = static
         rows = static.arenas * static.robots
