@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.world.engines.discs_fixed import ROBOT, gap_to_circle, gap_to_fixed
 
 # Robots look ahead for what their speed may reach in a step and this share of their radius, since others may push them.
@@ -72,7 +73,7 @@ def _is_before(one, other):
 
 
 @njit(cache=True)
-def crowd_of(rows, contacts):
+def crowd_of(rows: int, contacts: AnyArray) -> tuple[IntArray, IntArray]:
     """The rows near which something is listed, and the others; both rising."""
     crowded = np.zeros(rows, np.bool_)
     for k in range(len(contacts)):
