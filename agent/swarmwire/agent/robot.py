@@ -20,6 +20,7 @@ from swarmwire.agent.readings import (
 from swarmwire.agent.robots import forward_and_turn, had
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.leds import rgb_of
 from swarmwire.comms.messages import DICT_TAG, Message, decode_dict, encode_dict
 from swarmwire.comms.outcomes import SendResult
 from swarmwire.comms.packets import Payloads
@@ -81,6 +82,13 @@ class Robot(Handle):
     def wheels(self, left_mps: float, right_mps: float) -> None:
         """Wanted speeds of the two wheels, until the next call of this or `drive`; NotFitted if the body has none."""
         self.drive(*forward_and_turn(left_mps, right_mps, self.body.wheels.wheel_base_m))
+
+    def led(self, red: float, green: float, blue: float, which: int | None = None) -> None:
+        """Colour of all LEDs, or of the one at place `which` of the body's sheet, each share 0 to 1; all 0: dark.
+
+        It holds until the next call. NotFitted if the body has no LEDs, ValueError if it has not that one.
+        """
+        self._turn.leds(which)[self._row] = rgb_of(red, green, blue)
 
     def note(self, state: str) -> None:
         """Name what the robot is at ("search", "wait"), for recordings and pictures; it holds until the next call."""

@@ -18,6 +18,7 @@ from swarmwire.agent.readings import (
 )
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.leds import rgb_of
 from swarmwire.comms.messages import Message, encode_rows
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.sheets import Ring
@@ -93,6 +94,22 @@ class Robots(Handle):
         """Wanted speeds of the two wheels, (n,) or one number; NotFitted if the bodies have none."""
         left, right = np.asarray(left_mps, np.float64), np.asarray(right_mps, np.float64)
         self.drive(*forward_and_turn(left, right, self.body.wheels.wheel_base_m), rows=rows)
+
+    def led(
+        self,
+        red: ArrayLike,
+        green: ArrayLike,
+        blue: ArrayLike,
+        which: int | None = None,
+        rows: BoolArray | None = None,
+    ) -> None:
+        """Colour of all LEDs, or of the one at place `which`, of the robots of the mask `rows`, or of all robots.
+
+        Each share, 0 to 1, is (n,) or one number; all 0: dark. It holds until the next call. NotFitted if the bodies
+        have no LEDs, ValueError if they have not that one.
+        """
+        here = True if rows is None else rows[:, None]
+        np.copyto(self._turn.leds(which), rgb_of(red, green, blue)[..., None], where=here)
 
     def note(self, state: str, rows: BoolArray | None = None) -> None:
         """Name what the robots of the mask `rows`, or all, are at; for recordings and pictures, until the next call."""

@@ -1,12 +1,12 @@
 """Ground truth for observers: `Static` once, `Truth` per tick. It never crosses to a runner."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Literal
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.body import Body
 from swarmwire.comms.floor import Floor
 from swarmwire.comms.packets import Payloads
@@ -33,6 +33,10 @@ class Obstacle:
     def movable(self) -> bool:
         """Whether robots can push it."""
         return self.mass_kg is not None
+
+    def put_at(self, x_m: float, y_m: float, heading_rad: float) -> "Obstacle":
+        """The same obstacle elsewhere."""
+        return replace(self, x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 
     @property
     def corners_m(self) -> FloatArray:
@@ -87,6 +91,20 @@ class Static:
         return self.boundary == "walls"
 
     @property
+    def movable(self) -> int:
+        """How many obstacles of each arena robots can push."""
+        return sum(obstacle.movable for obstacle in self.obstacles[0])
+
+    def movable_at(self, arena: int, pose: AnyArray) -> tuple[Obstacle, ...]:
+        """The movable obstacles of an arena at poses (k, 3)."""
+        own = (obstacle for obstacle in self.obstacles[arena] if obstacle.movable)
+        return tuple(obstacle.put_at(*at) for obstacle, at in zip(own, pose.tolist(), strict=True))
+
+    def fixed(self, arena: int) -> tuple[Obstacle, ...]:
+        """The obstacles of an arena that nobody can push."""
+        return tuple(obstacle for obstacle in self.obstacles[arena] if not obstacle.movable)
+
+    @property
     def arenas(self) -> int:
         """How many arenas the world holds."""
         return len(self.seeds)
@@ -95,6 +113,11 @@ class Static:
     def robots(self) -> int:
         """Robots in each arena."""
         return len(self.robot_names)
+
+    @property
+    def most_leds(self) -> int:
+        """LEDs of the robot that has the most."""
+        return max(group.body.led_count for group in self.groups)
 
     @property
     def act_every_ticks(self) -> IntArray:
@@ -187,6 +210,7 @@ class Truth:
     command: FloatArray  # (rows, 3) within the drive's limits: forward m/s, left turn rad/s, to the left m/s
     state: IntArray  # (rows,) what the agent says it is at, a place in `states`; 0: it has said nothing
     states: tuple[str, ...]  # named so far, in that order; the first is empty
+    leds: IntArray  # (rows, most LEDs of a robot) 0xRRGGBB as switched in this tick; 0: dark, or not there
     senses: Senses  # by group, of the robots that act in this tick: what they sensed at its start
     contact_onsets: IntArray  # (arenas, 2) that began in this tick: robot with robot, robot with wall or obstacle
     edges: IntArray | None  # (e, 2) robot rows joined in the radio graph at the tick's start; None without a radio
@@ -194,3 +218,4 @@ class Truth:
     finished: Finished | None  # None without a radio
     events: tuple[Happened, ...] = ()  # at the tick's start, in order
     departed: Departed | None = None  # None without a radio; views of a run elsewhere do not get it
+    movable: FloatArray | None = None  # (arenas, movable obstacles, 3) x, y, heading of those; None: there are none

@@ -1,7 +1,7 @@
 """The scenario as run, in the run folder, with the files that it names: the folder needs the original no more.
 
     scenario.toml      overrides applied, the seed as run; what was left out stays left out
-    files/<name>       agent files and measured links, byte for byte
+    files/<name>       agent files, measured links, pictures of the arena, byte for byte
 
 Bodies come with swarmwire and are covered by the digests of its parts. An agent file is loaded without its folder on
 `sys.path`, so there is nothing beside it that it could have imported; installed modules are not copied but named by
@@ -18,6 +18,7 @@ import tomli_w
 from swarmwire.agent.loading import resolve
 from swarmwire.deploy.link_trace_file import trace_path
 from swarmwire.metrics.record.names import SCENARIO
+from swarmwire.world.grey_image import beside
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.scenario_mapping import mapping_of
 
@@ -30,7 +31,7 @@ class CopiedFile:
 
     path: str  # within the run folder
     sha256: str
-    what: str  # "scenario" | "agent" | "trace"
+    what: str  # "scenario" | "agent" | "trace" | "map" | "ground"
 
 
 def copy_scenario(scenario: Scenario, seeds: tuple[int, ...], folder: Path) -> tuple[CopiedFile, ...]:
@@ -45,6 +46,10 @@ def copy_scenario(scenario: Scenario, seeds: tuple[int, ...], folder: Path) -> t
     trace = trace_path(scenario)
     if trace is not None:
         mapping["radio"]["trace"]["file"] = copies.add(trace, "trace")
+    for what in ("map", "ground"):
+        table = mapping["arena"].get(what, {})
+        if "image" in table:
+            table["image"] = copies.add(beside(scenario.source, table["image"]).resolve(), what)
     text = f"{_header(scenario)}\n{tomli_w.dumps(mapping)}".encode()
     (folder / SCENARIO).write_bytes(text)
     return (CopiedFile(SCENARIO, _sha256(text), "scenario"), *copies.made)

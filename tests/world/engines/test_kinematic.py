@@ -1,4 +1,4 @@
-"""Bodies without contacts go exactly where they are told, wrap on a torus, slide along what holds them back, fly over."""
+"""Bodies without contacts go exactly where told, wrap on a torus, slide along what holds them back, and fly over."""
 
 from typing import Any
 

@@ -61,7 +61,8 @@ def place(scenario: Scenario, layout: Layout, groups: Sequence[Group], seed: int
     pose = np.empty((groups[-1].stop, 3))
     for group in groups:
         table, body = scenario.robots[group.name], group.body
-        fixed, disc = _fixed(table), Disc(body.radius_m, gaps_m[group.name], 0.0, body.height_m)
+        bottom_m, fixed = body.altitude_m, _fixed(table)
+        disc = Disc(body.radius_m, gaps_m[group.name], bottom_m, bottom_m + body.height_m)
         lost = put_robots(taken, _region(table.place, taken), fixed, key, ROBOT, group.start, group.stop, disc)
         if lost >= 0:
             i, why = lost - group.start, TRIED

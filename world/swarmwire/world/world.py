@@ -15,8 +15,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.truth import Group, Static
-from swarmwire.world.actuation.limits import limits_of, take_commands
-from swarmwire.world.actuation.noise import NoisyWheels
+from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.angles import wrapped
 from swarmwire.world.checks import bodies_of
 from swarmwire.world.engines.choice import engines_of
@@ -39,7 +38,8 @@ class World:
         keys: (arenas,) the key of each arena's draws, which depends on its seed alone.
         pose: (rows, 3) x, y in m, heading in rad in (-pi, pi], arena frame.
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
-        command: (rows, 3) within the drives' limits: forward m/s, left turn rad/s, to the left m/s.
+        movable: (arenas, movable obstacles, 3) x, y in m, heading in rad; None: there are none.
+        actuators: motors and LEDs: what they were asked for, and what they do.
         alive: (rows,).
         sensors: those that agents need, by group and sense; `Staged.failed` may be set.
         states: what each robot is at, as its agent named it.
@@ -74,24 +74,25 @@ class World:
         self.obstacles = obstacle_arrays(obstacles)
         engines = engines_of(scenario, bodies)
         self._physics = Physics(self.static, self.obstacles, engines, pose, scenario.physics.steps)
+        self.actuators = Actuators(groups, self.keys)
         self.sensors = _sensors(scenario, self._scene(1.0 / scenario.time.rate_hz), groups, needs)
         rows = self.static.arenas * self.static.robots
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
         self.alive: BoolArray = np.ones(rows, np.bool_)
-        self.command: FloatArray = np.zeros((rows, 3))
-        self._limits, self._noise = limits_of(groups), NoisyWheels(groups, self.keys)
-        self._target = np.zeros((self.static.arenas, self.static.robots, 3))  # what the engine is given
-        self._ticks = 0  # moved so far
         self.states = States(rows)
-        self._clipped = self._not_finite = 0
         self._show()
+
+    @property
+    def engines(self) -> tuple[str, ...]:
+        """The names of the engines that move the robots."""
+        return self._physics.names
 
     def live(self, alive: BoolArray) -> None:
         """These robots (rows,) are alive from now on; the others brake, and resist whatever pushes them."""
         self.states.forget(alive & ~self.alive)  # a robot that is revived starts afresh
-        self.alive, self.command = alive.copy(), self.command.copy()
-        self.command[~alive] = 0.0
+        self.alive = alive.copy()
+        self.actuators.stop(~alive)
         self._physics.braked[:] = ~alive.reshape(self.static.arenas, self.static.robots)
 
     def sense(self, tick: int) -> Senses:
@@ -119,29 +120,28 @@ class World:
         Returns:
             (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle.
         """
-        self.command = self.command.copy()
-        asked = actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps
-        clipped, not_finite = take_commands(self._limits, self.alive, *asked, self.command)
-        self._clipped, self._not_finite = self._clipped + clipped, self._not_finite + not_finite
+        self.actuators.take(actions, self.alive)
         self.states.take(actions.notes, self.alive)
-        self._target[:] = self.command.reshape(self._target.shape)
-        if self._noise.any:
-            self._noise.act(self._ticks, self._target)
-        onsets = self._physics.tick(self._target)
-        self._ticks += 1
+        onsets = self._physics.tick(self.actuators.target)
         self._show()
         return onsets
 
+    @property
+    def command(self) -> FloatArray:
+        """Commands within the drives' limits, (rows, 3): forward m/s, left turn rad/s, to the left m/s."""
+        return self.actuators.command
+
     def counts(self) -> dict[str, int]:
-        """Commands since the start that drives could not follow, or not finite and so dropped; states too many."""
+        """What actuators could not follow since the start, by name; states too many."""
         states = {"states_over_limit": self.states.dropped} if self.states.dropped else {}
-        return {"clipped_commands": self._clipped, "nan_commands": self._not_finite, **states}
+        return {**self.actuators.counts(), **states}
 
     def _show(self) -> None:
         state = self._physics.state.reshape(-1, 6)
         self.pose: FloatArray = state[:, :3].copy()
         self.pose[:, 2] = wrapped(self.pose[:, 2])
         self.velocity: FloatArray = state[:, 3:].copy()
+        self.movable: FloatArray | None = self._physics.movable.copy() if self.static.movable else None
 
     def _scene(self, tick_s: float) -> Scene:
         static, physics = self.static, self._physics
@@ -162,8 +162,8 @@ class World:
             state=physics.state,
             travel_m=physics.travel_m,
             touched=physics.touched,
-            target=np.zeros((static.arenas, static.robots, 2)),
-            leds=np.zeros((static.arenas, static.robots, 0), np.int64),
+            target=self.actuators.target,
+            leds=self.actuators.leds.rgb,
         )
 
 

@@ -9,6 +9,7 @@ from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.glimpse import Glimpse, Scene
+from swarmwire.comms.leds import BRIGHTEST
 from swarmwire.comms.notes import LONGEST_STATE
 from swarmwire.comms.senses import GroupSenses, Senses
 from swarmwire.comms.truth import Finished, Happened, Static, Tally, Truth
@@ -30,6 +31,7 @@ def encode_truth(glimpse: Glimpse) -> bytes:
         "velocity": truth.velocity,
         "command": truth.command,
         "state": truth.state,
+        "leds": truth.leds,
         "contact_onsets": truth.contact_onsets,
         "values": glimpse.values,
     }
@@ -37,6 +39,8 @@ def encode_truth(glimpse: Glimpse) -> bytes:
         arrays[f"sense/{name}/rows"] = group.rows
         for sense, column in group.fields.items():
             arrays[f"sense/{name}/{sense}"] = column
+    if truth.movable is not None:
+        arrays["movable"] = truth.movable
     if truth.edges is not None:
         arrays["edges"] = truth.edges
     if truth.tally is not None:
@@ -67,6 +71,8 @@ def decode_truth(frame: Frame, scene: Scene) -> Glimpse:
     states = _states(frame)
     state = checked_array(frame, "state", "<i8", (n,))
     _within("state", state, len(states))
+    leds = checked_array(frame, "leds", "<i8", (n, static.most_leds))
+    _within("leds", leds, BRIGHTEST + 1)
     truth = Truth(
         tick=_least(frame.tick, 0, "tick"),
         time_ns=_least(frame.values.get("time_ns"), 0, "time_ns"),
@@ -76,12 +82,14 @@ def decode_truth(frame: Frame, scene: Scene) -> Glimpse:
         command=checked_array(frame, "command", "<f8", (n, 3)),
         state=state,
         states=states,
+        leds=leds,
         senses=_senses(frame, static),
         contact_onsets=checked_array(frame, "contact_onsets", "<i8", (static.arenas, 2)),
         edges=_edges(frame, n),
         tally=_tally(frame, static.arenas),
         finished=_finished(frame, static),
         events=_events(frame, n),
+        movable=checked_array(frame, "movable", "<f8", (static.arenas, static.movable, 3)) if static.movable else None,
     )
     values = checked_array(frame, "values", "<f8", (len(scene.series), static.arenas))
     serial, ticks = _least(frame.values.get("serial"), 0, "serial"), _least(frame.values.get("ticks"), 1, "ticks")
