@@ -31,7 +31,8 @@ def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: 
         state=state,
         travel_m=np.zeros((1, robots, 2)),
         touched=np.zeros((1, robots)),
-        target=np.zeros((1, robots, 2)),
+        target=np.zeros((1, robots, 3)),
+        charge=np.ones((1, robots)),
         leds=np.zeros((1, robots, 0), np.int64),
     )
 

@@ -238,3 +238,16 @@ def test_odometry_is_the_same_however_often_an_agent_looks() -> None:
 def test_the_sheets_of_the_bodies_have_a_sensor_each() -> None:
     assert EPUCK.senses.keys() == FOOTBOT.senses.keys() == {"proximity", "compass", "odometry", "light", "bumper"}
     assert isinstance(EPUCK.proximity, Proximity)
+
+
+def test_wheels_differ_from_what_their_encoders_take_them_for() -> None:
+    """Drawn once per wheel, so it grows with the way; travel back and forth undoes it."""
+    looked_at = scene(np.zeros((400, 3)), EPUCK)
+    odometry = staged(looked_at, EPUCK, "odometry", Odometry(wheel_error_std=0.02))
+    looked_at.travel_m[0] = 2.0
+    told = odometry.read(1)
+    drawn = normal(7, np.arange(400)[:, None], 0, np.arange(2), purpose("odometry wheel"))
+    for wheel, field in enumerate(("odometry.left_m", "odometry.right_m")):
+        assert told[field] == pytest.approx(2.0 * (1.0 + 0.02 * drawn[:, wheel]))
+    looked_at.travel_m[0] = 0.0
+    assert odometry.read(2)["odometry.left_m"] == pytest.approx(np.zeros(400), abs=1e-12)

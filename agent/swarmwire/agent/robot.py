@@ -10,8 +10,10 @@ from swarmwire.agent.handle import Handle
 from swarmwire.agent.outcome import Outcome
 from swarmwire.agent.packet import Packet, Packets
 from swarmwire.agent.readings import (
+    BatteryReading,
     BumperReading,
     CompassReading,
+    ImuReading,
     LightReading,
     OdometryReading,
     PositioningReading,
@@ -20,6 +22,7 @@ from swarmwire.agent.readings import (
 from swarmwire.agent.robots import forward_and_turn, had
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.leds import rgb_of
 from swarmwire.comms.messages import DICT_TAG, Message, decode_dict, encode_dict
 from swarmwire.comms.outcomes import SendResult
 from swarmwire.comms.packets import Payloads
@@ -68,6 +71,19 @@ class Robot(Handle):
         x, y = self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m")
         return PositioningReading(float(x[self._row]), float(y[self._row]))
 
+    @property
+    def imu(self) -> ImuReading:
+        """Acceleration and turn rate in the body's frame."""
+        turn, row = self._turn, self._row
+        names = "forward_mps2", "left_mps2", "turn_radps"
+        return ImuReading(*(float(turn.field("imu", name)[row]) for name in names))
+
+    @property
+    def battery(self) -> BatteryReading:
+        """Charge, 1 full and 0 empty, and voltage."""
+        charge, voltage = self._turn.field("battery", "charge"), self._turn.field("battery", "voltage_v")
+        return BatteryReading(float(charge[self._row]), float(voltage[self._row]))
+
     def drive(self, linear_mps: float, angular_radps: float, lateral_mps: float = 0.0) -> None:
         """Wanted forward speed and turn rate (positive to the left); they hold until the next call.
 
@@ -81,6 +97,13 @@ class Robot(Handle):
     def wheels(self, left_mps: float, right_mps: float) -> None:
         """Wanted speeds of the two wheels, until the next call of this or `drive`; NotFitted if the body has none."""
         self.drive(*forward_and_turn(left_mps, right_mps, self.body.wheels.wheel_base_m))
+
+    def led(self, red: float, green: float, blue: float, which: int | None = None) -> None:
+        """Colour of all LEDs, or of the one at place `which` of the body's sheet, each share 0 to 1; all 0: dark.
+
+        It holds until the next call. NotFitted if the body has no LEDs, ValueError if it has not that one.
+        """
+        self._turn.leds(which)[self._row] = rgb_of(red, green, blue)
 
     def note(self, state: str) -> None:
         """Name what the robot is at ("search", "wait"), for recordings and pictures; it holds until the next call."""

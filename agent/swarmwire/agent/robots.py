@@ -9,8 +9,10 @@ from swarmwire.agent.draw import Draws
 from swarmwire.agent.handle import Handle
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.readings import (
+    BatteryReadings,
     BumperReadings,
     CompassReadings,
+    ImuReadings,
     LightReadings,
     OdometryReadings,
     PositioningReadings,
@@ -18,6 +20,7 @@ from swarmwire.agent.readings import (
 )
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.leds import rgb_of
 from swarmwire.comms.messages import Message, encode_rows
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.sheets import Ring
@@ -71,6 +74,16 @@ class Robots(Handle):
         """Positions in the arena's frame: x_m and y_m (n,)."""
         return PositioningReadings(self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m"))
 
+    @property
+    def imu(self) -> ImuReadings:
+        """Accelerations and turn rates in the bodies' frames: forward_mps2, left_mps2 and turn_radps (n,)."""
+        return ImuReadings(*(self._turn.field("imu", name) for name in ("forward_mps2", "left_mps2", "turn_radps")))
+
+    @property
+    def battery(self) -> BatteryReadings:
+        """Batteries: charge, 1 full and 0 empty, and voltage_v (n,)."""
+        return BatteryReadings(self._turn.field("battery", "charge"), self._turn.field("battery", "voltage_v"))
+
     def drive(
         self,
         linear_mps: ArrayLike,
@@ -93,6 +106,22 @@ class Robots(Handle):
         """Wanted speeds of the two wheels, (n,) or one number; NotFitted if the bodies have none."""
         left, right = np.asarray(left_mps, np.float64), np.asarray(right_mps, np.float64)
         self.drive(*forward_and_turn(left, right, self.body.wheels.wheel_base_m), rows=rows)
+
+    def led(
+        self,
+        red: ArrayLike,
+        green: ArrayLike,
+        blue: ArrayLike,
+        which: int | None = None,
+        rows: BoolArray | None = None,
+    ) -> None:
+        """Colour of all LEDs, or of the one at place `which`, of the robots of the mask `rows`, or of all robots.
+
+        Each share, 0 to 1, is (n,) or one number; all 0: dark. It holds until the next call. NotFitted if the bodies
+        have no LEDs, ValueError if they have not that one.
+        """
+        here = True if rows is None else rows[:, None]
+        np.copyto(self._turn.leds(which), rgb_of(red, green, blue)[..., None], where=here)
 
     def note(self, state: str, rows: BoolArray | None = None) -> None:
         """Name what the robots of the mask `rows`, or all, are at; for recordings and pictures, until the next call."""

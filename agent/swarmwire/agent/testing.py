@@ -165,6 +165,8 @@ def _assert_same(first: Actions, second: Actions, text: str) -> None:
             raise AssertionError(f"{text}: {name}\n{one}\n{other}")
     if _states(first) != _states(second):
         raise AssertionError(f"{text}: states\n{_states(first)}\n{_states(second)}")
+    if _leds(first) != _leds(second):
+        raise AssertionError(f"{text}: leds\n{_leds(first)}\n{_leds(second)}")
     if _packets(first.sent) != _packets(second.sent):
         raise AssertionError(f"{text}: packets\n{_packets(first.sent)}\n{_packets(second.sent)}")
 
@@ -172,6 +174,12 @@ def _assert_same(first: Actions, second: Actions, text: str) -> None:
 def _states(actions: Actions) -> dict[int, str]:
     notes = actions.notes
     return {int(row): notes.names[code] for row, code in zip(notes.rows, notes.code, strict=True)}
+
+
+def _leds(actions: Actions) -> dict[tuple[int, int], int]:
+    """The colours that LEDs were switched to, by robot and LED."""
+    rows, which, rgb = actions.leds.rows.tolist(), actions.leds.which.tolist(), actions.leds.rgb.tolist()
+    return dict(zip(zip(rows, which, strict=True), rgb, strict=True))
 
 
 def _packets(sent: Sent) -> list[tuple[int, int, int, bytes]]:

@@ -7,6 +7,8 @@ import numpy as np
 from swarmwire.agent.packet import NotDeclared, Packets
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
+from swarmwire.comms.body import NotFitted
+from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
 from swarmwire.comms.messages import Message, decode_alike, decode_rows
 from swarmwire.comms.notes import Notes, checked_state
 from swarmwire.comms.outcomes import Outcomes
@@ -15,6 +17,7 @@ from swarmwire.comms.senses import Actions, GroupSenses
 
 M = TypeVar("M", bound=Message)
 OUTCOMES = "radio.outcomes"
+NOT_SWITCHED = -1
 
 
 class Turn:
@@ -43,6 +46,7 @@ class Turn:
         self._outbox: list[Sent] = []
         self._states: dict[str, int] = {}  # that were named in this tick, by code
         self._state: IntArray | None = None  # (n,) codes; -1: none named
+        self._leds: IntArray | None = None  # (n, leds) colours; NOT_SWITCHED: none given in this tick
         self._packets: dict[type[Message], Packets[Any]] = {}
 
     def field(self, sense: str, name: str) -> FloatArray:
@@ -98,15 +102,32 @@ class Turn:
             self._state = np.full(self.n, -1)
         self._state[rows] = self._states.setdefault(checked_state(state), len(self._states))
 
+    def leds(self, which: int | None) -> IntArray:
+        """The colours to switch an LED of each body to, or all, (n, leds), to write into; NotFitted if it has none."""
+        body = self.group.body
+        if not body.led_count:
+            raise NotFitted(f"the body {body.name} has no LEDs")
+        if which is not None and not 0 <= which < body.led_count:
+            raise ValueError(f"led(which=…): the body {body.name} has LEDs 0 to {body.led_count - 1}, got {which}")
+        if self._leds is None:
+            self._leds = np.full((self.n, body.led_count), NOT_SWITCHED)
+        return self._leds if which is None else self._leds[:, which : which + 1]
+
     def actions(self) -> Actions:
         """What the robots did."""
         sent = Sent.joined(self._outbox)
         command = self.linear_mps, self.angular_radps, self.lateral_mps
-        return Actions(self.senses.rows, self.drive, *command, sent, self._notes())
+        return Actions(self.senses.rows, self.drive, *command, sent, self._notes(), self._led_changes())
 
     def _require(self, need: str) -> None:
         if need not in self.needs:
             raise NotDeclared(f"reads {need!r}, which its needs do not name: {', '.join(self.needs) or 'none'}")
+
+    def _led_changes(self) -> LedChanges:
+        if self._leds is None:
+            return NO_LED_CHANGES
+        place, which = np.nonzero(self._leds != NOT_SWITCHED)
+        return LedChanges(self.senses.rows[place], which, self._leds[place, which])
 
     def _notes(self) -> Notes:
         if self._state is None:

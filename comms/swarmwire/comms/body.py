@@ -10,8 +10,12 @@ from functools import cached_property
 from importlib.resources import files
 from typing import Any, TypeVar, cast
 
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.drives import DRIVES, Drive, Holonomic, Twist, Wheels
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.leds import Leds
 from swarmwire.comms.parameters import parameter
 from swarmwire.comms.sheets import SHEETS, Compass, Light, Odometry, Proximity, Sheet
 from swarmwire.comms.tables import built, mapping_of
@@ -35,6 +39,7 @@ class Body:
     drive: Drive = parameter(help="how it moves")
     altitude_m: float = parameter(0.0, help="height of its lower side above the floor", unit="m", at_least=0)
     contacts: bool = parameter(True, help="whether others and obstacles stop it; false: it passes through them")
+    leds: Leds | None = None
     senses: dict[str, Sheet] = field(default_factory=dict[str, Sheet])
 
     @cached_property
@@ -66,6 +71,16 @@ class Body:
         if isinstance(self.drive, Holonomic):
             raise NotFitted(f"the body {self.name} has no wheels: its drive is {self.drive.kind}")
         return self.drive
+
+    @property
+    def led_count(self) -> int:
+        """How many LEDs it has."""
+        return 0 if self.leds is None else self.leds.count
+
+    @cached_property
+    def led_places_m(self) -> FloatArray:
+        """Where its LEDs sit: x ahead, y to the left, z above its lower side, (leds, 3)."""
+        return np.empty((0, 3)) if self.leds is None else self.leds.places_m(self.radius_m)
 
     @property
     def max_linear_mps(self) -> float:
@@ -107,6 +122,8 @@ def body_from(sheet: Mapping[str, Any], where: str) -> Body:
     rest["senses"] = {name: built(SHEETS[name], value, where, f"senses.{name}") for name, value in senses.items()}
     if "drive" in rest:
         rest["drive"] = _drive(rest["drive"], where)
+    if rest.get("leds") is not None:  # None: a sheet written down as a mapping
+        rest["leds"] = built(Leds, rest["leds"], where, "leds")
     return built(Body, rest, where, "")
 
 

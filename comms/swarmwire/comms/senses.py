@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
 from swarmwire.comms.notes import Notes
 from swarmwire.comms.packets import Sent
 
@@ -31,6 +32,7 @@ class Actions:
     lateral_mps: FloatArray  # (n,) speed to the left asked for; 0 but for holonomic bodies
     sent: Sent = field(default_factory=Sent.none)
     notes: Notes = field(default_factory=Notes.none)
+    leds: LedChanges = NO_LED_CHANGES
 
     @classmethod
     def joined(cls, parts: "list[Actions]") -> "Actions":
@@ -49,4 +51,5 @@ class Actions:
             np.concatenate([part.lateral_mps for part in parts]),
             Sent.joined([part.sent for part in parts]),
             Notes.joined([part.notes for part in parts]),
+            LedChanges.joined([part.leds for part in parts]),
         )

@@ -91,6 +91,11 @@ class Static:
         return len(self.robot_names)
 
     @property
+    def most_leds(self) -> int:
+        """LEDs of the robot that has the most."""
+        return max(group.body.led_count for group in self.groups)
+
+    @property
     def act_every_ticks(self) -> IntArray:
         """Each robot index acts when the tick modulo this is 0, (robots,)."""
         return np.concatenate([np.full(group.stop - group.start, group.act_every_ticks) for group in self.groups])
@@ -162,9 +167,9 @@ class Tally:
 class Happened:
     """An event that began in this tick, or one that ended after its time."""
 
-    serial: int  # its place in the scenario
+    serial: int  # its place in the scenario; -1: it is not of the scenario's making
     at_s: float  # when the scenario lets it begin
-    do: str  # the action
+    do: str  # the action, or run_down: batteries are empty
     ended: bool
     changed: BoolArray  # (rows,) the robots for which it made a difference
 
@@ -181,6 +186,7 @@ class Truth:
     command: FloatArray  # (rows, 3) within the drive's limits: forward m/s, left turn rad/s, to the left m/s
     state: IntArray  # (rows,) what the agent says it is at, a place in `states`; 0: it has said nothing
     states: tuple[str, ...]  # named so far, in that order; the first is empty
+    leds: IntArray  # (rows, most LEDs of a robot) 0xRRGGBB as switched in this tick; 0: dark, or not there
     senses: Senses  # by group, of the robots that act in this tick: what they sensed at its start
     contact_onsets: IntArray  # (arenas, 2) that began in this tick: robot with robot, robot with wall or obstacle
     edges: IntArray | None  # (e, 2) robot rows joined in the radio graph at the tick's start; None without a radio

@@ -24,6 +24,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.led_changes import LedChanges
 from swarmwire.comms.notes import Notes
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard, Sent
@@ -74,6 +75,7 @@ class RealTime(Roster[_Slot]):
         self._drive, self._command = np.zeros(rows, np.bool_), np.zeros((3, rows))
         self._sent: list[Sent] = []
         self._notes: list[Notes] = []
+        self._leds: list[LedChanges] = []
         self.late, self.watchdog_stops = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
         self.frames_dropped = self.packets_dropped = self.outcomes_dropped = 0
 
@@ -120,9 +122,10 @@ class RealTime(Roster[_Slot]):
         rows = np.arange(len(self._drive))
         linear_mps, angular_radps, lateral_mps = self._command
         sent, notes = Sent.joined(self._sent), self._latest_notes()
-        actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, notes)
+        leds = LedChanges.joined(self._leds)
+        actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, notes, leds)
         self._drive, self._command = np.zeros_like(self._drive), np.zeros_like(self._command)
-        self._sent, self._notes = [], []
+        self._sent, self._notes, self._leds = [], [], []
         return actions
 
     def _acted(self, slot: _Slot, frame: Frame) -> None:
@@ -141,6 +144,7 @@ class RealTime(Roster[_Slot]):
         self._command[:, given] = command[:, actions.drive]
         self._sent.append(actions.sent)
         self._notes.append(actions.notes)
+        self._leds.append(actions.leds)
 
     def _catch_up(self, slot: _Slot) -> Sequence[bytes]:
         return ()  # the next tick is soon

@@ -12,8 +12,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.truth import Group, Static
-from swarmwire.world.actuation.limits import limits_of, take_commands
-from swarmwire.world.actuation.noise import NoisyWheels
+from swarmwire.world.actuation.actuators import Actuators
+from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.angles import wrapped
 from swarmwire.world.checks import bodies_of
 from swarmwire.world.physics import Physics
@@ -34,8 +34,9 @@ class World:
         keys: (arenas,) the key of each arena's draws, which depends on its seed alone.
         pose: (rows, 3) x, y in m, heading in rad in (-pi, pi], arena frame.
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
-        command: (rows, 3) within the drives' limits: forward m/s, left turn rad/s, to the left m/s.
+        actuators: motors and LEDs: what they were asked for, and what they do.
         alive: (rows,).
+        batteries: of all robots; `charge` may be written to.
         sensors: those that agents need, by group and sense; `Staged.failed` may be set.
         states: what each robot is at, as its agent named it.
     """
@@ -65,25 +66,39 @@ class World:
         )
         tick_s, steps = 1.0 / scenario.time.rate_hz, scenario.physics.steps
         self._physics = Physics(scenario.arena.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
+        self.actuators = Actuators(groups, self.keys)
+        self.batteries = Batteries(groups, self.static.arenas, tick_s)
         self.sensors = _sensors(scenario, self._scene(tick_s), groups, needs)
         rows = self.static.arenas * self.static.robots
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
         self.alive: BoolArray = np.ones(rows, np.bool_)
-        self.command: FloatArray = np.zeros((rows, 3))
-        self._limits, self._noise = limits_of(groups), NoisyWheels(groups, self.keys)
-        self._target = np.zeros((self.static.arenas, self.static.robots, 3))  # what the engine is given
-        self._ticks = 0  # moved so far
         self.states = States(rows)
-        self._clipped = self._not_finite = 0
         self._show()
 
     def live(self, alive: BoolArray) -> None:
         """These robots (rows,) are alive from now on; the others brake, and resist whatever pushes them."""
-        self.states.forget(alive & ~self.alive)  # a robot that is revived starts afresh
-        self.alive, self.command = alive.copy(), self.command.copy()
-        self.command[~alive] = 0.0
-        self._physics.braked = ~alive.reshape(self.static.arenas, self.static.robots)
+        revived = alive & ~self.alive  # they start afresh
+        self.states.forget(revived)
+        self.batteries.renew(revived)
+        self.alive = alive.copy()
+        self.actuators.stop(~alive)
+        self._brake()
+
+    def fail(self, failed: Mapping[str, BoolArray]) -> None:
+        """From now on these parts of robots (rows,) do not work, by name: motors, wheels, senses; all others do."""
+        self.actuators.failed.fail(failed)
+        self._brake()
+        shape = self.static.arenas, self.static.robots
+        for group in self.static.groups:
+            for name, sensor in self.sensors[group.name].items():
+                mask = failed[name].reshape(shape)[:, group.start : group.stop] if name in failed else None
+                sensor.failed = mask if mask is not None and mask.any() else None
+
+    def _brake(self) -> None:
+        """The motors of robots that are dead, or whose motors failed, do not drive: they only resist."""
+        dead = ~self.alive.reshape(self.static.arenas, self.static.robots)
+        self._physics.braked = dead | self.actuators.failed.motors
 
     def sense(self, tick: int) -> Senses:
         """What the robots alive that act in a tick sense, by group: rows rising, and the fields that are needed."""
@@ -110,23 +125,23 @@ class World:
         Returns:
             (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle.
         """
-        self.command = self.command.copy()
-        asked = actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps
-        clipped, not_finite = take_commands(self._limits, self.alive, *asked, self.command)
-        self._clipped, self._not_finite = self._clipped + clipped, self._not_finite + not_finite
+        self.actuators.take(actions, self.alive)
         self.states.take(actions.notes, self.alive)
-        self._target[:] = self.command.reshape(self._target.shape)
-        if self._noise.any:
-            self._noise.act(self._ticks, self._target)
-        onsets = self._physics.tick(self._target)
-        self._ticks += 1
+        if self.batteries.any:
+            self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target)
+        onsets = self._physics.tick(self.actuators.target)
         self._show()
         return onsets
 
+    @property
+    def command(self) -> FloatArray:
+        """Commands within the drives' limits, (rows, 3): forward m/s, left turn rad/s, to the left m/s."""
+        return self.actuators.command
+
     def counts(self) -> dict[str, int]:
-        """Commands since the start that drives could not follow, or not finite and so dropped; states too many."""
+        """What actuators could not follow since the start, by name; states too many."""
         states = {"states_over_limit": self.states.dropped} if self.states.dropped else {}
-        return {"clipped_commands": self._clipped, "nan_commands": self._not_finite, **states}
+        return {**self.actuators.counts(), **states}
 
     def _show(self) -> None:
         state = self._physics.state.reshape(-1, 6)
@@ -138,6 +153,7 @@ class World:
         static, physics = self.static, self._physics
         counts = [group.stop - group.start for group in static.groups]
         radius_m = np.repeat([group.body.radius_m for group in static.groups], counts)
+        bottom_m = np.repeat([group.body.altitude_m for group in static.groups], counts)
         height_m = np.repeat([group.body.height_m for group in static.groups], counts)
         return Scene(
             keys=self.keys,
@@ -147,13 +163,14 @@ class World:
             lights=static.lights,
             tick_s=tick_s,
             radius_m=radius_m,
-            bottom_m=np.zeros(len(radius_m)),
-            top_m=height_m,
+            bottom_m=bottom_m,
+            top_m=bottom_m + height_m,
             state=physics.state,
             travel_m=physics.travel_m,
             touched=physics.touched,
-            target=np.zeros((static.arenas, static.robots, 2)),
-            leds=np.zeros((static.arenas, static.robots, 0), np.int64),
+            target=self.actuators.target,
+            charge=self.batteries.charge,
+            leds=self.actuators.leds.rgb,
         )
 
 

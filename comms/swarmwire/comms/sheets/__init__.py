@@ -3,8 +3,10 @@
 A file per sense. A new one: its sheet in a file here, and its line in `SHEETS`.
 """
 
+from swarmwire.comms.sheets.battery import Battery
 from swarmwire.comms.sheets.bumper import Bumper
 from swarmwire.comms.sheets.compass import Compass
+from swarmwire.comms.sheets.imu import Imu
 from swarmwire.comms.sheets.light import Light
 from swarmwire.comms.sheets.odometry import Odometry
 from swarmwire.comms.sheets.positioning import Positioning
@@ -19,12 +21,16 @@ SHEETS: dict[str, type[Sheet]] = {
     "light": Light,
     "bumper": Bumper,
     "positioning": Positioning,
+    "imu": Imu,
+    "battery": Battery,
 }
 
 __all__ = [
     "SHEETS",
+    "Battery",
     "Bumper",
     "Compass",
+    "Imu",
     "Light",
     "Odometry",
     "Positioning",

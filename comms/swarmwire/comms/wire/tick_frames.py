@@ -7,6 +7,8 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
+from swarmwire.comms.leds import BRIGHTEST
 from swarmwire.comms.notes import MOST_STATES, Notes, checked_state
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
@@ -81,6 +83,8 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
         arrays["sent/offset"] = actions.sent.payloads.offset
         if actions.sent.outcome_id is not None:
             arrays["sent/outcome_id"] = actions.sent.outcome_id
+    if len(actions.leds):
+        arrays["leds"] = np.array((actions.leds.rows, actions.leds.which, actions.leds.rgb))
     values: dict[str, Any] = {"dropped": dropped} if dropped else {}
     if len(actions.notes):
         arrays["notes"] = np.array((actions.notes.rows, actions.notes.code))
@@ -96,7 +100,8 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     drive, linear_mps, angular_radps, lateral_mps = checked_array(frame, "command", "<f8", (4, n))
     sent = _sent(frame, rows) if "sent" in frame.arrays else Sent.none()
     notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
-    return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes)
+    leds = _leds(frame, rows) if "leds" in frame.arrays else NO_LED_CHANGES
+    return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds)
 
 
 def _sent(frame: Frame, rows: IntArray) -> Sent:
@@ -133,6 +138,13 @@ def _notes(frame: Frame, rows: IntArray) -> Notes:
     if ((code < 0) | (code >= len(states))).any():
         raise BadFrame("malformed", "notes: expected places in states")
     return Notes(noted, code, states)
+
+
+def _leds(frame: Frame, rows: IntArray) -> LedChanges:
+    switched, which, rgb = checked_array(frame, "leds", "<i8", (3, None))
+    if not _own(switched, rows) or (which < 0).any() or (rgb < 0).any() or (rgb > BRIGHTEST).any():
+        raise BadFrame("malformed", "leds: expected colours up to 0xFFFFFF of LEDs of the runner's own robots")
+    return LedChanges(switched, which, rgb)
 
 
 def _own(some: IntArray, rows: IntArray) -> bool:

@@ -7,8 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 from swarmwire.comms.truth import Group
+from swarmwire.world.sensors.battery import BatterySensor
 from swarmwire.world.sensors.bumper import BumperSensor
 from swarmwire.world.sensors.compass import CompassSensor
+from swarmwire.world.sensors.imu import ImuSensor
 from swarmwire.world.sensors.light import LightSensor
 from swarmwire.world.sensors.odometry import OdometrySensor
 from swarmwire.world.sensors.positioning import PositioningSensor
@@ -23,6 +25,8 @@ SENSORS: dict[str, Callable[[Scene, Group, Any], TrueSense]] = {
     "light": LightSensor,
     "bumper": BumperSensor,
     "positioning": PositioningSensor,
+    "imu": ImuSensor,
+    "battery": BatterySensor,
 }
 
 __all__ = ["SENSORS", "Scene"]

@@ -23,5 +23,6 @@ class Scene:
     state: FloatArray  # (arenas, robots, 6) x, y in m, heading in rad (not wrapped), velocities; arena frame
     travel_m: FloatArray  # (arenas, robots, 2) rolled by the left and right wheel since the start
     touched: FloatArray  # (arenas, robots) 1 if it touched anything in the tick before, else 0
-    target: FloatArray  # (arenas, robots, 2) what the motors were told in the tick before
+    target: FloatArray  # (arenas, robots, 3) what the engine was given in the tick before
+    charge: FloatArray  # (arenas, robots) of the battery, 1 full, 0 empty
     leds: IntArray  # (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0 dark

@@ -1,0 +1,29 @@
+"""What a robot's senses read in this tick, a file per sense. Arrays have a leading axis n for a VectorAgent."""
+
+from swarmwire.agent.readings.battery import BatteryReading, BatteryReadings
+from swarmwire.agent.readings.bumper import BumperReading, BumperReadings
+from swarmwire.agent.readings.compass import CompassReading, CompassReadings
+from swarmwire.agent.readings.imu import ImuReading, ImuReadings
+from swarmwire.agent.readings.light import LightReading, LightReadings
+from swarmwire.agent.readings.odometry import OdometryReading, OdometryReadings
+from swarmwire.agent.readings.positioning import PositioningReading, PositioningReadings
+from swarmwire.agent.readings.proximity import ProximityReading, ProximityReadings
+
+__all__ = [
+    "BatteryReading",
+    "BatteryReadings",
+    "BumperReading",
+    "BumperReadings",
+    "CompassReading",
+    "CompassReadings",
+    "ImuReading",
+    "ImuReadings",
+    "LightReading",
+    "LightReadings",
+    "OdometryReading",
+    "OdometryReadings",
+    "PositioningReading",
+    "PositioningReadings",
+    "ProximityReading",
+    "ProximityReadings",
+]
