@@ -136,8 +136,8 @@ def test_what_robots_see_of_each_other_does_not_depend_on_the_frame(x: float, y:
     moved = np.stack(
         [x + c * poses[:, 0] - s * poses[:, 1], y + s * poses[:, 0] + c * poses[:, 1], poses[:, 2] + turn], axis=1
     )
-    before = proximity(scene(poses, EPUCK, walled=False), EPUCK).distance_m()
-    after = proximity(scene(moved, EPUCK, walled=False), EPUCK).distance_m()
+    before = proximity(scene(poses, EPUCK, boundary="open"), EPUCK).distance_m()
+    after = proximity(scene(moved, EPUCK, boundary="open"), EPUCK).distance_m()
     grazing = np.isfinite(before) != np.isfinite(after)  # a ray that just touches or just reaches
     assert np.count_nonzero(grazing) <= 1
     both = np.isfinite(before) & np.isfinite(after)
@@ -149,7 +149,7 @@ def test_proximity_noise_is_uniform_keyed_and_clipped() -> None:
     poses = np.stack([np.linspace(-4, 4, 500), np.zeros(500), np.zeros(500)], axis=1)
     assert EPUCK.proximity is not None
     sheet = replace(EPUCK.proximity, noise=0.05)
-    sensor = staged(scene(poses[::25], EPUCK, walled=False), EPUCK, "proximity", sheet)
+    sensor = staged(scene(poses[::25], EPUCK, boundary="open"), EPUCK, "proximity", sheet)
     draws = np.concatenate([sensor.read(tick)["proximity.value"].ravel() for tick in range(50)])
     assert draws.min() == 0.0
     assert 0.0499 < draws.max() <= 0.05

@@ -12,12 +12,16 @@ from swarmwire.agent.packet import Packet, Packets
 from swarmwire.agent.readings import (
     BatteryReading,
     BumperReading,
+    CameraReading,
     CompassReading,
+    GroundReading,
     ImuReading,
+    InfraredReading,
     LightReading,
     OdometryReading,
     PositioningReading,
     ProximityReading,
+    ScanReading,
 )
 from swarmwire.agent.robots import forward_and_turn, had
 from swarmwire.agent.turn import Turn
@@ -83,6 +87,27 @@ class Robot(Handle):
         """Charge, 1 full and 0 empty, and voltage."""
         charge, voltage = self._turn.field("battery", "charge"), self._turn.field("battery", "voltage_v")
         return BatteryReading(float(charge[self._row]), float(voltage[self._row]))
+
+    @property
+    def infrared(self) -> InfraredReading:
+        """Light of other robots, by rays around the body: value, distance_m and angle_rad, (rays,)."""
+        return InfraredReading(self._turn.field("infrared", "value")[self._row], had(self.body.infrared))
+
+    @property
+    def scan(self) -> ScanReading:
+        """Laser scan: range_m and angle_rad, (rays,)."""
+        return ScanReading(self._turn.field("scan", "range_m")[self._row], had(self.body.scan))
+
+    @property
+    def ground(self) -> GroundReading:
+        """Shade of the floor under the sensors, (points,)."""
+        return GroundReading(self._turn.field("ground", "shade")[self._row])
+
+    @property
+    def camera(self) -> CameraReading:
+        """LEDs of other robots in sight."""
+        names = "distance_m", "bearing_rad", "colour"
+        return CameraReading.of(*(self._turn.field("camera", name)[self._row] for name in names))
 
     def drive(self, linear_mps: float, angular_radps: float, lateral_mps: float = 0.0) -> None:
         """Wanted forward speed and turn rate (positive to the left); they hold until the next call.

@@ -11,22 +11,26 @@ from swarmwire.agent.packet import Packets
 from swarmwire.agent.readings import (
     BatteryReadings,
     BumperReadings,
+    CameraReadings,
     CompassReadings,
+    GroundReadings,
     ImuReadings,
+    InfraredReadings,
     LightReadings,
     OdometryReadings,
     PositioningReadings,
     ProximityReadings,
+    ScanReadings,
 )
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.leds import rgb_of
 from swarmwire.comms.messages import Message, encode_rows
 from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.sheets import Ring
+from swarmwire.comms.sheets import Sheet
 
 M = TypeVar("M", bound=Message)
-S = TypeVar("S", bound=Ring)
+S = TypeVar("S", bound=Sheet)
 N = TypeVar("N", float, FloatArray)
 
 
@@ -83,6 +87,27 @@ class Robots(Handle):
     def battery(self) -> BatteryReadings:
         """Batteries: charge, 1 full and 0 empty, and voltage_v (n,)."""
         return BatteryReadings(self._turn.field("battery", "charge"), self._turn.field("battery", "voltage_v"))
+
+    @property
+    def infrared(self) -> InfraredReadings:
+        """Light of other robots, by rays around the bodies: value and distance_m (n, rays), angle_rad (rays,)."""
+        return InfraredReadings(self._turn.field("infrared", "value"), had(self.body.infrared))
+
+    @property
+    def scan(self) -> ScanReadings:
+        """Laser scans: range_m (n, rays), angle_rad (rays,)."""
+        return ScanReadings(self._turn.field("scan", "range_m"), had(self.body.scan))
+
+    @property
+    def ground(self) -> GroundReadings:
+        """Shades of the floor under the sensors: shade (n, points)."""
+        return GroundReadings(self._turn.field("ground", "shade"))
+
+    @property
+    def camera(self) -> CameraReadings:
+        """LEDs of other robots in sight: distance_m, bearing_rad and colour (n, most_blobs), count (n,)."""
+        names = "distance_m", "bearing_rad", "colour"
+        return CameraReadings(*(self._turn.field("camera", name) for name in names))
 
     def drive(
         self,

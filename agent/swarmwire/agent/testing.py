@@ -143,6 +143,11 @@ def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatA
     if "positioning" in body.senses:
         for axis in ("x_m", "y_m"):
             fields[f"positioning.{axis}"] = _uniform(key, tick, axis, (n,)) * 4.0 - 2.0
+    if body.infrared is not None:
+        value = _uniform(key, tick, "infrared", (n, len(body.infrared.angles_deg)))
+        fields["infrared.value"] = np.maximum(value * 2.0 - 1.0, 0.0)
+    if body.scan is not None:
+        fields["scan.range_m"] = _uniform(key, tick, "scan", (n, body.scan.rays)) * body.scan.range_m
     return fields
 
 

@@ -17,7 +17,7 @@ from swarmwire.comms.drives import DRIVES, Drive, Holonomic, Twist, Wheels
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.leds import Leds
 from swarmwire.comms.parameters import parameter
-from swarmwire.comms.sheets import SHEETS, Compass, Light, Odometry, Proximity, Sheet
+from swarmwire.comms.sheets import SHEETS, Compass, Infrared, Light, Odometry, Proximity, Scan, Sheet
 from swarmwire.comms.tables import built, mapping_of
 
 S = TypeVar("S", bound=Sheet)
@@ -61,6 +61,16 @@ class Body:
     def light(self) -> Light | None:
         """The photocells' sheet."""
         return self._sheet(Light)
+
+    @cached_property
+    def infrared(self) -> Infrared | None:
+        """The passive infrared sensor's sheet."""
+        return self._sheet(Infrared)
+
+    @cached_property
+    def scan(self) -> Scan | None:
+        """The laser scanner's sheet."""
+        return self._sheet(Scan)
 
     def _sheet(self, kind: type[S]) -> S | None:
         return next((sheet for sheet in self.senses.values() if isinstance(sheet, kind)), None)
@@ -124,7 +134,12 @@ def body_from(sheet: Mapping[str, Any], where: str) -> Body:
         rest["drive"] = _drive(rest["drive"], where)
     if rest.get("leds") is not None:  # None: a sheet written down as a mapping
         rest["leds"] = built(Leds, rest["leds"], where, "leds")
-    return built(Body, rest, where, "")
+    body: Body = built(Body, rest, where, "")
+    for name, sheet_of in body.senses.items():
+        fault = sheet_of.fault(body.radius_m)
+        if fault:
+            raise BadInput(where, f"senses.{name}.{fault[0]}", fault[1])
+    return body
 
 
 def _kind_of(sheet: Mapping[str, Any], otherwise: object = "wheels") -> object:

@@ -1,7 +1,7 @@
 """Square cells over the arenas, so that kernels look at what is near only. Compiled.
 
-The plane is rolled up: cell (i, j) stands for all places (i + k nx, j + l ny). So robots that leave an open arena spread
-over all cells as well, and a torus needs no cells of its own. Whoever finds something in a cell compares its position.
+The plane is rolled up: cell (i, j) stands for all places (i + k nx, j + l ny). So robots that leave an open arena
+spread over all cells as well, and a torus needs no cells of its own. Whoever finds something compares its position.
 """
 
 # pyright: basic, reportUnknownMemberType=false

@@ -29,8 +29,13 @@ class Things(NamedTuple):
     cells: Cells
 
 
-def things_within(obstacles: Obstacles, size_m: tuple[float, float], reach_m: float, torus: bool) -> Things:
-    """The obstacles of arenas of this size by cell, for looking `reach_m` far; on a torus at most over its edges."""
+def things_within(
+    obstacles: Obstacles, size_m: tuple[float, float], reach_m: float, torus: bool, images_m: float | None = None
+) -> Things:
+    """The obstacles of arenas of this size by cell, for looking `reach_m` far.
+
+    On a torus their images are among them that are within `images_m` of the arena, which is the reach if left out.
+    """
     arenas = len(obstacles.circle_start) - 1
     shape = np.concatenate(
         [
@@ -41,7 +46,7 @@ def things_within(obstacles: Obstacles, size_m: tuple[float, float], reach_m: fl
     starts = obstacles.circle_start, obstacles.polygon_start
     arena = np.concatenate([np.repeat(np.arange(arenas), np.diff(start)) for start in starts])
     sides = np.concatenate([np.zeros(len(obstacles.circle), np.int64), np.diff(obstacles.side_start)])
-    shape, arena, sides, side = _with_images(shape, arena, sides, obstacles.side, size_m, reach_m, torus)
+    shape, arena, sides, side = _with_images(shape, arena, sides, obstacles.side, size_m, images_m or reach_m, torus)
     side_start = np.concatenate([[0], np.cumsum(sides)])
     per_obstacle_m = np.sqrt(size_m[0] * size_m[1] * arenas / (CELLS_PER_OBSTACLE * max(len(shape), 1)))
     cell_m = max(0.5 * reach_m, float(per_obstacle_m)) if len(shape) else max(size_m)
@@ -62,10 +67,10 @@ def _with_images(shape, arena, sides, side, size_m, reach_m, torus):
     offsets = (-1, 0, 1) if torus else (0,)
     for i, j in ((i, j) for i in offsets for j in offsets if i or j):
         shift_x, shift_y = i * size_m[0], j * size_m[1]
-        moved = shape + [shift_x, shift_y, 0.0, 0.0]
+        moved = shape + np.array([shift_x, shift_y, 0.0, 0.0])
         beyond = np.abs(moved[:, :2]) - moved[:, 2:3] - 0.5 * np.array(size_m)
         near = (beyond < reach_m + MARGIN_M).all(axis=1)
-        moved_side = side + [shift_x, shift_y, 0.0, 0.0, 0.0]
+        moved_side = side + np.array([shift_x, shift_y, 0.0, 0.0, 0.0])
         moved_side[:, 4] += side[:, 2] * shift_x + side[:, 3] * shift_y
         parts.append((moved[near], arena[near], sides[near], moved_side[near[owner]]))
     return tuple(np.concatenate(column) for column in zip(*parts, strict=True))

@@ -10,6 +10,7 @@ from swarmwire.comms.body import Body
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.ground import ground_of
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
@@ -20,6 +21,7 @@ from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.sensors import SENSORS, Scene
+from swarmwire.world.sensors.scene import led_places_m
 from swarmwire.world.sensors.staged import Staged
 from swarmwire.world.states import States
 
@@ -158,9 +160,10 @@ class World:
         return Scene(
             keys=self.keys,
             size_m=static.arena_size_m,
-            walled=static.walled,
+            boundary=static.boundary,
             obstacles=obstacle_arrays(static.obstacles),
             lights=static.lights,
+            ground=ground_of(static.floor, static.arena_size_m, static.boundary),
             tick_s=tick_s,
             radius_m=radius_m,
             bottom_m=bottom_m,
@@ -171,6 +174,7 @@ class World:
             target=self.actuators.target,
             charge=self.batteries.charge,
             leds=self.actuators.leds.rgb,
+            led_places_m=led_places_m(static.groups, self.actuators.leds.rgb.shape[2]),
         )
 
 

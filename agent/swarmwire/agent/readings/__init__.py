@@ -2,22 +2,33 @@
 
 from swarmwire.agent.readings.battery import BatteryReading, BatteryReadings
 from swarmwire.agent.readings.bumper import BumperReading, BumperReadings
+from swarmwire.agent.readings.camera import Blob, CameraReading, CameraReadings
 from swarmwire.agent.readings.compass import CompassReading, CompassReadings
+from swarmwire.agent.readings.ground import GroundReading, GroundReadings
 from swarmwire.agent.readings.imu import ImuReading, ImuReadings
+from swarmwire.agent.readings.infrared import InfraredReading, InfraredReadings
 from swarmwire.agent.readings.light import LightReading, LightReadings
 from swarmwire.agent.readings.odometry import OdometryReading, OdometryReadings
 from swarmwire.agent.readings.positioning import PositioningReading, PositioningReadings
 from swarmwire.agent.readings.proximity import ProximityReading, ProximityReadings
+from swarmwire.agent.readings.scan import ScanReading, ScanReadings
 
 __all__ = [
     "BatteryReading",
     "BatteryReadings",
+    "Blob",
     "BumperReading",
     "BumperReadings",
+    "CameraReading",
+    "CameraReadings",
     "CompassReading",
     "CompassReadings",
+    "GroundReading",
+    "GroundReadings",
     "ImuReading",
     "ImuReadings",
+    "InfraredReading",
+    "InfraredReadings",
     "LightReading",
     "LightReadings",
     "OdometryReading",
@@ -26,4 +37,6 @@ __all__ = [
     "PositioningReadings",
     "ProximityReading",
     "ProximityReadings",
+    "ScanReading",
+    "ScanReadings",
 ]

@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.cells import Cells, cells_over, column_of, row_of
 from swarmwire.world.sensors.scene import Scene
 
-ROBOTS_PER_CELL = 1.0
+ROBOTS_PER_CELL = 0.5
 
 
 class Crowd(NamedTuple):
@@ -59,14 +59,13 @@ def nearest(at, there, wrap, per_wrap):
 
 
 @borrowing()
-def near_robots(crowd, arena, own, x, y, reach_m):
-    """Write into `crowd.found` the robots whose rims robot `own` may see within reach of a place; how many.
+def near_robots(crowd, arena, own, x, y, reach_m, low_m, high_m):
+    """Write into `crowd.found` the robots but `own` whose rims are within reach of a place; how many.
 
-    Those whose heights do not meet its own are not among them.
+    Only those that are somewhere between two heights above the floor.
     """
     cells, count = crowd.cells, 0
     row, column = row_of(cells, y), column_of(cells, x)
-    bottom, top = crowd.bottom_m[own], crowd.top_m[own]
     for j in range(min(cells.ny, 3)):
         r = (row + j - 1) % cells.ny
         for i in range(min(cells.nx, 3)):
@@ -78,7 +77,7 @@ def near_robots(crowd, arena, own, x, y, reach_m):
                 ox, oy, reach = cx - x, cy - y, reach_m + crowd.radius_m[other]
                 if ox * ox + oy * oy >= reach * reach or other == own:
                     continue
-                if crowd.bottom_m[other] < top and bottom < crowd.top_m[other]:
+                if crowd.bottom_m[other] < high_m and low_m < crowd.top_m[other]:
                     crowd.found[count] = other
                     crowd.found_at[count, 0], crowd.found_at[count, 1] = cx, cy
                     count += 1

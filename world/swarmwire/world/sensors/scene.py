@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
 from swarmwire.comms.geometry import Obstacles
-from swarmwire.comms.truth import Light
+from swarmwire.comms.ground import Ground
+from swarmwire.comms.truth import Boundary, Group, Light
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,9 +16,10 @@ class Scene:
 
     keys: KeyArray  # (arenas,)
     size_m: tuple[float, float]  # full extents of an arena
-    walled: bool
+    boundary: Boundary
     obstacles: Obstacles
     lights: tuple[tuple[Light, ...], ...]  # of each arena
+    ground: Ground  # the floor of all arenas
     tick_s: float
     radius_m: FloatArray  # (robots,) of each robot index
     bottom_m: FloatArray  # (robots,) height above the floor of the lower end of the body
@@ -26,3 +30,12 @@ class Scene:
     target: FloatArray  # (arenas, robots, 3) what the engine was given in the tick before
     charge: FloatArray  # (arenas, robots) of the battery, 1 full, 0 empty
     leds: IntArray  # (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0 dark
+    led_places_m: FloatArray  # (robots, most LEDs of a robot, 3) x ahead, y to the left, z above the body's lower side
+
+
+def led_places_m(groups: tuple[Group, ...], most: int) -> FloatArray:
+    """Where the LEDs of each robot sit, as a scene has them, with room for so many."""
+    places = np.zeros((groups[-1].stop, most, 3))
+    for group in groups:
+        places[group.start : group.stop, : group.body.led_count] = group.body.led_places_m
+    return places
