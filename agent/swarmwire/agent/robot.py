@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any, TypeVar, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from swarmwire.agent.draw import Draw
 from swarmwire.agent.handle import Handle
@@ -19,6 +20,7 @@ from swarmwire.agent.readings import (
     InfraredReading,
     LightReading,
     OdometryReading,
+    OwnReading,
     PositioningReading,
     ProximityReading,
     ScanReading,
@@ -109,6 +111,11 @@ class Robot(Handle):
         names = "distance_m", "bearing_rad", "colour"
         return CameraReading.of(*(self._turn.field("camera", name)[self._row] for name in names))
 
+    def sense(self, name: str) -> OwnReading:
+        """What a sense of your own reads: each field as an attribute, a float or an array (width,)."""
+        columns = ((field, values[self._row]) for field, values in self._turn.fields(name).items())
+        return OwnReading(name, {field: value if np.ndim(value) else float(value) for field, value in columns})
+
     def drive(self, linear_mps: float, angular_radps: float, lateral_mps: float = 0.0) -> None:
         """Wanted forward speed and turn rate (positive to the left); they hold until the next call.
 
@@ -129,6 +136,13 @@ class Robot(Handle):
         It holds until the next call. NotFitted if the body has no LEDs, ValueError if it has not that one.
         """
         self._turn.leds(which)[self._row] = rgb_of(red, green, blue)
+
+    def actuate(self, name: str, values: ArrayLike) -> None:
+        """Set an actuator of your own, to one number or as many as it takes; what that does, and how long, it knows.
+
+        NotFitted if the body has none of this name, ValueError if the numbers do not fit or are not finite.
+        """
+        self._turn.actuate(name, np.reshape(values, (1, -1)), slice(self._row, self._row + 1))
 
     def note(self, state: str) -> None:
         """Name what the robot is at ("search", "wait"), for recordings and pictures; it holds until the next call."""

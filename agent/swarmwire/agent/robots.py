@@ -18,6 +18,7 @@ from swarmwire.agent.readings import (
     InfraredReadings,
     LightReadings,
     OdometryReadings,
+    OwnReading,
     PositioningReadings,
     ProximityReadings,
     ScanReadings,
@@ -109,6 +110,10 @@ class Robots(Handle):
         names = "distance_m", "bearing_rad", "colour"
         return CameraReadings(*(self._turn.field("camera", name) for name in names))
 
+    def sense(self, name: str) -> OwnReading:
+        """What a sense of your own reads: each field as an attribute, (n,) or (n, width)."""
+        return OwnReading(name, self._turn.fields(name))
+
     def drive(
         self,
         linear_mps: ArrayLike,
@@ -147,6 +152,18 @@ class Robots(Handle):
         """
         here = True if rows is None else rows[:, None]
         np.copyto(self._turn.leds(which), rgb_of(red, green, blue)[..., None], where=here)
+
+    def actuate(self, name: str, values: ArrayLike, rows: BoolArray | None = None) -> None:
+        """Set an actuator of your own of the robots of the mask `rows`, or of all.
+
+        To one number, (n,), or (n, width): of robots outside the mask they do not count. What they do, and for how
+        long, is the actuator's to know. NotFitted if the bodies have none of this name, ValueError if the numbers do
+        not fit or are not finite.
+        """
+        if rows is None:
+            self._turn.actuate(name, values, slice(None))
+        else:
+            self._turn.actuate(name, _of(rows, values), rows)
 
     def note(self, state: str, rows: BoolArray | None = None) -> None:
         """Name what the robots of the mask `rows`, or all, are at; for recordings and pictures, until the next call."""

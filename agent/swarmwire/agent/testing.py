@@ -172,6 +172,8 @@ def _assert_same(first: Actions, second: Actions, text: str) -> None:
         raise AssertionError(f"{text}: states\n{_states(first)}\n{_states(second)}")
     if _leds(first) != _leds(second):
         raise AssertionError(f"{text}: leds\n{_leds(first)}\n{_leds(second)}")
+    if _actuations(first) != _actuations(second):
+        raise AssertionError(f"{text}: actuators\n{_actuations(first)}\n{_actuations(second)}")
     if _packets(first.sent) != _packets(second.sent):
         raise AssertionError(f"{text}: packets\n{_packets(first.sent)}\n{_packets(second.sent)}")
 
@@ -185,6 +187,12 @@ def _leds(actions: Actions) -> dict[tuple[int, int], int]:
     """The colours that LEDs were switched to, by robot and LED."""
     rows, which, rgb = actions.leds.rows.tolist(), actions.leds.which.tolist(), actions.leds.rgb.tolist()
     return dict(zip(zip(rows, which, strict=True), rgb, strict=True))
+
+
+def _actuations(actions: Actions) -> dict[tuple[int, int], float]:
+    """What own actuators were set to, by robot and place."""
+    rows, place, value = actions.own.rows.tolist(), actions.own.place.tolist(), actions.own.value.tolist()
+    return dict(zip(zip(rows, place, strict=True), value, strict=True))
 
 
 def _packets(sent: Sent) -> list[tuple[int, int, int, bytes]]:

@@ -48,7 +48,7 @@ def _value(hint: Any, value: object, where: str, key: str) -> Any:
         if not isfinite(value):
             raise BadInput(where, key, f"expected a finite number, got {value!r}")
         return float(value)
-    if hint is int and (isinstance(value, bool) or not isinstance(value, int)):
+    if hint is int and type(value) is not int:
         raise BadInput(where, key, f"expected a whole number, got {value!r}")
     if get_origin(hint) is tuple:
         if not isinstance(value, list | tuple) or not value:

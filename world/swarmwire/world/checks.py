@@ -5,9 +5,10 @@ import math
 import numpy as np
 
 from swarmwire.comms.air.radio_checks import check_radio
-from swarmwire.comms.body import Body, load_body
+from swarmwire.comms.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
+from swarmwire.world.bodies import bodies_of
 from swarmwire.world.obstacles import extent, heading_of, obstacle_at
 from swarmwire.world.scenario import ObstacleTable, Scenario
 
@@ -26,17 +27,6 @@ def check(scenario: Scenario, where: str) -> None:
     _check_antennas(scenario, where)
     for i, event in enumerate(scenario.events):
         _check_event(scenario, bodies, event, f"events.{i}", where)
-
-
-def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
-    """The body of each group, by the group's name."""
-    bodies: dict[str, Body] = {}
-    for group, table in scenario.robots.items():
-        try:
-            bodies[group] = load_body(table.body)
-        except BadInput as error:
-            raise BadInput(where, f"robots.{group}.body", error.expected) from None
-    return bodies
 
 
 def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> None:

@@ -12,16 +12,21 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.ground import ground_of
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
+from swarmwire.comms.sheets import OwnSheet, Sheet
 from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.actuation.batteries import Batteries
+from swarmwire.world.actuation.own_actuators import OwnActuators
 from swarmwire.world.angles import wrapped
-from swarmwire.world.checks import bodies_of
+from swarmwire.world.bodies import bodies_of
+from swarmwire.world.own.fitting import made_sensor
+from swarmwire.world.own.sensor import AskedSensor
 from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.sensors import SENSORS, Scene
 from swarmwire.world.sensors.scene import led_places_m
+from swarmwire.world.sensors.sensor import TrueSense
 from swarmwire.world.sensors.staged import Staged
 from swarmwire.world.states import States
 
@@ -70,7 +75,9 @@ class World:
         self._physics = Physics(scenario.arena.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
         self.actuators = Actuators(groups, self.keys)
         self.batteries = Batteries(groups, self.static.arenas, tick_s)
-        self.sensors = _sensors(scenario, self._scene(tick_s), groups, needs)
+        scene = self._scene(tick_s)
+        self.sensors = _sensors(scenario, scene, groups, needs)
+        self._own = OwnActuators(groups, scene)
         rows = self.static.arenas * self.static.robots
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
@@ -129,6 +136,8 @@ class World:
         """
         self.actuators.take(actions, self.alive)
         self.states.take(actions.notes, self.alive)
+        if self._own.any:
+            self._own.act(actions.own, self.alive)
         if self.batteries.any:
             self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target)
         onsets = self._physics.tick(self.actuators.target)
@@ -143,7 +152,8 @@ class World:
     def counts(self) -> dict[str, int]:
         """What actuators could not follow since the start, by name; states too many."""
         states = {"states_over_limit": self.states.dropped} if self.states.dropped else {}
-        return {**self.actuators.counts(), **states}
+        own = {"actuators_not_there": self._own.not_there} if self._own.not_there else {}
+        return {**self.actuators.counts(), **own, **states}
 
     def _show(self) -> None:
         state = self._physics.state.reshape(-1, 6)
@@ -201,6 +211,12 @@ def _sensors(
                 expected = f"the agent needs the sense {need!r}; the body {group.body.name} has {has}"
                 raise BadInput(scenario.source, f"robots.{group.name}.agent", expected)
             sheet = group.body.senses[need]
-            truth = SENSORS[need](scene, group, sheet)
+            truth = _truth(need, sheet, scene, group)
             made[group.name][need] = Staged(need, truth, sheet, scene.keys, group, scene.tick_s)
     return made
+
+
+def _truth(name: str, sheet: Sheet, scene: Scene, group: Group) -> TrueSense:
+    if isinstance(sheet, OwnSheet):
+        return AskedSensor(name, made_sensor(sheet), sheet, scene, group)
+    return SENSORS[name](scene, group, sheet)

@@ -9,6 +9,7 @@ from swarmwire.agent.readings.imu import ImuReading, ImuReadings
 from swarmwire.agent.readings.infrared import InfraredReading, InfraredReadings
 from swarmwire.agent.readings.light import LightReading, LightReadings
 from swarmwire.agent.readings.odometry import OdometryReading, OdometryReadings
+from swarmwire.agent.readings.own import OwnReading
 from swarmwire.agent.readings.positioning import PositioningReading, PositioningReadings
 from swarmwire.agent.readings.proximity import ProximityReading, ProximityReadings
 from swarmwire.agent.readings.scan import ScanReading, ScanReadings
@@ -33,6 +34,7 @@ __all__ = [
     "LightReadings",
     "OdometryReading",
     "OdometryReadings",
+    "OwnReading",
     "PositioningReading",
     "PositioningReadings",
     "ProximityReading",

@@ -12,6 +12,7 @@ from swarmwire.comms.sheets.imu import Imu
 from swarmwire.comms.sheets.infrared import Infrared
 from swarmwire.comms.sheets.light import Light
 from swarmwire.comms.sheets.odometry import Odometry
+from swarmwire.comms.sheets.own import OwnSheet
 from swarmwire.comms.sheets.positioning import Positioning
 from swarmwire.comms.sheets.proximity import Proximity
 from swarmwire.comms.sheets.rim import ResponseCurve, Rim
@@ -45,6 +46,7 @@ __all__ = [
     "Infrared",
     "Light",
     "Odometry",
+    "OwnSheet",
     "Positioning",
     "Proximity",
     "RangedSheet",

@@ -1,6 +1,7 @@
 """What sensors look at."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +32,7 @@ class Scene:
     charge: FloatArray  # (arenas, robots) of the battery, 1 full, 0 empty
     leds: IntArray  # (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0 dark
     led_places_m: FloatArray  # (robots, most LEDs of a robot, 3) x ahead, y to the left, z above the body's lower side
+    own: dict[str, Any] = field(default_factory=dict[str, Any])  # for own senses and actuators, to share what they like
 
 
 def led_places_m(groups: tuple[Group, ...], most: int) -> FloatArray:
