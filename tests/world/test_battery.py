@@ -1,4 +1,4 @@
-"""Batteries are drained by what robots do; an empty one stops the motors, and a bad sheet is refused."""
+"""Batteries are drained by what robots do; an empty one is death, and a bad sheet is refused."""
 
 from dataclasses import replace
 
@@ -10,6 +10,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sheets import Battery
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.batteries import Batteries
+from swarmwire.world.events import Events
+from swarmwire.world.world import World
+from tests.world.samples import commanded, posed
 from tests.world.scenes import read, scene
 
 EPUCK = load_body("epuck")
@@ -35,43 +38,54 @@ def batteries(*bodies: Body, arenas: int = 1) -> Batteries:
 
 
 def drained(of: Batteries, target, leds=None, alive=None):
-    """What targets (robots, 3) become in a tick of one arena, and whether somebody became empty, or not so."""
+    """A tick of one arena under these targets (robots, 3)."""
     robots, given = of.charge.shape[1], np.array([target], np.float64)
     lights = np.zeros((1, robots, 2), np.int64) if leds is None else np.array([leds])
-    changed = of.drain(np.ones(robots, bool) if alive is None else np.array(alive), lights, given)
-    return given[0], changed
+    of.drain(np.ones(robots, bool) if alive is None else np.array(alive), lights, given)
 
 
 def test_what_is_used_is_power_times_time() -> None:
     of = batteries(with_battery(SHEET), with_battery(SHEET), EPUCK, with_battery(SHEET))
     base_m = EPUCK.wheels.wheel_base_m
     targets = [[0.1, 0.0, 0.0], [0.0, 2.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]]
-    given, changed = drained(of, targets, [[0, 0], [0, 0], [5, 5], [0xFF0000, 1]])
+    drained(of, targets, [[0, 0], [0, 0], [5, 5], [0xFF0000, 1]])
     watts = np.array([1.0 + 20.0 * 0.1, 1.0 + 20.0 * base_m, 0.0, 1.0 + 2 * 0.5])
     assert of.charge[0] == pytest.approx(1.0 - watts * 0.1 / 3600.0 / 0.01)
-    assert np.array_equal(given, targets)
-    assert not changed
     moving = batteries(HOLONOMIC)
     drained(moving, [[0.3, 1.0, -0.4]])
     assert moving.charge[0, 0] == pytest.approx(1.0 - 20.0 * 0.5 * 0.1 / 3600.0 / 0.01)
 
 
-def test_an_empty_battery_stops_the_motors_and_stays_empty() -> None:
-    of = batteries(with_battery(replace(SHEET, start=0.01)), EPUCK)
-    targets = [[0.1, 1.0, 0.0]] * 2
+def test_a_charge_ends_at_nothing_and_only_empty_batteries_are_renewed() -> None:
+    of = batteries(with_battery(replace(SHEET, start=0.01)), with_battery(SHEET), EPUCK)
     for _ in range(2):
-        given, _ = drained(of, targets)
-    assert of.charge[0].tolist() == [0.0, 1.0]
-    given, changed = drained(of, targets)
-    assert given.tolist() == [[0.0, 0.0, 0.0], targets[1]]
-    assert changed
-    assert of.empty.tolist() == [[True, False]]
-    assert not drained(of, targets)[1]
-    of.charge[0, 0] = 0.5  # charged from outside
-    given, changed = drained(of, targets)
-    assert given.tolist() == targets
-    assert changed
-    assert not of.empty.any()
+        drained(of, [[0.1, 1.0, 0.0]] * 3)
+    assert of.charge[0, 0] == 0.0
+    assert of.empty.tolist() == [True, False, False]
+    before = of.charge[0, 1]
+    of.renew(np.array([True, True, True]))
+    assert of.charge[0].tolist() == [1.0, before, 1.0]
+
+
+def test_a_robot_whose_battery_is_empty_is_dead_and_its_run_says_so() -> None:
+    events = [{"at_s": 1.0, "do": "revive", "robots": {"names": ["a-0"]}}]
+    scenario = posed([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], events=events, duration_s=2.5)
+    world = World(scenario, [1], {})
+    short = with_battery(Battery(capacity_wh=1.0, idle_w=3700.0, start=0.5))
+    world.batteries = Batteries([Group("a", short, 0, 2)], 1, 0.1)
+    told = Events(scenario.events, world.static, world.keys)
+    deaths: list[tuple[int, str, list[bool]]] = []
+    for tick in range(25):
+        happened = told.apply(tick * 10**8, world, None)
+        deaths += [(tick, each.do, each.changed.tolist()) for each in happened]
+        world.move(commanded(world, 0.05, 0.0))
+    # Half a watt-hour lasts not quite half a second at 3,700 W, a full one not quite a second.
+    assert deaths == [
+        (5, "run_down", [True, True]),
+        (10, "revive", [True, False]),
+        (20, "run_down", [True, False]),
+    ]
+    assert world.command[1].tolist() == [0.0, 0.0, 0.0]
 
 
 def test_a_dead_robot_draws_nothing() -> None:

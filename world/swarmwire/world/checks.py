@@ -26,7 +26,7 @@ def check(scenario: Scenario, where: str) -> None:
         check_radio(scenario.radio, where)
     _check_antennas(scenario, where)
     for i, event in enumerate(scenario.events):
-        _check_event(scenario, event, f"events.{i}", where)
+        _check_event(scenario, bodies, event, f"events.{i}", where)
 
 
 def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> None:
@@ -63,12 +63,13 @@ def _check_antennas(scenario: Scenario, where: str) -> None:
             raise BadInput(where, f"robots.{group}.radio", f"expected a radio with signals: {why}")
 
 
-def _check_event(scenario: Scenario, event: Event, key: str, where: str) -> None:
+def _check_event(scenario: Scenario, bodies: dict[str, Body], event: Event, key: str, where: str) -> None:
     """An event names robots that there are, and fits the radio, if it needs one."""
     if event.needs_radio and scenario.radio is None:
         raise BadInput(where, f"{key}.do", f"expected a scenario with a [radio] for {event.do!r}")
     try:
         event.check(scenario.groups())
+        event.check_bodies(scenario.groups(), bodies)
         if event.needs_radio and scenario.radio is not None:
             event.check_radio(scenario.radio)
     except BadInput as error:

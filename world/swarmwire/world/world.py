@@ -87,14 +87,27 @@ class World:
 
     def live(self, alive: BoolArray) -> None:
         """These robots (rows,) are alive from now on; the others brake, and resist whatever pushes them."""
-        self.states.forget(alive & ~self.alive)  # a robot that is revived starts afresh
+        revived = alive & ~self.alive  # they start afresh
+        self.states.forget(revived)
+        self.batteries.renew(revived)
         self.alive = alive.copy()
         self.actuators.stop(~alive)
         self._brake()
 
+    def fail(self, failed: Mapping[str, BoolArray]) -> None:
+        """From now on these parts of robots (rows,) do not work, by name: motors, wheels, senses; all others do."""
+        self.actuators.failed.fail(failed)
+        self._brake()
+        shape = self.static.arenas, self.static.robots
+        for group in self.static.groups:
+            for name, sensor in self.sensors[group.name].items():
+                mask = failed[name].reshape(shape)[:, group.start : group.stop] if name in failed else None
+                sensor.failed = mask if mask is not None and mask.any() else None
+
     def _brake(self) -> None:
-        """The motors of robots that are dead, or without charge, do not drive: they only resist."""
-        self._physics.braked = ~self.alive.reshape(self.static.arenas, self.static.robots) | self.batteries.empty
+        """The motors of robots that are dead, or whose motors failed, do not drive: they only resist."""
+        dead = ~self.alive.reshape(self.static.arenas, self.static.robots)
+        self._physics.braked = dead | self.actuators.failed.motors
 
     def sense(self, tick: int) -> Senses:
         """What the robots alive that act in a tick sense, by group: rows rising, and the fields that are needed."""
@@ -125,8 +138,8 @@ class World:
         self.states.take(actions.notes, self.alive)
         if self._own.any:
             self._own.act(actions.own, self.alive)
-        if self.batteries.any and self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target):
-            self._brake()
+        if self.batteries.any:
+            self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target)
         onsets = self._physics.tick(self.actuators.target)
         self._show()
         return onsets

@@ -8,7 +8,7 @@ from swarmwire.comms.sheets.sheet import Sheet
 
 @dataclass(frozen=True)
 class Battery(Sheet):
-    """What the robot runs on; when it is empty, the motors stop. Sense: charge (n,), 0 to 1, and voltage_v (n,).
+    """What the robot runs on; when it is empty, the robot is dead. Sense: charge (n,), 0 to 1, and voltage_v (n,).
 
     It gives `idle_w`, `drive_w_per_mps` times the mean speed at which the wheels are told to run (of a body without
     wheels, the speed in the plane), and `led_w` for each LED that is lit. The voltage falls evenly with the charge.

@@ -1,4 +1,4 @@
-"""Batteries: what robots draw from them in a tick, and that motors stop when they are empty. Compiled."""
+"""Batteries: what robots draw from them in a tick. Compiled."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -22,7 +22,6 @@ class Batteries:
 
     Attributes:
         charge: (arenas, robots) 1 full, 0 empty; always 1 for a body without a battery. Changed in place, and may be.
-        empty: (arenas, robots) those without charge when the last tick was drained.
     """
 
     def __init__(self, groups: Sequence[Group], arenas: int, tick_s: float) -> None:
@@ -36,33 +35,32 @@ class Batteries:
         self._draw = np.repeat(np.array(draw) * share[:, None], sizes, axis=0)  # (robots, 3) in a tick
         limits = limits_of(groups)
         self._half_base_m, self._holonomic = limits.half_base_m, limits.kind == HOLONOMIC
-        self.empty: BoolArray = self.charge <= 0.0
 
-    def drain(self, alive: BoolArray, leds: IntArray, target: FloatArray) -> bool:
-        """Draw what a tick takes; robots that are empty are told to stop.
+    @property
+    def empty(self) -> BoolArray:
+        """Robots without charge, (rows,)."""
+        return self.charge.ravel() <= 0.0
+
+    def renew(self, rows: BoolArray) -> None:
+        """Those of these robots (rows,) that are empty get a full battery."""
+        self.charge[(rows & self.empty).reshape(self.charge.shape)] = 1.0
+
+    def drain(self, alive: BoolArray, leds: IntArray, target: FloatArray) -> None:
+        """Draw what a tick takes.
 
         Args:
             alive: (rows,) the others are switched off, and draw nothing.
             leds: (arenas, robots, LEDs) 0 dark.
-            target: (arenas, robots, 3) what engines are given; changed.
-
-        Returns:
-            Whether `empty` is another than in the tick before.
+            target: (arenas, robots, 3) what engines are given.
         """
-        wheels = self._half_base_m, self._holonomic
-        return _drain(self.charge, self.empty, self._draw, *wheels, alive, leds, target)
+        _drain(self.charge, self._draw, self._half_base_m, self._holonomic, alive, leds, target)
 
 
 @njit(cache=True)
-def _drain(charge, empty, draw, half_base_m, holonomic, alive, leds, target):
-    robots, changed = charge.shape[1], False
+def _drain(charge, draw, half_base_m, holonomic, alive, leds, target):
+    robots = charge.shape[1]
     for arena in range(charge.shape[0]):
         for i in range(robots):
-            is_empty = charge[arena, i] <= 0.0
-            changed |= is_empty != empty[arena, i]
-            empty[arena, i] = is_empty
-            if is_empty:
-                target[arena, i] = 0.0
             if not alive[arena * robots + i]:
                 continue
             forward, turn, left = target[arena, i]
@@ -76,4 +74,3 @@ def _drain(charge, empty, draw, half_base_m, holonomic, alive, leds, target):
                 lit += led != 0
             used = draw[i, 0] + draw[i, 1] * speed + draw[i, 2] * lit
             charge[arena, i] = max(charge[arena, i] - used, 0.0)
-    return changed
