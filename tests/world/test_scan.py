@@ -38,7 +38,7 @@ def test_ranges_are_counted_from_the_scanner() -> None:
     plain = scanned(poses, sheet, boundary="open")
     assert plain == pytest.approx(np.array([[0.5 - FOOTBOT.radius_m, np.inf], [np.inf, 0.5 - FOOTBOT.radius_m]]))
     forward = scanned(poses, replace(sheet, at_m=0.05), boundary="open")
-    assert forward == pytest.approx(plain + [[-0.05, 0.0], [0.0, 0.05]])
+    assert forward == pytest.approx(plain + np.array([[-0.05, 0.0], [0.0, 0.05]]))
 
 
 def test_what_is_too_near_reads_the_least_range_and_nothing_reads_inf() -> None:
