@@ -35,4 +35,5 @@ def test_robots_of_different_arenas_have_no_gap():
 def test_it_is_that_of_all_pairs_also_of_different_bodies(robots):
     x, y, radius = np.array(robots).T
     pairs = [np.hypot(x[i] - x[j], y[i] - y[j]) - radius[i] - radius[j] for i in range(len(robots)) for j in range(i)]
-    assert smallest_gap_m(np.stack([x, y], 1), radius) == pytest.approx(min(pairs), abs=1e-12)
+    pose, alive, order = np.stack([x, y, 0 * x], 1), np.ones(len(x), np.bool_), np.arange(len(x))[None]
+    assert smallest_gap_m(pose, radius, alive, order) == [pytest.approx(min(pairs), abs=1e-12)]

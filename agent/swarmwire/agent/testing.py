@@ -20,9 +20,11 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import GroupAssignment, params_of
 from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.leds import BRIGHTEST
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
+from swarmwire.comms.sheets import Camera, GroundColour, OwnSheet
 
 RATE_HZ = 10
 GIVEN = ("range_m", "bearing_rad", "rssi_dbm")
@@ -38,7 +40,7 @@ class Trial:
     robots: int = 7
     ticks: int = 12
     seed: int = 1
-    body: str = "epuck"
+    body: str | Body = "epuck"  # one that comes with swarmwire, or any other
     params: dict[str, Any] | None = None  # a list has a value for each robot
 
 
@@ -66,11 +68,15 @@ def assert_rows_independent(vector: type[VectorAgent[Any]], trial: Trial | None 
         show(at_once.sent)
 
 
+def _body(trial: Trial) -> Body:
+    return load_body(trial.body) if isinstance(trial.body, str) else trial.body
+
+
 def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> Hosted:
     keys = np.array([draws.derive_key("trial", trial.seed, int(row)) for row in rows], np.uint64)
     names = tuple(f"robot-{row}" for row in rows)
     params = params_of(trial.params or {}, rows)
-    group = GroupAssignment("trial", "", params, load_body(trial.body), rows, names, keys)
+    group = GroupAssignment("trial", "", params, _body(trial), rows, names, keys)
     return hosted(group, kind)
 
 
@@ -117,7 +123,7 @@ class _Given(NamedTuple):
 def _inputs(trial: Trial) -> Iterator[tuple[_Given, Callable[[Sent], None]]]:
     """What the robots are given, tick by tick, and whom to show what they sent."""
     key = draws.derive_key("inputs", trial.seed)
-    body, ether = load_body(trial.body), _Ether(key)
+    body, ether = _body(trial), _Ether(key)
     for tick in range(trial.ticks):
         rows = np.flatnonzero(_uniform(key, tick, "drop-out", (trial.robots,)) >= DROP_OUT)
         time_ns = tick_start_ns(tick, RATE_HZ)
@@ -143,11 +149,40 @@ def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatA
     if "positioning" in body.senses:
         for axis in ("x_m", "y_m"):
             fields[f"positioning.{axis}"] = _uniform(key, tick, axis, (n,)) * 4.0 - 2.0
+    if "imu" in body.senses:
+        for name in ("forward_mps2", "left_mps2", "turn_radps"):
+            fields[f"imu.{name}"] = _uniform(key, tick, name, (n,)) * 2.0 - 1.0
+    if "battery" in body.senses:
+        charge = _uniform(key, tick, "battery", (n,))
+        fields["battery.charge"], fields["battery.voltage_v"] = charge, 3.4 + 0.8 * charge
+    for name, sheet in body.senses.items():
+        if isinstance(sheet, OwnSheet):
+            for field, width in sheet.fields.items():
+                fields[f"{name}.{field}"] = _uniform(key, tick, f"{name}.{field}", (n, width) if width else (n,))
+    fields.update(_seen(body, key, tick, n))
+    return fields
+
+
+def _seen(body: Body, key: int, tick: int, n: int) -> dict[str, FloatArray]:
+    """What senses show that look around or down."""
+    fields = dict[str, FloatArray]()
     if body.infrared is not None:
         value = _uniform(key, tick, "infrared", (n, len(body.infrared.angles_deg)))
         fields["infrared.value"] = np.maximum(value * 2.0 - 1.0, 0.0)
     if body.scan is not None:
-        fields["scan.range_m"] = _uniform(key, tick, "scan", (n, body.scan.rays)) * body.scan.range_m
+        share = _uniform(key, tick, "scan", (n, body.scan.rays))
+        fields["scan.range_m"] = np.where(share < 0.8, share * body.scan.range_m, np.inf)
+    ground, camera = body.senses.get("ground"), body.senses.get("camera")
+    if isinstance(ground, GroundColour):
+        fields["ground.shade"] = _uniform(key, tick, "ground", (n, len(ground.points_m)))
+    if isinstance(camera, Camera):
+        shape = n, camera.most_blobs
+        none = np.arange(camera.most_blobs) >= _uniform(key, tick, "blobs", (n, 1)) * camera.most_blobs
+        nearest_first = np.sort(_uniform(key, tick, "distance", shape), axis=1)
+        bearing = (_uniform(key, tick, "bearing", shape) * 2.0 - 1.0) * np.pi
+        colour = np.floor(_uniform(key, tick, "colour", shape) * BRIGHTEST)
+        for name, column in (("distance_m", nearest_first), ("bearing_rad", bearing), ("colour", colour)):
+            fields[f"camera.{name}"] = np.where(none, np.nan, column)
     return fields
 
 

@@ -27,6 +27,12 @@ class Obstacle:
     size_m: tuple[float, float] = (0.0, 0.0)
     points_m: tuple[tuple[float, float], ...] = ()  # convex, counter-clockwise, around (x_m, y_m) at heading 0
     height_m: float = inf  # from the floor to its top; inf: taller than anything
+    mass_kg: float | None = None  # of one that robots can push; None: it is fixed
+
+    @property
+    def movable(self) -> bool:
+        """Whether robots can push it."""
+        return self.mass_kg is not None
 
     @property
     def corners_m(self) -> FloatArray:

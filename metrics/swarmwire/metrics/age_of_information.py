@@ -1,8 +1,11 @@
 """Age of information: how old the newest is that robots know of one another."""
 
+# pyright: basic, reportUnknownMemberType=false
+
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
@@ -13,6 +16,7 @@ from swarmwire.metrics.moment import Moment
 
 MOST_PAIRS = 2**18  # of an arena: 2 MB
 NEVER = -1
+HEARD = int(Fate.HEARD)
 
 
 @dataclass(frozen=True)
@@ -40,9 +44,9 @@ class AgeOfInformation(Metric):
         """A fresh measure, which keeps when the newest packet of each pair was sent."""
         newest = Newest(static)
 
-        def measure(moment: Moment) -> FloatArray:
+        def measure(moment: Moment) -> FloatArray | float:
             if moment.truth.finished is None:
-                return np.full(static.arenas, np.nan)
+                return np.nan
             newest.see(moment.truth.finished, moment.alive)
             return newest.mean_age_s(moment.truth.time_ns)
 
@@ -55,27 +59,21 @@ class Newest:
     def __init__(self, static: Static) -> None:
         arenas, robots = static.arenas, static.robots
         self._every = -(-robots * robots // MOST_PAIRS)  # robots from one receiver to the next
-        self._receivers, self._robots = -(-robots // self._every), robots
-        self._counts: BoolArray = np.arange(robots) % self._every == 0  # as a receiver
-        self._sent_at_ns: IntArray = np.full((arenas, self._receivers, robots), NEVER, np.int64)
+        receivers = -(-robots // self._every)
+        self._sent_at_ns: IntArray = np.full((arenas, receivers, robots), NEVER, np.int64)
         self._alive: BoolArray = np.ones((arenas, robots), np.bool_)
         self._pairs: IntArray = np.zeros(arenas, np.int64)
         self._total_ns = [0] * arenas  # Python's whole numbers: a day of a million pairs is beyond 64 bits
 
     def see(self, ended: Finished, alive: BoolArray) -> None:
         """Take in what was heard; `alive` (arenas, robots) are the robots that count from now on."""
+        gained_ns = np.zeros(len(self._pairs), np.int64)
+        links = ended.fate, ended.arena, ended.receiver, ended.sender, ended.sent_at_ns
+        _take(*links, self._every, alive, self._sent_at_ns, self._pairs, gained_ns)
         if not np.array_equal(alive, self._alive):
             self._alive = alive.copy()
-            self._take(ended)
             self._count_again()
             return
-        rows, before_ns, after_ns = self._take(ended)
-        arena = ended.arena[rows]
-        counts = alive[arena, ended.receiver[rows]] & alive[arena, ended.sender[rows]]
-        first = before_ns == NEVER
-        gained_ns = np.zeros(len(self._pairs), np.int64)
-        np.add.at(gained_ns, arena, np.where(counts, after_ns - np.where(first, 0, before_ns), 0))
-        self._pairs += np.bincount(arena[counts & first], minlength=len(self._pairs))
         self._total_ns = [total + gain for total, gain in zip(self._total_ns, gained_ns.tolist(), strict=True)]
 
     def mean_age_s(self, now_ns: int) -> FloatArray:
@@ -86,25 +84,25 @@ class Newest:
         ]
         return np.array(ages_s, np.float64)
 
-    def _take(self, ended: Finished) -> tuple[IntArray, IntArray, IntArray]:
-        """Put in what was heard: a row of `ended` for each pair that did, its time before and its time now."""
-        rows = np.flatnonzero((ended.fate == Fate.HEARD) & self._counts[ended.receiver])
-        place = ended.arena[rows] * self._receivers + ended.receiver[rows] // self._every
-        place = place * self._robots + ended.sender[rows]
-        table, sent_at_ns = self._sent_at_ns.reshape(-1), ended.sent_at_ns[rows]
-        before_ns = table[place]
-        np.maximum.at(table, place, sent_at_ns)
-        after_ns = table[place]
-        # A pair that heard several packets counts once: the row whose number stays when all are written to its place.
-        number = np.arange(len(place))
-        table[place] = number
-        counted = table[place] == number
-        table[place] = after_ns
-        return rows[counted], before_ns[counted], after_ns[counted]
-
     def _count_again(self) -> None:
         counts = self._sent_at_ns != NEVER
         counts &= self._alive[:, :: self._every, None] & self._alive[:, None, :]
         self._pairs = np.count_nonzero(counts, axis=(1, 2))
         by_receiver_ns = np.sum(self._sent_at_ns, axis=2, where=counts)
         self._total_ns = [sum(own) for own in by_receiver_ns.tolist()]
+
+
+@njit(cache=True)
+def _take(fate, arena, receiver, sender, sent_at_ns, every, alive, newest_ns, pairs, gained_ns):
+    """Put in what was heard; add to the pairs alive that ever heard, (arenas,), and to the sum of their times."""
+    for i in range(len(fate)):
+        a, r, s = arena[i], receiver[i], sender[i]
+        if fate[i] != HEARD or r % every:
+            continue
+        before_ns = newest_ns[a, r // every, s]
+        if sent_at_ns[i] <= before_ns:
+            continue
+        newest_ns[a, r // every, s] = sent_at_ns[i]
+        if alive[a, r] and alive[a, s]:
+            pairs[a] += before_ns == NEVER
+            gained_ns[a] += sent_at_ns[i] - (0 if before_ns == NEVER else before_ns)

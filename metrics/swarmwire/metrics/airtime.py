@@ -1,8 +1,11 @@
 """Airtime: how much of the time radios are sending."""
 
+# pyright: basic, reportUnknownMemberType=false
+
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
@@ -29,15 +32,28 @@ class Airtime(Metric):
         owed_ns: IntArray = np.zeros((static.arenas, static.robots), np.int64)
         tick_ns = NS_PER_S // static.rate_hz
 
-        def measure(moment: Moment) -> FloatArray:
-            departed = moment.truth.departed
-            if departed is None:
-                return np.full(static.arenas, np.nan)
-            lasted_ns = departed.off_air_at_ns - departed.on_air_at_ns
-            np.add.at(owed_ns.reshape(-1), departed.arena * static.robots + departed.sender, lasted_ns)
-            counted_ns = np.minimum(owed_ns, tick_ns)
-            owed_ns[:] -= counted_ns
-            alive = np.where(moment.robots_alive > 0, moment.robots_alive, np.nan)
-            return np.sum(counted_ns, axis=1, where=moment.alive) / (tick_ns * alive)
+        def measure(moment: Moment) -> FloatArray | float:
+            gone = moment.truth.departed
+            if gone is None:
+                return np.nan
+            counted_ns = _counted_ns(
+                gone.arena, gone.sender, gone.on_air_at_ns, gone.off_air_at_ns, tick_ns, moment.alive, owed_ns
+            )
+            return counted_ns / (tick_ns * moment.per_robot_alive)
 
         return measure
+
+
+@njit(cache=True)
+def _counted_ns(arena, sender, on_air_at_ns, off_air_at_ns, tick_ns, alive, owed_ns):
+    """The airtime that counts in this tick, of robots alive, (arenas,); `owed_ns` is what every robot has left."""
+    for i in range(len(arena)):
+        owed_ns[arena[i], sender[i]] += off_air_at_ns[i] - on_air_at_ns[i]
+    total_ns = np.zeros(len(owed_ns), np.int64)
+    for a in range(owed_ns.shape[0]):
+        for robot in range(owed_ns.shape[1]):
+            counted_ns = min(owed_ns[a, robot], tick_ns)
+            owed_ns[a, robot] -= counted_ns
+            if alive[a, robot]:
+                total_ns[a] += counted_ns
+    return total_ns

@@ -26,9 +26,6 @@ class ComponentCount(Metric):
         return _components
 
 
-def _components(moment: Moment) -> FloatArray:
-    arenas = moment.static.arenas
+def _components(moment: Moment) -> FloatArray | float:
     found = moment.components
-    if found is None:
-        return np.full(arenas, np.nan)
-    return np.bincount(found.arena, minlength=arenas).astype(np.float64)
+    return np.nan if found is None else found.pieces.astype(np.float64)

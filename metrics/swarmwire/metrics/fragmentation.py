@@ -9,11 +9,14 @@ A swarm that starts in pieces has not fallen apart: it is no event until it was 
 nothing changes, and without a radio there are no events at all.
 """
 
-from dataclasses import dataclass, field
+# pyright: basic, reportUnknownMemberType=false
+
+from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.parameters import parameter
 from swarmwire.comms.truth import Static
@@ -30,42 +33,57 @@ class OfFragmentation(Metric):
     hold_s: float = parameter(1.0, help="a shorter split is no event", unit="s", at_least=0.0)
 
 
-@dataclass
 class Fragmentation:
-    """The events of each arena so far. `see` must be called once per tick."""
+    """The events of each arena so far. `see` must be called once per tick.
 
-    static: Static
-    hold_s: float
-    rejoined_s: list[list[float]] = field(init=False)  # by arena: length of each event that is over, in order
-    started: IntArray = field(init=False)  # (arenas,) events counted so far
+    Attributes:
+        started: (arenas,) events counted so far.
+        rejoined: (arenas,) of these, that are over.
+        rejoined_s: by arena, how long each event lasted that is over, in order.
+        rejoined_now: the arenas of which an event was over in the last tick.
+    """
 
-    def __post_init__(self) -> None:
-        arenas = self.static.arenas
-        self.rejoined_s = [[] for _ in range(arenas)]
-        self.started = np.zeros(arenas, np.int64)
+    def __init__(self, static: Static, hold_s: float) -> None:
+        arenas = static.arenas
+        self._hold_ns = to_ns(hold_s)
+        self.started: IntArray = np.zeros(arenas, np.int64)
+        self.rejoined: IntArray = np.zeros(arenas, np.int64)
+        self.rejoined_s: list[list[float]] = [[] for _ in range(arenas)]
+        self.rejoined_now: list[int] = []
         self._was_whole: BoolArray = np.zeros(arenas, np.bool_)
         self._since_ns: IntArray = np.full(arenas, NEVER, np.int64)  # start of the present split
         self._event: BoolArray = np.zeros(arenas, np.bool_)  # it was counted
 
-    def see(self, moment: Moment) -> BoolArray:
-        """In which arenas an event is counted in this tick, (arenas,)."""
-        found, now_ns = moment.components, moment.truth.time_ns
+    def see(self, moment: Moment) -> IntArray:
+        """How many events, 0 or 1, are counted in this tick, (arenas,)."""
+        counted, found = np.zeros_like(self.started), moment.components
+        self.rejoined_now = []
         if found is None:
-            return np.zeros_like(self._event)
-        pieces = np.bincount(found.arena, minlength=self.static.arenas)
-        for arena in np.flatnonzero(self._event & (pieces == 1)).tolist():
-            self.rejoined_s[arena].append((now_ns - int(self._since_ns[arena])) / NS_PER_S)
-        self._was_whole |= pieces == 1
-        self._event &= pieces != 1
-        self._since_ns[pieces == 1] = NEVER
-        self._since_ns[(pieces > 1) & self._was_whole & (self._since_ns == NEVER)] = now_ns
-        held = (self._since_ns != NEVER) & (now_ns - self._since_ns >= to_ns(self.hold_s))
-        counted = held & ~self._event & (pieces > 1)
-        self._event |= counted
+            return counted
+        lasted_ns = np.full_like(self.started, NEVER)
+        state = self._was_whole, self._since_ns, self._event
+        if _follow(found.pieces, moment.truth.time_ns, self._hold_ns, *state, counted, lasted_ns):
+            self.rejoined_now = np.flatnonzero(lasted_ns != NEVER).tolist()
+            self.rejoined[self.rejoined_now] += 1
+            for arena in self.rejoined_now:
+                self.rejoined_s[arena].append(int(lasted_ns[arena]) / NS_PER_S)
         self.started += counted
         return counted
 
-    def of_rejoined(self, statistic: str) -> FloatArray:
-        """The median or max of the lengths in s of each arena's events that are over, NaN before the first."""
-        pick = {"median": np.median, "max": np.max}[statistic]
-        return np.array([pick(lengths) if lengths else np.nan for lengths in self.rejoined_s], np.float64)
+
+@njit(cache=True)
+def _follow(pieces, now_ns, hold_ns, was_whole, since_ns, event, counted, lasted_ns):
+    """The table above for each arena: sets `counted`, and `lasted_ns` where an event is over; whether any is."""
+    any_over = False
+    for arena in range(len(pieces)):
+        if pieces[arena] == 1:
+            if event[arena]:
+                lasted_ns[arena] = now_ns - since_ns[arena]
+                any_over = True
+            was_whole[arena], since_ns[arena], event[arena] = True, NEVER, False
+        elif pieces[arena] > 1 and was_whole[arena]:
+            if since_ns[arena] == NEVER:
+                since_ns[arena] = now_ns
+            if not event[arena] and now_ns - since_ns[arena] >= hold_ns:
+                event[arena], counted[arena] = True, 1
+    return any_over

@@ -27,8 +27,8 @@ class Fragmentations(OfFragmentation):
         """A fresh measure."""
         events = Fragmentation(static, self.hold_s)
 
-        def measure(moment: Moment) -> FloatArray:
+        def measure(moment: Moment) -> FloatArray | float:
             counted = events.see(moment)
-            return np.where(counted, 1.0, 0.0) if moment.components is not None else np.full(static.arenas, np.nan)
+            return np.nan if moment.components is None else counted.astype(np.float64)
 
         return measure

@@ -26,10 +26,6 @@ class LargestComponent(Metric):
         return _largest_component
 
 
-def _largest_component(moment: Moment) -> FloatArray:
+def _largest_component(moment: Moment) -> FloatArray | float:
     found = moment.components
-    if found is None:
-        return np.full(moment.static.arenas, np.nan)
-    largest = np.zeros(moment.static.arenas)
-    np.maximum.at(largest, found.arena, found.size)
-    return largest / np.where(moment.robots_alive > 0, moment.robots_alive, np.nan)
+    return np.nan if found is None else found.largest / moment.per_robot_alive

@@ -9,9 +9,14 @@ from swarmwire.comms.truth import Static
 from swarmwire.metrics.moment import Moment
 
 
-def light_distance(static: Static) -> Callable[[Moment], FloatArray]:
-    """To each robot's distance in m from its centre to the nearest light, (arenas, robots); inf where there is none."""
+def light_distance(static: Static) -> Callable[[Moment], FloatArray] | None:
+    """To each robot's distance in m from its centre to the nearest light, (arenas, robots); inf where there is none.
+
+    None if no arena has a light.
+    """
     lights = static.lights or ((),) * static.arenas
+    if not any(lights):
+        return None
     at_m: FloatArray = np.full((static.arenas, max(map(len, lights), default=0), 2), np.inf)
     for arena, own in enumerate(lights):
         at_m[arena, : len(own)] = np.array([(light.x_m, light.y_m) for light in own]).reshape(-1, 2)

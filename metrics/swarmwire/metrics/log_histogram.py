@@ -1,8 +1,11 @@
 """Percentiles in constant memory: a histogram whose bins grow with the value, so that the error is relative."""
 
+# pyright: basic, reportUnknownMemberType=false
+
 import math
 
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 
@@ -31,9 +34,7 @@ class LogHistogram:
 
     def add(self, arena: IntArray, duration_ns: IntArray) -> None:
         """Count these durations, (k,), each in its arena, (k,)."""
-        within = np.clip(duration_ns, 1, LARGEST_NS)
-        bins: IntArray = np.ceil(np.log(within) / _LOG_GROWTH).astype(np.int64) + 1
-        np.add.at(self._count, (arena, np.where(duration_ns > 0, bins, 0)), 1)
+        _count(self._count, arena, duration_ns)
 
     def percentiles_ns(self, arena: int, percents: tuple[float, ...]) -> FloatArray:
         """The percentiles in ns, one for each of `percents` (0 to 100); NaN of nothing."""
@@ -44,3 +45,14 @@ class LogHistogram:
         rank: FloatArray = np.maximum(np.ceil(share * running[-1]), 1.0)
         bins: IntArray = np.array([running.searchsorted(one) for one in rank], np.int64)
         return np.where(bins > 0, 2.0 * np.power(_GROWTH, bins - 1.0) / (_GROWTH + 1.0), 0.0)
+
+
+@njit(cache=True)
+def _count(count, arena, duration_ns):
+    last_ns, place = 0, 0
+    for i in range(len(duration_ns)):
+        if duration_ns[i] != last_ns:  # a logarithm less for each receiver of a packet but the first
+            last_ns, place = duration_ns[i], 0
+            if last_ns > 0:
+                place = math.ceil(math.log(min(last_ns, LARGEST_NS)) / _LOG_GROWTH) + 1
+        count[arena[i], place] += 1

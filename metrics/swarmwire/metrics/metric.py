@@ -9,7 +9,7 @@ from swarmwire.comms.truth import Static
 from swarmwire.metrics.moment import Moment
 
 Kind = Literal["level", "count"]
-Measure = Callable[[Moment], FloatArray]  # to (arenas,); NaN where there is nothing to measure
+Measure = Callable[[Moment], FloatArray | float]  # to (arenas,), or one number for all; NaN: nothing to measure
 
 
 class Metric(ABC):

@@ -1,9 +1,12 @@
 """Metrics, computed online: one number per metric and arena in each tick, their statistics over ticks at the end."""
 
+# pyright: basic, reportUnknownMemberType=false
+
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static, Tally, Truth
@@ -44,12 +47,8 @@ class Metrics:
         value = np.empty_like(self._sum)
         for row, measure in enumerate(self._measures):
             value[row] = measure(moment)
-        known = ~np.isnan(value)
-        self._seen += known
-        self._sum += np.where(known, value, 0.0)
-        self._min = np.fmin(self._min, value)
-        self._max = np.fmax(self._max, value)
-        self._latest = np.where(self._counts[:, None] & (self._seen > 0), self._sum, value)
+        _add(value, self._counts, self._seen, self._sum, self._min, self._max)
+        self._latest = value
 
     @property
     def latest(self) -> dict[str, FloatArray]:
@@ -69,3 +68,18 @@ class Metrics:
                 for arena in range(self._static.arenas)
             ]
         }
+
+
+@njit(cache=True)
+def _add(value, counts, seen, total, least, most):
+    """Add the values of a tick, (metrics, arenas), to the statistics; those of counts become their totals so far."""
+    for m in range(value.shape[0]):
+        for arena in range(value.shape[1]):
+            one = value[m, arena]
+            if not np.isnan(one):
+                seen[m, arena] += 1
+                total[m, arena] += one
+                least[m, arena] = one if seen[m, arena] == 1 else min(least[m, arena], one)
+                most[m, arena] = one if seen[m, arena] == 1 else max(most[m, arena], one)
+            if counts[m] and seen[m, arena]:
+                value[m, arena] = total[m, arena]

@@ -1,12 +1,12 @@
 """One tick as metrics see it: the truth, and what several metrics share, worked out once."""
 
+# pyright: basic, reportUnknownMemberType=false
+
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, cast
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components  # pyright: ignore[reportUnknownVariableType] - it brings no types
+from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static, Truth
@@ -14,18 +14,18 @@ from swarmwire.comms.truth import Static, Truth
 
 @dataclass(frozen=True)
 class Components:
-    """The connected components of the radio graph that hold a robot alive, c of them over all arenas."""
+    """The components of the radio graph that hold a robot alive; none spans two arenas, since no edge does."""
 
-    arena: IntArray  # (c,) a component never spans two arenas, since no edge does
-    size: IntArray  # (c,) robots alive
+    pieces: IntArray  # (arenas,) how many
+    largest: IntArray  # (arenas,) robots alive in the one that holds most; 0 without a component
 
 
-@dataclass(frozen=True)
 class Moment:
     """The truth of one tick with its rows folded to (arenas, robots)."""
 
-    static: Static
-    truth: Truth
+    def __init__(self, static: Static, truth: Truth) -> None:
+        self.static, self.truth = static, truth
+        self._shape = static.arenas, static.robots
 
     @cached_property
     def alive(self) -> BoolArray:
@@ -35,7 +35,16 @@ class Moment:
     @cached_property
     def robots_alive(self) -> IntArray:
         """How many robots of each arena are alive, (arenas,)."""
-        return np.count_nonzero(self.alive, axis=1)
+        return np.add.reduce(self.alive, 1, np.int64)
+
+    @cached_property
+    def per_robot_alive(self) -> FloatArray:
+        """What to divide a sum over robots by for their mean, (arenas,); NaN if none is alive."""
+        return np.where(self.robots_alive > 0, self.robots_alive, np.nan)
+
+    def sum_alive(self, values: FloatArray) -> FloatArray:
+        """The sum of `values` (arenas, robots) over the robots alive of each arena, (arenas,)."""
+        return np.add.reduce(values, 1, where=self._counted)
 
     @cached_property
     def heading_rad(self) -> FloatArray:
@@ -56,17 +65,36 @@ class Moment:
     def components(self) -> Components | None:
         """The radio graph's components; None without a radio. One pass over all arenas, O(rows + edges)."""
         edges = self.truth.edges
-        if edges is None:
-            return None
-        rows = self.truth.alive.size
-        graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(rows, rows))
-        count, label = cast(tuple[int, IntArray], cast(Any, connected_components)(graph, directed=False))
-        size = np.bincount(label[self.truth.alive], minlength=count)
-        arena = np.zeros(count, np.int64)
-        arena[label] = np.arange(rows) // self.static.robots
-        held = size > 0  # a dead robot is a component of its own, of nobody
-        return Components(arena[held], size[held])
+        return None if edges is None else Components(*_components(edges, self.alive))
 
-    @property
-    def _shape(self) -> tuple[int, int]:
-        return self.static.arenas, self.static.robots
+    @cached_property
+    def _counted(self) -> BoolArray | bool:
+        """A mask costs numpy as much as the sum: as most often all are alive, none is needed."""
+        return self.alive if np.minimum.reduce(self.truth.alive) == 0 else True
+
+
+@njit(cache=True)
+def _components(edges, alive):
+    """Union-find: how many components each arena has that hold a robot alive, and the most of them that one holds."""
+    arenas, robots = alive.shape
+    parent, size = np.arange(arenas * robots), np.zeros(arenas * robots, np.int64)
+    for e in range(len(edges)):
+        a, b = _root(parent, edges[e, 0]), _root(parent, edges[e, 1])
+        parent[max(a, b)] = min(a, b)
+    pieces, largest = np.zeros(arenas, np.int64), np.zeros(arenas, np.int64)
+    for arena in range(arenas):
+        for i in range(robots):
+            if alive[arena, i]:
+                root = _root(parent, arena * robots + i)
+                pieces[arena] += size[root] == 0
+                size[root] += 1
+                largest[arena] = max(largest[arena], size[root])
+    return pieces, largest
+
+
+@njit(cache=True)
+def _root(parent, row):
+    while parent[row] != row:
+        parent[row] = parent[parent[row]]  # halves the way for those to come
+        row = parent[row]
+    return row

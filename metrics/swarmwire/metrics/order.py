@@ -32,9 +32,6 @@ class Order(Metric):
 
 
 def _order(moment: Moment) -> FloatArray:
-    alive, heading_rad = moment.alive, moment.heading_rad
-    x = np.sum(np.cos(heading_rad), axis=1, where=alive)
-    y = np.sum(np.sin(heading_rad), axis=1, where=alive)
-    n = moment.robots_alive
+    x, y = moment.sum_alive(np.cos(moment.heading_rad)), moment.sum_alive(np.sin(moment.heading_rad))
     # Rounding may carry the sum of n equal unit vectors just past n.
-    return np.minimum(np.hypot(x, y) / np.where(n > 0, n, np.nan), 1.0)
+    return np.minimum(np.hypot(x, y) / moment.per_robot_alive, 1.0)

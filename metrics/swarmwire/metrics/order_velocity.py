@@ -30,9 +30,9 @@ class OrderVelocity(Metric):
 
 
 def _order_velocity(moment: Moment) -> FloatArray:
-    alive, vx, vy = moment.alive, moment.velocity_mps[:, :, 0], moment.velocity_mps[:, :, 1]
-    together = np.hypot(np.sum(vx, axis=1, where=alive), np.sum(vy, axis=1, where=alive))
-    speeds = np.sum(np.hypot(vx, vy), axis=1, where=alive)
+    vx, vy = moment.velocity_mps[:, :, 0], moment.velocity_mps[:, :, 1]
+    together = np.hypot(moment.sum_alive(vx), moment.sum_alive(vy))
+    speeds = moment.sum_alive(np.hypot(vx, vy))
     # Rounding may carry the sum of equal velocities just past that of their speeds.
     order = np.minimum(together / np.where(speeds > 0.0, speeds, 1.0), 1.0)
     return np.where(moment.robots_alive > 0, order, np.nan)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.clock import NS_PER_S, tick_start_ns
+from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.fates import FATE_NAMES, Fate
 from swarmwire.comms.truth import Finished, Static, Tally, Truth
 from swarmwire.metrics.log_histogram import LogHistogram
@@ -55,14 +55,11 @@ class RadioTally:
         self._fates += tally.fates
 
     def _time(self, finished: Finished, tick: int) -> None:
-        heard = finished.fate == Fate.HEARD
+        heard = np.flatnonzero(finished.fate == Fate.HEARD)
         arena, sent_at_ns = finished.arena[heard], finished.sent_at_ns[heard]
         self._air.add(arena, finished.final_at_ns[heard] - sent_at_ns)
-        every = self._act_every_ticks[finished.receiver[heard]]
-        for period in np.unique(every).tolist():  # a few at most: groups share theirs
-            of = every == period
-            acts_at_ns = tick_start_ns(-(-tick // period) * period, self._rate_hz)
-            self._agent.add(arena[of], acts_at_ns - sent_at_ns[of])
+        acts_at_ns = -(-tick // self._act_every_ticks) * self._act_every_ticks * NS_PER_S // self._rate_hz
+        self._agent.add(arena, acts_at_ns[finished.receiver[heard]] - sent_at_ns)
 
     def _arena(self, arena: int) -> dict[str, Any]:
         fates = [int(count) for count in self._fates[arena]]

@@ -1,7 +1,9 @@
 """How long a swarm that fell apart takes to be whole again: usually, and at worst."""
 
+from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+
+import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
@@ -19,15 +21,21 @@ class _Rejoin(OfFragmentation):
 
     unit = "s"
     bounds = (0.0, None)
-    statistic: ClassVar[str]
+
+    @abstractmethod
+    def statistic(self, lengths_s: list[float]) -> float:
+        """The statistic of the lengths of the events that are over: at least one."""
 
     def begin(self, static: Static) -> Measure:
         """A fresh measure."""
         events = Fragmentation(static, self.hold_s)
+        found_s: FloatArray = np.full(static.arenas, np.nan)
 
         def measure(moment: Moment) -> FloatArray:
             events.see(moment)
-            return events.of_rejoined(self.statistic)
+            for arena in events.rejoined_now:
+                found_s[arena] = self.statistic(events.rejoined_s[arena])
+            return found_s
 
         return measure
 
@@ -38,7 +46,10 @@ class RejoinMedian(_Rejoin):
 
     name = "rejoin_median"
     help = "median time to re-join over the fragmentations re-joined so far, in s"
-    statistic = "median"
+
+    def statistic(self, lengths_s: list[float]) -> float:
+        """The middle one, or the mean of the two in the middle."""
+        return float(np.median(lengths_s))
 
 
 @dataclass(frozen=True)
@@ -47,4 +58,7 @@ class RejoinWorst(_Rejoin):
 
     name = "rejoin_worst"
     help = "longest time to re-join over the fragmentations re-joined so far, in s"
-    statistic = "max"
+
+    def statistic(self, lengths_s: list[float]) -> float:
+        """The longest."""
+        return max(lengths_s)

@@ -27,7 +27,9 @@ class TargetBest(Metric):
         """A fresh measure; nothing is remembered."""
         distance_m = light_distance(static)
 
-        def measure(moment: Moment) -> FloatArray:
+        def measure(moment: Moment) -> FloatArray | float:
+            if distance_m is None:
+                return np.nan
             best_m = np.min(distance_m(moment), axis=1, where=moment.alive, initial=np.inf)
             return np.where(np.isfinite(best_m), best_m, np.nan)
 

@@ -27,8 +27,10 @@ class TargetMean(Metric):
         """A fresh measure; nothing is remembered."""
         distance_m = light_distance(static)
 
-        def measure(moment: Moment) -> FloatArray:
-            n, sum_m = moment.robots_alive, np.sum(distance_m(moment), axis=1, where=moment.alive)
-            return np.where(np.isfinite(sum_m), sum_m, np.nan) / np.where(n > 0, n, np.nan)
+        def measure(moment: Moment) -> FloatArray | float:
+            if distance_m is None:
+                return np.nan
+            sum_m = moment.sum_alive(distance_m(moment))
+            return np.where(np.isfinite(sum_m), sum_m, np.nan) / moment.per_robot_alive
 
         return measure

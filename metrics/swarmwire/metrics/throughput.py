@@ -1,8 +1,11 @@
 """Throughput: how much of what was sent arrives."""
 
+# pyright: basic, reportUnknownMemberType=false
+
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.fates import Fate
@@ -11,6 +14,7 @@ from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
 
 BITS_PER_BYTE = 8
+HEARD = int(Fate.HEARD)
 
 
 @dataclass(frozen=True)
@@ -31,9 +35,17 @@ class Throughput(Metric):
         return _throughput_bps
 
 
-def _throughput_bps(moment: Moment) -> FloatArray:
+def _throughput_bps(moment: Moment) -> FloatArray | float:
     static, ended = moment.static, moment.truth.finished
     if ended is None:
-        return np.full(static.arenas, np.nan)
-    heard_bytes = np.bincount(ended.arena, np.where(ended.fate == Fate.HEARD, ended.size_bytes, 0), static.arenas)
-    return np.asarray(heard_bytes, np.float64) * (BITS_PER_BYTE * static.rate_hz)
+        return np.nan
+    return _heard_bytes(ended.fate, ended.arena, ended.size_bytes, static.arenas) * (BITS_PER_BYTE * static.rate_hz)
+
+
+@njit(cache=True)
+def _heard_bytes(fate, arena, size_bytes, arenas):
+    total = np.zeros(arenas)
+    for i in range(len(fate)):
+        if fate[i] == HEARD:
+            total[arena[i]] += size_bytes[i]
+    return total

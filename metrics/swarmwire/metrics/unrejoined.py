@@ -26,9 +26,10 @@ class Unrejoined(OfFragmentation):
         """A fresh measure."""
         events = Fragmentation(static, self.hold_s)
 
-        def measure(moment: Moment) -> FloatArray:
+        def measure(moment: Moment) -> FloatArray | float:
             events.see(moment)
-            over = np.array([len(lengths) for lengths in events.rejoined_s])
-            return (events.started - over) / np.where(events.started > 0, events.started, np.nan)
+            if moment.components is None:
+                return np.nan
+            return (events.started - events.rejoined) / np.where(events.started > 0, events.started, np.nan)
 
         return measure

@@ -9,6 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
+from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.notes import Notes
@@ -136,6 +137,36 @@ def refused(**changes: Any) -> None:
     frame = frames.decode(encode_actions(0, sound()))
     with pytest.raises(BadFrame) as caught:
         decode_actions(replace(frame, arrays={**frame.arrays, **changes}), ROWS)
+    assert caught.value.fault == "malformed"
+
+
+ACTUATED = Actuations(np.array([4, 4, 9]), np.array([0, 3, 1]), np.array([0.5, -2.0, 1e300]))
+
+
+def test_own_actuators_come_over_whole() -> None:
+    frame = frames.decode(encode_actions(0, replace(sound(), own=ACTUATED)))
+    got = decode_actions(frame, ROWS).own
+    assert all(same(getattr(got, name), getattr(ACTUATED, name)) for name in ("rows", "place", "value"))
+    assert not len(decode_actions(frames.decode(encode_actions(0, sound())), ROWS).own)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"own": np.array([[4, 4, 8], [0, 3, 1]])},  # another runner's robot
+        {"own": np.array([[4, 4, 9], [0, -1, 1]])},
+        {"own": np.array([[4, 9], [0, 1]])},
+        {"own": np.array([[4.0, 4.0, 9.0], [0.0, 3.0, 1.0]])},
+        {"own/value": np.array([0.5, np.nan, 1.0])},
+        {"own/value": np.array([0.5, np.inf, 1.0])},
+        {"own/value": np.array([1, 2, 3])},
+    ],
+    ids=repr,
+)
+def test_own_actuators_that_are_none_are_refused(wrong: Any) -> None:
+    frame = frames.decode(encode_actions(0, replace(sound(), own=ACTUATED)))
+    with pytest.raises(BadFrame) as caught:
+        decode_actions(replace(frame, arrays={**frame.arrays, **wrong}), ROWS)
     assert caught.value.fault == "malformed"
 
 

@@ -3,8 +3,11 @@
 import tomllib
 from pathlib import Path
 
+from swarmwire.comms.actuator_sheet import ActuatorSheet
 from swarmwire.comms.body import Body, body_from, load_body
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.sheets import OwnSheet
+from swarmwire.comms.truth import Static
 from swarmwire.world.own.fitting import fitted
 from swarmwire.world.scenario import Scenario
 
@@ -25,6 +28,14 @@ def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
 def sheet_path(body: str, where: str) -> Path | None:
     """Where the sheet lies that a scenario names as a `body`; None for one that comes with swarmwire."""
     return (Path(where).parent / body).resolve() if body.endswith(SUFFIX) else None
+
+
+def own_code(static: Static) -> tuple[str, ...]:
+    """The classes of the bodies' own senses and actuators: "package.module:Class" or "/path/file.py:Class"."""
+    sheets = [
+        sheet for group in static.groups for sheet in (*group.body.senses.values(), *group.body.actuators.values())
+    ]
+    return tuple(dict.fromkeys(sheet.kind for sheet in sheets if isinstance(sheet, OwnSheet | ActuatorSheet)))
 
 
 def _body(name: str, where: str, key: str) -> Body:

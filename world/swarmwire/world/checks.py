@@ -8,9 +8,12 @@ from swarmwire.comms.air.radio_checks import check_radio
 from swarmwire.comms.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
+from swarmwire.world.arena_tables import ObstacleTable
 from swarmwire.world.bodies import bodies_of
+from swarmwire.world.engines.choice import check_engines, engines_of
+from swarmwire.world.layout import read_layout
 from swarmwire.world.obstacles import extent, heading_of, obstacle_at
-from swarmwire.world.scenario import ObstacleTable, Scenario
+from swarmwire.world.scenario import Scenario
 
 MOST_OF_RADIUS = 0.25  # how far a robot at full speed may move in one physics step
 
@@ -18,9 +21,11 @@ MOST_OF_RADIUS = 0.25  # how far a robot at full speed may move in one physics s
 def check(scenario: Scenario, where: str) -> None:
     """Raise BadInput for the first contradiction in a scenario."""
     bodies = bodies_of(scenario, where)
+    check_engines(scenario, bodies, where)
     _check_steps(scenario, bodies, where)
+    size_m = read_layout(scenario.arena, where).size_m
     for i, obstacle in enumerate(scenario.arena.obstacles):
-        _check_obstacle(scenario, obstacle, f"arena.obstacles.{i}", where)
+        _check_obstacle(size_m, obstacle, f"arena.obstacles.{i}", where)
     _check_send_offset(scenario, where)
     if scenario.radio is not None:
         check_radio(scenario.radio, where)
@@ -30,17 +35,18 @@ def check(scenario: Scenario, where: str) -> None:
 
 
 def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> None:
-    for group, body in bodies.items():
+    for group, engine in engines_of(scenario, bodies).items():
+        body = bodies[group]
         tick_m = body.max_linear_mps / scenario.time.rate_hz
         needed = math.ceil(tick_m / (MOST_OF_RADIUS * body.radius_m) - 1e-9)
-        if scenario.physics.steps < needed:
+        if engine != "kinematic" and scenario.physics.steps < needed:
             text = f"so that a robot of {group} at full speed moves at most a quarter of its radius in one step"
             raise BadInput(where, "physics.steps", f"expected at least {needed}, {text}; got {scenario.physics.steps}")
 
 
-def _check_obstacle(scenario: Scenario, table: ObstacleTable, key: str, where: str) -> None:
+def _check_obstacle(extents_m: tuple[float, float], table: ObstacleTable, key: str, where: str) -> None:
     """A fixed obstacle lies within the arena; a random one would fit into it somewhere at heading 0."""
-    size_m = np.array(scenario.arena.size_m)
+    size_m = np.array(extents_m)
     least, greatest = extent(obstacle_at(table, *(table.at or (0.0, 0.0)), heading_of(table) or 0.0))
     fits = np.all(greatest - least <= size_m + 2e-9)
     if not fits or (table.at and (np.any(greatest > 0.5 * size_m + 1e-9) or np.any(least < -0.5 * size_m - 1e-9))):

@@ -1,4 +1,7 @@
-"""The world: every arena's bodies and senses, tick by tick. It does no I/O and knows neither agents nor the radio."""
+"""The world: every arena's bodies and senses, tick by tick. It knows neither agents nor the radio.
+
+It does no I/O but that it reads the pictures that a scenario names, when it is made.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -19,6 +22,8 @@ from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.actuation.own_actuators import OwnActuators
 from swarmwire.world.angles import wrapped
 from swarmwire.world.bodies import bodies_of
+from swarmwire.world.engines.choice import engines_of
+from swarmwire.world.layout import read_layout
 from swarmwire.world.own.fitting import made_sensor
 from swarmwire.world.own.sensor import AskedSensor
 from swarmwire.world.physics import Physics
@@ -44,6 +49,7 @@ class World:
         actuators: motors and LEDs: what they were asked for, and what they do.
         alive: (rows,).
         batteries: of all robots; `charge` may be written to.
+        scene: what sensors look at, always the present.
         sensors: those that agents need, by group and sense; `Staged.failed` may be set.
         states: what each robot is at, as its agent named it.
     """
@@ -55,29 +61,34 @@ class World:
         """
         if not seeds:
             raise BadInput(scenario.source, "seed", "expected at least one seed")
-        groups = _groups(scenario, bodies_of(scenario, scenario.source))
+        bodies = bodies_of(scenario, scenario.source)
+        groups = _groups(scenario, bodies)
         self.keys: KeyArray = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
-        placed = [place(scenario, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
+        layout = read_layout(scenario.arena, scenario.source)
+        placed = [place(scenario, layout, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
         obstacles, pose = tuple(p.obstacles for p in placed), np.stack([p.pose for p in placed])
         self.static = Static(
             name=scenario.name,
             seeds=tuple(seeds),
             rate_hz=scenario.time.rate_hz,
-            arena_size_m=scenario.arena.size_m,
+            arena_size_m=layout.size_m,
             boundary=scenario.arena.boundary,
             obstacles=obstacles,
             groups=groups,
             robot_names=scenario.robot_names(),
             range_m=range_of(scenario.radio) if scenario.radio else None,
             lights=tuple(p.lights for p in placed),
+            floor=layout.floor,
         )
-        tick_s, steps = 1.0 / scenario.time.rate_hz, scenario.physics.steps
-        self._physics = Physics(scenario.arena.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
+        self.obstacles = obstacle_arrays(obstacles)
+        engines = engines_of(scenario, bodies)
+        self._physics = Physics(self.static, self.obstacles, engines, pose, scenario.physics.steps)
         self.actuators = Actuators(groups, self.keys)
+        tick_s = 1.0 / scenario.time.rate_hz
         self.batteries = Batteries(groups, self.static.arenas, tick_s)
-        scene = self._scene(tick_s)
-        self.sensors = _sensors(scenario, scene, groups, needs)
-        self._own = OwnActuators(groups, scene)
+        self.scene = self._scene_of(tick_s)
+        self.sensors = _sensors(scenario, self.scene, groups, needs)
+        self._own = OwnActuators(groups, self.scene)
         rows = self.static.arenas * self.static.robots
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
@@ -107,7 +118,7 @@ class World:
     def _brake(self) -> None:
         """The motors of robots that are dead, or whose motors failed, do not drive: they only resist."""
         dead = ~self.alive.reshape(self.static.arenas, self.static.robots)
-        self._physics.braked = dead | self.actuators.failed.motors
+        self._physics.braked[:] = dead | self.actuators.failed.motors
 
     def sense(self, tick: int) -> Senses:
         """What the robots alive that act in a tick sense, by group: rows rising, and the fields that are needed."""
@@ -161,7 +172,7 @@ class World:
         self.pose[:, 2] = wrapped(self.pose[:, 2])
         self.velocity: FloatArray = state[:, 3:].copy()
 
-    def _scene(self, tick_s: float) -> Scene:
+    def _scene_of(self, tick_s: float) -> Scene:
         static, physics = self.static, self._physics
         counts = [group.stop - group.start for group in static.groups]
         radius_m = np.repeat([group.body.radius_m for group in static.groups], counts)
@@ -171,7 +182,8 @@ class World:
             keys=self.keys,
             size_m=static.arena_size_m,
             boundary=static.boundary,
-            obstacles=obstacle_arrays(static.obstacles),
+            obstacles=self.obstacles,
+            obstacles_move=any(o.movable for standing in static.obstacles for o in standing),
             lights=static.lights,
             ground=ground_of(static.floor, static.arena_size_m, static.boundary),
             tick_s=tick_s,

@@ -88,11 +88,7 @@ class Air:
         medium = Medium(radio, keys, robots, obstacles, size_m, radii_m, self._held, own, traces)
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
-        self._way: Way
-        if radio.is_signal:
-            self._way = SignalWay(medium, size_m, send_times, radii_m)
-        else:
-            self._way = DiskWay(medium, size_m, send_times)
+        self._way: Way = SignalWay(medium, send_times) if radio.is_signal else DiskWay(medium, send_times)
         self._accounts = Accounts(len(keys), robots)
         self._lives = Lives(rows)
         self._others_alive = np.zeros(rows, np.int64)

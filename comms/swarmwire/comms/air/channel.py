@@ -19,8 +19,8 @@ ROUNDING = 1e-9
 class Channel:
     """Decides what becomes of packets at robots that stand at given poses."""
 
-    def __init__(self, medium: Medium, size_m: tuple[float, float]) -> None:
-        self._radio, self._arenas, self._size_m = medium.radio, len(medium.keys), size_m
+    def __init__(self, medium: Medium) -> None:
+        self._radio, self._arenas, self._size_m = medium.radio, len(medium.keys), medium.size_m
         self._columns = len(medium.radio.gives.columns)
         self._stages = chain(medium)
 

@@ -37,7 +37,7 @@ def _within(x, y, alive, robots, cells, range_m, sender, to):
     most = 0
     for p in range(len(sender)):
         for j in range(-1, 2):
-            first, stop = _strip(x[sender[p]], y[sender[p]], sender[p] // robots, cells, j)
+            first, stop = strip(x[sender[p]], y[sender[p]], sender[p] // robots, cells, j)
             most += stop - first
     packet, receiver = np.empty(most, np.int64), np.empty(most, np.int64)
     found = 0
@@ -49,7 +49,7 @@ def _within(x, y, alive, robots, cells, range_m, sender, to):
             found += _joined(x, y, alive, range_m, s, r)
             continue
         for j in range(-1, 2):
-            first, stop = _strip(x[s], y[s], s // robots, cells, j)
+            first, stop = strip(x[s], y[s], s // robots, cells, j)
             for k in range(first, stop):
                 r = cells.order[k]
                 # Written first and kept if it counts: a branch would be guessed wrong a third of the time.
@@ -59,8 +59,11 @@ def _within(x, y, alive, robots, cells, range_m, sender, to):
 
 
 @njit(cache=True)
-def _strip(x, y, arena, cells, row):
-    """First and stop in the grid's order of the three cells side by side that are `row` rows above (x, y)."""
+def strip(x, y, arena, cells, row):
+    """First and stop in the grid's order of the three cells side by side that are `row` rows above (x, y) in m.
+
+    `cells` is a `grid.Grid`; what lies beyond its edge is empty.
+    """
     i = grid.cell_of(x, cells.left_m, cells.cell_m, cells.nx)
     j = grid.cell_of(y, cells.bottom_m, cells.cell_m, cells.ny) + row
     if j < 0 or j >= cells.ny:
