@@ -26,7 +26,7 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("seed", -1, "seed: expected a whole number of at least 0 and at most 9223372036854775807, got -1"),
     ("duration_s", float("inf"), "duration_s: expected a number above 0 and at most 1000000000 (s), got inf"),
     ("time.rate_hz", 1001, "time.rate_hz: expected a whole number of at least 1 and at most 1000 (Hz), got 1001"),
-    ("physics.engine", "bullet", "physics.engine: expected auto, discs, pymunk or kinematic, got 'bullet'"),
+    ("physics.engine", "bullet", "physics.engine: expected one of auto, discs, pymunk, kinematic, got 'bullet'"),
     ("physics.steps", 1, f"physics.steps: expected at least 2, {STEPS}; got 1"),
     ("arena.size_m", 3, "arena.size_m: expected a list of 2 numbers above 0 and at most 10000 (m), got 3"),
     ("arena.size_m", [1.0], f"arena.size_m.1: is missing; {NUMBER}"),

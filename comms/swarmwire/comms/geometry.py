@@ -107,6 +107,33 @@ def ray_to_polygon(px, py, dx, dy, obstacles, k):
 
 
 @njit(cache=True)
+def to_nearest(away_m, side_m):
+    """What to add to a difference of coordinates on a torus, so that it becomes the shortest; 0 if `side_m` is 0.
+
+    A side of 0 stands for an axis along which an arena does not go on at its other side.
+    """
+    return -side_m * np.floor(away_m / side_m + 0.5) if side_m > 0.0 else 0.0
+
+
+@njit(cache=True)
+def is_blocked_on(obstacles, arena, x0, y0, x1, y1, side_x, side_y):
+    """As `is_blocked`, for the shortest line between two points of a torus with these sides; 0: the arena ends there.
+
+    Obstacles lie within the arena, so that the line is looked at where it leaves it, and where it comes in again.
+    """
+    over_x, over_y = to_nearest(x1 - x0, side_x), to_nearest(y1 - y0, side_y)
+    x1, y1 = x1 + over_x, y1 + over_y
+    if is_blocked(obstacles, arena, x0, y0, x1, y1):
+        return True
+    if over_x != 0.0 and is_blocked(obstacles, arena, x0 - over_x, y0, x1 - over_x, y1):
+        return True
+    if over_y != 0.0 and is_blocked(obstacles, arena, x0, y0 - over_y, x1, y1 - over_y):
+        return True
+    both = over_x != 0.0 and over_y != 0.0
+    return both and is_blocked(obstacles, arena, x0 - over_x, y0 - over_y, x1 - over_x, y1 - over_y)
+
+
+@njit(cache=True)
 def is_blocked(obstacles, arena, x0, y0, x1, y1):
     """Whether an obstacle of the arena touches the straight line between two points."""
     dx, dy = x1 - x0, y1 - y0

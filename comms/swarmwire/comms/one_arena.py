@@ -23,6 +23,7 @@ def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
     within = senses_within(truth.senses, rows)
     senses = {name: GroupSenses(group.rows - rows.start, group.fields) for name, group in within.items()}
     edges, tally, finished, departed = truth.edges, truth.tally, truth.finished, truth.departed
+    movable = truth.movable
     if edges is not None:
         edges = edges[(edges[:, 0] >= rows.start) & (edges[:, 0] < rows.stop)] - rows.start
     return replace(
@@ -40,6 +41,7 @@ def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
         finished=None if finished is None else _finished_of(finished, arena),
         events=tuple(replace(event, changed=event.changed[rows]) for event in truth.events),
         departed=None if departed is None else _departed_of(departed, arena),
+        movable=None if movable is None else movable[arena : arena + 1],
     )
 
 

@@ -1,12 +1,12 @@
 """Ground truth for observers: `Static` once, `Truth` per tick. It never crosses to a runner."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Literal
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.body import Body
 from swarmwire.comms.floor import Floor
 from swarmwire.comms.packets import Payloads
@@ -33,6 +33,10 @@ class Obstacle:
     def movable(self) -> bool:
         """Whether robots can push it."""
         return self.mass_kg is not None
+
+    def put_at(self, x_m: float, y_m: float, heading_rad: float) -> "Obstacle":
+        """The same obstacle elsewhere."""
+        return replace(self, x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 
     @property
     def corners_m(self) -> FloatArray:
@@ -85,6 +89,20 @@ class Static:
     def walled(self) -> bool:
         """Whether walls stand around each arena."""
         return self.boundary == "walls"
+
+    @property
+    def movable(self) -> int:
+        """How many obstacles of each arena robots can push."""
+        return sum(obstacle.movable for obstacle in self.obstacles[0])
+
+    def movable_at(self, arena: int, pose: AnyArray) -> tuple[Obstacle, ...]:
+        """The movable obstacles of an arena at poses (k, 3)."""
+        own = (obstacle for obstacle in self.obstacles[arena] if obstacle.movable)
+        return tuple(obstacle.put_at(*at) for obstacle, at in zip(own, pose.tolist(), strict=True))
+
+    def fixed(self, arena: int) -> tuple[Obstacle, ...]:
+        """The obstacles of an arena that nobody can push."""
+        return tuple(obstacle for obstacle in self.obstacles[arena] if not obstacle.movable)
 
     @property
     def arenas(self) -> int:
@@ -200,3 +218,4 @@ class Truth:
     finished: Finished | None  # None without a radio
     events: tuple[Happened, ...] = ()  # at the tick's start, in order
     departed: Departed | None = None  # None without a radio; views of a run elsewhere do not get it
+    movable: FloatArray | None = None  # (arenas, movable obstacles, 3) x, y, heading of those; None: there are none

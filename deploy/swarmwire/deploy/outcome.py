@@ -31,6 +31,7 @@ def outcome(
     origin: Origin,
     inputs: InputsRecord | None,
     losses: Sequence[Loss],
+    engines: Sequence[str],
     realtime: RealTimeReport | None,
     folder: Path | None,
 ) -> Result:
@@ -42,6 +43,7 @@ def outcome(
         scenario=static.name,
         robots=static.robots,
         runners=runners,
+        engine=" and ".join(engines),
         mode="realtime" if realtime else "lockstep" if runners else "local",
         ended=ended,
         error=str(error) if ended == "failed" else None,

@@ -20,7 +20,7 @@ def print_result(result: Result, console: Console) -> None:
         "robots", f"{result.robots}, {who}" + (f", {len(result.arenas)} arenas" if len(result.arenas) > 1 else "")
     )
     speed = f"{result.sim_time_s:g} s in {result.wall_time_s:.2f} s: {result.realtime_factor:.1f} x real time"
-    table.add_row("simulated", f"{speed} (start took {result.start_time_s:.2f} s)")
+    table.add_row("simulated", f"{speed} (start took {result.start_time_s:.2f} s), engine {result.engine}")
     if result.ended != "duration":
         table.add_row("ended", result.ended)
     if len(result.arenas) > 1:

@@ -72,6 +72,7 @@ class Result:
 
     scenario: str
     robots: int  # in each arena
+    engine: str  # that moved the bodies: "discs", "pymunk", "kinematic", or two of them joined by " and "
     runners: int  # 0: all agents in the world's process
     mode: str  # "local" | "lockstep" | "realtime"
     ended: str  # "duration" | "interrupted" | "left" (by whoever stepped it) | "failed"
@@ -126,6 +127,7 @@ class Result:
             "seed": self.arenas[0].seed if one else [arena.seed for arena in self.arenas],
             "arenas": len(self.arenas),
             "robots": self.robots,
+            "engine": self.engine,
             "runners": self.runners,
             "mode": self.mode,
             "ended": self.ended,

@@ -12,7 +12,6 @@ from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.antennas import Antennas
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted
-from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.agents import agent_specs, check_agents
@@ -218,6 +217,7 @@ class Simulation:
                 origin=self._origin,
                 inputs=self._record.inputs(),
                 losses=self._losses,
+                engines=self.world.engines,
                 realtime=crew.report() if isinstance(crew, PacedCrew | RealTimeCrew) else None,
                 folder=self.folder,
             )
@@ -232,7 +232,6 @@ class Simulation:
         static, radio = self.static, self.scenario.radio
         if radio is None:
             return None
-        obstacles = obstacle_arrays(static.obstacles)
         size_m, every = static.arena_size_m, static.act_every_ticks
         radius_m = np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for group in static.groups])
         antennas = Antennas.of_groups((table.count, table.radio) for table in self.scenario.robots.values())
@@ -241,12 +240,13 @@ class Simulation:
             self.world.keys,
             static.robots,
             size_m,
-            obstacles,
+            self.world.obstacles,  # which follow those that are pushed
             static.rate_hz,
             every,
             radius_m,
             self._traces,
             antennas,
+            static.boundary,
         )
 
     def _from_outside(self, tick: int) -> bool:

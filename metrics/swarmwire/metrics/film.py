@@ -7,7 +7,8 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Static
+from swarmwire.comms.truth import Obstacle, Static
+from swarmwire.metrics.record.tick_columns import MOVABLE
 
 if TYPE_CHECKING:
     import polars as pl
@@ -41,6 +42,11 @@ class Film:
     metrics: dict[str, FloatArray]  # (T,) each, NaN where undefined
     state: IntArray | None = None  # (T, n) places in `state_names`, NO_STATE for none; None if no robot has any
     state_names: tuple[str, ...] = ()
+    movable: AnyArray | None = None  # (T, k, 3) where movable obstacles were; None: there are none
+
+    def movable_at(self, index: int) -> tuple[Obstacle, ...]:
+        """The movable obstacles at a tick."""
+        return () if self.movable is None else self.static.movable_at(self.arena, self.movable[index])
 
     def index_at(self, time_s: float) -> int:
         """The last tick that had begun by then; the first if none had."""
@@ -55,7 +61,7 @@ def film_of(recorded: Recorded, arena: int, where: str) -> Film:
     frame = recorded.ticks(arena).sort("tick")
     if frame.is_empty():
         raise BadInput(where, "", "holds no tick yet")
-    pose = np.stack([frame[name].to_numpy() for name in ("x_m", "y_m", "heading_rad")], axis=-1)
+    pose = _stacked(frame, ("x_m", "y_m", "heading_rad"))
     names, state = states(frame)
     return Film(
         static=static,
@@ -66,7 +72,13 @@ def film_of(recorded: Recorded, arena: int, where: str) -> Film:
         metrics=_metrics(frame, static.rate_hz),
         state=state,
         state_names=names,
+        movable=_stacked(frame, MOVABLE) if static.movable else None,
     )
+
+
+def _stacked(frame: "pl.DataFrame", names: tuple[str, ...]) -> AnyArray:
+    """Columns of lists as one array, (T, items, columns)."""
+    return np.stack([frame[name].to_numpy() for name in names], axis=-1)
 
 
 def states(frame: "pl.DataFrame") -> tuple[tuple[str, ...], IntArray | None]:

@@ -49,8 +49,16 @@ class RerunArena:
         full = truth.tick % self.links_every_ticks == 0
         self._robots.log(rec, truth, self._rows, trails=full)
         self._selected.log(rec, truth, full=full)
+        if truth.movable is not None:
+            self._log_movable(rec, truth.movable[self._arena])
         if full:
             self._log_radio(rec, truth, truth.pose[self._rows, :2])
+
+    def _log_movable(self, rec: Any, pose: FloatArray) -> None:
+        import rerun as rr
+
+        strips = [_outline(obstacle) for obstacle in self._static.movable_at(self._arena, pose)]
+        rec.log("world/movable", rr.LineStrips2D.from_fields(strips=strips))
 
     def _log_radio(self, rec: Any, truth: Truth, position_m: FloatArray) -> None:
         import rerun as rr
@@ -75,10 +83,12 @@ class RerunArena:
         boundary = _closed(np.array([[-half_x, -half_y], [half_x, -half_y], [half_x, half_y], [-half_x, half_y]]))
         width = rr.Radius.ui_points(1.2 if static.walled else 0.5)
         rec.log("world/boundary", rr.LineStrips2D([boundary], radii=width, colors=WALL), static=True)
-        outlines = [_outline(obstacle) for obstacle in static.obstacles[self._arena]]
+        thin = rr.Radius.ui_points(1.2)
+        outlines = [_outline(obstacle) for obstacle in static.fixed(self._arena)]
         if outlines:
-            thin = rr.Radius.ui_points(1.2)
             rec.log("world/obstacles", rr.LineStrips2D(outlines, radii=thin, colors=WALL), static=True)
+        if static.movable:
+            rec.log("world/movable", rr.LineStrips2D.from_fields(radii=thin, colors=WALL), static=True)
         lights = [(light.x_m, light.y_m) for light in static.lights[self._arena]] if static.lights else []
         if lights:
             disc = rr.Radius.ui_points(6.0)

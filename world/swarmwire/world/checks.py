@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from swarmwire.comms.air.radio_checks import check_radio
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.radio_checks import check_radio, unfit_for_torus
 from swarmwire.comms.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
@@ -29,6 +30,7 @@ def check(scenario: Scenario, where: str) -> None:
     _check_send_offset(scenario, where)
     if scenario.radio is not None:
         check_radio(scenario.radio, where)
+        _check_torus(scenario, scenario.radio, where)
     _check_antennas(scenario, where)
     for i, event in enumerate(scenario.events):
         _check_event(scenario, bodies, event, f"events.{i}", where)
@@ -60,6 +62,13 @@ def _check_send_offset(scenario: Scenario, where: str) -> None:
     if not known:
         expected = "expected uniform, tick, or an offset in s from 0 to below the period of a tick"
         raise BadInput(where, "radio.send_offset", f"{expected}; got {offset!r}")
+
+
+def _check_torus(scenario: Scenario, radio: Radio, where: str) -> None:
+    unfit = unfit_for_torus(radio) if scenario.arena.boundary == "torus" else None
+    if unfit is not None:
+        expected = "expected a disk without bodies_block: what is between two robots across a torus's seam is not known"
+        raise BadInput(where, f"radio.{unfit}", expected)
 
 
 def _check_antennas(scenario: Scenario, where: str) -> None:

@@ -10,21 +10,21 @@ from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 
 @njit(cache=True)
 def pairs_of(contacts: AnyArray, ids: AnyArray, index: IntArray) -> IntArray:
-    """One rising int64 code for each pair of bodies in contact: lower index x bodies + higher index.
+    """One rising int64 code for each pair of bodies in contact, as `count_began` has them, of one arena.
 
     Args:
         contacts: (k, 2) ids of the two bodies, pairs may repeat.
-        ids: (bodies,) all ids, rising.
-        index: (bodies,) the index of each body; the highest is the static body's.
+        ids: (all bodies,) all ids, rising.
+        index: (all bodies,) the index of each body: of a robot its own, of all that is not a robot the one after.
     """
-    codes = np.empty(len(contacts), np.int64)
+    codes, bodies = np.empty(len(contacts), np.int64), index.max() + 1
     for k in range(len(contacts)):
         a, b = index[np.searchsorted(ids, contacts[k, 0])], index[np.searchsorted(ids, contacts[k, 1])]
-        codes[k] = min(a, b) * len(ids) + max(a, b)
+        codes[k] = min(a, b) * bodies + max(a, b)
     codes.sort()
-    kept = 0
+    kept, two_obstacles = 0, bodies * bodies - 1
     for k in range(len(codes)):
-        if k == 0 or codes[k] != codes[k - 1]:
+        if codes[k] != two_obstacles and (k == 0 or codes[k] != codes[k - 1]):
             codes[kept] = codes[k]
             kept += 1
     return codes[:kept]

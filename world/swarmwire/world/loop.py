@@ -59,7 +59,7 @@ class Loop:
         outcomes = self._mailbox.hand_over_outcomes(tick, news.outcomes if news else NO_OUTCOMES, world.alive)
         actions = self.crew.act(tick, senses, packets, outcomes)
 
-        pose, velocity, alive = world.pose, world.velocity, world.alive.copy()
+        pose, velocity, movable, alive = world.pose, world.velocity, world.movable, world.alive.copy()
         if self.air:
             self.air.hold(pose, alive)
             self.air.send(start_ns, tick, self._addressable(actions.sent))
@@ -88,6 +88,7 @@ class Loop:
             finished=finished,
             events=events,
             departed=news.departed if news else None,
+            movable=movable,
         )
         for observer in self.observers:
             observer.see(truth)

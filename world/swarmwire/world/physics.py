@@ -11,11 +11,13 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import Obstacles
 from swarmwire.comms.truth import Static
 from swarmwire.world.engines.choice import EngineName
+from swarmwire.world.engines.discs import DiscsEngine
 from swarmwire.world.engines.engine import Engine, Setting, setting_of
 from swarmwire.world.engines.kinematic import KinematicEngine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
 
 ENGINES: dict[EngineName, Callable[[Setting, FloatArray], Engine]] = {
+    "discs": DiscsEngine,
     "pymunk": PymunkEngine,
     "kinematic": KinematicEngine,
 }
@@ -29,6 +31,7 @@ class Physics:
     Attributes:
         names: of the engines, floor first.
         state, travel_m, touched: see `Engine`, of all robots.
+        movable: (arenas, movable obstacles, 3) x, y in m, heading in rad (not wrapped), always the present.
         braked: (arenas, robots) motors that only resist, if their commands are 0; written in place from outside.
     """
 
@@ -50,6 +53,8 @@ class Physics:
             setting = setting_of(static, obstacles, moved, steps)
             self._engines.append(ENGINES[name](setting, np.ascontiguousarray(pose[:, index])))
             self._robots.append(index)
+        pushing = [engine for engine in self._engines if isinstance(engine, PymunkEngine)]
+        self.movable = pushing[0].movable if pushing else np.zeros((len(pose), 0, 3))
         if len(self._engines) == 1:
             only = self._engines[0]
             self.state, self.travel_m, self.touched, self.braked = only.state, only.travel_m, only.touched, only.braked

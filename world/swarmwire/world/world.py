@@ -46,6 +46,7 @@ class World:
         keys: (arenas,) the key of each arena's draws, which depends on its seed alone.
         pose: (rows, 3) x, y in m, heading in rad in (-pi, pi], arena frame.
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
+        movable: (arenas, movable obstacles, 3) x, y in m, heading in rad; None: there are none.
         actuators: motors and LEDs: what they were asked for, and what they do.
         alive: (rows,).
         batteries: of all robots; `charge` may be written to.
@@ -95,6 +96,11 @@ class World:
         self.alive: BoolArray = np.ones(rows, np.bool_)
         self.states = States(rows)
         self._show()
+
+    @property
+    def engines(self) -> tuple[str, ...]:
+        """The names of the engines that move the robots."""
+        return self._physics.names
 
     def live(self, alive: BoolArray) -> None:
         """These robots (rows,) are alive from now on; the others brake, and resist whatever pushes them."""
@@ -171,6 +177,7 @@ class World:
         self.pose: FloatArray = state[:, :3].copy()
         self.pose[:, 2] = wrapped(self.pose[:, 2])
         self.velocity: FloatArray = state[:, 3:].copy()
+        self.movable: FloatArray | None = self._physics.movable.copy() if self.static.movable else None
 
     def _scene_of(self, tick_s: float) -> Scene:
         static, physics = self.static, self._physics

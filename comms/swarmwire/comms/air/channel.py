@@ -5,6 +5,7 @@ import numpy as np
 from swarmwire.comms.air.links import HEARD, THE_REST, Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.reach import links_in_range
+from swarmwire.comms.air.reach_torus import links_in_range_on_torus
 from swarmwire.comms.air.stage import Medium
 from swarmwire.comms.air.stages import chain
 from swarmwire.comms.air.transmissions import Transmissions
@@ -21,6 +22,7 @@ class Channel:
 
     def __init__(self, medium: Medium) -> None:
         self._radio, self._arenas, self._size_m = medium.radio, len(medium.keys), medium.size_m
+        self._links_in_range = links_in_range_on_torus if medium.is_torus else links_in_range
         self._columns = len(medium.radio.gives.columns)
         self._stages = chain(medium)
 
@@ -79,7 +81,7 @@ class Channel:
 
     def _reach(self, pose: FloatArray, alive: BoolArray, sender: IntArray, to: IntArray) -> tuple[IntArray, IntArray]:
         assert self._radio.range_m is not None  # `Air` has refused a disk without
-        return links_in_range(pose, alive, self._arenas, self._size_m, self._radio.range_m, sender, to)
+        return self._links_in_range(pose, alive, self._arenas, self._size_m, self._radio.range_m, sender, to)
 
 
 def with_the_rest(links: Links, packets: Transmissions, in_range: IntArray, columns: int) -> Links:

@@ -39,6 +39,8 @@ def encode_truth(glimpse: Glimpse) -> bytes:
         arrays[f"sense/{name}/rows"] = group.rows
         for sense, column in group.fields.items():
             arrays[f"sense/{name}/{sense}"] = column
+    if truth.movable is not None:
+        arrays["movable"] = truth.movable
     if truth.edges is not None:
         arrays["edges"] = truth.edges
     if truth.tally is not None:
@@ -87,6 +89,7 @@ def decode_truth(frame: Frame, scene: Scene) -> Glimpse:
         tally=_tally(frame, static.arenas),
         finished=_finished(frame, static),
         events=_events(frame, n),
+        movable=checked_array(frame, "movable", "<f8", (static.arenas, static.movable, 3)) if static.movable else None,
     )
     values = checked_array(frame, "values", "<f8", (len(scene.series), static.arenas))
     serial, ticks = _least(frame.values.get("serial"), 0, "serial"), _least(frame.values.get("ticks"), 1, "ticks")

@@ -20,7 +20,7 @@ from swarmwire.metrics.drawing.legend import (
 from swarmwire.metrics.drawing.looks import INK, LONG_SIDE_IN, STATE_COLORS, TITLE_PT
 from swarmwire.metrics.drawing.metric_strip import MetricStrip, choose
 from swarmwire.metrics.drawing.radio_range import in_range
-from swarmwire.metrics.drawing.scenery import draw_scale_bar, draw_scenery
+from swarmwire.metrics.drawing.scenery import draw_scale_bar, draw_scenery, place_movable
 from swarmwire.metrics.drawing.swarm import Swarm
 from swarmwire.metrics.film import NO_STATE, Film
 
@@ -45,7 +45,7 @@ class FilmFigure:
         layout = lay_out(static.arena_size_m, _STRIP_IN if names else 0.0, -(-len(entries) // columns), axes_in=0.0)
         self._figure = figure = new_figure(layout.width_in, layout.height_in, size_px)
         axes = add_arena_axes(figure, layout, static.arena_size_m)
-        draw_scenery(axes, static, film.arena)
+        self._movable = draw_scenery(axes, static, film.arena)
         self._swarm = Swarm(axes, static)
         self._state = _colored(film)
         draw_scale_bar(axes, static.arena_size_m, self._swarm.enlargement)
@@ -55,7 +55,8 @@ class FilmFigure:
         self._time: Any = figure.text(layout.right, top, "", fontsize=TITLE_PT, color=INK, ha="right")
         add_legend(figure, entries, layout.left, layout.below_top(0.34), columns)
         self._strip = MetricStrip(figure, layout, film.time_s, film.metrics, names) if names else None
-        self._moving = [*self._swarm.artists, self._time, *(self._strip.artists if self._strip else ())]
+        pushed = [self._movable] if static.movable else []
+        self._moving = [*pushed, *self._swarm.artists, self._time, *(self._strip.artists if self._strip else ())]
         self._still: Any = None  # pixels of what does not move
 
     def frame(self, index: int) -> ByteArray:
@@ -85,9 +86,12 @@ class FilmFigure:
     def _show(self, index: int) -> None:
         film = self._film
         pose, alive = film.pose[index], film.alive[index]
+        movable = film.movable_at(index)
+        if movable:
+            place_movable(self._movable, movable)
         edges: IntArray | None = None
         if film.static.range_m is not None:
-            edges = in_range(pose[:, :2], alive, film.static.range_m, film.static.obstacles[film.arena])
+            edges = in_range(pose[:, :2], alive, film.static.range_m, (*film.static.fixed(film.arena), *movable))
         state = None if self._state is None else self._state[index]
         self._swarm.show(pose, alive, edges, _trail(film, index), state)
         self._time.set_text(f"t = {film.time_s[index]:.1f} s")

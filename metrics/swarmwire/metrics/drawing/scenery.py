@@ -1,5 +1,6 @@
 """What stands still in an arena: floor, boundary, obstacles, lights."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from swarmwire.comms.truth import Obstacle, Static
@@ -20,9 +21,11 @@ _BAR_BELOW_IN = 0.1
 _GLOW = ((0.045, 0.10), (0.03, 0.16), (0.018, 0.3))  # radius as a share of the arena's longer side, and opacity
 
 
-def draw_scenery(axes: Any, static: Static, arena: int) -> None:
-    """Draw it once, below everything else. A boundary that is no wall is dashed."""
-    from matplotlib.collections import PatchCollection
+def draw_scenery(axes: Any, static: Static, arena: int) -> Any:
+    """Draw it once, below everything else. A boundary that is no wall is dashed.
+
+    Returns the collection of the movable obstacles, which `place_movable` moves.
+    """
     from matplotlib.patches import Rectangle
 
     width, height = static.arena_size_m
@@ -31,12 +34,25 @@ def draw_scenery(axes: Any, static: Static, arena: int) -> None:
     look = wall if static.walled else edge
     floor = Rectangle((-width / 2, -height / 2), width, height, facecolor=FLOOR, zorder=0, **look)
     axes.add_patch(floor)
-    shapes = [_shape(obstacle) for obstacle in static.obstacles[arena]]
-    if shapes:
-        solid: Look = {"facecolor": OBSTACLE, "edgecolor": OBSTACLE_EDGE, "linewidth": 0.8, "zorder": 1}
-        axes.add_collection(PatchCollection(shapes, **solid), autolim=False)
+    _add_obstacles(axes, static.fixed(arena))
+    movable = _add_obstacles(axes, [obstacle for obstacle in static.obstacles[arena] if obstacle.movable])
     for light in static.lights[arena] if static.lights else ():
         _draw_light(axes, light.x_m, light.y_m, max(width, height))
+    return movable
+
+
+def place_movable(collection: Any, obstacles: Sequence[Obstacle]) -> None:
+    """Draw these movable obstacles in the place of those that the collection holds."""
+    collection.set_paths([_shape(obstacle) for obstacle in obstacles])
+
+
+def _add_obstacles(axes: Any, obstacles: Sequence[Obstacle]) -> Any:
+    from matplotlib.collections import PatchCollection
+
+    solid: Look = {"facecolor": OBSTACLE, "edgecolor": OBSTACLE_EDGE, "linewidth": 0.8, "zorder": 1}
+    collection: Any = PatchCollection([_shape(obstacle) for obstacle in obstacles], **solid)
+    axes.add_collection(collection, autolim=False)
+    return collection
 
 
 def draw_scale_bar(axes: Any, size_m: tuple[float, float], note: str) -> None:

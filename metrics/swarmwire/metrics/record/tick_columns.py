@@ -18,13 +18,14 @@ VELOCITY = ("vx_mps", "vy_mps", "turn_radps")  # arena frame
 COMMAND = ("command_forward_mps", "command_turn_radps")  # as applied
 MOTION = (*POSE, *VELOCITY, *COMMAND)  # lists with a number per robot, float32
 ROBOT_COLUMNS = (*MOTION, "alive", "state")  # lists with an item per robot
+MOVABLE = ("movable_x_m", "movable_y_m", "movable_heading_rad")  # lists with a number per movable obstacle, if any
 RADIO = ("sent", "heard", "in_range")  # packets; receivers; receivers: since the tick before
 KEYS = ("tick", "time_s", "arena", "seed")
 BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 2
 
 
-def tick_schema(robots: int, metrics: Sequence[str]) -> "dict[str, Any]":
-    """The type of each column, for so many robots in an arena and these metrics."""
+def tick_schema(robots: int, metrics: Sequence[str], movable: int) -> "dict[str, Any]":
+    """The type of each column, for so many robots and movable obstacles in an arena, and these metrics."""
     import polars as pl
 
     return {
@@ -35,6 +36,7 @@ def tick_schema(robots: int, metrics: Sequence[str]) -> "dict[str, Any]":
         **dict.fromkeys(MOTION, pl.Array(pl.Float32, robots)),
         "alive": pl.Array(pl.Boolean, robots),
         "state": pl.Array(pl.String, robots),
+        **(dict.fromkeys(MOVABLE, pl.Array(pl.Float32, movable)) if movable else {}),
         **dict.fromkeys(metrics, pl.Float64),
         **dict.fromkeys(RADIO, pl.Int64),
     }
@@ -54,6 +56,7 @@ class TickColumns:
         self._pose: AnyArray = np.empty((*of_robots, len(POSE)), np.float32)
         self._velocity: AnyArray = np.empty((*of_robots, len(VELOCITY)), np.float32)
         self._command: AnyArray = np.empty((*of_robots, len(COMMAND)), np.float32)
+        self._movable: AnyArray = np.empty((*shape, static.movable, len(MOVABLE)), np.float32)
         self._alive: AnyArray = np.empty(of_robots, np.bool_)
         self._state: AnyArray = np.empty(of_robots, np.uint16)
         self._states: tuple[str, ...] = ("",)
@@ -68,6 +71,8 @@ class TickColumns:
         self._pose[at] = truth.pose.reshape(*shape, -1)
         self._velocity[at] = truth.velocity.reshape(*shape, -1)
         self._command[at] = truth.command.reshape(*shape, -1)[..., : len(COMMAND)]
+        if truth.movable is not None:
+            self._movable[at] = truth.movable
         self._alive[at] = truth.alive.reshape(shape)
         self._state[at] = truth.state.reshape(shape)
         self._states = truth.states  # it only grows
@@ -95,12 +100,15 @@ class TickColumns:
                 columns[name] = np.ascontiguousarray(values[:ticks, ..., place]).reshape(per_robot)
         columns["alive"] = self._alive[:ticks].reshape(per_robot)
         columns["state"] = pl.Series(self._states).gather(self._state[:ticks].reshape(-1)).reshape(per_robot)
+        if movable := self._static.movable:
+            for place, name in enumerate(MOVABLE):
+                columns[name] = np.ascontiguousarray(self._movable[:ticks, ..., place]).reshape(-1, movable)
         measured = {name: self._measured[row, :ticks].reshape(-1) for row, name in enumerate(self._metrics)}
         columns |= {name: pl.Series(values).fill_nan(None) for name, values in measured.items()}
         no_radio = pl.Series(np.repeat(~self._has_radio[:ticks], arenas))
         for row, name in enumerate(RADIO):
             columns[name] = pl.Series(self._radio[row, :ticks].reshape(-1)).set(no_radio, None)
-        return pl.DataFrame(columns, schema=tick_schema(robots, self._metrics))
+        return pl.DataFrame(columns, schema=tick_schema(robots, self._metrics, self._static.movable))
 
 
 def _counts(tally: Tally) -> AnyArray:

@@ -13,7 +13,7 @@ EngineName = Literal["discs", "pymunk", "kinematic"]
 def engines_of(scenario: Scenario, bodies: Mapping[str, Body]) -> dict[str, EngineName]:
     """The engine of each group, by the group's name."""
     asked = scenario.physics.engine
-    floor: EngineName = asked if asked != "auto" else "pymunk"
+    floor: EngineName = asked if asked != "auto" else "pymunk" if movable_in(scenario) else "discs"
     return {name: floor if body.contacts and body.altitude_m == 0.0 else "kinematic" for name, body in bodies.items()}
 
 
@@ -34,5 +34,8 @@ def check_engines(scenario: Scenario, bodies: Mapping[str, Body], where: str) ->
         raise BadInput(where, f"arena.obstacles.{movable[0]}.movable", expected)
     stuck = [group for group, engine in engines.items() if engine != "kinematic"]
     if scenario.arena.boundary == "torus" and stuck:
-        expected = f"expected walls or open: on a torus no robot has contacts, and those of robots.{stuck[0]} do"
-        raise BadInput(where, "arena.boundary", f"{expected} (physics.engine = {engines[stuck[0]]!r})")
+        body = bodies[stuck[0]].name
+        expected = f"expected walls or open: on a torus no robot has contacts, and {body} (robots.{stuck[0]}) does"
+        raise BadInput(
+            where, "arena.boundary", f'{expected}; physics.engine = "kinematic" takes them all off the floor'
+        )

@@ -1,0 +1,90 @@
+"""Arenas made by hand for any engine, and what the conformance tests measure of them."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.body import load_body
+from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.truth import Boundary, Obstacle
+from swarmwire.world.drive import Motors
+from swarmwire.world.engines.discs import DiscsEngine
+from swarmwire.world.engines.engine import Engine, Setting
+from swarmwire.world.engines.kinematic import KinematicEngine
+from swarmwire.world.engines.pymunk_engine import PymunkEngine
+
+Make = Callable[[Setting, FloatArray], Engine]
+FLOOR: tuple[Make, ...] = (PymunkEngine, DiscsEngine)
+EVERY: tuple[Make, ...] = (*FLOOR, KinematicEngine)
+TICK_S = 0.1
+FOOTBOT = load_body("footbot")
+R = FOOTBOT.radius_m
+
+
+def made(
+    make: Make,
+    pose: Any,
+    size_m: tuple[float, float] = (4.0, 4.0),
+    boundary: Boundary = "walls",
+    obstacles: Sequence[Obstacle] = (),
+    steps: int = 5,
+    radius_m: Any = R,
+    mass_kg: Any = FOOTBOT.mass_kg,
+    max_force_n: Any = 15.0,
+    max_torque_nm: Any = 150.0,
+    wheel_base_m: Any = 0.14,
+) -> Engine:
+    """Foot-bots, or what differs from them, at pose (n, 3) or (arenas, n, 3)."""
+    at = np.array(pose, np.float64)
+    at = at if at.ndim == 3 else at[None]
+    arenas, n = at.shape[:2]
+    radius, mass, force, torque, base = (
+        np.broadcast_to(np.asarray(value, np.float64), n).copy()
+        for value in (radius_m, mass_kg, max_force_n, max_torque_nm, wheel_base_m)
+    )
+    motors = Motors(base, force, torque, mass, 0.5 * mass * radius**2)
+    standing = (tuple(obstacles),) * arenas
+    low = np.zeros(n)
+    of = size_m, boundary, standing, obstacle_arrays(standing), radius, low, low + 0.1, motors
+    return make(Setting(*of, TICK_S, steps), at)
+
+
+def asked(engine: Engine, forward_mps: Any = 0.0, turn_radps: Any = 0.0, left_mps: Any = 0.0) -> FloatArray:
+    """Targets for all robots: numbers, or (n,) or (arenas, n) each."""
+    shape = engine.touched.shape
+    columns = [np.broadcast_to(np.asarray(v, np.float64), shape) for v in (forward_mps, turn_radps, left_mps)]
+    return np.ascontiguousarray(np.stack(columns, axis=2))
+
+
+def overlap_m(engine: Engine, radius_m: Any, size_m: tuple[float, float] | None = None) -> float:
+    """The deepest overlap of two robots, or of a robot with the walls of an arena of this size; negative: a gap."""
+    radius = np.broadcast_to(np.asarray(radius_m, np.float64), engine.touched.shape[1])
+    deepest = -np.inf
+    for state in engine.state:
+        xy = state[:, :2]
+        apart = np.hypot(*(xy[:, None] - xy).transpose(2, 0, 1))
+        np.fill_diagonal(apart, np.inf)
+        deepest = max(deepest, float((radius[:, None] + radius - apart).max()))
+        if size_m is not None:
+            deepest = max(deepest, float((np.abs(xy) + radius[:, None] - 0.5 * np.array(size_m)).max()))
+    return deepest
+
+
+def packed(n: int, side_m: float, radius_m: float, seed: int) -> FloatArray:
+    """Poses (n, 3) that do not overlap, anywhere in a square: shaken off a grid, in random order and direction."""
+    rng = np.random.default_rng(seed)
+    per_side = int(np.ceil(np.sqrt(n)))
+    line = np.linspace(-0.5, 0.5, per_side) * (side_m - 2.1 * radius_m)
+    free_m = 0.5 * (line[1] - line[0]) - radius_m
+    assert free_m > 0.0
+    xy = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)[rng.permutation(per_side**2)[:n]]
+    xy = np.clip(xy + rng.uniform(-free_m, free_m, xy.shape), -0.5 * side_m + radius_m, 0.5 * side_m - radius_m)
+    return np.column_stack([xy, rng.uniform(-np.pi, np.pi, n)])
+
+
+def energy_j(engine: Engine, mass_kg: Any, radius_m: Any) -> float:
+    """Kinetic energy of all robots, turning included."""
+    vx, vy, turn = engine.state[:, :, 3:].transpose(2, 0, 1)
+    return float((0.5 * mass_kg * (vx**2 + vy**2 + 0.5 * (radius_m * turn) ** 2)).sum())

@@ -1,0 +1,83 @@
+"""An array engine for round robots: one compiled call moves those of all arenas through all steps of a tick.
+
+Rows of different arenas are never near each other, and contacts are solved in an order of their own (see `discs_near`),
+so an arena moves bit for bit alike alone and beside others, and what is far away changes nothing.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.world.engines.discs_contacts import CONTACT, contacts_of, crowd_of
+from swarmwire.world.engines.discs_near import fixed_near, pairs_near
+from swarmwire.world.engines.discs_obstacle_cells import obstacle_cells
+from swarmwire.world.engines.discs_robots import robots_of
+from swarmwire.world.engines.discs_tick import advance, needed_margin_m
+from swarmwire.world.engines.engine import Setting
+
+# How far robots may move until near things are listed anew, of the widest radius; their speed may ask for more.
+MARGIN = 0.3
+
+
+class DiscsEngine:
+    """An `Engine` for robots against robots, walls, and obstacles that stand still."""
+
+    name: ClassVar[str] = "discs"
+
+    def __init__(self, setting: Setting, pose: FloatArray) -> None:
+        arenas, robots = pose.shape[:2]
+        self._setting = setting
+        self.state: FloatArray = np.zeros((arenas, robots, 6))
+        self.state[:, :, :3] = pose
+        self.travel_m: FloatArray = np.zeros((arenas, robots, 2))
+        self.touched: FloatArray = np.zeros((arenas, robots))
+        self.braked: BoolArray = np.zeros((arenas, robots), np.bool_)
+        self._robots = robots_of(setting, arenas)
+        self._widest_m = float(setting.radius_m.max(initial=0.0))
+        self._spread = np.zeros(2)
+        self._contacts = np.zeros(0, CONTACT)
+        self._set_margin(MARGIN * self._widest_m)
+        self._list_near()
+
+    def tick(self, target: FloatArray) -> IntArray:
+        """Move by one tick towards targets (arenas, robots, 3): see `Engine`."""
+        arenas, per_arena = self.touched.shape
+        onsets = np.zeros((arenas, 2), np.int64)
+        setting, rows, obstacles = self._setting, arenas * per_arena, self._setting.obstacles
+        step_s, half_size_m = setting.tick_s / setting.steps, (0.5 * setting.size_m[0], 0.5 * setting.size_m[1])
+        step = 0
+        while True:
+            step = advance(
+                step, setting.steps, step_s, self._margin_m, self._widest_m, half_size_m, per_arena,
+                self._robots, self.state.reshape(rows, 6), self.travel_m.reshape(rows, 2), self.touched.reshape(rows),
+                self.braked.reshape(rows), target.reshape(rows, 3), self._spread, self._contacts, self._met,
+                self._crowd, self._loners, obstacles.circle, obstacles.side_start, obstacles.side,
+                onsets,
+            )  # fmt: skip
+            if step == setting.steps:
+                return onsets
+            self._list_near()
+
+    def _set_margin(self, margin_m: float) -> None:
+        self._margin_m = margin_m
+        # The cell of a robot's middle lists what its rim may reach.
+        self._cells = obstacle_cells(self._setting.obstacles, self._setting.size_m, self._widest_m + margin_m)
+
+    def _list_near(self) -> None:
+        """List what is near each robot, with a margin that lasts for a tick at least."""
+        setting, (arenas, per_arena) = self._setting, self.touched.shape
+        step_s = setting.tick_s / setting.steps
+        needed_m = needed_margin_m(self._spread[1], self._widest_m, step_s, setting.steps)
+        if needed_m > self._margin_m:
+            self._set_margin(1.5 * needed_m)
+        robots, state, margin_m = self._robots, self.state.reshape(arenas * per_arena, 6), self._margin_m
+        pairs = pairs_near(robots, state, arenas, setting.size_m, self._widest_m, margin_m)
+        walled = setting.boundary == "walls"
+        things = fixed_near(robots, state, setting.size_m, walled, setting.obstacles, self._cells, margin_m)
+        old, self._contacts = self._contacts, np.zeros(len(pairs) + len(things), CONTACT)
+        contacts_of(self._contacts, robots, pairs, things, old)
+        self._met = np.zeros(len(self._contacts), np.int64)
+        self._crowd, self._loners = crowd_of(len(state), self._contacts)
+        robots["listed_x_m"], robots["listed_y_m"] = state[:, 0], state[:, 1]
+        self._spread[0] = 0.0

@@ -1,0 +1,147 @@
+"""Which things a robot may touch soon (Verlet lists): listed with a margin, and anew once a robot has moved that far.
+
+What moves does not depend on the margin: contacts are found among the listed things by what is near at the time, in an
+order that the lists keep: pairs by the lower and then by the higher row, fixed things by row.
+
+L. Verlet (1967), Computer "experiments" on classical fluids, Phys. Rev. 159, 98.
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import numpy as np
+
+from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.geometry import Obstacles
+from swarmwire.comms.grid import build, cell_of
+from swarmwire.world.engines.discs_fixed import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, gap_to_fixed, gap_to_wall
+from swarmwire.world.engines.discs_obstacle_cells import ObstacleCells
+
+
+def pairs_near(
+    robots: AnyArray, state: FloatArray, arenas: int, size_m: tuple[float, float], widest_m: float, margin_m: float
+) -> IntArray:
+    """Pairs of robots with a gap of up to twice the margin, (pairs, 2): lower row, higher row.
+
+    Args:
+        robots: (rows,) ROBOT records.
+        state: (rows, 6) x, y in m first.
+        arenas: how many there are.
+        size_m: of an arena.
+        widest_m: the greatest radius.
+        margin_m: the margin of each robot.
+    """
+    rows = len(state)
+    per_arena = rows // arenas
+    # About a robot in each cell, if they are spread evenly.
+    spacing_m = float(np.sqrt(size_m[0] * size_m[1] / max(per_arena, 1)))
+    grid = build(state[:, 0], state[:, 1], arenas, size_m, max(2.0 * (widest_m + margin_m), spacing_m))
+    pairs = np.empty((2 * rows + 16, 2), np.int64)
+    count = _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs)
+    if count > len(pairs):
+        pairs = np.empty((count, 2), np.int64)
+        _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs)
+    return pairs[:count]
+
+
+def fixed_near(
+    robots: AnyArray,
+    state: FloatArray,
+    size_m: tuple[float, float],
+    walled: bool,
+    obstacles: Obstacles,
+    cells: ObstacleCells,
+    margin_m: float,
+) -> IntArray:
+    """Fixed things with a gap of up to the margin, (things, 3): row, kind, number of the circle or polygon.
+
+    An obstacle that ends where a robot begins, or lower, is none to it.
+    """
+    per_arena = len(state) // (len(obstacles.circle_start) - 1)
+    things = np.empty((len(state) + 16, 3), np.int64)
+    count = _list_fixed(robots, state, per_arena, size_m, walled, obstacles, cells, margin_m, things)
+    if count > len(things):
+        things = np.empty((count, 3), np.int64)
+        _list_fixed(robots, state, per_arena, size_m, walled, obstacles, cells, margin_m, things)
+    return things[:count]
+
+
+@borrowing()
+def _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs):
+    """Fill `pairs`, and return how many there are, whether there is room for them or not."""
+    count = 0
+    farthest_m = 2.0 * (widest_m + margin_m)
+    for row in range(len(state)):
+        x, y = state[row, 0], state[row, 1]
+        i = cell_of(x, grid.left_m, grid.cell_m, grid.nx)
+        j = cell_of(y, grid.bottom_m, grid.cell_m, grid.ny)
+        begin = count
+        for beside in range(max(j - 1, 0), min(j + 2, grid.ny)):
+            c = ((row // per_arena) * grid.ny + beside) * grid.nx
+            for k in range(grid.start[c + max(i - 1, 0)], grid.start[c + min(i + 2, grid.nx)]):
+                other = grid.order[k]
+                dx, dy = state[other, 0] - x, state[other, 1] - y
+                apart2 = dx * dx + dy * dy
+                if apart2 > farthest_m * farthest_m or other <= row:
+                    continue
+                if apart2 <= (robots[row].radius_m + robots[other].radius_m + 2.0 * margin_m) ** 2:
+                    if count < len(pairs):
+                        _insert(pairs, begin, count, row, other)
+                    count += 1
+    return count
+
+
+@borrowing()
+def _insert(pairs, begin, count, row, other):
+    """Put a pair among those of the same row, pairs[begin:count], so that they rise."""
+    place = count
+    while place > begin and pairs[place - 1, 1] > other:
+        pairs[place, 0], pairs[place, 1] = pairs[place - 1, 0], pairs[place - 1, 1]
+        place -= 1
+    pairs[place, 0], pairs[place, 1] = row, other
+
+
+@borrowing()
+def _list_fixed(robots, state, per_arena, size_m, walled, obstacles, cells, margin_m, things):
+    """Fill `things`, and return how many there are, whether there is room for them or not."""
+    half_size_m = (0.5 * size_m[0], 0.5 * size_m[1])
+    width_m, height_m = size_m[0] / cells.per_side, size_m[1] / cells.per_side
+    count = 0
+    for row in range(len(state)):
+        robot, x, y = robots[row], state[row, 0], state[row, 1]
+        reach_m = robot.radius_m + margin_m
+        if walled and (abs(x) + reach_m >= half_size_m[0] or abs(y) + reach_m >= half_size_m[1]):
+            for wall in (LEFT, RIGHT, BOTTOM, TOP):
+                if gap_to_wall(wall, x, y, robot.radius_m, half_size_m)[0] <= margin_m:
+                    _put(things, count, row, wall, 0)
+                    count += 1
+        i = cell_of(x, -half_size_m[0], width_m, cells.per_side)
+        j = cell_of(y, -half_size_m[1], height_m, cells.per_side)
+        c = ((row // per_arena) * cells.per_side + j) * cells.per_side + i
+        for k in range(cells.start[c], cells.start[c + 1]):
+            kind, which, top_m = _told(obstacles, cells.which[k])
+            if top_m > robot.bottom_m and _gap_m(kind, which, x, y, robot, half_size_m, obstacles) <= margin_m:
+                _put(things, count, row, kind, which)
+                count += 1
+    return count
+
+
+@borrowing()
+def _put(things, place, row, kind, which):
+    if place < len(things):
+        things[place, 0], things[place, 1], things[place, 2] = row, kind, which
+
+
+@borrowing()
+def _told(obstacles, obstacle):
+    """The kind of an obstacle that the cells list, its number among its kind, and its height in m."""
+    polygon = obstacle - len(obstacles.circle)
+    if polygon < 0:
+        return CIRCLE, obstacle, obstacles.circle_top_m[obstacle]
+    return POLYGON, polygon, obstacles.polygon_top_m[polygon]
+
+
+@borrowing()
+def _gap_m(kind, which, x, y, robot, half_size_m, obstacles):
+    circle, side_start, side = obstacles.circle, obstacles.side_start, obstacles.side
+    return gap_to_fixed(kind, which, x, y, robot.radius_m, half_size_m, circle, side_start, side)[0]
