@@ -13,7 +13,9 @@ swarmwire screenshot "$runs/flocking-disrupted" --tick 300 --to docs/rerun.png
 swarmwire export "$runs/flocking-disrupted" --gif --to docs/demo.gif
 swarmwire export "$runs/split" --png 35 --to docs/split.png
 swarmwire export "$runs/pso" --png 55 --to docs/pso.png
-swarmwire draw footbot --to docs/footbot.png
+for body in epuck epuck2 flockbot footbot kilobot point turtlebot3-burger; do
+  swarmwire draw "$body" --size 900 --to "docs/bodies/$body.png"
+done
 swarmwire radio probe scenarios/warehouse-wifi.toml --at=-6,-3.5 --bytes 64 --to docs/coverage.png
 swarmwire run scenarios/warehouse-wifi.toml --quiet --no-rrd --out "$runs/warehouse"
 swarmwire export "$runs/warehouse" --pdr --to docs/delivery.png

@@ -11,6 +11,8 @@ from swarmwire.comms.body import Body, body_from, body_names, load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sheets import Positioning, Proximity
 
+WITH_PROXIMITY = [name for name in body_names() if load_body(name).proximity]
+
 
 def proximity_of(name: str) -> Proximity:
     sheet = load_body(name).proximity
@@ -52,6 +54,24 @@ def test_proximity_answers_as_in_argos(name: str, distance_m: float, value: floa
     assert round(float(proximity_of(name).response.value(np.float64(distance_m))), digits) == value
 
 
+@pytest.mark.parametrize("distance_m", [0.01, 0.02, 0.05])
+def test_the_epuck2_answers_as_its_driver_reads_it(distance_m: float) -> None:
+    # epuck_driver_cpp: the distance in m is 0.5 / sqrt(value), of 4095.
+    value = proximity_of("epuck2").response.value(np.float64(distance_m))
+    assert 0.5 / np.sqrt(4095.0 * value) == pytest.approx(distance_m, rel=1e-3)
+
+
+def test_the_flockbot_sees_five_diameters_far_with_three_rays_in_each_sector() -> None:
+    # Sectors of minimalist flocking: front (-45, 45], left (45, 135], rear (135, 225], right (225, 315].
+    body, sheet = load_body("flockbot"), proximity_of("flockbot")
+    infrared = body.infrared
+    assert infrared is not None
+    assert sheet.range_m == infrared.range_m == pytest.approx(5.0 * 2.0 * body.radius_m)
+    for each in (sheet, infrared):
+        sector = np.floor((np.rad2deg(each.angle_rad) + 45.0 - 1e-9) / 90.0) % 4
+        assert np.bincount(sector.astype(int)).tolist() == [3, 3, 3, 3]
+
+
 def test_the_epuck_sees_nothing_from_48_mm_on() -> None:
     assert not proximity_of("epuck").response.value(np.linspace(0.048, 0.2, 100)).any()
 
@@ -62,7 +82,7 @@ def test_the_footbot_answers_fully_at_the_rim_and_not_beyond_10_cm() -> None:
     assert response.value(np.array([0.1001, 1.0])).tolist() == [0.0, 0.0]
 
 
-@pytest.mark.parametrize("name", body_names())
+@pytest.mark.parametrize("name", WITH_PROXIMITY)
 @given(st.floats(0.0, 0.2))
 def test_a_response_names_the_distance_it_came_from(name: str, distance_m: float) -> None:
     response = proximity_of(name).response
@@ -73,7 +93,7 @@ def test_a_response_names_the_distance_it_came_from(name: str, distance_m: float
         assert response.distance_m(value)[0] == response.reach_m
 
 
-@pytest.mark.parametrize("name", body_names())
+@pytest.mark.parametrize("name", WITH_PROXIMITY)
 def test_a_stronger_response_never_means_farther_away(name: str) -> None:
     response = proximity_of(name).response
     distance_m = response.distance_m(np.linspace(0.0, 1.0, 1001))
@@ -81,11 +101,12 @@ def test_a_stronger_response_never_means_farther_away(name: str) -> None:
     assert 0.0 <= distance_m.min() <= distance_m.max() == response.reach_m
 
 
-@pytest.mark.parametrize("name", body_names())
+@pytest.mark.parametrize("name", WITH_PROXIMITY)
 def test_rays_are_mirrored_left_and_right_and_lie_within_half_a_turn(name: str) -> None:
     angle = proximity_of(name).angle_rad
     assert np.all((angle > -np.pi) & (angle <= np.pi))
-    assert np.allclose(np.sort(angle), np.sort(-angle))
+    ahead, left = np.round(np.cos(angle), 9), np.round(np.sin(angle), 9)
+    assert set(zip(ahead, left, strict=True)) == set(zip(ahead, -left, strict=True))
 
 
 def test_the_turning_limit_follows_from_wheels_and_axle() -> None:
@@ -122,8 +143,16 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("radius_m", None, "radius_m: is missing"),
         ("drive", None, "drive: is missing"),
         ("drive.wheel_base_m", None, "drive.wheel_base_m: is missing"),
-        ("like", "roomba", "like: expected one of epuck, epuck-gps, footbot; got 'roomba'"),
-        ("like", 3, "like: expected one of epuck, epuck-gps, footbot; got 3"),
+        (
+            "like",
+            "roomba",
+            f"like: expected one of {', '.join(body_names())}; got 'roomba'",
+        ),
+        (
+            "like",
+            3,
+            f"like: expected one of {', '.join(body_names())}; got 3",
+        ),
         ("senses.light.noise", 2, "senses.light.noise: expected at most 1, got 2.0"),
         ("senses.bumper.noise", 1, "senses.bumper.noise: unknown key; expected one of"),
         ("senses.positioning", {"noise_m": -1}, "senses.positioning.noise_m: expected at least 0 m, got -1.0"),
@@ -141,7 +170,12 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("radius_m", float("inf"), "radius_m: expected a finite number, got inf"),
         ("senses.compass.noise_rad", -1, "senses.compass.noise_rad: expected at least 0 rad, got -1.0"),
         ("senses.odometry.slip", 2, "senses.odometry.slip: expected at most 1, got 2.0"),
-        ("senses.proximity.response.kind", "cubic", "response.kind: expected one of rational, quadratic; got 'cubic'"),
+        ("senses.proximity.response.b", 36.8961, "response: expected a curve that falls from the rim to reach_m"),
+        (
+            "senses.proximity.response.kind",
+            "cubic",
+            "response.kind: expected one of rational, inverse_square, quadratic; got 'cubic'",
+        ),
         ("senses.proximity.angles_deg", 17, "senses.proximity.angles_deg: expected a list, got 17"),
         ("senses.proximity.angles_deg", [], "senses.proximity.angles_deg: expected a list, got []"),
         ("senses.proximity.angles_deg", [1, "x"], "senses.proximity.angles_deg[1]: expected a number, got 'x'"),
@@ -174,7 +208,7 @@ def test_a_body_like_another_differs_only_in_what_it_says() -> None:
 
 
 def test_bodies_know_no_global_position_unless_they_say_so() -> None:
-    assert [name for name in body_names() if "positioning" in load_body(name).senses] == ["epuck-gps"]
+    assert [name for name in body_names() if "positioning" in load_body(name).senses] == ["epuck-gps", "point"]
 
 
 def test_photocells_are_argos_s() -> None:

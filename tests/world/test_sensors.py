@@ -16,7 +16,7 @@ from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.sensors import Scene
 from swarmwire.world.sensors.proximity import ProximitySensor
 from swarmwire.world.world import World
-from tests.world.samples import commanded, posed
+from tests.world.samples import SENSES, commanded, posed
 from tests.world.scenes import read, scene, staged
 
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
@@ -236,7 +236,7 @@ def test_odometry_is_the_same_however_often_an_agent_looks() -> None:
 
 
 def test_the_sheets_of_the_bodies_have_a_sensor_each() -> None:
-    assert EPUCK.senses.keys() == FOOTBOT.senses.keys() == {"proximity", "compass", "odometry", "light", "bumper"}
+    assert EPUCK.senses.keys() == FOOTBOT.senses.keys() == {*SENSES, "ground", "camera"}
     assert isinstance(EPUCK.proximity, Proximity)
 
 

@@ -71,7 +71,7 @@ def test_only_what_is_needed_is_sensed() -> None:
 
 
 def test_a_sense_that_the_body_lacks_is_refused() -> None:
-    has = "the body epuck has proximity, compass, odometry, light, bumper"
+    has = "the body epuck has proximity, compass, odometry, light, ground, camera, bumper"
     text = f"^f: robots.flock.agent: the agent needs the sense 'sonar'; {has}$"
     with pytest.raises(BadInput, match=text):
         World(scenario_from(SAMPLE, "f"), [1], {"flock": ("sonar",)})

@@ -20,10 +20,11 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import GroupAssignment, params_of
 from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.leds import BRIGHTEST
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
-from swarmwire.comms.sheets import OwnSheet
+from swarmwire.comms.sheets import Camera, GroundColour, OwnSheet
 
 RATE_HZ = 10
 GIVEN = ("range_m", "bearing_rad", "rssi_dbm")
@@ -158,11 +159,30 @@ def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatA
         if isinstance(sheet, OwnSheet):
             for field, width in sheet.fields.items():
                 fields[f"{name}.{field}"] = _uniform(key, tick, f"{name}.{field}", (n, width) if width else (n,))
+    fields.update(_seen(body, key, tick, n))
+    return fields
+
+
+def _seen(body: Body, key: int, tick: int, n: int) -> dict[str, FloatArray]:
+    """What senses show that look around or down."""
+    fields = dict[str, FloatArray]()
     if body.infrared is not None:
         value = _uniform(key, tick, "infrared", (n, len(body.infrared.angles_deg)))
         fields["infrared.value"] = np.maximum(value * 2.0 - 1.0, 0.0)
     if body.scan is not None:
-        fields["scan.range_m"] = _uniform(key, tick, "scan", (n, body.scan.rays)) * body.scan.range_m
+        share = _uniform(key, tick, "scan", (n, body.scan.rays))
+        fields["scan.range_m"] = np.where(share < 0.8, share * body.scan.range_m, np.inf)
+    ground, camera = body.senses.get("ground"), body.senses.get("camera")
+    if isinstance(ground, GroundColour):
+        fields["ground.shade"] = _uniform(key, tick, "ground", (n, len(ground.points_m)))
+    if isinstance(camera, Camera):
+        shape = n, camera.most_blobs
+        none = np.arange(camera.most_blobs) >= _uniform(key, tick, "blobs", (n, 1)) * camera.most_blobs
+        nearest_first = np.sort(_uniform(key, tick, "distance", shape), axis=1)
+        bearing = (_uniform(key, tick, "bearing", shape) * 2.0 - 1.0) * np.pi
+        colour = np.floor(_uniform(key, tick, "colour", shape) * BRIGHTEST)
+        for name, column in (("distance_m", nearest_first), ("bearing_rad", bearing), ("colour", colour)):
+            fields[f"camera.{name}"] = np.where(none, np.nan, column)
     return fields
 
 

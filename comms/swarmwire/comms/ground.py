@@ -5,8 +5,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.floor import Floor
 from swarmwire.comms.geometry import sides_of
@@ -52,7 +52,7 @@ def ground_of(floor: Floor | None, size_m: tuple[float, float], boundary: Bounda
     )
 
 
-@njit(cache=True)
+@borrowing()
 def shade_at(ground, x, y):
     """The shade at a point of the arena in m, 0 black … 1 white; outside an arena that is no torus the rest's."""
     for k in range(len(ground.patch) - 1, -1, -1):

@@ -187,6 +187,7 @@ class World:
             size_m=static.arena_size_m,
             boundary=static.boundary,
             obstacles=self.obstacles,
+            obstacles_move=any(o.movable for standing in static.obstacles for o in standing),
             lights=static.lights,
             ground=ground_of(static.floor, static.arena_size_m, static.boundary),
             tick_s=tick_s,

@@ -4,7 +4,21 @@ import math
 
 from swarmwire.comms.body import Body
 from swarmwire.comms.drives import Holonomic, Twist, Wheels
-from swarmwire.comms.sheets import Battery, Bumper, Compass, Imu, Light, Odometry, Positioning, Proximity, Sheet
+from swarmwire.comms.sheets import (
+    Battery,
+    Bumper,
+    Camera,
+    Compass,
+    GroundColour,
+    Imu,
+    Light,
+    Odometry,
+    OwnSheet,
+    Positioning,
+    Rim,
+    Scan,
+    Sheet,
+)
 
 
 def facts_of(body: Body) -> list[tuple[str, str]]:
@@ -13,7 +27,7 @@ def facts_of(body: Body) -> list[tuple[str, str]]:
     facts = [
         ("size", f"{_length(2.0 * body.radius_m)} across, {_length(body.height_m)} high"),
         ("mass", f"{body.mass_kg:g} kg"),
-        ("wheels", "none: it moves in every direction" if isinstance(drive, Holonomic) else _apart(drive)),
+        ("wheels", "none, it is holonomic" if isinstance(drive, Holonomic) else _apart(drive)),
         ("top speed", f"{body.max_linear_mps:.3g} m/s"),
         ("turns", f"{math.degrees(body.max_angular_radps):.0f} degrees/s"),
         ("drive", f"{drive.max_force_n:g} N, {drive.max_torque_nm:g} N m"),
@@ -21,29 +35,42 @@ def facts_of(body: Body) -> list[tuple[str, str]]:
     if body.leds:
         facts.append(("LEDs", f"{body.led_count}{', the last a beacon' if body.leds.beacon_height_m else ''}"))
     for name, sheet in body.senses.items():
-        facts.extend(zip((name, *[""] * 9), _told(sheet), strict=False))
+        facts.extend(zip((name, *[""] * 9), _told(sheet, body.altitude_m), strict=False))
+    if body.leds is not None:
+        facts.append(("LEDs", f"{body.leds.count}"))
     return facts
 
 
-def _told(sheet: Sheet) -> list[str]:
+def _told(sheet: Sheet, altitude_m: float) -> list[str]:
     match sheet:
-        case Proximity():
+        case Rim():
             return [f"{len(sheet.angles_deg)} rays of {_length(sheet.range_m)}", *_noise(sheet.noise)]
+        case Scan():
+            return [
+                f"{_count(sheet.rays, 'ray')} of {_length(sheet.range_m)}",
+                _error(_length(sheet.noise_m), sheet.noise_m),
+            ]
+        case GroundColour():
+            return [f"{len(sheet.points_m)} points under the body", *_noise(sheet.noise)]
+        case Camera():
+            return [f"LEDs within {_length(sheet.reach_m(altitude_m))}"]
         case Light():
-            return [f"{len(sheet.angles_deg)} photocells", *_noise(sheet.noise)]
+            return [_count(len(sheet.angles_deg), "photocell"), *_noise(sheet.noise)]
         case Compass():
-            return [f"error {math.degrees(sheet.noise_rad):.2g} degrees"]
+            return [_error(f"{math.degrees(sheet.noise_rad):.2g} degrees", sheet.noise_rad)]
         case Odometry():
             step = f", step {sheet.step_m * 1000:.2g} mm" if sheet.step_m else ""
             return [f"slip {100 * sheet.slip:.2g} %{step}"]
         case Positioning():
-            return [f"error {_length(sheet.noise_m)}"]
+            return [_error(_length(sheet.noise_m), sheet.noise_m)]
         case Bumper():
             return ["the whole rim"]
         case Imu():
-            return [f"noise {sheet.noise_mps2:.2g} m/s², {math.degrees(sheet.noise_radps):.2g} degrees/s"]
+            return [f"noise {sheet.noise_mps2:.2g} m/s²", f"{math.degrees(sheet.noise_radps):.2g} degrees/s"]
         case Battery():
             return [f"{sheet.capacity_wh:g} Wh, {sheet.full_v:g} V"]
+        case OwnSheet():
+            return [f"by {sheet.kind.rpartition('/')[2]}"]
         case _:
             return ["yes"]
 
@@ -54,6 +81,14 @@ def _apart(drive: Wheels | Twist) -> str:
 
 def _noise(half_width: float) -> list[str]:
     return [f"noise ±{half_width:g} of 1"] if half_width else []
+
+
+def _error(told: str, size: float) -> str:
+    return f"error {told}" if size else "no error"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def _length(metres: float) -> str:

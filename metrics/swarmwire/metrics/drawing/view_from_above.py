@@ -1,20 +1,14 @@
-"""A body from above and to scale, its front up: disc, wheels and axle, and whatever sits around its rim."""
+"""A body from above and to scale, its front up: disc, wheels and axle, and what it senses and shows with."""
 
-import math
 from typing import Any
 
-import numpy as np
-
-from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.body import Body
 from swarmwire.comms.drives import Holonomic
-from swarmwire.comms.sheets import Bumper, Light, Proximity
+from swarmwire.comms.sheets import Rim
+from swarmwire.metrics.drawing.body_parts import draw_parts
 from swarmwire.metrics.drawing.looks import (
     CURVE,
     INK,
-    LIGHT,
-    LIGHT_EDGE,
-    OBSTACLE_EDGE,
     SMALL_PT,
     SOFT,
     Look,
@@ -24,8 +18,6 @@ from swarmwire.metrics.drawing.looks import (
 from swarmwire.metrics.drawing.scenery import round_length_m
 from swarmwire.metrics.palette import robot_color
 
-_RAY = "#d1495b"
-_LED = "#7fd14a"
 _COLOR = robot_color(0)
 _ROOM = 1.16  # of what is seen by what is drawn, so that numbers at the rays' ends fit
 _BELOW = -0.035  # where legend and bar are, as a share of the view's height
@@ -37,27 +29,15 @@ def draw_from_above(axes: Any, body: Body) -> None:
 
     A data sheet has no size of the wheels: theirs is for show, the distance between them is not.
     """
-    reach_m = body.radius_m + (body.proximity.range_m if body.proximity else 0.0)
+    rims = [sheet.range_m for sheet in body.senses.values() if isinstance(sheet, Rim)]
+    reach_m = body.radius_m + max(rims, default=0.0)
     half_m = _ROOM * max(reach_m, _LEAST_RADII * body.radius_m)
     axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal")
     axes.set_axis_off()
     _draw_disc(axes, body)
     if not isinstance(body.drive, Holonomic):
         _draw_wheels(axes, body.radius_m, body.drive.wheel_base_m)
-    if body.led_count:
-        _draw_leds(axes, body.led_places_m)
-    for sheet in body.senses.values():
-        match sheet:
-            case Proximity():
-                _draw_rays(axes, body.radius_m, sheet)
-            case Light():
-                x, y = _around(sheet.angle_rad, 0.86 * body.radius_m)
-                look: Look = {"markerfacecolor": LIGHT, "markeredgecolor": LIGHT_EDGE, "markeredgewidth": 0.7}
-                axes.plot(x, y, "s", markersize=3.6, zorder=6, label="photocell", **look)
-            case Bumper():
-                _draw_bumper(axes, body.radius_m)
-            case _:
-                pass  # compass, odometry and positioning have no place on the body
+    draw_parts(axes, body)
     _draw_heading(axes, body.radius_m)
     _draw_bar(axes, half_m)
     if axes.get_legend_handles_labels()[0]:
@@ -92,30 +72,6 @@ def _draw_wheels(axes: Any, radius_m: float, wheel_base_m: float) -> None:
         axes.add_patch(FancyBboxPatch(corner, wide_m, long_m, boxstyle=style, **look))
 
 
-def _draw_leds(axes: Any, places_m: FloatArray) -> None:
-    look: Look = {"markerfacecolor": _LED, "markeredgecolor": INK, "markeredgewidth": 0.5}
-    axes.plot(-places_m[:, 1], places_m[:, 0], "o", markersize=3.2, zorder=8, label="LED", **look)
-
-
-def _draw_rays(axes: Any, radius_m: float, sheet: Proximity) -> None:
-    """From the rim outwards, numbered as an agent has them."""
-    from matplotlib.collections import LineCollection
-
-    start, end = (np.stack(_around(sheet.angle_rad, at), axis=1) for at in (radius_m, radius_m + sheet.range_m))
-    label = "proximity ray"
-    rays = LineCollection(list(np.stack([start, end], axis=1)), colors=_RAY, linewidths=0.9, zorder=2, label=label)
-    axes.add_collection(rays)
-    axes.plot(start[:, 0], start[:, 1], "o", color=_RAY, markersize=2.4, zorder=6)
-    number_at = radius_m + sheet.range_m + 0.055 * axes.get_xlim()[1]
-    for i, (x, y) in enumerate(np.stack(_around(sheet.angle_rad, number_at), axis=1)):
-        axes.text(x, y, str(i), fontsize=SMALL_PT, color=_RAY, ha="center", va="center")
-
-
-def _draw_bumper(axes: Any, radius_m: float) -> None:
-    x, y = _around(np.linspace(0.0, 2.0 * np.pi, 181), radius_m)
-    axes.plot(x, y, color=OBSTACLE_EDGE, lw=3.4, zorder=2.5, label="bumper")
-
-
 def _draw_heading(axes: Any, radius_m: float) -> None:
     look: Look = {"arrowstyle": "-|>", "color": CURVE, "lw": 1.8, "mutation_scale": 11, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", xy=(0.0, 0.7 * radius_m), xytext=(0.0, 0.0), arrowprops=look, zorder=7)
@@ -128,9 +84,3 @@ def _draw_bar(axes: Any, half_m: float) -> None:
     axes.plot([-half_m, -half_m + length_m], [low, low], color=INK, lw=1.6, solid_capstyle="butt", clip_on=False)
     label = f"{100 * length_m:g} cm"
     axes.text(-half_m + length_m + share, low, label, fontsize=SMALL_PT, color=SOFT, va="center")
-
-
-def _around(angle_rad: FloatArray, at_m: float) -> tuple[FloatArray, FloatArray]:
-    """Points at this distance, for angles from ahead, which is up: the body's frame turned by a quarter."""
-    turned = angle_rad + math.pi / 2
-    return at_m * np.cos(turned), at_m * np.sin(turned)

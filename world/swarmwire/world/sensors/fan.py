@@ -12,11 +12,13 @@ from swarmwire.comms.cells import sort
 from swarmwire.comms.geometry import ray_to_circle
 from swarmwire.comms.obstacle_cells import near_things, ray_to_thing
 from swarmwire.comms.sheets import Rim
+from swarmwire.comms.sheets.rim import FORMS
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.standing import Standing
 
+RATIONAL, QUADRATIC = FORMS.index("rational"), FORMS.index("quadratic")
 MARGIN_M = 1e-9  # a disc farther than that from a ray is missed, however numbers are rounded
 
 
@@ -29,7 +31,7 @@ class Fan(NamedTuple):
     range_m: float
     half_x: float  # where walls stand; inf: nowhere
     half_y: float
-    rational: bool  # form of the response; `ResponseCurve` says what the numbers mean
+    form: int  # of the response, a place in FORMS; `ResponseCurve` says what the numbers mean
     a: float
     b: float
     c: float
@@ -58,7 +60,7 @@ class FanSight:
             sheet.range_m,
             0.5 * width if walled else np.inf,
             0.5 * height if walled else np.inf,
-            curve.kind == "rational",
+            FORMS.index(curve.kind),
             curve.a,
             curve.b,
             curve.c,
@@ -161,10 +163,12 @@ def _answer(distance, fan):
     """What a sensor answers to a distance (`ResponseCurve.value`)."""
     if distance > fan.reach_m:
         return 0.0
-    if not fan.rational:
+    if fan.form == QUADRATIC:
         value = fan.a * distance * distance + fan.b * distance + fan.c
     elif distance < fan.full_m:
         value = 1.0
-    else:
+    elif fan.form == RATIONAL:
         value = fan.a / (distance + fan.b)
+    else:
+        value = fan.a / ((distance + fan.b) * (distance + fan.b))
     return min(max(value, 0.0), 1.0)

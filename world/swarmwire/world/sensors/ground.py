@@ -3,8 +3,8 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
+from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.ground import shade_at
 from swarmwire.comms.sheets import GroundColour
@@ -30,7 +30,7 @@ class GroundSensor:
         return (shade,)
 
 
-@njit(cache=True)
+@borrowing()
 def _look_down(shade, state, start, points, ground):
     """Set shade (arenas, n, points)."""
     for arena in range(shade.shape[0]):
