@@ -13,7 +13,7 @@ Figure = tuple[str, str, object]  # path within the sheet, unit, value
 
 
 def body_table() -> str:
-    """Every figure of every body, a column each."""
+    """Every figure that a body's sheet gives, a column for each body; what is at its default is left out."""
     sheets = [{path: (unit, value) for path, unit, value in _figures(load_body(name))} for name in body_names()]
     paths = {path: unit for sheet in sheets for path, (unit, _) in sheet.items()}
     rows = [
@@ -42,7 +42,7 @@ def _of(sheet: Any, prefix: str, skipped: tuple[str, ...] = ()) -> Iterator[Figu
         value = getattr(sheet, of.name)
         if is_dataclass(value):
             yield from _of(value, f"{prefix}{of.name}.")
-        elif of.name not in skipped:
+        elif of.name not in skipped and value != of.default:
             yield prefix + of.name, limits_of(of).unit, value
 
 
@@ -52,8 +52,13 @@ def _value(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, tuple):
-        return _ring(cast("tuple[float, ...]", value))
+        items = cast("tuple[Any, ...]", value)
+        return _points(items) if isinstance(items[0], tuple) else _ring(items)
     return number(value) if isinstance(value, int | float) else str(value)
+
+
+def _points(points: tuple[tuple[float, ...], ...]) -> str:
+    return ", ".join(f"({', '.join(number(at) for at in point)})" for point in points)
 
 
 def _ring(angles: tuple[float, ...]) -> str:
