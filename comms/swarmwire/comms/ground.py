@@ -5,6 +5,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray

@@ -187,7 +187,7 @@ class World:
             size_m=static.arena_size_m,
             boundary=static.boundary,
             obstacles=self.obstacles,
-            obstacles_move=any(o.movable for standing in static.obstacles for o in standing),
+            obstacles_move=static.movable > 0,
             lights=static.lights,
             ground=ground_of(static.floor, static.arena_size_m, static.boundary),
             tick_s=tick_s,
@@ -201,7 +201,6 @@ class World:
             charge=self.batteries.charge,
             leds=self.actuators.leds.rgb,
             led_places_m=led_places_m(static.groups, self.actuators.leds.rgb.shape[2]),
-            obstacles_move=any(obstacle.movable for own in static.obstacles for obstacle in own),
         )
 
 
