@@ -18,7 +18,8 @@ from tests.world.brute_force import FOOTBOT
 from tests.world.scenes import scene
 
 assert FOOTBOT.proximity is not None
-RING: dict[str, Any] = {"angles_deg": tuple(range(0, 360, 30)), "range_m": 0.5, "response": FOOTBOT.proximity.response}
+RESPONSE = replace(FOOTBOT.proximity.response, reach_m=0.5)
+RING: dict[str, Any] = {"angles_deg": tuple(range(0, 360, 30)), "range_m": 0.5, "response": RESPONSE}
 SHEETS: dict[str, Any] = {
     "proximity": Proximity(**RING),
     "infrared": Infrared(**RING),
