@@ -37,7 +37,10 @@ class Painter(OwnActuator):
     """Adds up what it is set to; set to a negative first number it stops the robot."""
 
     gain: float = parameter(1.0, help="of what is added", above=0)
-    width = 2
+
+    @property
+    def width(self) -> Any:
+        return 2
 
     def act(self, tick: int, rows: Any, values: Any) -> None:
         arena, robot = self.at(rows)
@@ -51,7 +54,9 @@ class Painter(OwnActuator):
 class Alone(OwnSensor):
     """A single field needs no tuple."""
 
-    fields = (Field("x"),)
+    @property
+    def fields(self) -> Any:
+        return (Field("x"),)
 
     def truth(self, tick: int) -> Any:
         return self.pose[:, :, 0]
@@ -71,17 +76,23 @@ class WrongShape(Alone):
 
 @dataclass
 class NoTruth(OwnSensor):
-    fields = (Field("x"),)
+    @property
+    def fields(self) -> Any:
+        return (Field("x"),)
 
 
 @dataclass
 class NoFields(Alone):
-    fields = "x"
+    @property
+    def fields(self) -> Any:
+        return "x"
 
 
 @dataclass
 class Twice(Alone):
-    fields = (Field("x"), Field("x"))
+    @property
+    def fields(self) -> Any:
+        return (Field("x"), Field("x"))
 
 
 @dataclass
@@ -96,7 +107,9 @@ class Plain(Alone):
 
 @dataclass
 class NoWidth(Painter):
-    width = 0
+    @property
+    def width(self) -> Any:
+        return 0
 
 
 @dataclass

@@ -190,7 +190,6 @@ class World:
             size_m=static.arena_size_m,
             boundary=static.boundary,
             obstacles=self.obstacles,
-            obstacles_move=any(o.movable for standing in static.obstacles for o in standing),
             lights=static.lights,
             ground=ground_of(static.floor, static.arena_size_m, static.boundary),
             tick_s=tick_s,
@@ -204,6 +203,7 @@ class World:
             charge=self.batteries.charge,
             leds=self.actuators.leds.rgb,
             led_places_m=led_places_m(static.groups, self.actuators.leds.rgb.shape[2]),
+            obstacles_move=any(obstacle.movable for own in static.obstacles for obstacle in own),
         )
 
 
