@@ -10,14 +10,16 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.sheets import Camera, Infrared, Light, Proximity, Scan
-from swarmwire.comms.truth import Group
+from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.comms.truth import Light as Lamp
-from swarmwire.world.sensors import SENSORS
+from swarmwire.world.sensors import SENSORS, Scene
+from swarmwire.world.sensors.sensor import TrueSense
 from tests.world.brute_force import FOOTBOT
 from tests.world.scenes import scene
 
 assert FOOTBOT.proximity is not None
-RING: dict[str, Any] = {"angles_deg": tuple(range(0, 360, 30)), "range_m": 0.5, "response": FOOTBOT.proximity.response}
+RESPONSE = replace(FOOTBOT.proximity.response, reach_m=0.5)
+RING: dict[str, Any] = {"angles_deg": tuple(range(0, 360, 30)), "range_m": 0.5, "response": RESPONSE}
 SHEETS: dict[str, Any] = {
     "proximity": Proximity(**RING),
     "infrared": Infrared(**RING),
@@ -87,3 +89,27 @@ def test_a_group_of_many_arenas_sees_what_it_sees_alone(name: str) -> None:
         alone = scene(poses[arena], FOOTBOT, size_m=2.0, colour=0xFF0000, lights=(Lamp(0.1, 0.2, 1.0),))
         for one, other in zip(SENSORS[name](alone, group, SHEETS[name]).truth(0), together, strict=True):
             assert np.array_equal(one[0], other[arena], equal_nan=True)
+
+
+@pytest.mark.parametrize("name", ["proximity", "infrared", "scan", "camera", "light"])
+def test_an_obstacle_that_was_pushed_is_seen_where_it_is(name: str) -> None:
+    poses = np.random.default_rng(5).uniform(-1, 1, (12, 3)) * [0.6, 0.6, np.pi]
+    pillar, box = Obstacle("cylinder", -0.9, 0.0, radius_m=0.3), Obstacle("box", 0.0, 0.7, size_m=(0.3, 0.2))
+
+    def around(*obstacles: Obstacle, moves: bool = False) -> Scene:
+        lamps = (Lamp(0.9, 0.9, 1.0), Lamp(-0.9, 0.9, 1.0))
+        made = scene(poses, FOOTBOT, obstacles, size_m=2.0, colour=0xFF0000, lights=lamps)
+        return replace(made, obstacles_move=moves)
+
+    def truth(sense: TrueSense) -> FloatArray:
+        return np.stack([field[0] for field in sense.truth(0)])
+
+    group, pushed = Group("a", FOOTBOT, 0, 12), (replace(pillar, x_m=0.1), replace(box, y_m=-0.2, heading_rad=1.0))
+    looked_at, expected = around(pillar, box, moves=True), around(*pushed)
+    sense = SENSORS[name](looked_at, group, SHEETS[name])
+    before = truth(sense)
+    for have, now in zip(looked_at.obstacles, expected.obstacles, strict=True):
+        have[...] = now
+    after = truth(sense)
+    assert np.array_equal(after, truth(SENSORS[name](expected, group, SHEETS[name])), equal_nan=True)
+    assert not np.array_equal(before, after, equal_nan=True)
