@@ -58,6 +58,13 @@ def asked(engine: Engine, forward_mps: Any = 0.0, turn_radps: Any = 0.0, left_mp
     return np.ascontiguousarray(np.stack(columns, axis=2))
 
 
+def towards(engine: Engine, x_m: Any, y_m: Any) -> FloatArray:
+    """Turn rates (arenas, n) that make robots face a place."""
+    x, y, heading = engine.state[:, :, :3].transpose(2, 0, 1)
+    off = np.angle(np.exp(1j * (np.arctan2(y_m - y, x_m - x) - heading)))
+    return np.clip(4.0 * off, -3.0, 3.0)
+
+
 def overlap_m(engine: Engine, radius_m: Any, size_m: tuple[float, float] | None = None) -> float:
     """The deepest overlap of two robots, or of a robot with the walls of an arena of this size; negative: a gap."""
     radius = np.broadcast_to(np.asarray(radius_m, np.float64), engine.touched.shape[1])
@@ -82,9 +89,3 @@ def packed(n: int, side_m: float, radius_m: float, seed: int) -> FloatArray:
     xy = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)[rng.permutation(per_side**2)[:n]]
     xy = np.clip(xy + rng.uniform(-free_m, free_m, xy.shape), -0.5 * side_m + radius_m, 0.5 * side_m - radius_m)
     return np.column_stack([xy, rng.uniform(-np.pi, np.pi, n)])
-
-
-def energy_j(engine: Engine, mass_kg: Any, radius_m: Any) -> float:
-    """Kinetic energy of all robots, turning included."""
-    vx, vy, turn = engine.state[:, :, 3:].transpose(2, 0, 1)
-    return float((0.5 * mass_kg * (vx**2 + vy**2 + 0.5 * (radius_m * turn) ** 2)).sum())

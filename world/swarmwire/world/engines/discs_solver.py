@@ -1,8 +1,12 @@
 """Impulses at contacts, one contact after the other, several times over (sequential impulses). Compiled.
 
 Contacts may be speculative: two things with a gap may approach by that gap within the step, no more, so that they meet
-and do not overlap. Impulses start from those of the step before (warm start), so that those in a jam, which take more
-sweeps than there are in a step, come about over several steps.
+and do not overlap.
+
+Where robots are driven, impulses start from those of the step before (warm start): a jam takes more sweeps than there
+are in a step, so its impulses come about over several steps. Elsewhere they start from nothing. Then every one of them
+lowers kinetic energy + sum of impulse x allowed closing speed, of which the second is never negative: what nobody
+drives can only lose energy, however far the sweeps get.
 
 E. Catto (2005), Iterative dynamics with temporal coherence, and (2006), Fast and simple physics using sequential
 impulses, Game Developers Conference.
