@@ -298,6 +298,18 @@ def test_obstacles_and_lights_are_drawn_once_where_they_are(tmp_path):
     assert column(tmp_path / "dark.rrd", "/world/lights", "Points2D:positions") == {}
 
 
+def test_movable_obstacles_are_drawn_where_they_are_in_each_tick(tmp_path):
+    pushed = Obstacle("box", 0.0, 0.0, size_m=(2.0, 1.0), mass_kg=1.0)
+    of = static(2, obstacles=(*OBSTACLES, pushed))
+    ticks = (truth(of, tick, movable=np.array([[[tick, 1.0, tick * np.pi / 2]]])) for tick in range(2))
+    record(tmp_path / "run.rrd", of, ticks)
+    (fixed,) = column(tmp_path / "run.rrd", "/world/obstacles", "LineStrips2D:strips").values()
+    assert len(fixed) == len(OBSTACLES)
+    found = column(tmp_path / "run.rrd", "/world/movable", "LineStrips2D:strips")
+    assert np.allclose(found[0], [[[-1.0, 0.5], [1.0, 0.5], [1.0, 1.5], [-1.0, 1.5], [-1.0, 0.5]]])
+    assert np.allclose(found[1], [[[1.5, 0.0], [1.5, 2.0], [0.5, 2.0], [0.5, 0.0], [1.5, 0.0]]])
+
+
 def test_the_floor_is_one_picture_below_all_else(tmp_path):
     of = replace(static(2), floor=Floor(1.0, (Patch("disc", 4.0, 3.0, 0.0, radius_m=1.0),)))
     record(tmp_path / "run.rrd", of, moving(of, 2))

@@ -1,4 +1,4 @@
-"""The floor engines agree in what crowds do on average, though not in single paths: robots that bump into everything."""
+"""The floor engines agree in what crowds do on average, though not in single paths."""
 
 from typing import Any
 

@@ -117,9 +117,8 @@ class TickColumns:
                 columns[name] = np.ascontiguousarray(values[:ticks, ..., place]).reshape(per_robot)
         columns["alive"] = self._alive[:ticks].reshape(per_robot)
         columns["state"] = pl.Series(self._states).gather(self._state[:ticks].reshape(-1)).reshape(per_robot)
-        if movable := self._static.movable:
-            for place, name in enumerate(MOVABLE):
-                columns[name] = np.ascontiguousarray(self._movable[:ticks, ..., place]).reshape(-1, movable)
+        for place, name in enumerate(movable_columns(self._static)):
+            columns[name] = np.ascontiguousarray(self._movable[:ticks, ..., place]).reshape(ticks * arenas, -1)
         measured = {name: self._measured[row, :ticks].reshape(-1) for row, name in enumerate(self._metrics)}
         columns |= {name: pl.Series(values).fill_nan(None) for name, values in measured.items()}
         no_radio = pl.Series(np.repeat(~self._has_radio[:ticks], arenas))
