@@ -90,7 +90,7 @@ def test_rays_are_mirrored_left_and_right_and_lie_within_half_a_turn(name: str) 
 
 def test_the_turning_limit_follows_from_wheels_and_axle() -> None:
     body = load_body("epuck")
-    assert body.max_angular_radps == pytest.approx(2.0 * body.drive.max_wheel_mps / body.drive.wheel_base_m)
+    assert body.max_angular_radps == pytest.approx(2.0 * body.drive.max_wheel_mps / body.wheels.wheel_base_m)
     assert body.max_linear_mps == body.drive.max_wheel_mps
 
 
@@ -169,7 +169,7 @@ def test_a_body_like_another_differs_only_in_what_it_says() -> None:
     }
     assert gps.senses == {**epuck.senses, "positioning": Positioning(0.01)}
     mine = body_from({"like": "epuck-gps", "name": "mine", "drive": {"wheel_base_m": 0.06}}, "mine.toml")
-    assert (mine.drive.wheel_base_m, mine.drive.max_force_n) == (0.06, epuck.drive.max_force_n)
+    assert (mine.wheels.wheel_base_m, mine.drive.max_force_n) == (0.06, epuck.drive.max_force_n)
     assert (mine.name, mine.senses) == ("mine", gps.senses)
 
 

@@ -177,3 +177,11 @@ def test_a_polygon_blocks_the_line_through_it() -> None:
     assert not is_blocked(obstacles, 0, 0.6, 0.6, 1.0, 0.1)
     assert not is_blocked(obstacles, 0, -0.1, -1.0, -0.1, 2.0)
     assert Obstacle("cylinder", 0.0, 0.0, radius_m=1.0).corners_m.shape == (0, 2)
+
+
+def test_heights_stand_with_their_shapes_and_are_endless_if_left_out() -> None:
+    low, high = Obstacle("cylinder", 0.0, 0.0, radius_m=0.1, height_m=0.2), Obstacle("cylinder", 1.0, 0.0, radius_m=0.1)
+    box = Obstacle("box", 0.0, 1.0, size_m=(1.0, 1.0), height_m=0.5)
+    arrays = obstacle_arrays(((box, low), (high, box)))
+    assert arrays.circle_top_m.tolist() == [0.2, math.inf]
+    assert arrays.polygon_top_m.tolist() == [0.5, 0.5]

@@ -84,7 +84,7 @@ def test_outcomes_joined_are_sorted_by_robot_and_id() -> None:
 
 def test_actions_joined_carry_the_packets_of_all() -> None:
     parts = [
-        Actions(np.array([row]), np.array([True]), np.array([0.1]), np.array([0.2]), sent)
+        Actions(np.array([row]), np.array([True]), np.array([0.1]), np.array([0.2]), np.array([0.3]), sent)
         for row, sent in ((2, Sent.none()), (0, Sent(np.array([0]), np.array([BROADCAST]), Payloads.of([b"xy"]))))
     ]
     joined = Actions.joined(parts)

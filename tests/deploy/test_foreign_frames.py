@@ -31,7 +31,7 @@ class Vandal:
         with open_runner(unix_endpoint(self._path)) as session:
             answer = self.keys.answer("r0")
             rows = np.arange(7, dtype=np.int64)
-            nothing = {"rows": rows, "command": np.zeros((3, 7))}
+            nothing = {"rows": rows, "command": np.zeros((4, 7))}
             for key, payload in (
                 (answer, b"\x00garbage"),
                 (answer, b""),

@@ -182,7 +182,7 @@ class Standing:
     def start(self) -> None: ...
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> Actions:
-        return Actions(np.zeros(1, np.int64), np.ones(1, np.bool_), np.zeros(1), np.zeros(1))
+        return Actions(np.zeros(1, np.int64), np.ones(1, np.bool_), *np.zeros((3, 1)))
 
     def counts(self) -> dict[str, int]:
         return {}

@@ -19,8 +19,10 @@ from swarmwire.comms import errors
 from swarmwire.comms.air.presets import PRESETS
 from swarmwire.comms.air.radio import Gives
 from swarmwire.comms.body import body_names, load_body
+from swarmwire.comms.drives import DRIVES, Holonomic, Twist, Wheels
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.leds import Leds
 from swarmwire.comms.sheets import SHEETS
 from swarmwire.deploy import run
 from swarmwire.deploy.cli import app
@@ -94,6 +96,8 @@ def test_the_bodies_page_names_bodies_senses_and_their_fields(site):
     read = {name for kind in kinds for name in (*vars(kind), *(of.name for of in fields(kind))) if name[0] != "_"}
     assert read - {"sheet", "vector_sum"} <= named
     assert {*SHEETS, *(f"radio.{of.name}" for of in fields(Gives))} <= named
+    assert {f'kind = "{name}"' for name in DRIVES} <= named
+    assert {of.name for kind in (Wheels, Twist, Holonomic, Leds) for of in fields(kind)} <= named
     assert {*body_names(), *(f"[senses.{name}]" for name in SHEETS)} <= named
     for name in body_names():
         assert html.escape(load_body(name).source, quote=False) in page(site, "bodies")

@@ -50,7 +50,7 @@ def wandering(of, ticks, seed=5, **fields):
             tick,
             pose=rng.uniform(-3.0, 3.0, (rows, 3)),
             velocity=rng.normal(size=(rows, 3)),
-            command=rng.normal(size=(rows, 2)),
+            command=rng.normal(size=(rows, 3)),
             alive=rng.random(rows) < 0.8,
             state=rng.integers(0, 3 if tick else 1, rows),
             states=states if tick else states[:1],

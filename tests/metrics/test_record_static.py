@@ -1,11 +1,14 @@
 import json
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
 
 from swarmwire.comms.body import body_names, load_body
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.floor import Floor, Patch, packed_image
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
 from swarmwire.metrics.record.static_file import read_static, write_static
 from tests.metrics.truths import static
@@ -21,7 +24,13 @@ OBSTACLE = st.builds(
     NUMBER,
     PAIR,
     st.lists(PAIR, max_size=4).map(tuple),
+    st.floats(0.0, allow_nan=False),
 )
+GREY = npst.arrays(np.uint8, npst.array_shapes(min_dims=2, max_dims=2, max_side=4))
+PATCH = st.builds(
+    Patch, st.sampled_from(["disc", "polygon"]), NUMBER, NUMBER, NUMBER, NUMBER, st.lists(PAIR, max_size=4).map(tuple)
+)
+FLOOR = st.builds(Floor, NUMBER, st.lists(PATCH, max_size=3).map(tuple), st.none() | GREY.map(packed_image))
 LIGHT = st.builds(Light, NUMBER, NUMBER, NUMBER)
 
 
@@ -42,12 +51,13 @@ def statics(draw):
         seeds=tuple(draw(st.lists(st.integers(0), min_size=arenas, max_size=arenas, unique=True))),
         rate_hz=draw(st.integers(1, 1000)),
         arena_size_m=draw(PAIR),
-        walled=draw(st.booleans()),
+        boundary=draw(st.sampled_from(["walls", "open", "torus"])),
         obstacles=draw(each(OBSTACLE, arenas)),
         groups=tuple(groups),
         robot_names=tuple(names),
         range_m=draw(st.none() | NUMBER),
         lights=draw(each(LIGHT, arenas)),
+        floor=draw(st.none() | FLOOR),
     )
 
 
@@ -63,7 +73,7 @@ def test_what_was_written_is_read_back_equal(tmp_path_factory, of):
 @pytest.mark.parametrize(
     ("change", "fault"),
     [
-        ({"format": 2}, "format: expected 1, got 2"),
+        ({"format": 1}, "format: expected 2, got 1"),
         ({"wheels": 3}, "expected the static part of a run: .*wheels"),
         ({"groups": [{"name": "a"}]}, "expected the static part of a run: 'body'"),
         ({"obstacles": None}, "expected the static part of a run"),

@@ -71,6 +71,21 @@ def test_a_recording_holds_the_positions_and_headings_of_its_arena(tmp_path, are
         np.testing.assert_allclose(np.arctan2(y, x), pose[:, 2], atol=1e-5)
 
 
+def test_lit_leds_are_drawn_where_they_sit_until_they_are_dark(tmp_path):
+    of = static(2)
+    leds = np.zeros((2, 8), np.int64)
+    leds[1, 2] = 0x0080FF  # the one to the left
+    pose = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, np.pi / 2]])
+    dark = truth(of, 3, pose=pose), truth(of, 4, pose=pose)
+    lit = truth(of, 1, pose=pose, leds=leds), truth(of, 2, pose=pose, leds=leds)
+    record(tmp_path / "run.rrd", of, [truth(of, 0, pose=pose), *lit, *dark])
+    positions = column(tmp_path / "run.rrd", "/world/leds", "Points2D:positions")
+    np.testing.assert_allclose(positions.pop(1), [[1.0 - 0.042, 2.0]], atol=1e-6)
+    np.testing.assert_allclose(positions.pop(2), [[1.0 - 0.042, 2.0]], atol=1e-6)
+    assert positions == {3: []}
+    assert column(tmp_path / "run.rrd", "/world/leds", "Points2D:colors")[1] == [0x0080FFFF]
+
+
 def test_links_join_the_positions_of_the_robots_that_an_edge_names(tmp_path):
     of = static(3, arenas=2)
     [seen] = moving(of, 1, edges=edges((0, 1), (3, 5)))

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.body import load_body
+from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.truth import Departed, Finished, Group, Light, Obstacle, Static, Tally, Truth
@@ -18,15 +18,16 @@ def static(
     radio: bool = True,
     obstacles: Sequence[Obstacle] = (),
     lights: Sequence[Sequence[Light]] = (),
+    body: Body | None = None,
 ) -> Static:
     return Static(
         name="test",
         seeds=tuple(range(1, arenas + 1)),
         rate_hz=10,
         arena_size_m=(8.0, 6.0),
-        walled=True,
+        boundary="walls",
         obstacles=(tuple(obstacles),) * arenas,
-        groups=(Group("flock", load_body("epuck"), 0, robots),),
+        groups=(Group("flock", body or load_body("epuck"), 0, robots),),
         robot_names=tuple(f"flock-{i}" for i in range(robots)),
         range_m=2.0 if radio else None,
         lights=tuple(map(tuple, lights)),
@@ -41,9 +42,10 @@ def truth(of: Static, tick: int = 0, **given: Any) -> Truth:
         "alive": np.ones(rows, np.bool_),
         "pose": np.zeros((rows, 3)),
         "velocity": np.zeros((rows, 3)),
-        "command": np.zeros((rows, 2)),
+        "command": np.zeros((rows, 3)),
         "state": np.zeros(rows, np.int64),
         "states": ("",),
+        "leds": np.zeros((rows, of.most_leds), np.int64),
         "senses": {},
         "contact_onsets": np.zeros((of.arenas, 2), np.int64),
         "edges": None,

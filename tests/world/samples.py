@@ -63,13 +63,12 @@ def posed(poses: list[list[float]], body: str = "epuck", **tables: Any) -> Scena
     return scenario_from({**mapping, **tables}, "posed")
 
 
-def commanded(world: World, linear_mps: Any, angular_radps: Any) -> Actions:
+def commanded(world: World, linear_mps: Any, angular_radps: Any, lateral_mps: Any = 0.0) -> Actions:
     """A command for every robot; numbers or arrays with a value per row."""
     rows = np.arange(world.static.arenas * world.static.robots)
-    linear, angular = (
-        np.broadcast_to(np.asarray(v, np.float64), rows.shape).copy() for v in (linear_mps, angular_radps)
-    )
-    return Actions(rows, np.ones(len(rows), np.bool_), linear, angular)
+    speeds = (linear_mps, angular_radps, lateral_mps)
+    asked = (np.broadcast_to(np.asarray(v, np.float64), rows.shape).copy() for v in speeds)
+    return Actions(rows, np.ones(len(rows), np.bool_), *asked)
 
 
 def wandering(world: World, tick: int) -> Actions:

@@ -48,7 +48,7 @@ class Ahead:
         rows = np.concatenate([group.rows for group in senses.values()])
         self.rows.append(rows.tolist())
         n = len(rows)
-        return Actions(rows, np.ones(n, np.bool_), np.full(n, self.linear_mps), np.zeros(n))
+        return Actions(rows, np.ones(n, np.bool_), np.full(n, self.linear_mps), *np.zeros((2, n)))
 
     def counts(self) -> dict[str, int]:
         return {}
@@ -132,7 +132,7 @@ def test_commands_for_the_dead_do_nothing():
     world = World(posed(TWO), [1], {})
     world.live(np.array([False, True]))
     world.move(commanded(world, 0.1, 0.0))
-    assert world.command.tolist() == [[0.0, 0.0], [0.1, 0.0]]
+    assert world.command.tolist() == [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]
 
 
 def test_all_may_be_dead_and_the_run_goes_on():

@@ -11,17 +11,17 @@ from hypothesis import strategies as st
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.draws import purpose, uniform
-from swarmwire.comms.truth import Group, Light, Obstacle
+from swarmwire.comms.truth import Light, Obstacle
 from swarmwire.world.sensors import Scene
-from swarmwire.world.sensors.light import LightSensor
-from tests.world.test_sensors import scene
+from swarmwire.world.sensors.staged import Staged
+from tests.world.scenes import scene, staged
 
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
 
 
-def sensor(looked_at: Scene, body: Body, **sheet: Any) -> LightSensor:
+def sensor(looked_at: Scene, body: Body, **sheet: Any) -> Staged:
     assert body.light is not None
-    return LightSensor(looked_at, Group("a", body, 0, len(looked_at.radius_m)), replace(body.light, **sheet))
+    return staged(looked_at, body, "light", replace(body.light, **sheet))
 
 
 def values(looked_at: Scene, body: Body = EPUCK) -> FloatArray:
@@ -106,7 +106,7 @@ def test_shadows_are_those_of_a_search_among_all_robots(spread_m: float) -> None
     lights = (*lights, Light(float(poses[0, 0]), -1.0, 20.0), Light(1.0, float(poses[1, 1]), 20.0))  # along the axes
     outcomes = set[bool]()
     for light in lights:
-        seen = values(scene(poses, EPUCK, size_m=5.0, walled=False, lights=(light,))).any(axis=1)
+        seen = values(scene(poses, EPUCK, size_m=5.0, boundary="open", lights=(light,))).any(axis=1)
         to = np.array([light.x_m, light.y_m]) - poses[:, :2]
         length = np.hypot(*to.T)
         apart = poses[None, :, :2] - poses[:, None, :2]  # from robot i to robot j
@@ -121,7 +121,7 @@ def test_light_noise_is_uniform_keyed_and_clipped() -> None:
     poses = np.stack([np.linspace(-4, 4, 20), np.zeros(20), np.zeros(20)], axis=1)
     noisy = sensor(scene(poses, EPUCK), EPUCK)
     told = noisy.read(3)["light.value"]
-    draw = uniform(7, np.arange(20)[:, None], 3, np.arange(8), purpose("light noise"))
+    draw = uniform(7, np.arange(20)[:, None], 3, np.arange(8), purpose("light.value noise"))
     assert told == pytest.approx(np.maximum(0.05 * (2.0 * draw - 1.0), 0.0))
     assert np.array_equal(told, noisy.read(3)["light.value"])
     assert not np.array_equal(told, noisy.read(4)["light.value"])

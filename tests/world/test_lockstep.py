@@ -67,7 +67,9 @@ def all_senses(tick: int = 0) -> Senses:
 def actions(rows: list[int]) -> Actions:
     row = np.array(rows, np.int64)
     payloads = Payloads.of([bytes([r, r, r]) for r in rows])
-    return Actions(row, row % 2 == 0, row * 0.1, row * -0.1, Sent(row, np.full(len(rows), BROADCAST), payloads))
+    return Actions(
+        row, row % 2 == 0, row * 0.1, row * -0.1, row * 0.2, Sent(row, np.full(len(rows), BROADCAST), payloads)
+    )
 
 
 def rows_of(frame: bytes) -> list[int]:

@@ -135,7 +135,7 @@ def test_commands_are_scaled_to_the_wheels_limit_along_the_same_curve(linear: fl
     assert applied[0] * angular == pytest.approx(applied[1] * linear)
     assert world.counts()["clipped_commands"] == (wheel > drive.max_wheel_mps * (1 + 1e-9))
     if wheel <= drive.max_wheel_mps:
-        assert applied.tolist() == [linear, angular]
+        assert applied.tolist() == [linear, angular, 0.0]
 
 
 def test_the_full_speed_of_the_sheet_is_not_clipped() -> None:

@@ -1,5 +1,7 @@
 """Things stand apart, where they were asked to, and where the seed alone puts them."""
 
+import copy
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,8 +11,10 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.body import load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Light, Obstacle, Static
+from swarmwire.world import checks
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.world.samples import SAMPLE, changed
@@ -168,7 +172,189 @@ def test_poses_are_taken_as_given_with_headings_wrapped() -> None:
     assert np.allclose(built(mapping, 1).pose[:2], [[0, 0, 0.5], [0.3, 0, 4.0 - 2 * np.pi]])
 
 
+def alone(place: dict[str, Any], count: int = 12, **arena: Any) -> dict[str, Any]:
+    """E-pucks of one group placed so, alone in 6 x 4 m unless `arena` says otherwise."""
+    group = {"body": "epuck", "count": count, "agent": "x", "place": place}
+    mapping = changed("robots", {"flock": group})
+    mapping["arena"] = {"size_m": [6.0, 4.0], **arena}
+    return mapping
+
+
+def gaps(world: World, wrapped: bool = False) -> FloatArray:
+    """Between the surfaces of the robots of the first arena, (pairs,), in m."""
+    xy, radius = world.pose[: world.static.robots, :2], radii(world.static)
+    away = xy[:, None] - xy
+    if wrapped:
+        size = np.array(world.static.arena_size_m)
+        away -= size * np.round(away / size)
+    distance = np.hypot(*away.transpose(2, 0, 1)) - radius[:, None] - radius
+    return distance[np.triu_indices(len(xy), 1)]
+
+
+RING = {"how": "ring", "inner_radius_m": 1.0, "radius_m": 1.5, "at": [0.5, 0.2]}
+BOX = {"how": "box", "size_m": [1.0, 3.0], "at": [-1.0, 0.2]}
+
+
+def test_robots_fill_a_ring_evenly() -> None:
+    world = built(alone({**RING, "radius_m": 9.0}, 800, size_m=[30, 30]), 1)
+    x, y = (world.pose[:, :2] - RING["at"]).T
+    distance = np.hypot(x, y)
+    assert (distance.min() >= 1.0, distance.max() <= 9.0) == (True, True)
+    # Shares of a half have a standard deviation of 0.018: 4 of them give a false alarm in 16,000.
+    for half in (distance**2 < (1.0 + 81.0) / 2, x > 0, y > 0, x > y):
+        assert abs(np.mean(half) - 0.5) < 0.072
+
+
+def test_robots_stand_in_the_box_or_the_ring_that_was_asked_for() -> None:
+    for seed in range(1, 6):
+        x, y = (built(alone(BOX), seed).pose[:, :2] - BOX["at"]).T
+        assert np.all((np.abs(x) <= 0.5) & (np.abs(y) <= 1.5))
+        x, y = (built(alone(RING), seed).pose[:, :2] - RING["at"]).T
+        assert np.all((np.hypot(x, y) >= 1.0) & (np.hypot(x, y) <= 1.5))
+
+
+@pytest.mark.parametrize("place", [{"how": "arena"}, {"how": "disc", "radius_m": 1.8}, BOX, RING])
+def test_robots_keep_the_distance_that_was_asked_for(place: dict[str, Any]) -> None:
+    obstacles = [
+        {"shape": "cylinder", "radius_m": 0.2, "at": [0.5, 1.4]},
+        {"shape": "box", "size_m": [0.2, 1], "at": [-1, 0]},
+    ]
+    nearest = []
+    for seed in range(1, 9):
+        world = built(alone({**place, "apart_m": 0.2}, obstacles=obstacles), seed)
+        xy = world.pose[:, :2]
+        nearest.append(gaps(world).min())
+        nearest += [depth(obstacle, xy).min() - 0.035 for obstacle in world.static.obstacles[0]]
+        assert min(nearest) >= 0.2 - 1e-12
+    assert min(nearest) < 0.25  # and no more than that
+
+
+def test_a_group_s_distance_counts_for_robots_put_before_but_not_for_those_put_after() -> None:
+    mapping = changed("robots.big.place", {"how": "arena", "apart_m": 0.5})
+    mapping["arena"]["obstacles"] = []
+    both = [built(mapping, seed) for seed in range(1, 9)]
+    size = both[0].static.robots
+    index = np.array([(i, j) for i in range(size) for j in range(i + 1, size)])
+    late = index[:, 1] >= 12  # a foot-bot with an e-puck or another foot-bot
+    assert min(gaps(world)[late].min() for world in both) >= 0.5 - 1e-12
+    assert min(gaps(world)[~late].min() for world in both) < 0.2
+
+
+def test_random_obstacles_and_lights_keep_their_distance_and_stay_within() -> None:
+    kinds = [
+        {"shape": "cylinder", "radius_m": 0.1, "count": 6, "apart_m": 0.25},
+        {"shape": "box", "size_m": [0.3, 0.1], "count": 5, "apart_m": 0.25},
+        {"shape": "polygon", "points": [[0, 0], [0.3, 0], [0, 0.2]], "count": 5, "apart_m": 0.25, "within": BOX},
+    ]
+    lights = [{"intensity": 1.0, "count": 5, "apart_m": 0.4, "within": RING}]
+    fixed = {"shape": "box", "size_m": [0.1, 0.5], "at": [0.0, 0.0]}
+    arena = {
+        "obstacles": [fixed, *({**kind, "place": "random"} for kind in kinds)],
+        "lights": [{**light, "place": "random"} for light in lights],
+    }
+    for seed in (1, 2, 3):
+        static = built(alone({"how": "arena"}, 1, **arena), seed).static
+        obstacles, lit = static.obstacles[0], np.array([(o.x_m, o.y_m) for o in static.lights[0]])
+        for i, one in enumerate(obstacles):
+            assert depth(one, lit).min() >= 0.4 - 1e-9
+            for other in obstacles[:i]:
+                between = min(depth(one, outline(other)).min(), depth(other, outline(one)).min())
+                assert between >= 0.25 - 1e-9
+        for one in obstacles[-5:]:
+            assert (abs(one.x_m + 1.0) <= 0.5, abs(one.y_m - 0.2) <= 1.5) == (True, True)
+        apart = np.hypot(*(lit[:, None] - lit).transpose(2, 0, 1)) + 9.0 * np.eye(5)
+        assert apart.min() >= 0.4
+        assert np.all(np.abs(np.hypot(*(lit - RING["at"]).T) - 1.25) <= 0.25)
+
+
+@pytest.mark.parametrize("place", [{"how": "arena"}, {"how": "disc", "radius_m": 1.8}, BOX, RING])
+def test_robots_head_where_they_are_told(place: dict[str, Any]) -> None:
+    told, drawn = (built(alone({**place, **heading}), 1).pose for heading in ({"heading_rad": 4.0}, {}))
+    assert np.allclose(told[:, 2], 4.0 - 2.0 * np.pi)
+    assert np.array_equal(told[:, :2], drawn[:, :2])
+    assert len(np.unique(drawn[:, 2])) == 12
+    grid = built(alone({"how": "grid", "spacing_m": 0.3, "heading_rad": -1.0}), 1).pose
+    assert np.all(grid[:, 2] == -1.0)
+
+
+def test_on_a_torus_distances_are_kept_across_the_seam() -> None:
+    obstacles = [
+        {"shape": "cylinder", "radius_m": 0.1, "at": [-1.85, 0.5]},
+        {"shape": "box", "size_m": [0.2, 0.2], "count": 3, "place": "random", "apart_m": 0.3},
+    ]
+    arena = {"size_m": [4.0, 3.0], "boundary": "torus", "obstacles": obstacles}
+    beyond = False
+    for seed in range(1, 21):
+        mapping = {**alone({"how": "arena", "apart_m": 0.35}, 12, **arena), "physics": {"engine": "kinematic"}}
+        world = built(mapping, seed)
+        assert gaps(world, wrapped=True).min() >= 0.35 - 1e-12
+        xy = world.pose[:, :2]
+        assert np.all((xy >= [-2.0, -1.5]) & (xy < [2.0, 1.5]))
+        beyond |= bool(np.any(np.abs(xy) > [2.0 - 0.035, 1.5 - 0.035]))
+        for i, one in enumerate(world.static.obstacles[0]):
+            assert np.all(np.abs(outline(one)) <= [2.0, 1.5])
+            for shift in [(4.0 * across, 3.0 * up) for across in (-1, 0, 1) for up in (-1, 0, 1)]:
+                assert depth(one, xy + shift).min() >= 0.35 + 0.035 - 1e-12
+                for other in world.static.obstacles[0][:i]:
+                    assert depth(one, outline(other) + shift).min() >= 0.3 - 1e-9
+    assert beyond  # they stand across the seam
+
+
+def test_on_a_torus_a_disc_goes_on_at_the_other_side() -> None:
+    place = {"how": "disc", "radius_m": 0.5, "at": [2.0, 1.5]}
+    arena = {"size_m": [4.0, 3.0], "boundary": "torus"}
+    world = built({**alone(place, 20, **arena), "physics": {"engine": "kinematic"}}, 1)
+    x, y = world.pose[:, :2].T
+    assert np.all(np.hypot(2.0 - np.abs(x), 1.5 - np.abs(y)) <= 0.5)
+    assert {(bool(right), bool(up)) for right, up in zip(x > 0, y > 0, strict=True)} == {
+        (right, up) for right in (False, True) for up in (False, True)
+    }
+
+
+def test_a_torus_is_for_robots_without_contacts() -> None:
+    with pytest.raises(BadInput, match=r"^file.toml: arena.boundary: expected walls or open: on a torus no robot"):
+        built(alone({"how": "arena"}, boundary="torus"), 1)
+
+
+def test_robots_in_the_air_keep_clear_of_what_they_could_touch_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    epuck, high = load_body("epuck"), replace(load_body("epuck"), altitude_m=0.5)
+    monkeypatch.setattr(checks, "load_body", lambda name: high if name == "high" else epuck)
+    spot = {"how": "poses", "poses": [[1.0, 0.0, 0.0]]}
+    mapping = alone(spot, 1, obstacles=[{"shape": "cylinder", "radius_m": 0.2, "at": [0.0, 0.0], "height_m": 0.4}])
+    mapping["robots"]["high"] = {**mapping["robots"]["flock"], "body": "high"}
+    assert np.array_equal(built(mapping, 1).pose[:, :2], [[1.0, 0.0]] * 2)
+    over = copy.deepcopy(mapping)
+    over["robots"]["high"]["place"] = {"how": "poses", "poses": [[0.1, 0.0, 0.0]]}
+    assert np.array_equal(built(over, 1).pose[1, :2], [0.1, 0.0])
+    over["arena"]["obstacles"][0]["height_m"] = 0.51
+    with pytest.raises(BadInput, match=r"no room for high-0 with seed 1: at \(0.1, 0\)"):
+        built(over, 1)
+    mapping["robots"]["higher"] = copy.deepcopy(mapping["robots"]["high"])
+    with pytest.raises(BadInput, match="no room for higher-0"):
+        built(mapping, 1)
+
+
 NO_ROOM = [
+    (
+        "robots.flock.place",
+        {"how": "disc", "radius_m": 0.8, "apart_m": 0.6},
+        r"robots.flock.place: no room for flock-\d+ with seed 1: none of 1000 places",
+    ),
+    (
+        "arena.obstacles.0.apart_m",
+        3.0,
+        "arena.obstacles.0: no room for cylinder 3 of 4 with seed 1: none of 1000 places",
+    ),
+    (
+        "arena.obstacles.0.within",
+        {"how": "disc", "radius_m": 0.5, "at": [9.0, 0.0]},
+        "arena.obstacles.0: no room for cylinder 1 of 4 with seed 1: none of 1000 places",
+    ),
+    (
+        "arena.lights.0.apart_m",
+        5.5,
+        "arena.lights.0: no room for light [12] of 2 with seed 1: none of 1000 places",
+    ),
     (
         "robots.flock.place.radius_m",
         0.08,

@@ -7,23 +7,21 @@ from swarmwire.comms.body import load_body
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sheets import Positioning
-from swarmwire.comms.truth import Group
-from swarmwire.world.sensors.positioning import PositioningSensor
 from swarmwire.world.world import World
 from tests.world.samples import posed
-from tests.world.test_sensors import scene
+from tests.world.scenes import read, scene
 
 GPS = load_body("epuck-gps")
 
 
 def test_the_error_is_normal_and_keyed_by_robot_tick_and_axis() -> None:
     poses = np.random.default_rng(1).uniform(-2, 2, (20, 3))
-    looked_at, group = scene(poses, GPS), Group("a", GPS, 0, 20)
-    exact = PositioningSensor(looked_at, group, Positioning(0.0)).read(4)
-    noisy = PositioningSensor(looked_at, group, Positioning(0.1)).read(4)
+    looked_at = scene(poses, GPS)
+    exact = read(looked_at, GPS, "positioning", Positioning(0.0), 4)
+    noisy = read(looked_at, GPS, "positioning", Positioning(0.1), 4)
     for axis, field in enumerate(("positioning.x_m", "positioning.y_m")):
         assert np.array_equal(exact[field], poses[:, axis])
-        error = 0.1 * normal(7, np.arange(20), 4, axis, purpose("positioning noise"))
+        error = 0.1 * normal(7, np.arange(20), 4, 0, purpose(f"{field} noise"))
         assert np.allclose(noisy[field], poses[:, axis] + error)
         assert noisy[field].flags.c_contiguous
     assert np.array_equal(looked_at.state[0, :, :3], poses)

@@ -15,6 +15,9 @@ COUNT = "expected a whole number of at least 1 and at most 1000000"
 OFFSET = "expected uniform, tick, or an offset in s from 0 to below the period of a tick"
 NUMBER = "expected a number above 0 and at most 10000 (m)"
 STEPS = "so that a robot of flock at full speed moves at most a quarter of its radius in one step"
+GAP = "expected a number of at least 0 and at most 10000 (m)"
+HEADING = "expected a number of at least -7 and at most 7 (rad)"
+RANDOM_ALONE = 'expected place = "random" with within or apart_m, not at = [x, y]'
 CONVEX = "expected the corners of a convex polygon in order"
 POLYGON = {"shape": "polygon", "at": [0.0, 0.0]}
 FAULTS: list[tuple[str, Any, str]] = [
@@ -23,15 +26,40 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("seed", -1, "seed: expected a whole number of at least 0 and at most 9223372036854775807, got -1"),
     ("duration_s", float("inf"), "duration_s: expected a number above 0 and at most 1000000000 (s), got inf"),
     ("time.rate_hz", 1001, "time.rate_hz: expected a whole number of at least 1 and at most 1000 (Hz), got 1001"),
-    ("physics.engine", "discs", "physics.engine: expected pymunk, got 'discs'"),
+    ("physics.engine", "bullet", "physics.engine: expected auto, discs, pymunk or kinematic, got 'bullet'"),
     ("physics.steps", 1, f"physics.steps: expected at least 2, {STEPS}; got 1"),
     ("arena.size_m", 3, "arena.size_m: expected a list of 2 numbers above 0 and at most 10000 (m), got 3"),
     ("arena.size_m", [1.0], f"arena.size_m.1: is missing; {NUMBER}"),
     ("arena.size_m", [1.0, float("nan")], f"arena.size_m.1: {NUMBER}, got nan"),
-    ("arena.boundary", "torus", "arena.boundary: expected one of walls, open, got 'torus'"),
-    ("arena.windows", [], "arena.windows: unknown key; expected one of size_m, boundary, obstacles, lights"),
+    ("arena.boundary", "sea", "arena.boundary: expected one of walls, open, torus, got 'sea'"),
+    (
+        "arena.windows",
+        [],
+        "arena.windows: unknown key; expected one of size_m, boundary, obstacles, lights, map, ground",
+    ),
     ("arena.lights", [{"at": [0, 0]}], f"arena.lights.0.intensity: is missing; {NUMBER}"),
     ("arena.lights", [{"intensity": 1.0}], 'arena.lights.0: expected either at = [x, y] or place = "random"'),
+    ("arena.lights", [{"intensity": 1, "at": [0, 0], "apart_m": 0.1}], f"arena.lights.0: {RANDOM_ALONE}"),
+    (
+        "arena.lights.0.within",
+        {"how": "arena"},
+        "arena.lights.0.within.how: expected one of box, disc, ring; got 'arena'",
+    ),
+    ("arena.obstacles.1.within", {"how": "disc", "radius_m": 1.0}, f"arena.obstacles.1: {RANDOM_ALONE}"),
+    ("arena.obstacles.1.height_m", 0, f"arena.obstacles.1.height_m: {NUMBER}, got 0"),
+    ("arena.map", {"image": "", "resolution_m": 1}, "arena.map.image: expected a text that is not empty, got ''"),
+    ("arena.map", {"image": "maze.png", "resolution_m": -1}, f"arena.map.resolution_m: {NUMBER}, got -1"),
+    ("arena.ground.shade", 2, "arena.ground.shade: expected a number of at least 0 and at most 1, got 2"),
+    (
+        "arena.ground.patches",
+        [{"shape": "polygon", "points": [[0, 0], [1, 0], [2, 0]], "shade": 0}],
+        f"arena.ground.patches.0.points: {CONVEX}; (0, 0) lies on or beyond the side from (2, 0) to (1, 0)",
+    ),
+    (
+        "arena.ground.patches",
+        [{"shape": "disc", "at": [0, 0], "shade": 0}],
+        f"arena.ground.patches.0.radius_m: is missing; {NUMBER}",
+    ),
     ("arena.lights", [{"intensity": 0, "at": [0, 0]}], f"arena.lights.0.intensity: {NUMBER}, got 0"),
     ("arena.obstacles.0", {**POLYGON, "points": 3}, "arena.obstacles.0.points: expected a list (m), got 3"),
     (
@@ -63,7 +91,8 @@ FAULTS: list[tuple[str, Any, str]] = [
     (
         "arena.obstacles.0.size_m",
         [1, 1],
-        "arena.obstacles.0.size_m: unknown key; expected one of at, place, count, shape, radius_m",
+        "arena.obstacles.0.size_m: unknown key; expected one of "
+        "at, place, count, within, apart_m, height_m, movable, mass_kg, shape, radius_m",
     ),
     ("arena.obstacles.0.at", [1, 1], 'arena.obstacles.0: expected either at = [x, y] or place = "random"'),
     (
@@ -89,8 +118,23 @@ FAULTS: list[tuple[str, Any, str]] = [
         "robots.flock.colour: unknown key; expected one of body, count, agent, act_every_ticks, params, radio, place",
     ),
     ("robots.flock.place", 3, "robots.flock.place: expected a table, got 3"),
-    ("robots.flock.place", {}, "robots.flock.place.how: is missing; expected one of arena, disc, grid, poses"),
-    ("robots.flock.place.how", "ring", "robots.flock.place.how: expected one of arena, disc, grid, poses; got 'ring'"),
+    (
+        "robots.flock.place",
+        {},
+        "robots.flock.place.how: is missing; expected one of arena, box, disc, grid, poses, ring",
+    ),
+    (
+        "robots.flock.place.how",
+        "heap",
+        "robots.flock.place.how: expected one of arena, box, disc, grid, poses, ring; got 'heap'",
+    ),
+    (
+        "robots.flock.place",
+        {"how": "ring", "inner_radius_m": 2.0, "radius_m": 1.0},
+        "robots.flock.place: expected an inner_radius_m of at most radius_m, 1.0; got 2.0",
+    ),
+    ("robots.flock.place.apart_m", -1, f"robots.flock.place.apart_m: {GAP}, got -1"),
+    ("robots.flock.place.heading_rad", "east", f"robots.flock.place.heading_rad: {HEADING}, got 'east'"),
     ("robots.flock.place.radius_m", "a", f"robots.flock.place.radius_m: {NUMBER}, got 'a'"),
     (
         "robots.flock.place",
@@ -124,6 +168,13 @@ def test_a_missing_key_says_what_it_should_hold() -> None:
     with pytest.raises(BadInput) as caught:
         scenario_from(without("robots.flock.count"), "file.toml")
     assert str(caught.value) == f"file.toml: robots.flock.count: is missing; {COUNT}"
+
+
+def test_an_arena_has_a_size_or_a_map() -> None:
+    with pytest.raises(BadInput) as caught:
+        scenario_from(without("arena.size_m"), "file.toml")
+    expected = "expected a list of 2 numbers above 0 and at most 10000 (m), or a map"
+    assert str(caught.value) == f"file.toml: arena.size_m: is missing; {expected}"
 
 
 def test_further_faults_are_counted() -> None:
@@ -219,5 +270,5 @@ def test_unreadable_files_are_bad_input_too(tmp_path: Path) -> None:
 def test_a_scenario_cannot_be_changed() -> None:
     scenario = scenario_from(SAMPLE, "f")
     with pytest.raises(ValueError, match="frozen"):
-        scenario.seed = 4  # pyright: ignore
+        scenario.seed = 4  # pyright: ignore[reportAttributeAccessIssue] - frozen: that is what is tested
     assert isinstance(scenario, Scenario)

@@ -11,34 +11,15 @@ from hypothesis import strategies as st
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.draws import normal, purpose
-from swarmwire.comms.geometry import obstacle_arrays
 from swarmwire.comms.sheets import Compass, Odometry, Proximity
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.sensors import Scene
-from swarmwire.world.sensors.compass import CompassSensor
-from swarmwire.world.sensors.odometry import OdometrySensor
 from swarmwire.world.sensors.proximity import ProximitySensor
 from swarmwire.world.world import World
 from tests.world.samples import commanded, posed
+from tests.world.scenes import read, scene, staged
 
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
-
-
-def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: float = 10.0, **more: Any) -> Scene:
-    """One arena with robots of one body at these poses (robots, 3)."""
-    state = np.zeros((1, len(poses), 6))
-    state[0, :, :3] = poses
-    return Scene(
-        keys=np.array([7], np.uint64),
-        size_m=(size_m, size_m),
-        walled=more.get("walled", True),
-        obstacles=obstacle_arrays((obstacles,)),
-        lights=(more.get("lights", ()),),
-        radius_m=np.full(len(poses), body.radius_m),
-        state=state,
-        travel_m=np.zeros((1, len(poses), 2)),
-        touched=np.zeros((1, len(poses))),
-    )
 
 
 def proximity(looked_at: Scene, body: Body, **sheet: Any) -> ProximitySensor:
@@ -48,7 +29,8 @@ def proximity(looked_at: Scene, body: Body, **sheet: Any) -> ProximitySensor:
 
 
 def values(looked_at: Scene, body: Body) -> FloatArray:
-    return proximity(looked_at, body, noise=0.0).read(0)["proximity.value"]
+    assert body.proximity is not None
+    return read(looked_at, body, "proximity", replace(body.proximity, noise=0.0))["proximity.value"]
 
 
 # ARGoS's foot-bot, ideal rays, an infinite wall dead ahead: gap from wall to body in m, length of the mean vector.
@@ -96,8 +78,8 @@ def test_an_epuck_answers_to_a_wall_by_its_quadratic_curve() -> None:
 def test_the_kernel_answers_as_the_sheet_s_curve(body: Body) -> None:
     assert body.proximity is not None
     poses = np.random.default_rng(1).uniform(-1, 1, (100, 3)) * [0.6, 0.6, np.pi]
-    sensor = proximity(scene(poses, body, size_m=1.4), body, noise=0.0)
-    distance_m, value = sensor.distance_m()[0], sensor.read(0)["proximity.value"]
+    looked_at = scene(poses, body, size_m=1.4)
+    distance_m, value = proximity(looked_at, body).distance_m()[0], values(looked_at, body)
     seen = np.isfinite(distance_m)
     assert 100 < np.count_nonzero(seen) < seen.size
     assert np.array_equal(value[seen], body.proximity.response.value(distance_m[seen]))
@@ -154,8 +136,8 @@ def test_what_robots_see_of_each_other_does_not_depend_on_the_frame(x: float, y:
     moved = np.stack(
         [x + c * poses[:, 0] - s * poses[:, 1], y + s * poses[:, 0] + c * poses[:, 1], poses[:, 2] + turn], axis=1
     )
-    before = proximity(scene(poses, EPUCK, walled=False), EPUCK).distance_m()
-    after = proximity(scene(moved, EPUCK, walled=False), EPUCK).distance_m()
+    before = proximity(scene(poses, EPUCK, boundary="open"), EPUCK).distance_m()
+    after = proximity(scene(moved, EPUCK, boundary="open"), EPUCK).distance_m()
     grazing = np.isfinite(before) != np.isfinite(after)  # a ray that just touches or just reaches
     assert np.count_nonzero(grazing) <= 1
     both = np.isfinite(before) & np.isfinite(after)
@@ -165,7 +147,9 @@ def test_what_robots_see_of_each_other_does_not_depend_on_the_frame(x: float, y:
 
 def test_proximity_noise_is_uniform_keyed_and_clipped() -> None:
     poses = np.stack([np.linspace(-4, 4, 500), np.zeros(500), np.zeros(500)], axis=1)
-    sensor = proximity(scene(poses[::25], EPUCK, walled=False), EPUCK, noise=0.05)
+    assert EPUCK.proximity is not None
+    sheet = replace(EPUCK.proximity, noise=0.05)
+    sensor = staged(scene(poses[::25], EPUCK, boundary="open"), EPUCK, "proximity", sheet)
     draws = np.concatenate([sensor.read(tick)["proximity.value"].ravel() for tick in range(50)])
     assert draws.min() == 0.0
     assert 0.0499 < draws.max() <= 0.05
@@ -178,12 +162,11 @@ def test_proximity_noise_is_uniform_keyed_and_clipped() -> None:
 def test_the_compass_errs_normally_and_stays_within_a_turn() -> None:
     poses = np.tile([0.0, 0.0, np.pi], (20, 1))
     looked_at = scene(poses, EPUCK)
-    group = Group("a", EPUCK, 0, 20)
-    exact = CompassSensor(looked_at, group, Compass(0.0)).read(0)["compass.heading_rad"]
+    exact = read(looked_at, EPUCK, "compass", Compass(0.0))["compass.heading_rad"]
     assert np.array_equal(exact, np.full(20, np.pi))
-    noisy = CompassSensor(looked_at, group, Compass(0.1)).read(5)["compass.heading_rad"]
+    noisy = read(looked_at, EPUCK, "compass", Compass(0.1), 5)["compass.heading_rad"]
     error = np.angle(np.exp(1j * (noisy - np.pi)))
-    expected = 0.1 * normal(7, np.arange(20), 5, 0, purpose("compass noise"))
+    expected = 0.1 * normal(7, np.arange(20), 5, 0, purpose("compass.heading_rad noise"))
     assert np.allclose(error, expected)
     assert np.all((noisy > -np.pi) & (noisy <= np.pi))
 
@@ -191,7 +174,7 @@ def test_the_compass_errs_normally_and_stays_within_a_turn() -> None:
 @given(turns=st.integers(-5, 5), heading=st.floats(-3.14, 3.14))
 def test_the_compass_forgets_full_turns(turns: int, heading: float) -> None:
     looked_at = scene([[0.0, 0.0, heading + turns * 2 * np.pi]], EPUCK)
-    told = CompassSensor(looked_at, Group("a", EPUCK, 0, 1), Compass(0.0)).read(0)["compass.heading_rad"]
+    told = read(looked_at, EPUCK, "compass", Compass(0.0))["compass.heading_rad"]
     assert told[0] == pytest.approx(heading, abs=1e-12)
 
 
@@ -204,7 +187,7 @@ def test_wheels_roll_the_way_that_the_robot_drives(steps: int) -> None:
     left, right = rolled[:, 0], rolled[:, 1]
     assert left[0] == pytest.approx(right[0])
     assert left[0] == pytest.approx(np.hypot(*world.pose[0, :2]))
-    turned = (right - left) / EPUCK.drive.wheel_base_m
+    turned = (right - left) / EPUCK.wheels.wheel_base_m
     assert np.angle(np.exp(1j * (world.pose[:, 2] - [0.3, 1.0, 0.0] - turned))) == pytest.approx(np.zeros(3), abs=1e-9)
     # The last arc: chord = 2 (v/w) sin(turn / 2), where only the path while speeding up is not on it.
     arc_m, turn = 0.5 * (left + right)[2], turned[2]
@@ -220,9 +203,8 @@ def test_a_robot_held_by_a_wall_rolls_no_further() -> None:
 
 def test_encoders_slip_by_tick_and_show_whole_steps() -> None:
     looked_at = scene(np.zeros((2, 3)), EPUCK)
-    group = Group("a", EPUCK, 0, 2)
-    slipping = OdometrySensor(looked_at, group, Odometry(slip=0.05, step_m=0.0))
-    stepped = OdometrySensor(looked_at, group, Odometry(slip=0.05, step_m=0.001))
+    slipping = staged(looked_at, EPUCK, "odometry", Odometry(slip=0.05, step_m=0.0))
+    stepped = staged(looked_at, EPUCK, "odometry", Odometry(slip=0.05, step_m=0.001))
     told = np.zeros((2, 2))
     for tick in range(1, 20):
         looked_at.travel_m[0] += [[0.01, 0.02], [-0.01, 0.0]]
@@ -256,3 +238,16 @@ def test_odometry_is_the_same_however_often_an_agent_looks() -> None:
 def test_the_sheets_of_the_bodies_have_a_sensor_each() -> None:
     assert EPUCK.senses.keys() == FOOTBOT.senses.keys() == {"proximity", "compass", "odometry", "light", "bumper"}
     assert isinstance(EPUCK.proximity, Proximity)
+
+
+def test_wheels_differ_from_what_their_encoders_take_them_for() -> None:
+    """Drawn once per wheel, so it grows with the way; travel back and forth undoes it."""
+    looked_at = scene(np.zeros((400, 3)), EPUCK)
+    odometry = staged(looked_at, EPUCK, "odometry", Odometry(wheel_error_std=0.02))
+    looked_at.travel_m[0] = 2.0
+    told = odometry.read(1)
+    drawn = normal(7, np.arange(400)[:, None], 0, np.arange(2), purpose("odometry wheel"))
+    for wheel, field in enumerate(("odometry.left_m", "odometry.right_m")):
+        assert told[field] == pytest.approx(2.0 * (1.0 + 0.02 * drawn[:, wheel]))
+    looked_at.travel_m[0] = 0.0
+    assert odometry.read(2)["odometry.left_m"] == pytest.approx(np.zeros(400), abs=1e-12)

@@ -95,18 +95,18 @@ def test_robots_without_a_command_keep_the_last_one() -> None:
     world = World(posed([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), [1], {})
     world.move(commanded(world, [0.05, 0.06, 0.07], 0.0))
     rows = np.array([2, 0])
-    world.move(Actions(rows, np.array([True, False]), np.array([0.01, 0.02]), np.array([0.5, 0.6])))
-    assert world.command.tolist() == [[0.05, 0.0], [0.06, 0.0], [0.01, 0.5]]
+    world.move(Actions(rows, np.array([True, False]), np.array([0.01, 0.02]), np.array([0.5, 0.6]), np.zeros(2)))
+    assert world.command.tolist() == [[0.05, 0.0, 0.0], [0.06, 0.0, 0.0], [0.01, 0.5, 0.0]]
 
 
 def test_commands_that_are_not_finite_are_dropped_and_counted() -> None:
     world = World(posed([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), [1], {})
     world.move(commanded(world, 0.05, 0.1))
     world.move(commanded(world, [np.nan, 0.01, 0.02], [0.0, np.inf, 0.3]))
-    assert world.command.tolist() == [[0.05, 0.1], [0.05, 0.1], [0.02, 0.3]]
+    assert world.command.tolist() == [[0.05, 0.1, 0.0], [0.05, 0.1, 0.0], [0.02, 0.3, 0.0]]
     assert world.counts() == {"clipped_commands": 0, "nan_commands": 2}
     unasked = commanded(world, np.nan, 0.0)
-    world.move(Actions(unasked.rows, ~unasked.drive, unasked.linear_mps, unasked.angular_radps))
+    world.move(Actions(unasked.rows, ~unasked.drive, unasked.linear_mps, unasked.angular_radps, unasked.lateral_mps))
     assert world.counts()["nan_commands"] == 2
 
 

@@ -5,27 +5,30 @@ A sheet with `like = "epuck"` starts from that body's sheet, table by table, and
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from importlib.resources import files
-from math import isfinite
-from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
+import numpy as np
+
+from swarmwire.comms.actuator_sheet import ActuatorSheet, actuator_sheet
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.drives import DRIVES, Drive, Holonomic, Twist, Wheels
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parameters import fault_of, limits_of, parameter
-from swarmwire.comms.sheets import SHEETS, Compass, Light, Odometry, Proximity, Sheet
+from swarmwire.comms.leds import Leds
+from swarmwire.comms.parameters import parameter
+from swarmwire.comms.sheets import SHEETS, Compass, Infrared, Light, Odometry, OwnSheet, Proximity, Scan, Sheet
+from swarmwire.comms.sheets.own import own_sheet
+from swarmwire.comms.tables import built, mapping_of
 
 S = TypeVar("S", bound=Sheet)
+HERE = Path()
 
 
-@dataclass(frozen=True)
-class DifferentialDrive:
-    """Two wheels on one axle, driven by bounded force."""
-
-    wheel_base_m: float = parameter(help="distance between the wheels", unit="m", above=0)
-    max_wheel_mps: float = parameter(help="fastest speed of a wheel", unit="m/s", above=0)
-    max_force_n: float = parameter(help="largest force along the body, or across it before it slips", unit="N", above=0)
-    max_torque_nm: float = parameter(help="largest turning moment", unit="N m", above=0)
+class NotFitted(AttributeError):
+    """The body does not have what an agent asks it for: wheels, LEDs."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +40,12 @@ class Body:
     radius_m: float = parameter(help="radius of the body", unit="m", above=0)
     height_m: float = parameter(help="height of the body", unit="m", above=0)
     mass_kg: float = parameter(help="mass", unit="kg", above=0)
-    drive: DifferentialDrive = parameter(help="how it moves")
+    drive: Drive = parameter(help="how it moves")
+    altitude_m: float = parameter(0.0, help="height of its lower side above the floor", unit="m", at_least=0)
+    contacts: bool = parameter(True, help="whether others and obstacles stop it; false: it passes through them")
+    leds: Leds | None = None
     senses: dict[str, Sheet] = field(default_factory=dict[str, Sheet])
+    actuators: dict[str, ActuatorSheet] = field(default_factory=dict[str, ActuatorSheet])  # of the user's own
 
     @cached_property
     def proximity(self) -> Proximity | None:
@@ -60,18 +67,62 @@ class Body:
         """The photocells' sheet."""
         return self._sheet(Light)
 
+    @cached_property
+    def infrared(self) -> Infrared | None:
+        """The passive infrared sensor's sheet."""
+        return self._sheet(Infrared)
+
+    @cached_property
+    def scan(self) -> Scan | None:
+        """The laser scanner's sheet."""
+        return self._sheet(Scan)
+
+    @cached_property
+    def actuator_places(self) -> dict[str, slice]:
+        """Where the numbers of each own actuator stand among those of all of them, by its name."""
+        places: dict[str, slice] = {}
+        start = 0
+        for name, sheet in self.actuators.items():
+            places[name] = slice(start, start + sheet.width)
+            start += sheet.width
+        return places
+
     def _sheet(self, kind: type[S]) -> S | None:
         return next((sheet for sheet in self.senses.values() if isinstance(sheet, kind)), None)
 
     @property
+    def wheels(self) -> Wheels | Twist:
+        """The drive of a body with two wheels; NotFitted if it moves in another way."""
+        if isinstance(self.drive, Holonomic):
+            raise NotFitted(f"the body {self.name} has no wheels: its drive is {self.drive.kind}")
+        return self.drive
+
+    @property
+    def led_count(self) -> int:
+        """How many LEDs it has."""
+        return 0 if self.leds is None else self.leds.count
+
+    @cached_property
+    def led_places_m(self) -> FloatArray:
+        """Where its LEDs sit: x ahead, y to the left, z above its lower side, (leds, 3)."""
+        return np.empty((0, 3)) if self.leds is None else self.leds.places_m(self.radius_m)
+
+    @property
     def max_linear_mps(self) -> float:
         """The fastest it can drive straight ahead."""
-        return self.drive.max_wheel_mps
+        return self.drive.max_linear_mps
 
     @property
     def max_angular_radps(self) -> float:
         """The fastest it can turn on the spot."""
-        return 2.0 * self.drive.max_wheel_mps / self.drive.wheel_base_m
+        return self.drive.max_angular_radps
+
+    @property
+    def told(self) -> "Body":
+        """The body as agents know it: without the keys of own senses and actuators, which may tell of the arena."""
+        senses = {n: replace(s, params={}) if isinstance(s, OwnSheet) else s for n, s in self.senses.items()}
+        actuators = {name: replace(sheet, params={}) for name, sheet in self.actuators.items()}
+        return replace(self, senses=senses, actuators=actuators)
 
     def as_mapping(self) -> dict[str, Any]:
         """The sheet as `body_from` reads it back."""
@@ -88,17 +139,55 @@ def load_body(name: str) -> Body:
     return body_from(_shipped(name, "", "body"), where=f"{name}.toml")
 
 
-def body_from(sheet: Mapping[str, Any], where: str) -> Body:
-    """The body of a data sheet; BadInput names `where` and the key of what is wrong."""
+def body_from(sheet: Mapping[str, Any], where: str, beside: Path = HERE) -> Body:
+    """The body of a data sheet; BadInput names `where` and the key of what is wrong.
+
+    Files of the user's own senses and actuators lie in the folder `beside`.
+    """
     like, rest = sheet.get("like"), {key: value for key, value in sheet.items() if key != "like"}
     if like is not None:
-        return body_from(_merged(_shipped(like, where, "like"), rest), where)
-    senses = _mapping(where, "senses", rest.pop("senses", {}))
-    unknown = [name for name in senses if name not in SHEETS]
-    if unknown:
-        raise BadInput(where, f"senses.{unknown[0]}", f"unknown sense; expected one of {', '.join(SHEETS)}")
-    built = {name: _build(SHEETS[name], value, where, f"senses.{name}") for name, value in senses.items()}
-    return _build(Body, {**rest, "senses": built}, where, "")
+        base = _shipped(like, where, "like")
+        if _kind_of(rest, _kind_of(base)) != _kind_of(base):
+            base.pop("drive", None)  # of another kind: its limits have other names
+        return body_from(_merged(base, rest), where, beside)
+    senses = mapping_of(where, "senses", rest.pop("senses", {}))
+    rest["senses"] = {name: _sense(name, table, where, beside) for name, table in senses.items()}
+    actuators = mapping_of(where, "actuators", rest.pop("actuators", {}))
+    rest["actuators"] = {name: actuator_sheet(name, table, where, beside) for name, table in actuators.items()}
+    if "drive" in rest:
+        rest["drive"] = _drive(rest["drive"], where)
+    if rest.get("leds") is not None:  # None: a sheet written down as a mapping
+        rest["leds"] = built(Leds, rest["leds"], where, "leds")
+    body: Body = built(Body, rest, where, "")
+    for name, sheet_of in body.senses.items():
+        fault = sheet_of.fault(body.radius_m)
+        if fault:
+            raise BadInput(where, f"senses.{name}.{fault[0]}", fault[1])
+    return body
+
+
+def _sense(name: str, table: object, where: str, beside: Path) -> Sheet:
+    key = f"senses.{name}"
+    if name in SHEETS:
+        return built(SHEETS[name], table, where, key)
+    if "kind" not in mapping_of(where, key, table) or not name.isidentifier():
+        expected = f'expected one of {", ".join(SHEETS)}, or a kind = "file.py:Class" of your own'
+        raise BadInput(where, key, f"unknown sense; {expected}")
+    return own_sheet(table, where, key, beside)
+
+
+def _kind_of(sheet: Mapping[str, Any], otherwise: object = "wheels") -> object:
+    """The kind of drive that a sheet names."""
+    drive: object = sheet.get("drive")
+    return cast("Mapping[str, object]", drive).get("kind", otherwise) if isinstance(drive, Mapping) else otherwise
+
+
+def _drive(value: object, where: str) -> Drive:
+    table = mapping_of(where, "drive", value)
+    kind = table.get("kind", "wheels")
+    if not isinstance(kind, str) or kind not in DRIVES:
+        raise BadInput(where, "drive.kind", f"expected one of {', '.join(DRIVES)}; got {kind!r}")
+    return built(DRIVES[kind], table, where, "drive")
 
 
 def _shipped(name: object, where: str, key: str) -> dict[str, Any]:
@@ -112,54 +201,3 @@ def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """`base` with what `over` says in its place; tables that both have are merged."""
     both = {key for key in over if isinstance(over[key], Mapping) and isinstance(base.get(key), Mapping)}
     return {**base, **over, **{key: _merged(base[key], over[key]) for key in both}}
-
-
-def _mapping(where: str, key: str, value: object) -> dict[str, Any]:
-    if not isinstance(value, Mapping):
-        raise BadInput(where, key, f"expected a table, got {value!r}")
-    return {str(name): item for name, item in cast("Mapping[object, Any]", value).items()}
-
-
-def _build(kind: type[Any], value: object, where: str, key: str) -> Any:
-    given = _mapping(where, key, value)
-    hints = get_type_hints(kind)
-    known = {of.name: of for of in fields(kind)}
-    made: dict[str, Any] = {}
-    for name in given:
-        if name not in known:
-            raise BadInput(where, _join(key, name), f"unknown key; expected one of {', '.join(known)}")
-    for name, of in known.items():
-        if name in given:
-            made[name] = _value(hints[name], given[name], where, _join(key, name))
-            limits = limits_of(of)
-            fault = fault_of(made[name], limits) if isinstance(made[name], float) else None
-            if limits.choices and made[name] not in limits.choices:
-                fault = f"expected one of {', '.join(limits.choices)}; got {made[name]!r}"
-            if fault:
-                raise BadInput(where, _join(key, name), fault)
-        elif of.default is MISSING and of.default_factory is MISSING:
-            raise BadInput(where, _join(key, name), "is missing")
-    return kind(**made)
-
-
-def _value(hint: Any, value: object, where: str, key: str) -> Any:
-    if is_dataclass(hint) and isinstance(hint, type):
-        return _build(hint, value, where, key)
-    if hint is float:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise BadInput(where, key, f"expected a number, got {value!r}")
-        if not isfinite(value):
-            raise BadInput(where, key, f"expected a finite number, got {value!r}")
-        return float(value)
-    if get_origin(hint) is tuple:
-        if not isinstance(value, list | tuple) or not value:
-            raise BadInput(where, key, f"expected a list, got {value!r}")
-        items = cast("list[object]", value)
-        return tuple(_value(get_args(hint)[0], item, where, f"{key}[{i}]") for i, item in enumerate(items))
-    if hint is str and not isinstance(value, str):
-        raise BadInput(where, key, f"expected a text, got {value!r}")
-    return value
-
-
-def _join(key: str, name: str) -> str:
-    return f"{key}.{name}" if key else name

@@ -1,20 +1,10 @@
 """What may become of a packet for one intended receiver."""
 
-from enum import IntEnum
-from typing import Self
+from swarmwire.comms.explained import Explained
 
 
-class Fate(IntEnum):
+class Fate(Explained):
     """One per (packet, intended receiver), with its meaning; the order is that of the tally's columns."""
-
-    meaning: str
-
-    def __new__(cls, value: int, meaning: str) -> Self:
-        """The fate of this number."""
-        fate = int.__new__(cls, value)
-        fate._value_ = value
-        fate.meaning = meaning
-        return fate
 
     HEARD = 0, "reached the receiver"
     OUT_OF_RANGE = 1, "the receiver was out of the radio's reach when the packet went on air"

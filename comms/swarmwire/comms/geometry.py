@@ -23,6 +23,8 @@ class Obstacles(NamedTuple):
     polygon: FloatArray  # (polygons, 3) x, y, radius in m of a circle around it
     side_start: IntArray  # (polygons + 1,) polygon k has the sides side_start[k] to side_start[k + 1] - 1
     side: FloatArray  # (sides, 5) as `sides_of` has them
+    circle_top_m: FloatArray  # (circles,) from the floor; inf: taller than anything
+    polygon_top_m: FloatArray  # (polygons,) likewise
 
 
 @njit(cache=True)
@@ -45,9 +47,11 @@ def sides_of(corners):
 def obstacle_arrays(arenas: tuple[tuple[Obstacle, ...], ...]) -> Obstacles:
     """The obstacles of each arena as arrays."""
     circles, polygons, sides = [], [], []
+    tops = {True: [], False: []}  # of cylinders, of all else
     circle_start, polygon_start, side_start = [0], [0], [0]
     for obstacles in arenas:
         for o in obstacles:
+            tops[o.shape == "cylinder"].append(o.height_m)
             if o.shape == "cylinder":
                 circles.append((o.x_m, o.y_m, o.radius_m))
                 continue
@@ -65,6 +69,8 @@ def obstacle_arrays(arenas: tuple[tuple[Obstacle, ...], ...]) -> Obstacles:
         np.array(polygons, np.float64).reshape(-1, 3),
         np.array(side_start, np.int64),
         np.concatenate([np.empty((0, 5)), *sides]),
+        np.array(tops[True], np.float64),
+        np.array(tops[False], np.float64),
     )
 
 
@@ -98,6 +104,33 @@ def ray_to_polygon(px, py, dx, dy, obstacles, k):
         else:
             leave = min(leave, -outside / speed)
     return enter if enter <= leave else np.inf
+
+
+@njit(cache=True)
+def to_nearest(away_m, side_m):
+    """What to add to a difference of coordinates on a torus, so that it becomes the shortest; 0 if `side_m` is 0.
+
+    A side of 0 stands for an axis along which an arena does not go on at its other side.
+    """
+    return -side_m * np.floor(away_m / side_m + 0.5) if side_m > 0.0 else 0.0
+
+
+@njit(cache=True)
+def is_blocked_on(obstacles, arena, x0, y0, x1, y1, side_x, side_y):
+    """As `is_blocked`, for the shortest line between two points of a torus with these sides; 0: the arena ends there.
+
+    Obstacles lie within the arena, so that the line is looked at where it leaves it, and where it comes in again.
+    """
+    over_x, over_y = to_nearest(x1 - x0, side_x), to_nearest(y1 - y0, side_y)
+    x1, y1 = x1 + over_x, y1 + over_y
+    if is_blocked(obstacles, arena, x0, y0, x1, y1):
+        return True
+    if over_x != 0.0 and is_blocked(obstacles, arena, x0 - over_x, y0, x1 - over_x, y1):
+        return True
+    if over_y != 0.0 and is_blocked(obstacles, arena, x0, y0 - over_y, x1, y1 - over_y):
+        return True
+    both = over_x != 0.0 and over_y != 0.0
+    return both and is_blocked(obstacles, arena, x0 - over_x, y0 - over_y, x1 - over_x, y1 - over_y)
 
 
 @njit(cache=True)

@@ -32,6 +32,7 @@ def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
         velocity=truth.velocity[rows],
         command=truth.command[rows],
         state=truth.state[rows],
+        leds=truth.leds[rows],
         senses=senses,
         contact_onsets=truth.contact_onsets[arena : arena + 1],
         edges=edges,

@@ -1,25 +1,15 @@
 """What a sender's radio knows of an addressed packet once it is done with it: all but what became of it elsewhere."""
 
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import Self
 
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.explained import Explained
 
 
-class SendResult(IntEnum):
+class SendResult(Explained):
     """How a radio that waits for acknowledgements is done with a packet, with its meaning."""
-
-    meaning: str
-
-    def __new__(cls, value: int, meaning: str) -> Self:
-        """The result of this number."""
-        result = int.__new__(cls, value)
-        result._value_ = value
-        result.meaning = meaning
-        return result
 
     ACKNOWLEDGED = 0, "the receiver's radio said that it has it"
     NO_ACKNOWLEDGEMENT = 1, "no answer to any attempt: it was not heard, or the answer was not"

@@ -1,13 +1,18 @@
 """Ground truth for observers: `Static` once, `Truth` per tick. It never crosses to a runner."""
 
 from dataclasses import dataclass
+from math import inf
+from typing import Literal
 
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.body import Body
+from swarmwire.comms.floor import Floor
 from swarmwire.comms.packets import Payloads
 from swarmwire.comms.senses import Senses
+
+Boundary = Literal["walls", "open", "torus"]  # walls, nothing at all, or the opposite side
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +26,13 @@ class Obstacle:
     radius_m: float = 0.0
     size_m: tuple[float, float] = (0.0, 0.0)
     points_m: tuple[tuple[float, float], ...] = ()  # convex, counter-clockwise, around (x_m, y_m) at heading 0
+    height_m: float = inf  # from the floor to its top; inf: taller than anything
+    mass_kg: float | None = None  # of one that robots can push; None: it is fixed
+
+    @property
+    def movable(self) -> bool:
+        """Whether robots can push it."""
+        return self.mass_kg is not None
 
     @property
     def corners_m(self) -> FloatArray:
@@ -61,12 +73,18 @@ class Static:
     seeds: tuple[int, ...]  # of each arena
     rate_hz: int
     arena_size_m: tuple[float, float]  # full extents; the origin is the centre
-    walled: bool
+    boundary: Boundary
     obstacles: tuple[tuple[Obstacle, ...], ...]  # of each arena
     groups: tuple[Group, ...]
     robot_names: tuple[str, ...]  # of each index within an arena
     range_m: float | None = None  # of the radio, where there is one
     lights: tuple[tuple[Light, ...], ...] = ()  # of each arena
+    floor: Floor | None = None  # of all arenas; None: white
+
+    @property
+    def walled(self) -> bool:
+        """Whether walls stand around each arena."""
+        return self.boundary == "walls"
 
     @property
     def arenas(self) -> int:
@@ -77,6 +95,11 @@ class Static:
     def robots(self) -> int:
         """Robots in each arena."""
         return len(self.robot_names)
+
+    @property
+    def most_leds(self) -> int:
+        """LEDs of the robot that has the most."""
+        return max(group.body.led_count for group in self.groups)
 
     @property
     def act_every_ticks(self) -> IntArray:
@@ -150,9 +173,9 @@ class Tally:
 class Happened:
     """An event that began in this tick, or one that ended after its time."""
 
-    serial: int  # its place in the scenario
+    serial: int  # its place in the scenario; -1: it is not of the scenario's making
     at_s: float  # when the scenario lets it begin
-    do: str  # the action
+    do: str  # the action, or run_down: batteries are empty
     ended: bool
     changed: BoolArray  # (rows,) the robots for which it made a difference
 
@@ -166,9 +189,10 @@ class Truth:
     alive: BoolArray  # (rows,)
     pose: FloatArray  # (rows, 3) x, y in m, heading in rad, arena frame
     velocity: FloatArray  # (rows, 3) m/s, m/s, rad/s, arena frame
-    command: FloatArray  # (rows, 2) applied: forward m/s, left turn rad/s
+    command: FloatArray  # (rows, 3) within the drive's limits: forward m/s, left turn rad/s, to the left m/s
     state: IntArray  # (rows,) what the agent says it is at, a place in `states`; 0: it has said nothing
     states: tuple[str, ...]  # named so far, in that order; the first is empty
+    leds: IntArray  # (rows, most LEDs of a robot) 0xRRGGBB as switched in this tick; 0: dark, or not there
     senses: Senses  # by group, of the robots that act in this tick: what they sensed at its start
     contact_onsets: IntArray  # (arenas, 2) that began in this tick: robot with robot, robot with wall or obstacle
     edges: IntArray | None  # (e, 2) robot rows joined in the radio graph at the tick's start; None without a radio

@@ -9,8 +9,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
+from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.led_changes import LedChanges
 from swarmwire.comms.notes import Notes
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
@@ -114,11 +116,11 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
     drive = data.draw(npst.arrays(np.bool_, 3))
     ids = np.where(to == BROADCAST, UNTOLD, data.draw(npst.arrays(np.int64, k, elements=st.integers(UNTOLD, I64.max))))
     sent = Sent(sender, to, Payloads.of(payloads), data.draw(st.sampled_from([None, ids])))
-    actions = Actions(ROWS, drive, data.draw(floats(3)), data.draw(floats(3)), sent)
+    actions = Actions(ROWS, drive, *(data.draw(floats(3)) for _ in range(3)), sent)
     frame = frames.decode(encode_actions(8, actions))
     assert (frame.kind, frame.tick) == ("actions", 8)
     got = decode_actions(frame, ROWS)
-    for column in ("rows", "drive", "linear_mps", "angular_radps"):
+    for column in ("rows", "drive", "linear_mps", "angular_radps", "lateral_mps"):
         assert same(getattr(got, column), getattr(actions, column))
     assert same(got.sent.sender, sender)
     assert same(got.sent.to, to)
@@ -129,13 +131,43 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
 
 def sound() -> Actions:
     sent = Sent(np.array([4, 9, 9]), np.array([BROADCAST, 0, 2]), Payloads.of([b"ab", b"", b"cde"]))
-    return Actions(ROWS, np.array([True, False, True]), np.ones(3), np.zeros(3), sent)
+    return Actions(ROWS, np.array([True, False, True]), np.ones(3), np.zeros(3), np.zeros(3), sent)
 
 
 def refused(**changes: Any) -> None:
     frame = frames.decode(encode_actions(0, sound()))
     with pytest.raises(BadFrame) as caught:
         decode_actions(replace(frame, arrays={**frame.arrays, **changes}), ROWS)
+    assert caught.value.fault == "malformed"
+
+
+ACTUATED = Actuations(np.array([4, 4, 9]), np.array([0, 3, 1]), np.array([0.5, -2.0, 1e300]))
+
+
+def test_own_actuators_come_over_whole() -> None:
+    frame = frames.decode(encode_actions(0, replace(sound(), own=ACTUATED)))
+    got = decode_actions(frame, ROWS).own
+    assert all(same(getattr(got, name), getattr(ACTUATED, name)) for name in ("rows", "place", "value"))
+    assert not len(decode_actions(frames.decode(encode_actions(0, sound())), ROWS).own)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"own": np.array([[4, 4, 8], [0, 3, 1]])},  # another runner's robot
+        {"own": np.array([[4, 4, 9], [0, -1, 1]])},
+        {"own": np.array([[4, 9], [0, 1]])},
+        {"own": np.array([[4.0, 4.0, 9.0], [0.0, 3.0, 1.0]])},
+        {"own/value": np.array([0.5, np.nan, 1.0])},
+        {"own/value": np.array([0.5, np.inf, 1.0])},
+        {"own/value": np.array([1, 2, 3])},
+    ],
+    ids=repr,
+)
+def test_own_actuators_that_are_none_are_refused(wrong: Any) -> None:
+    frame = frames.decode(encode_actions(0, replace(sound(), own=ACTUATED)))
+    with pytest.raises(BadFrame) as caught:
+        decode_actions(replace(frame, arrays={**frame.arrays, **wrong}), ROWS)
     assert caught.value.fault == "malformed"
 
 
@@ -211,6 +243,34 @@ def test_packets_without_any_sender_are_none() -> None:
     empty = {"sent": np.empty((2, 0), np.int64), "sent/offset": np.zeros(1, np.int64)}
     arrays = {**frame.arrays, **empty, "sent/data": np.empty(0, np.uint8)}
     assert len(decode_actions(replace(frame, arrays=arrays), ROWS).sent) == 0
+
+
+def switching(leds: LedChanges) -> frames.Frame:
+    return frames.decode(encode_actions(0, replace(sound(), leds=leds)))
+
+
+def test_switched_leds_come_over_whole_and_cost_nothing_otherwise() -> None:
+    leds = LedChanges(np.array([9, 4, 9]), np.array([0, 12, 7]), np.array([0xFFFFFF, 0, 0x123456]))
+    got = decode_actions(switching(leds), ROWS).leds
+    assert all(same(getattr(got, name), getattr(leds, name)) for name in ("rows", "which", "rgb"))
+    assert "leds" not in frames.decode(encode_actions(0, sound())).arrays
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        [[5], [0], [1]],  # another's robot
+        [[4], [-1], [1]],
+        [[4], [0], [-1]],
+        [[4], [0], [0x1000000]],
+        [[4], [0]],
+        [4, 0, 1],
+        [[4.0], [0.0], [1.0]],
+    ],
+    ids=repr,
+)
+def test_leds_that_are_none_are_refused(wrong: list[Any]) -> None:
+    refused(leds=np.array(wrong))
 
 
 def noting(rows: list[int], code: list[int], names: tuple[str, ...]) -> bytes:

@@ -12,6 +12,7 @@ from hypothesis.extra import numpy as npst
 from swarmwire.comms.body import load_body
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.floor import Floor, FloorImage, Patch, packed_image
 from swarmwire.comms.glimpse import Glimpse, Scene, Series
 from swarmwire.comms.one_arena import static_of, truth_of
 from swarmwire.comms.senses import GroupSenses
@@ -23,18 +24,24 @@ from swarmwire.comms.wire.truth_frames import decode_truth, encode_truth
 ROBOTS, ARENAS = 3, 2
 NOT_SENT = ("rssi_dbm", "payload", "payloads")  # as columns of numbers
 ROWS = ROBOTS * ARENAS
-OBSTACLES = (Obstacle("box", 1.0, 0.5, 0.2, size_m=(1.0, 2.0)), Obstacle("polygon", 0, 0, points_m=((0, 0), (1, 0))))
+OBSTACLES = (
+    Obstacle("box", 1.0, 0.5, 0.2, size_m=(1.0, 2.0), height_m=0.3),
+    Obstacle("polygon", 0, 0, points_m=((0, 0), (1, 0))),
+)
+PATCHES = (Patch("disc", 1.0, 0.0, 0.5, 0.2), Patch("polygon", 0.0, 0.0, 0.1, points_m=((0, 0), (1, 0), (0, 1))))
+FLOOR = Floor(0.9, PATCHES, packed_image(np.arange(6, dtype=np.uint8).reshape(2, 3)))
 STATIC = Static(
     name="two groups",
     seeds=(4, 9),
     rate_hz=10,
     arena_size_m=(8.0, 6.0),
-    walled=True,
+    boundary="walls",
     obstacles=(OBSTACLES, ()),
     groups=(Group("a", load_body("epuck"), 0, 2), Group("b", load_body("footbot"), 2, 3, act_every_ticks=5)),
     robot_names=("a-0", "a-1", "b-0"),
     range_m=2.0,
     lights=((Light(0.5, 0.5, 2.0),), ()),
+    floor=FLOOR,
 )
 SCENE = Scene(STATIC, (Series("order", "", (0.0, 1.0)), Series("min_gap", "m", (None, None))), STATIC.robot_names[1])
 I64 = np.iinfo(np.int64)
@@ -81,9 +88,10 @@ def glimpses(draw: st.DrawFn) -> Glimpse:
         alive=draw(flags),
         pose=draw(floats(ROWS, 3)),
         velocity=draw(floats(ROWS, 3)),
-        command=draw(floats(ROWS, 2)),
+        command=draw(floats(ROWS, 3)),
         state=draw(ints(ROWS, least=0, most=len(states) - 1)),
         states=states,
+        leds=draw(ints(ROWS, SCENE.static.most_leds, least=0, most=0xFFFFFF)),
         senses=draw(st.sampled_from([{}, senses])),
         contact_onsets=draw(ints(ARENAS, 2)),
         edges=draw(st.none() | ints(draw(st.integers(0, 5)), 2, least=0, most=ROWS - 1)),
@@ -124,9 +132,10 @@ def quiet(**given: Any) -> Glimpse:
         alive=np.ones(ROWS, np.bool_),
         pose=np.zeros((ROWS, 3)),
         velocity=np.zeros((ROWS, 3)),
-        command=np.zeros((ROWS, 2)),
+        command=np.zeros((ROWS, 3)),
         state=np.zeros(ROWS, np.int64),
         states=("",),
+        leds=np.zeros((ROWS, SCENE.static.most_leds), np.int64),
         senses={},
         contact_onsets=np.zeros((ARENAS, 2), np.int64),
         edges=None,
@@ -147,6 +156,9 @@ def one_finished(**given: int) -> Finished:
         ("alive", {"alive": np.ones(ROWS - 1, np.bool_)}),
         ("pose", {"pose": np.zeros((ROWS, 2))}),
         ("velocity", {"velocity": np.zeros((ROWS, 3), np.int64)}),
+        ("leds", {"leds": np.zeros((ROWS, SCENE.static.most_leds + 1), np.int64)}),
+        ("leds", {"leds": np.full((ROWS, SCENE.static.most_leds), -1)}),
+        ("leds", {"leds": np.full((ROWS, SCENE.static.most_leds), 0x1000000)}),
         ("state", {"state": np.full(ROWS, 1)}),
         ("state", {"state": np.full(ROWS, -1)}),
         ("states", {"states": ()}),
@@ -200,6 +212,11 @@ def test_a_frame_is_not_taken_for_one_of_another_kind():
         ({"rate_hz": 10.5}, "scene.static.rate_hz"),
         ({"arena_size_m": (8.0, 0.0)}, "arena_size_m"),
         ({"arena_size_m": (8.0, float("nan"))}, r"scene.static.arena_size_m\[1\]"),
+        ({"arena_size_m": (8.0, float("inf"))}, r"scene.static.arena_size_m\[1\]"),
+        ({"boundary": "sea"}, "scene.static.boundary"),
+        ({"floor": replace(FLOOR, image=FloorImage(2, 3, "AAAA"))}, "floor.image"),
+        ({"floor": replace(FLOOR, image=replace(FLOOR.image, rows=3))}, "floor.image"),
+        ({"floor": replace(FLOOR, image=replace(FLOOR.image, rows=-2))}, "floor.image"),
         ({"arena_size_m": (8.0,)}, "expected 2 values"),
         ({"obstacles": ((),)}, "obstacles"),
         ({"lights": ((),)}, "lights"),

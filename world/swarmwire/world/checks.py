@@ -4,12 +4,17 @@ import math
 
 import numpy as np
 
-from swarmwire.comms.air.radio_checks import check_radio
-from swarmwire.comms.body import Body, load_body
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.radio_checks import check_radio, unfit_for_torus
+from swarmwire.comms.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
+from swarmwire.world.arena_tables import ObstacleTable
+from swarmwire.world.bodies import bodies_of
+from swarmwire.world.engines.choice import check_engines, engines_of
+from swarmwire.world.layout import read_layout
 from swarmwire.world.obstacles import extent, heading_of, obstacle_at
-from swarmwire.world.scenario import ObstacleTable, Scenario
+from swarmwire.world.scenario import Scenario
 
 MOST_OF_RADIUS = 0.25  # how far a robot at full speed may move in one physics step
 
@@ -17,40 +22,33 @@ MOST_OF_RADIUS = 0.25  # how far a robot at full speed may move in one physics s
 def check(scenario: Scenario, where: str) -> None:
     """Raise BadInput for the first contradiction in a scenario."""
     bodies = bodies_of(scenario, where)
+    check_engines(scenario, bodies, where)
     _check_steps(scenario, bodies, where)
+    size_m = read_layout(scenario.arena, where).size_m
     for i, obstacle in enumerate(scenario.arena.obstacles):
-        _check_obstacle(scenario, obstacle, f"arena.obstacles.{i}", where)
+        _check_obstacle(size_m, obstacle, f"arena.obstacles.{i}", where)
     _check_send_offset(scenario, where)
     if scenario.radio is not None:
         check_radio(scenario.radio, where)
+        _check_torus(scenario, scenario.radio, where)
     _check_antennas(scenario, where)
     for i, event in enumerate(scenario.events):
-        _check_event(scenario, event, f"events.{i}", where)
-
-
-def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
-    """The body of each group, by the group's name."""
-    bodies: dict[str, Body] = {}
-    for group, table in scenario.robots.items():
-        try:
-            bodies[group] = load_body(table.body)
-        except BadInput as error:
-            raise BadInput(where, f"robots.{group}.body", error.expected) from None
-    return bodies
+        _check_event(scenario, bodies, event, f"events.{i}", where)
 
 
 def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> None:
-    for group, body in bodies.items():
+    for group, engine in engines_of(scenario, bodies).items():
+        body = bodies[group]
         tick_m = body.max_linear_mps / scenario.time.rate_hz
         needed = math.ceil(tick_m / (MOST_OF_RADIUS * body.radius_m) - 1e-9)
-        if scenario.physics.steps < needed:
+        if engine != "kinematic" and scenario.physics.steps < needed:
             text = f"so that a robot of {group} at full speed moves at most a quarter of its radius in one step"
             raise BadInput(where, "physics.steps", f"expected at least {needed}, {text}; got {scenario.physics.steps}")
 
 
-def _check_obstacle(scenario: Scenario, table: ObstacleTable, key: str, where: str) -> None:
+def _check_obstacle(extents_m: tuple[float, float], table: ObstacleTable, key: str, where: str) -> None:
     """A fixed obstacle lies within the arena; a random one would fit into it somewhere at heading 0."""
-    size_m = np.array(scenario.arena.size_m)
+    size_m = np.array(extents_m)
     least, greatest = extent(obstacle_at(table, *(table.at or (0.0, 0.0)), heading_of(table) or 0.0))
     fits = np.all(greatest - least <= size_m + 2e-9)
     if not fits or (table.at and (np.any(greatest > 0.5 * size_m + 1e-9) or np.any(least < -0.5 * size_m - 1e-9))):
@@ -66,6 +64,13 @@ def _check_send_offset(scenario: Scenario, where: str) -> None:
         raise BadInput(where, "radio.send_offset", f"{expected}; got {offset!r}")
 
 
+def _check_torus(scenario: Scenario, radio: Radio, where: str) -> None:
+    unfit = unfit_for_torus(radio) if scenario.arena.boundary == "torus" else None
+    if unfit is not None:
+        expected = "expected a disk without bodies_block: what is between two robots across a torus's seam is not known"
+        raise BadInput(where, f"radio.{unfit}", expected)
+
+
 def _check_antennas(scenario: Scenario, where: str) -> None:
     for group, table in scenario.robots.items():
         if table.radio is not None and (scenario.radio is None or not scenario.radio.is_signal):
@@ -73,12 +78,13 @@ def _check_antennas(scenario: Scenario, where: str) -> None:
             raise BadInput(where, f"robots.{group}.radio", f"expected a radio with signals: {why}")
 
 
-def _check_event(scenario: Scenario, event: Event, key: str, where: str) -> None:
+def _check_event(scenario: Scenario, bodies: dict[str, Body], event: Event, key: str, where: str) -> None:
     """An event names robots that there are, and fits the radio, if it needs one."""
     if event.needs_radio and scenario.radio is None:
         raise BadInput(where, f"{key}.do", f"expected a scenario with a [radio] for {event.do!r}")
     try:
         event.check(scenario.groups())
+        event.check_bodies(scenario.groups(), bodies)
         if event.needs_radio and scenario.radio is not None:
             event.check_radio(scenario.radio)
     except BadInput as error:

@@ -32,21 +32,29 @@ def pairs_of(contacts: AnyArray, ids: AnyArray, index: IntArray) -> IntArray:
 
 @njit(cache=True)
 def count_began(now: IntArray, before: IntArray, bodies: int, onsets: IntArray) -> None:
-    """Add the pairs of `now` that are not in `before` to onsets (2,): of two robots, of a robot and something fixed."""
+    """Add the pairs of `now` that are not in `before` to onsets (arenas, 2): two robots, a robot and something fixed.
+
+    Args:
+        now: rising codes, (arena x bodies + lower index) x bodies + higher index.
+        before: likewise.
+        bodies: of an arena, robots and one that stands for all that is fixed, the last.
+        onsets: added to.
+    """
     at = 0
     for code in now:
         while at < len(before) and before[at] < code:
             at += 1
         if at == len(before) or before[at] != code:
-            onsets[1 if code % bodies == bodies - 1 else 0] += 1
+            onsets[code // (bodies * bodies), 1 if code % bodies == bodies - 1 else 0] += 1
 
 
 @njit(cache=True)
 def mark(now: IntArray, touched: FloatArray) -> None:
-    """Set touched (robots,) to 1 for each robot in the pairs of `now`, else to 0."""
+    """Set touched (arenas, robots) to 1 for each robot in the pairs of `now`, codes as above, else to 0."""
     touched[:] = 0.0
-    bodies = len(touched) + 1  # the highest index is the static body's
+    bodies = touched.shape[1] + 1
     for code in now:
-        for body in (code // bodies, code % bodies):
-            if body < len(touched):
-                touched[body] = 1.0
+        arena, pair = code // (bodies * bodies), code % (bodies * bodies)
+        touched[arena, pair // bodies] = 1.0
+        if pair % bodies < bodies - 1:
+            touched[arena, pair % bodies] = 1.0

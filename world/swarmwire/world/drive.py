@@ -1,35 +1,52 @@
-"""Differential drive by bounded force: what the motors and the grip of the wheels can do in one physics step. Compiled.
+"""Drives by bounded force: what motors and the grip of wheels can do in one physics step. Compiled.
 
 Velocities are never written: a motor pushes until its robot has the speed asked for or its force is spent, so contacts
 keep the last word. Along and across the body the wheels share one grip (a friction circle of `max_force_n`, as ARGoS
-bounds the length of its pivot's impulse), and turning has a bound of its own, `max_torque_nm`.
+bounds the length of its pivot's impulse), and turning has a bound of its own, `max_torque_nm`. A holonomic drive
+differs only in that it may be asked for a speed across the body.
 """
 
 # pyright: basic, reportUnknownMemberType=false
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.drives import Drive, Holonomic
+from swarmwire.comms.truth import Group
 
 
 class Motors(NamedTuple):
     """What drives each robot index of an arena, (robots,) each."""
 
-    wheel_base_m: FloatArray
-    max_wheel_mps: FloatArray
+    wheel_base_m: FloatArray  # 0: it has no wheels
     max_force_n: FloatArray
     max_torque_nm: FloatArray
     mass_kg: FloatArray
     inertia_kgm2: FloatArray
 
 
+def motors_of(groups: Sequence[Group]) -> Motors:
+    """The motors of each robot of the groups in order; a body's mass is spread evenly over its disc."""
+    drives = [
+        (_wheel_base_m(d), d.max_force_n, d.max_torque_nm, b.mass_kg, 0.5 * b.mass_kg * b.radius_m**2)
+        for b, d in ((group.body, group.body.drive) for group in groups)
+    ]
+    columns = np.repeat(np.array(drives), [group.stop - group.start for group in groups], axis=0).T
+    return Motors(*(np.ascontiguousarray(column) for column in columns))
+
+
+def _wheel_base_m(drive: Drive) -> float:
+    return 0.0 if isinstance(drive, Holonomic) else drive.wheel_base_m
+
+
 @njit(cache=True)
 def push(
     motors: Motors,
-    command: FloatArray,
+    target: FloatArray,
     state: FloatArray,
     dt_s: float,
     force: FloatArray,
@@ -48,10 +65,10 @@ def push(
 
     Args:
         motors: of each robot index.
-        command: (arenas, robots, 2) forward m/s, left turn rad/s, within the wheels' limits.
+        target: (arenas, robots, 3) forward m/s, left turn rad/s, to the left m/s.
         state: (arenas, robots, 6) x, y in m, heading in rad, velocity in m/s, m/s, rad/s, arena frame.
         dt_s: length of a physics step.
-        force: (arenas, robots + 1, 3) set: N, N, N m, arena frame; the last row is the static body's.
+        force: (arenas, robots or more, 3) set: N, N, N m, arena frame; rows beyond the robots stay as they are.
         travel_m: (arenas, robots, 2) left and right wheel, added to.
         unhindered: (arenas, robots) turn rate that the last torque would have given without contacts, set.
     """
@@ -68,26 +85,12 @@ def push(
             bound = motors.max_torque_nm[i]
             inertia = motors.inertia_kgm2[i]
             taken = unhindered[arena, i] - turn
-            torque = min(max((command[arena, i, 1] - turn + taken) * inertia / dt_s, -bound), bound)
+            torque = min(max((target[arena, i, 1] - turn + taken) * inertia / dt_s, -bound), bound)
             unhindered[arena, i] = turn + torque * dt_s / inertia
             ahead = heading + dt_s * (turn + 0.5 * unhindered[arena, i])
-            speed, per_step = command[arena, i, 0], motors.mass_kg[i] / dt_s
-            fx, fy = (speed * np.cos(ahead) - vx) * per_step, (speed * np.sin(ahead) - vy) * per_step
+            cos, sin, per_step = np.cos(ahead), np.sin(ahead), motors.mass_kg[i] / dt_s
+            forward, left = target[arena, i, 0], target[arena, i, 2]
+            fx, fy = (forward * cos - left * sin - vx) * per_step, (forward * sin + left * cos - vy) * per_step
             size = np.sqrt(fx * fx + fy * fy)
             share = motors.max_force_n[i] / size if size > motors.max_force_n[i] else 1.0
             force[arena, i, 0], force[arena, i, 1], force[arena, i, 2] = fx * share, fy * share, torque
-
-
-def within_wheels(
-    motors: Motors, index: IntArray, linear_mps: FloatArray, angular_radps: FloatArray
-) -> tuple[FloatArray, BoolArray]:
-    """Commands (n,) of robots with these indices as their wheels can follow them, and which of them were too fast.
-
-    Both speeds shrink by one factor, so that the curve stays the same.
-    """
-    half_base = 0.5 * motors.wheel_base_m[index]
-    most = motors.max_wheel_mps[index]
-    fastest = np.abs(linear_mps) + np.abs(angular_radps) * half_base
-    clipped = fastest > most * (1.0 + 1e-9)  # not a command that asks for exactly the limit and was rounded
-    share = np.where(clipped, most / np.maximum(fastest, most), 1.0)
-    return np.stack([linear_mps * share, angular_radps * share], axis=1), clipped

@@ -82,4 +82,5 @@ class Lockstep(Roster[_Slot]):
 def standing(slot: Slot) -> Actions:
     """Command 0 for every robot of a slot."""
     rows = slot.all_rows
-    return Actions(rows, np.ones(len(rows), np.bool_), np.zeros(len(rows)), np.zeros(len(rows)))
+    still = np.zeros(len(rows))
+    return Actions(rows, np.ones(len(rows), np.bool_), still, still, still)

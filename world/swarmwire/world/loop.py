@@ -80,6 +80,7 @@ class Loop:
             command=command,
             state=world.states.code,
             states=world.states.names,
+            leds=world.actuators.leds.told,
             senses=senses,
             contact_onsets=onsets,
             edges=edges,

@@ -1,19 +1,23 @@
 """Obstacles from the scenario's tables."""
 
+from math import inf
+
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Obstacle
-from swarmwire.world.scenario import CylinderTable, ObstacleTable, PolygonTable
+from swarmwire.world.arena_tables import CylinderTable, ObstacleTable, PolygonTable
 
 
 def obstacle_at(table: ObstacleTable, x_m: float, y_m: float, heading_rad: float) -> Obstacle:
     """The obstacle that a table describes, put at a place in the arena."""
+    height_m = inf if table.height_m is None else table.height_m
     if isinstance(table, CylinderTable):
-        return Obstacle("cylinder", x_m, y_m, radius_m=table.radius_m)
-    if isinstance(table, PolygonTable):
-        return Obstacle("polygon", x_m, y_m, heading_rad, points_m=table.points)
-    return Obstacle("box", x_m, y_m, heading_rad, size_m=table.size_m)
+        return Obstacle("cylinder", x_m, y_m, radius_m=table.radius_m, height_m=height_m, mass_kg=table.mass_kg)
+    size_m, points = ((0.0, 0.0), table.points) if isinstance(table, PolygonTable) else (table.size_m, ())
+    return Obstacle(
+        table.shape, x_m, y_m, heading_rad, size_m=size_m, points_m=points, height_m=height_m, mass_kg=table.mass_kg
+    )
 
 
 def heading_of(table: ObstacleTable) -> float | None:

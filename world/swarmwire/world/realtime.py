@@ -20,10 +20,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.led_changes import LedChanges
 from swarmwire.comms.notes import Notes
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard, Sent
@@ -71,9 +73,11 @@ class RealTime(Roster[_Slot]):
         self._watchdog_ns, self._timeout_ns = to_ns(watchdog_s), to_ns(timeout_s)
         self._asked_ns = np.full(rows, ANSWERED, np.int64)  # simulated time of the first question without an answer
         self._stopped = np.zeros(rows, np.bool_)
-        self._drive, self._command = np.zeros(rows, np.bool_), np.zeros((2, rows))
+        self._drive, self._command = np.zeros(rows, np.bool_), np.zeros((3, rows))
         self._sent: list[Sent] = []
         self._notes: list[Notes] = []
+        self._leds: list[LedChanges] = []
+        self._own: list[Actuations] = []
         self.late, self.watchdog_stops = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
         self.frames_dropped = self.packets_dropped = self.outcomes_dropped = 0
 
@@ -118,11 +122,12 @@ class RealTime(Roster[_Slot]):
         self.watchdog_stops += overdue
         self._stop(np.flatnonzero(overdue))
         rows = np.arange(len(self._drive))
-        linear_mps, angular_radps = self._command
+        linear_mps, angular_radps, lateral_mps = self._command
         sent, notes = Sent.joined(self._sent), self._latest_notes()
-        actions = Actions(rows, self._drive, linear_mps, angular_radps, sent, notes)
+        leds, own = LedChanges.joined(self._leds), Actuations.joined(self._own)
+        actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own)
         self._drive, self._command = np.zeros_like(self._drive), np.zeros_like(self._command)
-        self._sent, self._notes = [], []
+        self._sent, self._notes, self._leds, self._own = [], [], [], []
         return actions
 
     def _acted(self, slot: _Slot, frame: Frame) -> None:
@@ -137,10 +142,12 @@ class RealTime(Roster[_Slot]):
         self._asked_ns[asked.rows], self._stopped[asked.rows] = ANSWERED, False
         given = actions.rows[actions.drive]
         self._drive[given] = True
-        command: FloatArray = np.array((actions.linear_mps, actions.angular_radps))
+        command: FloatArray = np.array((actions.linear_mps, actions.angular_radps, actions.lateral_mps))
         self._command[:, given] = command[:, actions.drive]
         self._sent.append(actions.sent)
         self._notes.append(actions.notes)
+        self._leds.append(actions.leds)
+        self._own.append(actions.own)
 
     def _catch_up(self, slot: _Slot) -> Sequence[bytes]:
         return ()  # the next tick is soon

@@ -3,7 +3,7 @@
 from itertools import accumulate
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import BaseModel, Field, PrivateAttr, StringConstraints, field_validator, model_validator
+from pydantic import Field, PrivateAttr, StringConstraints, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from swarmwire.comms.air.presets import with_preset
@@ -12,27 +12,12 @@ from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.events.swarm import Groups
-from swarmwire.world.convex import counter_clockwise
-from swarmwire.world.schema import TABLE, AsTable, OneOf
+from swarmwire.world.arena_tables import ArenaTable
+from swarmwire.world.place_tables import AtPoses, InArena, PlaceTable
+from swarmwire.world.schema import AsTable, OneOf
+from swarmwire.world.tables import Table
 
-
-def _metres(**bounds: Any) -> Any:
-    return Field(json_schema_extra={"unit": "m"}, **bounds)
-
-
-Coordinate = Annotated[float, _metres(ge=-10_000, le=10_000)]
-Length = Annotated[float, _metres(gt=0, le=10_000)]
-Point = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
-Extents = Annotated[tuple[Length, Length], Field(strict=False)]
-Heading = Annotated[float, Field(ge=-7, le=7, json_schema_extra={"unit": "rad"})]
-Pose = Annotated[tuple[Coordinate, Coordinate, Heading], Field(strict=False)]
 GroupName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=40)]
-
-
-class Table(BaseModel):
-    """A table of the file."""
-
-    model_config = TABLE
 
 
 class TimeTable(Table):
@@ -45,130 +30,12 @@ class TimeTable(Table):
 class PhysicsTable(Table):
     """[physics]: how bodies move and touch."""
 
-    engine: Literal["pymunk"] = "pymunk"
-    """The engine that moves the bodies."""
+    engine: Literal["auto", "discs", "pymunk", "kinematic"] = "auto"
+    """What moves bodies that have contacts: discs, or pymunk, which also moves obstacles; "auto" takes discs unless an
+    obstacle is movable. Bodies without contacts, and such as fly, are kinematic; "kinematic" makes all of them so."""
     steps: int = Field(default=5, ge=1, le=1000)
-    """Physics steps per tick; refused if a robot at full speed would move over a quarter of its radius in one."""
-
-
-class _StandingTable(Table):
-    """Where a thing stands: either one at a point, or several at random."""
-
-    at: Point | None = None
-    """Where the one thing stands, in the arena's frame."""
-    place: Literal["random"] | None = None
-    """"random": anywhere in the arena, free of obstacles, by the seed."""
-    count: int = Field(default=1, ge=1, le=100_000)
-    """How many; only with place = "random"."""
-
-    @model_validator(mode="after")
-    def _one_place(self) -> "_StandingTable":
-        if (self.at is None) == (self.place is None):
-            raise PydanticCustomError("place", 'expected either at = [x, y] or place = "random"')
-        if self.at is not None and self.count != 1:
-            raise PydanticCustomError("place", 'expected place = "random" with a count; at = [x, y] sets only one')
-        return self
-
-
-class CylinderTable(_StandingTable):
-    """A round obstacle."""
-
-    shape: Literal["cylinder"]
-    """Its shape."""
-    radius_m: Length
-    """Its radius."""
-
-
-class _TurnedTable(_StandingTable):
-    """An obstacle with a heading."""
-
-    heading_rad: Heading | None = None
-    """Counter-clockwise turn; 0 if left out, or a random one with place = "random"."""
-
-
-class BoxTable(_TurnedTable):
-    """A rectangular obstacle."""
-
-    shape: Literal["box"]
-    """Its shape."""
-    size_m: Extents
-    """Full extents along and across its heading."""
-
-
-class PolygonTable(_TurnedTable):
-    """A convex obstacle with straight sides."""
-
-    shape: Literal["polygon"]
-    """Its shape."""
-    points: Annotated[tuple[Point, ...], Field(strict=False, json_schema_extra={"unit": "m"})]
-    """Its corners in order, around its own origin, which `at` puts somewhere and about which it turns."""
-
-    @field_validator("points")
-    @classmethod
-    def _convex(cls, points: tuple[Point, ...]) -> tuple[Point, ...]:
-        try:
-            return counter_clockwise(points)
-        except ValueError as error:
-            raise PydanticCustomError("points", "{fault}", {"fault": str(error)}) from None
-
-
-ObstacleTable = CylinderTable | BoxTable | PolygonTable
-
-
-class LightTable(_StandingTable):
-    """A light: it has no body, so that it neither holds robots back nor keeps them away from its place."""
-
-    intensity: Length
-    """How far it reaches: seen as exp(-2 d / intensity) at d m, and not at all beyond 2.5 of it."""
-
-
-class ArenaTable(Table):
-    """[arena]: a bounded plane and what stands in it; the origin is its centre."""
-
-    size_m: Extents
-    """Full extents along x and y."""
-    boundary: Literal["walls", "open"] = "walls"
-    """Walls that bodies hit and sensors see, or nothing at all."""
-    obstacles: tuple[Annotated[ObstacleTable, Field(discriminator="shape")], ...] = Field(default=(), strict=False)
-    """Fixed things that bodies hit, sensors see and radio signals are blocked by."""
-    lights: tuple[LightTable, ...] = Field(default=(), strict=False)
-    """Lights that sensors see."""
-
-
-class InDisc(Table):
-    """Uniform in a disc."""
-
-    how: Literal["disc"]
-    """Uniform in a disc."""
-    radius_m: Length
-    """Radius of the disc in which the robots' centres lie."""
-    at: Point = (0.0, 0.0)
-    """Centre of the disc."""
-
-
-class InArena(Table):
-    """Uniform in the whole arena."""
-
-    how: Literal["arena"]
-    """Uniform in the whole arena."""
-
-
-class OnGrid(Table):
-    """In rows, as square as can be, around the origin."""
-
-    how: Literal["grid"]
-    """In rows, as square as can be, around the origin."""
-    spacing_m: Length
-    """Distance between neighbours in a row and between rows."""
-
-
-class AtPoses(Table):
-    """At poses that are given."""
-
-    how: Literal["poses"]
-    """At poses that are given."""
-    poses: tuple[Pose, ...] = Field(strict=False, min_length=1)
-    """x, y and heading of each robot."""
+    """Physics steps per tick; refused if a robot with contacts at full speed would move over a quarter of its radius in
+    one."""
 
 
 class RobotsTable(Table):
@@ -186,7 +53,7 @@ class RobotsTable(Table):
     """The agent's parameters."""
     radio: Annotated[OwnAntenna, AsTable()] | None = None
     """Their own power and gain; only of a radio with signals."""
-    place: Annotated[InDisc | InArena | OnGrid | AtPoses, Field(discriminator="how")] = InArena(how="arena")
+    place: PlaceTable = InArena(how="arena")
     """Where the robots stand at the start."""
 
     @model_validator(mode="after")

@@ -1,4 +1,7 @@
-"""The world: every arena's bodies and senses, tick by tick. It does no I/O and knows neither agents nor the radio."""
+"""The world: every arena's bodies and senses, tick by tick. It knows neither agents nor the radio.
+
+It does no I/O but that it reads the pictures that a scenario names, when it is made.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,14 +13,25 @@ from swarmwire.comms.body import Body
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.ground import ground_of
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
+from swarmwire.comms.sheets import OwnSheet, Sheet
 from swarmwire.comms.truth import Group, Static
-from swarmwire.world.checks import bodies_of
-from swarmwire.world.drive import within_wheels
+from swarmwire.world.actuation.actuators import Actuators
+from swarmwire.world.actuation.batteries import Batteries
+from swarmwire.world.actuation.own_actuators import OwnActuators
+from swarmwire.world.bodies import bodies_of
+from swarmwire.world.engines.choice import engines_of
+from swarmwire.world.layout import read_layout
+from swarmwire.world.own.fitting import made_sensor
+from swarmwire.world.own.sensor import AskedSensor
 from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
-from swarmwire.world.sensors import SENSORS, Accumulating, Scene, Sensor
+from swarmwire.world.sensors import SENSORS, Scene
+from swarmwire.world.sensors.scene import led_places_m
+from swarmwire.world.sensors.sensor import TrueSense
+from swarmwire.world.sensors.staged import Staged
 from swarmwire.world.snapshot import snapshot
 from swarmwire.world.states import States
 
@@ -32,8 +46,11 @@ class World:
         keys: (arenas,) the key of each arena's draws, which depends on its seed alone.
         pose: (rows, 3) x, y in m, heading in rad in (-pi, pi], arena frame.
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
-        command: (rows, 2) applied, within the wheels' limits: forward m/s, left turn rad/s.
+        actuators: motors and LEDs: what they were asked for, and what they do.
         alive: (rows,).
+        batteries: of all robots; `charge` may be written to.
+        scene: what sensors look at, always the present.
+        sensors: those that agents need, by group and sense; `Staged.failed` may be set.
         states: what each robot is at, as its agent named it.
     """
 
@@ -44,55 +61,80 @@ class World:
         """
         if not seeds:
             raise BadInput(scenario.source, "seed", "expected at least one seed")
-        groups = _groups(scenario, bodies_of(scenario, scenario.source))
+        bodies = bodies_of(scenario, scenario.source)
+        groups = _groups(scenario, bodies)
         self.keys: KeyArray = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
-        placed = [place(scenario, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
+        layout = read_layout(scenario.arena, scenario.source)
+        placed = [place(scenario, layout, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
         obstacles, pose = tuple(p.obstacles for p in placed), np.stack([p.pose for p in placed])
         self.static = Static(
             name=scenario.name,
             seeds=tuple(seeds),
             rate_hz=scenario.time.rate_hz,
-            arena_size_m=scenario.arena.size_m,
-            walled=scenario.arena.boundary == "walls",
+            arena_size_m=layout.size_m,
+            boundary=scenario.arena.boundary,
             obstacles=obstacles,
             groups=groups,
             robot_names=scenario.robot_names(),
             range_m=range_of(scenario.radio) if scenario.radio else None,
             lights=tuple(p.lights for p in placed),
+            floor=layout.floor,
         )
-        tick_s, steps = 1.0 / scenario.time.rate_hz, scenario.physics.steps
-        self._physics = Physics(scenario.arena.size_m, self.static.walled, obstacles, groups, pose, tick_s, steps)
-        self._sensors = _sensors(scenario, self._scene(), groups, needs)
+        self.obstacles = obstacle_arrays(obstacles)
+        engines = engines_of(scenario, bodies)
+        self._physics = Physics(self.static, self.obstacles, engines, pose, scenario.physics.steps)
+        self.actuators = Actuators(groups, self.keys)
+        tick_s = 1.0 / scenario.time.rate_hz
+        self.batteries = Batteries(groups, self.static.arenas, tick_s)
+        self.scene = self._scene_of(tick_s)
+        self.sensors = _sensors(scenario, self.scene, groups, needs)
+        self._own = OwnActuators(groups, self.scene)
         rows = self.static.arenas * self.static.robots
+        starts = np.arange(self.static.arenas)[:, None] * self.static.robots
+        self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
         self.alive: BoolArray = np.ones(rows, np.bool_)
-        self.command: FloatArray = np.zeros((rows, 2))
         self.states = States(rows)
-        self._clipped = self._not_finite = 0
         self._show()
 
     def live(self, alive: BoolArray) -> None:
         """These robots (rows,) are alive from now on; the others brake, and resist whatever pushes them."""
-        self.states.forget(alive & ~self.alive)  # a robot that is revived starts afresh
-        self.alive, self.command = alive.copy(), self.command.copy()
-        self.command[~alive] = 0.0
-        self._physics.braked = ~alive.reshape(self.static.arenas, self.static.robots)
+        revived = alive & ~self.alive  # they start afresh
+        self.states.forget(revived)
+        self.batteries.renew(revived)
+        self.alive = alive.copy()
+        self.actuators.stop(~alive)
+        self._brake()
+
+    def fail(self, failed: Mapping[str, BoolArray]) -> None:
+        """From now on these parts of robots (rows,) do not work, by name: motors, wheels, senses; all others do."""
+        self.actuators.failed.fail(failed)
+        self._brake()
+        shape = self.static.arenas, self.static.robots
+        for group in self.static.groups:
+            for name, sensor in self.sensors[group.name].items():
+                mask = failed[name].reshape(shape)[:, group.start : group.stop] if name in failed else None
+                sensor.failed = mask if mask is not None and mask.any() else None
+
+    def _brake(self) -> None:
+        """The motors of robots that are dead, or whose motors failed, do not drive: they only resist."""
+        dead = ~self.alive.reshape(self.static.arenas, self.static.robots)
+        self._physics.braked[:] = dead | self.actuators.failed.motors
 
     def sense(self, tick: int) -> Senses:
         """What the robots alive that act in a tick sense, by group: rows rising, and the fields that are needed."""
         senses: Senses = {}
+        every_row_alive = bool(self.alive.all())
         for group in self.static.groups:
+            sensors = self.sensors[group.name].values()
             if tick % group.act_every_ticks:
-                for sensor in self._sensors[group.name]:
-                    if isinstance(sensor, Accumulating):
-                        sensor.follow(tick)
+                for sensor in sensors:
+                    sensor.follow(tick)
                 continue
-            index = np.arange(group.start, group.stop)
-            rows = (np.arange(self.static.arenas)[:, None] * self.static.robots + index).ravel()
-            fields: dict[str, FloatArray] = {}
-            for sensor in self._sensors[group.name]:
+            rows, fields = self._rows[group.name], dict[str, FloatArray]()
+            for sensor in sensors:
                 fields.update(sensor.read(tick))
-            here = self.alive[rows]
-            if not here.all():
+            if not every_row_alive:
+                here = self.alive[rows]
                 rows, fields = rows[here], {name: values[here] for name, values in fields.items()}
             senses[group.name] = GroupSenses(rows, fields)
         return senses
@@ -103,43 +145,55 @@ class World:
         Returns:
             (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle.
         """
-        finite = np.isfinite(actions.linear_mps) & np.isfinite(actions.angular_radps)
-        self._not_finite += int(np.count_nonzero(actions.drive & ~finite))
-        given = actions.drive & finite & self.alive[actions.rows]
-        rows = actions.rows[given]
-        linear_mps, angular_radps = actions.linear_mps[given], actions.angular_radps[given]
-        index = rows % self.static.robots
-        within, clipped = within_wheels(self._physics.motors, index, linear_mps, angular_radps)
-        self._clipped += int(np.count_nonzero(clipped))
-        self.command = self.command.copy()
-        self.command[rows] = within
+        self.actuators.take(actions, self.alive)
         self.states.take(actions.notes, self.alive)
-        onsets = self._physics.tick(self.command.reshape(self.static.arenas, self.static.robots, 2))
+        if self._own.any:
+            self._own.act(actions.own, self.alive)
+        if self.batteries.any:
+            self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target)
+        onsets = self._physics.tick(self.actuators.target)
         self._show()
         return onsets
 
+    @property
+    def command(self) -> FloatArray:
+        """Commands within the drives' limits, (rows, 3): forward m/s, left turn rad/s, to the left m/s."""
+        return self.actuators.command
+
     def counts(self) -> dict[str, int]:
-        """Commands since the start that the wheels could not follow, or not finite and so dropped; states too many."""
+        """What actuators could not follow since the start, by name; states too many."""
         states = {"states_over_limit": self.states.dropped} if self.states.dropped else {}
-        return {"clipped_commands": self._clipped, "nan_commands": self._not_finite, **states}
+        own = {"actuators_not_there": self._own.not_there} if self._own.not_there else {}
+        return {**self.actuators.counts(), **own, **states}
 
     def _show(self) -> None:
         self.pose, self.velocity = snapshot(self._physics.state)
 
-    def _scene(self) -> Scene:
-        radius_m = np.concatenate([np.full(g.stop - g.start, g.body.radius_m) for g in self.static.groups])
-        obstacles = obstacle_arrays(self.static.obstacles)
+    def _scene_of(self, tick_s: float) -> Scene:
         static, physics = self.static, self._physics
+        counts = [group.stop - group.start for group in static.groups]
+        radius_m = np.repeat([group.body.radius_m for group in static.groups], counts)
+        bottom_m = np.repeat([group.body.altitude_m for group in static.groups], counts)
+        height_m = np.repeat([group.body.height_m for group in static.groups], counts)
         return Scene(
             keys=self.keys,
             size_m=static.arena_size_m,
-            walled=static.walled,
-            obstacles=obstacles,
+            boundary=static.boundary,
+            obstacles=self.obstacles,
             lights=static.lights,
+            ground=ground_of(static.floor, static.arena_size_m, static.boundary),
+            tick_s=tick_s,
             radius_m=radius_m,
+            bottom_m=bottom_m,
+            top_m=bottom_m + height_m,
             state=physics.state,
             travel_m=physics.travel_m,
             touched=physics.touched,
+            target=self.actuators.target,
+            charge=self.batteries.charge,
+            leds=self.actuators.leds.rgb,
+            led_places_m=led_places_m(static.groups, self.actuators.leds.rgb.shape[2]),
+            obstacles_move=any(obstacle.movable for own in static.obstacles for obstacle in own),
         )
 
 
@@ -154,16 +208,24 @@ def _groups(scenario: Scenario, bodies: Mapping[str, Body]) -> tuple[Group, ...]
 
 def _sensors(
     scenario: Scenario, scene: Scene, groups: Sequence[Group], needs: Mapping[str, Sequence[str]]
-) -> dict[str, list[Sensor]]:
-    """The sensors of each group that its agents need."""
-    made: dict[str, list[Sensor]] = {group.name: [] for group in groups}
+) -> dict[str, dict[str, Staged]]:
+    """The sensors of each group that its agents need, by group and sense."""
+    made: dict[str, dict[str, Staged]] = {group.name: {} for group in groups}
     for group in groups:
-        for need in dict.fromkeys(needs.get(group.name, ())):
-            if need.startswith("radio."):
+        for need in needs.get(group.name, ()):
+            if need.startswith("radio.") or need in made[group.name]:
                 continue
             if need not in group.body.senses:
                 has = ", ".join(group.body.senses) or "none"
                 expected = f"the agent needs the sense {need!r}; the body {group.body.name} has {has}"
                 raise BadInput(scenario.source, f"robots.{group.name}.agent", expected)
-            made[group.name].append(SENSORS[need](scene, group, group.body.senses[need]))
+            sheet = group.body.senses[need]
+            truth = _truth(need, sheet, scene, group)
+            made[group.name][need] = Staged(need, truth, sheet, scene.keys, group, scene.tick_s)
     return made
+
+
+def _truth(name: str, sheet: Sheet, scene: Scene, group: Group) -> TrueSense:
+    if isinstance(sheet, OwnSheet):
+        return AskedSensor(name, made_sensor(sheet), sheet, scene, group)
+    return SENSORS[name](scene, group, sheet)

@@ -13,6 +13,7 @@ from swarmwire.comms.air.kept_order import wait_for_earlier
 from swarmwire.comms.air.links import HEARD, THE_REST, Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.radio_checks import unfit_for_torus
 from swarmwire.comms.air.send_times import SendTimes
 from swarmwire.comms.air.signal.signal_way import SignalWay
 from swarmwire.comms.air.stage import Medium
@@ -24,7 +25,7 @@ from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry import Obstacles
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import BROADCAST, NOWHERE, Heard, Sent
-from swarmwire.comms.truth import Departed, Finished, Tally
+from swarmwire.comms.truth import Boundary, Departed, Finished, Tally
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,31 +69,30 @@ class Air:
         radius_m: FloatArray | None = None,
         traces: LinkTraces | None = None,
         antennas: Antennas | None = None,
+        boundary: Boundary = "walls",
     ) -> None:
         """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out.
 
         `radius_m` (robots,) are their radii, which count for bodies between two robots; 0 each if left out. `traces`
         are what the file of the radio's trace holds, `antennas` those of a radio with signals. ValueError for a disk
-        without `range_m`, or a trace without its file or the other way round.
+        without `range_m`, a trace without its file or the other way round, or what `unfit_for_torus` names on a torus.
         """
         if not radio.is_signal and radio.range_m is None:
             raise ValueError("range_m: expected a range, as a disk has one")
         if (radio.trace is None) != (traces is None):
             raise ValueError("traces: expected what the file of the radio's trace holds, and nothing without one")
+        if boundary == "torus" and (unfit := unfit_for_torus(radio)) is not None:
+            raise ValueError(f"{unfit}: expected a disk without bodies_block on a torus")
         rows = len(keys) * robots
         self.radio = self._coming_radio = radio
         self._robots = robots
         self._held, self._coming = Disruption.none(rows), Disruption.none(rows)
         radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
         own = antennas or Antennas.alike(robots)
-        medium = Medium(radio, keys, robots, obstacles, size_m, radii_m, self._held, own, traces)
+        medium = Medium(radio, keys, robots, obstacles, size_m, radii_m, self._held, own, traces, boundary == "torus")
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
-        self._way: Way
-        if radio.is_signal:
-            self._way = SignalWay(medium, size_m, send_times, radii_m)
-        else:
-            self._way = DiskWay(medium, size_m, send_times)
+        self._way: Way = SignalWay(medium, send_times) if radio.is_signal else DiskWay(medium, send_times)
         self._accounts = Accounts(len(keys), robots)
         self._lives = Lives(rows)
         self._others_alive = np.zeros(rows, np.int64)

@@ -5,6 +5,7 @@ import numpy as np
 from swarmwire.comms.air.links import HEARD, THE_REST, Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.reach import Reach, links_in_reach, pairs_in_reach, reach
+from swarmwire.comms.air.reach_torus import reach_on_torus
 from swarmwire.comms.air.stage import Medium
 from swarmwire.comms.air.stages import chain
 from swarmwire.comms.air.transmissions import Transmissions
@@ -19,8 +20,9 @@ ROUNDING = 1e-9
 class Channel:
     """Decides what becomes of packets at robots that stand at given poses: arrays that nobody writes to any more."""
 
-    def __init__(self, medium: Medium, size_m: tuple[float, float]) -> None:
-        self._radio, self._arenas, self._size_m = medium.radio, len(medium.keys), size_m
+    def __init__(self, medium: Medium) -> None:
+        self._radio, self._arenas, self._size_m = medium.radio, len(medium.keys), medium.size_m
+        self._reach_at = reach_on_torus if medium.is_torus else reach
         self._columns = len(medium.radio.gives.columns)
         self._stages = chain(medium)
         self._known_pose: FloatArray | None = None  # for which it is known who is in range
@@ -84,7 +86,7 @@ class Channel:
         """Who is in range of whom; the poses of a tick serve its radio graph and the packets that go on air in it."""
         if pose is not self._known_pose:
             assert self._radio.range_m is not None  # `Air` has refused a disk without
-            self._known = reach(pose, self._arenas, self._size_m, self._radio.range_m)
+            self._known = self._reach_at(pose, self._arenas, self._size_m, self._radio.range_m)
             self._known_pose = pose
         return self._known
 

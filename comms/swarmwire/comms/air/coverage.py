@@ -13,10 +13,9 @@ from numba import njit
 from swarmwire.comms.air.decibels import to_db
 from swarmwire.comms.air.propagation.fading import fading_gain, fading_law
 from swarmwire.comms.air.propagation.link_budget import rssi_dbm
+from swarmwire.comms.air.propagation.loss_between import loss_between_db
 from swarmwire.comms.air.propagation.parameters import Shadowing, Walls
-from swarmwire.comms.air.propagation.path_loss import loss_db
-from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves, shadowing_db
-from swarmwire.comms.air.propagation.walls import wall_loss_db
+from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.signal.numbers import cut_off_dbm, rules_of, sensitivity_of
 from swarmwire.comms.air.signal.outcome import lone_deliveries
@@ -110,11 +109,9 @@ def _mean_dbm(curve, power_dbm, gain_dbi, waves, amplitude, obstacles, crossing_
     for i in range(len(start)):
         ax, ay = start[i]
         bx, by = end[i]
-        loss = loss_db(curve, math.sqrt((bx - ax) ** 2 + (by - ay) ** 2))
-        if amplitude > 0.0:
-            loss += shadowing_db(waves, amplitude, ax, ay, bx, by)
-        if crossing_db > 0.0 or inside_db_per_m > 0.0:
-            loss += wall_loss_db(obstacles, 0, crossing_db, inside_db_per_m, ax, ay, bx, by)
+        distance_m = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
+        walls = obstacles, 0, crossing_db, inside_db_per_m
+        loss = loss_between_db(curve, waves, amplitude, *walls, distance_m, ax, ay, bx, by)
         out_dbm[i] = rssi_dbm(power_dbm, gain_dbi, gain_dbi, loss)
     return out_dbm
 

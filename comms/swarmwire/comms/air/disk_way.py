@@ -23,10 +23,10 @@ NEVER_NS = 2**63 - 1
 class DiskWay(Way):
     """Senders with a queue each, then the chain of stages."""
 
-    def __init__(self, medium: Medium, size_m: tuple[float, float], send_times: SendTimes) -> None:
+    def __init__(self, medium: Medium, send_times: SendTimes) -> None:
         self._medium = medium
         self._senders = Senders(medium.radio, send_times, len(medium.keys) * medium.robots)
-        self._channel = Channel(medium, size_m)
+        self._channel = Channel(medium)
         self._pose = np.zeros((len(medium.keys) * medium.robots, 3))
         self._held, self._columns = medium.disruption, len(medium.radio.gives.columns)
         self._now_ns = 0

@@ -9,7 +9,7 @@ from swarmwire.comms.air.links import HEARD, Links
 from swarmwire.comms.air.stage import Medium, Stage
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.geometry import is_blocked
+from swarmwire.comms.geometry import is_blocked_on
 
 
 def stage(medium: Medium) -> Stage | None:
@@ -22,27 +22,27 @@ class LineOfSight(Stage):
     """A link is blocked if an obstacle touches the straight line between the centres of sender and receiver."""
 
     def __init__(self, medium: Medium) -> None:
-        self._obstacles, self._robots = medium.obstacles, medium.robots
+        self._obstacles, self._robots, self._wrap_m = medium.obstacles, medium.robots, medium.wrap_m
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Blocked links end, and were not in range."""
-        ends = blocked(self._obstacles, self._robots, pose, links.sender, links.receiver, links.fate)
+        ends = blocked(self._obstacles, self._robots, self._wrap_m, pose, links.sender, links.receiver, links.fate)
         links.fate[ends] = Fate.BLOCKED
         links.in_range[ends] = 0
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
         """0 where blocked, else 1."""
-        passes = ~blocked(self._obstacles, self._robots, pose, links.sender, links.receiver, links.fate)
-        return passes.astype(np.float64)
+        ends = blocked(self._obstacles, self._robots, self._wrap_m, pose, links.sender, links.receiver, links.fate)
+        return (~ends).astype(np.float64)
 
 
 @njit(cache=True)
-def blocked(obstacles, robots, pose, sender, receiver, fate):
+def blocked(obstacles, robots, wrap_m, pose, sender, receiver, fate):
     """Which of the links under way an obstacle blocks, (k,)."""
     ends = np.zeros(len(sender), np.bool_)
     for i in range(len(ends)):
         # From the lower row to the higher: both directions of a link then agree to the last bit.
         a, b = min(sender[i], receiver[i]), max(sender[i], receiver[i])
         if fate[i] == HEARD:
-            ends[i] = is_blocked(obstacles, a // robots, pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1])
+            ends[i] = is_blocked_on(obstacles, a // robots, pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1], *wrap_m)
     return ends

@@ -39,6 +39,11 @@ def check_radio(radio: Radio, where: str) -> None:
         _check_fits(radio, where)
 
 
+def unfit_for_torus(radio: Radio) -> str | None:
+    """The key by which a radio cannot be that of a torus, if any: only a disk's distances are known across its seam."""
+    return "model" if radio.is_signal else "bodies_block" if radio.bodies_block else None
+
+
 def _check_disk(radio: Radio, where: str) -> None:
     if radio.range_m is None:
         raise BadInput(where, "radio.range_m", "is missing; expected a number above 0 (m), as the model disk has one")

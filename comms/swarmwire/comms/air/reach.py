@@ -51,7 +51,7 @@ def links_in_reach(near: Reach, robots: int, sender: IntArray, to: IntArray) -> 
 @njit(cache=True)
 def pairs_in_reach(near: Reach, alive: BoolArray) -> IntArray:
     """Robot rows a < b of all pairs alive in range of each other, sorted, (e, 2)."""
-    pair = np.empty((len(near.other) // 2, 2), np.int64)
+    pair = np.empty((len(near.other), 2), np.int64)
     found = 0
     for a in range(len(alive)):
         of_a = found
@@ -92,13 +92,16 @@ def _strips(x, y, robots, cells):
     first, stop = np.empty((len(x), 3), np.int64), np.empty((len(x), 3), np.int64)
     for row in range(len(x)):
         for j in range(3):
-            first[row, j], stop[row, j] = _strip(x[row], y[row], row // robots, cells, j - 1)
+            first[row, j], stop[row, j] = strip(x[row], y[row], row // robots, cells, j - 1)
     return first, stop
 
 
 @njit(cache=True)
-def _strip(x, y, arena, cells, row):
-    """First and stop in the grid's order of the three cells side by side that are `row` rows above (x, y)."""
+def strip(x, y, arena, cells, row):
+    """First and stop in the grid's order of the three cells side by side that are `row` rows above (x, y) in m.
+
+    `cells` is a `grid.Grid`; what lies beyond its edge is empty.
+    """
     i = grid.cell_of(x, cells.left_m, cells.cell_m, cells.nx)
     j = grid.cell_of(y, cells.bottom_m, cells.cell_m, cells.ny) + row
     if j < 0 or j >= cells.ny:

@@ -25,6 +25,12 @@ class Medium:
     disruption: Disruption  # kept up to date by the air
     antennas: Antennas  # of robots
     traces: LinkTraces | None = None  # of the radio's trace, where it has one
+    is_torus: bool = False  # distances are the shortest
+
+    @property
+    def wrap_m(self) -> tuple[float, float]:
+        """The sides over which a torus goes on, in m; 0 where an arena ends, as `geometry.to_nearest` takes them."""
+        return self.size_m if self.is_torus else (0.0, 0.0)
 
 
 class Stage(ABC):

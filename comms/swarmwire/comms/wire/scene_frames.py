@@ -1,18 +1,21 @@
 """What a run tells once to whoever looks on, as a frame: names and types are those of `Scene`, checked on arrival."""
 
+import zlib
 from dataclasses import asdict, fields, is_dataclass
-from math import isfinite
+from math import inf, isfinite
 from types import NoneType, UnionType
-from typing import Any, cast, get_args, get_origin, get_type_hints
+from typing import Any, Literal, cast, get_args, get_origin, get_type_hints
 
 from swarmwire.comms.body import Body, body_from
 from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.floor import FloorImage
 from swarmwire.comms.glimpse import Scene
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame
 
 OBSERVED_VERSION = 1  # of the frames for observers
+_MAY_BE_INFINITE = ".height_m"  # of an obstacle
 
 
 def encode_scene(scene: Scene) -> bytes:
@@ -40,12 +43,14 @@ def check_version(frame: Frame, kind: str) -> None:
 def _check(static: Static) -> None:
     """Numbers of things that must agree, and values that are divided by."""
     starts = [0, *(group.stop for group in static.groups)]
+    image = static.floor.image if static.floor else None
     faults = {
         "seeds: expected an arena": not static.seeds,
         "rate_hz: expected 1 or more": static.rate_hz < 1,
         "arena_size_m: expected more than 0": min(static.arena_size_m) <= 0,
         "obstacles: expected those of each arena": len(static.obstacles) != static.arenas,
         "lights: expected those of each arena": len(static.lights) not in (0, static.arenas),
+        "floor.image: expected a grey for each row and column": image is not None and not _is_whole(image),
         "groups: expected each robot in one": [group.start for group in static.groups] != starts[:-1]
         or starts != sorted(set(starts))
         or starts[-1] != static.robots,
@@ -54,6 +59,13 @@ def _check(static: Static) -> None:
     for fault, found in faults.items():
         if found:
             raise BadFrame("malformed", fault)
+
+
+def _is_whole(image: FloorImage) -> bool:
+    try:
+        return min(image.grey.shape) > 0
+    except (ValueError, zlib.error):
+        return False
 
 
 def _build(hint: Any, value: object, key: str) -> Any:
@@ -69,8 +81,11 @@ def _build(hint: Any, value: object, key: str) -> Any:
         return None if value is None else _build(inner, value, key)
     if hint is float and type(value) in (int, float):
         number = float(cast("float", value))
-        if isfinite(number):
+        if isfinite(number) or (number == inf and key.endswith(_MAY_BE_INFINITE)):
             return number
+    elif get_origin(hint) is Literal:
+        if value in get_args(hint):
+            return value
     elif type(value) is hint:
         return value
     raise BadFrame("malformed", f"{key}: expected {hint}, got {str(value)[:40]}")

@@ -5,8 +5,11 @@ from typing import Any, cast
 
 import numpy as np
 
+from swarmwire.comms.actuations import NO_ACTUATIONS, Actuations
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
+from swarmwire.comms.leds import BRIGHTEST
 from swarmwire.comms.notes import MOST_STATES, Notes, checked_state
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
@@ -73,7 +76,7 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
     """An `actions` frame: what a runner's robots do and send, and how many frames to it were none that it could use."""
     arrays: dict[str, AnyArray] = {
         "rows": actions.rows,
-        "command": np.array((actions.drive, actions.linear_mps, actions.angular_radps)),
+        "command": np.array((actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps)),
     }
     if len(actions.sent):
         arrays["sent"] = np.array((actions.sent.sender, actions.sent.to))
@@ -81,6 +84,11 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
         arrays["sent/offset"] = actions.sent.payloads.offset
         if actions.sent.outcome_id is not None:
             arrays["sent/outcome_id"] = actions.sent.outcome_id
+    if len(actions.leds):
+        arrays["leds"] = np.array((actions.leds.rows, actions.leds.which, actions.leds.rgb))
+    if len(actions.own):
+        arrays["own"] = np.array((actions.own.rows, actions.own.place))
+        arrays["own/value"] = actions.own.value
     values: dict[str, Any] = {"dropped": dropped} if dropped else {}
     if len(actions.notes):
         arrays["notes"] = np.array((actions.notes.rows, actions.notes.code))
@@ -93,10 +101,12 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     n = len(rows)
     if (checked_array(frame, "rows", "<i8", (n,)) != rows).any():
         raise BadFrame("malformed", "rows: expected the runner's own robots")
-    drive, linear_mps, angular_radps = checked_array(frame, "command", "<f8", (3, n))
+    drive, linear_mps, angular_radps, lateral_mps = checked_array(frame, "command", "<f8", (4, n))
     sent = _sent(frame, rows) if "sent" in frame.arrays else Sent.none()
     notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
-    return Actions(rows, drive != 0.0, linear_mps, angular_radps, sent, notes)
+    leds = _leds(frame, rows) if "leds" in frame.arrays else NO_LED_CHANGES
+    own = _actuations(frame, rows) if "own" in frame.arrays else NO_ACTUATIONS
+    return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own)
 
 
 def _sent(frame: Frame, rows: IntArray) -> Sent:
@@ -133,6 +143,21 @@ def _notes(frame: Frame, rows: IntArray) -> Notes:
     if ((code < 0) | (code >= len(states))).any():
         raise BadFrame("malformed", "notes: expected places in states")
     return Notes(noted, code, states)
+
+
+def _leds(frame: Frame, rows: IntArray) -> LedChanges:
+    switched, which, rgb = checked_array(frame, "leds", "<i8", (3, None))
+    if not _own(switched, rows) or (which < 0).any() or (rgb < 0).any() or (rgb > BRIGHTEST).any():
+        raise BadFrame("malformed", "leds: expected colours up to 0xFFFFFF of LEDs of the runner's own robots")
+    return LedChanges(switched, which, rgb)
+
+
+def _actuations(frame: Frame, rows: IntArray) -> Actuations:
+    actuated, place = checked_array(frame, "own", "<i8", (2, None))
+    value = checked_array(frame, "own/value", "<f8", (len(actuated),))
+    if not _own(actuated, rows) or (place < 0).any() or not np.isfinite(value).all():
+        raise BadFrame("malformed", "own: expected finite numbers for actuators of the runner's own robots")
+    return Actuations(actuated, place, value)
 
 
 def _own(some: IntArray, rows: IntArray) -> bool:

@@ -9,6 +9,7 @@ from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.glimpse import Glimpse, Scene
+from swarmwire.comms.leds import BRIGHTEST
 from swarmwire.comms.notes import LONGEST_STATE
 from swarmwire.comms.senses import GroupSenses, Senses
 from swarmwire.comms.truth import Finished, Happened, Static, Tally, Truth
@@ -30,6 +31,7 @@ def encode_truth(glimpse: Glimpse) -> bytes:
         "velocity": truth.velocity,
         "command": truth.command,
         "state": truth.state,
+        "leds": truth.leds,
         "contact_onsets": truth.contact_onsets,
         "values": glimpse.values,
     }
@@ -67,15 +69,18 @@ def decode_truth(frame: Frame, scene: Scene) -> Glimpse:
     states = _states(frame)
     state = checked_array(frame, "state", "<i8", (n,))
     _within("state", state, len(states))
+    leds = checked_array(frame, "leds", "<i8", (n, static.most_leds))
+    _within("leds", leds, BRIGHTEST + 1)
     truth = Truth(
         tick=_least(frame.tick, 0, "tick"),
         time_ns=_least(frame.values.get("time_ns"), 0, "time_ns"),
         alive=checked_array(frame, "alive", "|b1", (n,)),
         pose=checked_array(frame, "pose", "<f8", (n, 3)),
         velocity=checked_array(frame, "velocity", "<f8", (n, 3)),
-        command=checked_array(frame, "command", "<f8", (n, 2)),
+        command=checked_array(frame, "command", "<f8", (n, 3)),
         state=state,
         states=states,
+        leds=leds,
         senses=_senses(frame, static),
         contact_onsets=checked_array(frame, "contact_onsets", "<i8", (static.arenas, 2)),
         edges=_edges(frame, n),

@@ -7,6 +7,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.body import Body
+from swarmwire.comms.drives import Holonomic
 from swarmwire.comms.sheets import Bumper, Light, Proximity
 from swarmwire.metrics.drawing.looks import (
     CURVE,
@@ -24,6 +25,7 @@ from swarmwire.metrics.drawing.scenery import round_length_m
 from swarmwire.metrics.palette import robot_color
 
 _RAY = "#d1495b"
+_LED = "#7fd14a"
 _COLOR = robot_color(0)
 _ROOM = 1.16  # of what is seen by what is drawn, so that numbers at the rays' ends fit
 _BELOW = -0.035  # where legend and bar are, as a share of the view's height
@@ -40,7 +42,10 @@ def draw_from_above(axes: Any, body: Body) -> None:
     axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal")
     axes.set_axis_off()
     _draw_disc(axes, body)
-    _draw_wheels(axes, body)
+    if not isinstance(body.drive, Holonomic):
+        _draw_wheels(axes, body.radius_m, body.drive.wheel_base_m)
+    if body.led_count:
+        _draw_leds(axes, body.led_places_m)
     for sheet in body.senses.values():
         match sheet:
             case Proximity():
@@ -75,16 +80,21 @@ def _draw_disc(axes: Any, body: Body) -> None:
     axes.add_patch(Circle((0.0, 0.0), body.radius_m, **look))
 
 
-def _draw_wheels(axes: Any, body: Body) -> None:
+def _draw_wheels(axes: Any, radius_m: float, wheel_base_m: float) -> None:
     from matplotlib.patches import FancyBboxPatch
 
-    half_m, long_m, wide_m = body.drive.wheel_base_m / 2, 0.62 * body.radius_m, 0.13 * body.radius_m
+    half_m, long_m, wide_m = wheel_base_m / 2, 0.62 * radius_m, 0.13 * radius_m
     axes.plot([-half_m, half_m], [0.0, 0.0], color=INK, lw=1.0, zorder=4)
     for x in (-half_m, half_m):
         style = f"round,pad=0,rounding_size={0.4 * wide_m}"
         corner = x - wide_m / 2, -long_m / 2
         look: Look = {"facecolor": INK, "edgecolor": INK, "linewidth": 0.5, "zorder": 5}
         axes.add_patch(FancyBboxPatch(corner, wide_m, long_m, boxstyle=style, **look))
+
+
+def _draw_leds(axes: Any, places_m: FloatArray) -> None:
+    look: Look = {"markerfacecolor": _LED, "markeredgecolor": INK, "markeredgewidth": 0.5}
+    axes.plot(-places_m[:, 1], places_m[:, 0], "o", markersize=3.2, zorder=8, label="LED", **look)
 
 
 def _draw_rays(axes: Any, radius_m: float, sheet: Proximity) -> None:

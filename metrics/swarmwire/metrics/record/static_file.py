@@ -3,20 +3,22 @@
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
+from math import inf
 from pathlib import Path
 from typing import Any, cast
 
 from swarmwire.comms.body import body_from
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.floor import Floor, FloorImage, Patch
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
 from swarmwire.metrics.record.whole_text import write_whole
 
-FORMAT = 1
+FORMAT = 2
 
 
 def write_static(static: Static, path: Path) -> None:
     """Write it aside, then rename, so that no half of it is ever seen."""
-    write_whole(path, json.dumps({"format": FORMAT, **asdict(static)}, indent=2) + "\n")
+    write_whole(path, json.dumps({"format": FORMAT, **_finite(static)}, indent=2, allow_nan=False) + "\n")
 
 
 def read_static(path: Path) -> Static:
@@ -37,8 +39,19 @@ def _static(read: Mapping[str, Any], where: str) -> Static:
     fields: dict[str, Any] = {key: _as_tuples(value) for key, value in read.items()}
     fields["obstacles"] = tuple(tuple(Obstacle(**_plain(item)) for item in own) for own in read["obstacles"])
     fields["lights"] = tuple(tuple(Light(**_plain(item)) for item in own) for own in read["lights"])
+    fields["floor"] = _floor(read["floor"]) if read["floor"] is not None else None
     fields["groups"] = tuple(_group(item, where) for item in read["groups"])
     return Static(**fields)
+
+
+def _finite(static: Static) -> dict[str, Any]:
+    """As a mapping without heights that are infinite: JSON has no word for that, and none is read as infinite."""
+    return asdict(static, dict_factory=lambda items: {key: value for key, value in items if value != inf})
+
+
+def _floor(item: Mapping[str, Any]) -> Floor:
+    image = FloorImage(**item["image"]) if item["image"] else None
+    return Floor(item["shade"], tuple(Patch(**_plain(patch)) for patch in item["patches"]), image)
 
 
 def _group(item: Mapping[str, Any], where: str) -> Group:

@@ -9,7 +9,7 @@ from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.chunk_limit import ChunkLimit
 from swarmwire.metrics.record.table_writer import Chunk, TableWriter
-from swarmwire.metrics.record.tick_columns import BYTES_PER_ROBOT, KEYS, RADIO, ROBOT_COLUMNS, TickColumns, tick_schema
+from swarmwire.metrics.record.tick_columns import BYTES_PER_ROBOT, KEYS, RADIO, TickColumns, robot_columns, tick_schema
 
 CHUNK_BYTES = 2_000_000
 MOST_TICKS = 4096  # in a chunk, however small the swarm
@@ -31,12 +31,12 @@ class TickRecorder:
         """Open the table; BadInput if a metric is named like another column."""
         self._names = [metric.name for metric in self._metrics.metrics]
         for name in self._names:
-            if name in (*KEYS, *ROBOT_COLUMNS, *RADIO):
+            if name in (*KEYS, *robot_columns(static), *RADIO):
                 raise BadInput("", f"metrics.{name}", "expected another name: ticks.parquet has a column of this name")
         self._static = static
         rows = static.arenas * static.robots
         self._ticks = min(MOST_TICKS, max(1, CHUNK_BYTES // (rows * BYTES_PER_ROBOT)))
-        schema = tick_schema(static.robots, self._names)
+        schema = tick_schema(static, self._names)
         self._writer = TableWriter(self._folder, "ticks", schema, self._may_drop)
         self._limit = ChunkLimit(self._ticks, self._clock)
         self._columns = self._new_columns()

@@ -180,7 +180,10 @@ def on_air_ticks(told: Run) -> list[int]:
 def test_all_wait_for_their_radio_up_to_the_limit(method: str):
     """Off from 0.2 to 0.8 s: four of six wait, and go out one after the other, before that of 0.8 s."""
     radio = replace(with_access(method), **SLOW)
-    sent: Callable[[int], Sent] = lambda tick: packets([0] * (tick < 9))  # noqa: E731 - as short as it is
+
+    def sent(tick: int) -> Sent:
+        return packets([0] * (tick < 9))
+
     told = ran(make_air(radio, 2), PAIR, sent, {2: switched(ALL, 0), 8: switched(ALL)})
     assert told.fates() == {"HEARD": 7, "QUEUE_FULL": 2}
     assert told.heard("sequence").tolist() == [0, 1, 2, 3, 4, 5, 8]
@@ -203,7 +206,9 @@ def test_the_newest_waits_and_what_it_replaces_ends_with_the_blackout(method: st
 
 @pytest.mark.parametrize("method", METHODS)
 def test_addressed_packets_wait_too_and_are_heard_once(method: str):
-    sent: Callable[[int], Sent] = lambda tick: packets([0] * 2 * (tick < 4), 1)  # noqa: E731 - as short as it is
+    def sent(tick: int) -> Sent:
+        return packets([0] * 2 * (tick < 4), 1)
+
     told = ran(make_air(with_access(method), 2), PAIR, sent, {1: switched(ALL, 0), 6: switched(ALL)})
     assert told.fates() == {"HEARD": 8}
     stricter = ran(

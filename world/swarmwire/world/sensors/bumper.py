@@ -4,6 +4,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.sheets import Bumper
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene
+from swarmwire.world.sensors.sensor import Field
 
 
 class BumperSensor:
@@ -11,7 +12,8 @@ class BumperSensor:
 
     def __init__(self, scene: Scene, group: Group, sheet: Bumper) -> None:
         self._scene, self._group = scene, group
+        self.fields = (Field("pressed", blank=0.0),)
 
-    def read(self, tick: int) -> dict[str, FloatArray]:
+    def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """Which robots of the group touched anything."""
-        return {"bumper.pressed": self._scene.touched[:, self._group.start : self._group.stop].flatten()}
+        return (self._scene.touched[:, self._group.start : self._group.stop].copy(),)

@@ -13,9 +13,7 @@ from numba import njit
 
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.jammers import Jammers
-from swarmwire.comms.air.propagation.path_loss import loss_db
-from swarmwire.comms.air.propagation.shadowing import shadowing_db
-from swarmwire.comms.air.propagation.walls import wall_loss_db
+from swarmwire.comms.air.propagation.loss_between import loss_between_db
 from swarmwire.comms.air.signal import dcf
 from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.link_table import Surroundings
@@ -35,20 +33,19 @@ def powers_of(
 @njit(cache=True)
 def _powers(jammers, place, x, y, robots, obstacles, around):
     power_mw = np.zeros((len(place), robots))
+    amplitude_db = around.amplitude_db if around.shadows else 0.0
+    crossing_db, inside_db_per_m = (around.crossing_db, around.inside_db_per_m) if around.walls else (0.0, 0.0)
     for j in range(len(place)):
         arena, jx, jy = jammers.arena[j], place[j, 0], place[j, 1]
+        shadows, walls = (around.field[arena], amplitude_db), (obstacles, arena, crossing_db, inside_db_per_m)
         for i in range(robots):
             r = arena * robots + i
             if r == jammers.carrier[j]:
                 continue
             if around.line_of_sight and is_blocked(obstacles, arena, jx, jy, x[r], y[r]):
                 continue
-            loss = loss_db(around.curve, math.hypot(x[r] - jx, y[r] - jy))
-            if around.shadows:
-                loss += shadowing_db(around.field[arena], around.amplitude_db, jx, jy, x[r], y[r])
-            if around.walls:
-                crossing_db, inside_db_per_m = around.crossing_db, around.inside_db_per_m
-                loss += wall_loss_db(obstacles, arena, crossing_db, inside_db_per_m, jx, jy, x[r], y[r])
+            distance_m = math.hypot(x[r] - jx, y[r] - jy)
+            loss = loss_between_db(around.curve, *shadows, *walls, distance_m, jx, jy, x[r], y[r])
             power_mw[j, i] = from_db(jammers.power_dbm[j] + around.receive_dbi[r] - loss)
     return power_mw
 

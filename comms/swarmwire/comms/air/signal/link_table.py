@@ -20,7 +20,7 @@ from swarmwire.comms.air.propagation.fading import FadingLaw, gain_of
 from swarmwire.comms.air.propagation.loss_curve import LossCurve
 from swarmwire.comms.air.propagation.path_loss import loss_db
 from swarmwire.comms.air.propagation.walls import wall_loss_db
-from swarmwire.comms.air.reach import CELL_SLACK, _strip
+from swarmwire.comms.air.reach import CELL_SLACK, strip
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.geometry import Obstacles, is_blocked
@@ -139,7 +139,7 @@ def _ahead(x, y, robots, cells, at, j):
     What comes later in its own row of cells (j = 0), and the row above (j = 1).
     """
     s = cells.order[at]
-    first, stop = _strip(x[s], y[s], s // robots, cells, j)
+    first, stop = strip(x[s], y[s], s // robots, cells, j)
     return (at + 1, stop) if j == 0 else (first, stop)
 
 

@@ -24,16 +24,9 @@ class LinksHeld:
         around: what links go by.
     """
 
-    def __init__(
-        self,
-        medium: Medium,
-        size_m: tuple[float, float],
-        around: Surroundings,
-        levels: Levels,
-        measured: MeasuredLinks | None,
-    ) -> None:
+    def __init__(self, medium: Medium, around: Surroundings, levels: Levels, measured: MeasuredLinks | None) -> None:
         """`measured` are the links of the radio's trace, kept up to date by others."""
-        self._medium, self._size_m, self._measured = medium, size_m, measured
+        self._medium, self._measured = medium, measured
         self.around, self._levels = around, levels
         rows = len(medium.keys) * medium.robots
         self.pose = np.zeros((rows, 3))
@@ -43,7 +36,7 @@ class LinksHeld:
     def pairs_at(self, pose: FloatArray) -> Pairs:
         """The pairs of robots that stand at `pose` (rows, 3)."""
         medium = self._medium
-        return pairs_of(pose, self._size_m, medium.keys, medium.obstacles, self.around, self._measured)
+        return pairs_of(pose, medium.size_m, medium.keys, medium.obstacles, self.around, self._measured)
 
     def mean_dbm(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
         """The mean power of each pair from a to b, and back, (k,) each."""

@@ -55,17 +55,14 @@ LONG_AGO_NS = -(10**15)
 class SignalWay(Way):
     """Packets queue, go on air by the access method, and are received or not by signal, noise and interference."""
 
-    def __init__(
-        self, medium: Medium, size_m: tuple[float, float], send_times: SendTimes, radius_m: FloatArray
-    ) -> None:
-        """`radius_m` (rows,) are the robots' radii."""
+    def __init__(self, medium: Medium, send_times: SendTimes) -> None:
         self._medium, self._radio, self._send_times = medium, medium.radio, send_times
         rows = len(medium.keys) * medium.robots
         self._rules = rules_of(medium.radio, medium.robots)
-        self._radius_m, self._antennas = radius_m, self._antennas_now()
+        self._antennas = self._antennas_now()
         self._measured = MeasuredLinks.of(medium)
         levels = levels_of(medium.radio, self._rules)
-        self._links = LinksHeld(medium, size_m, self._around(), levels, self._measured)
+        self._links = LinksHeld(medium, self._around(), levels, self._measured)
         self._jam, self._was_jammed = JamHeld(medium), False
         self._graph = RadioGraph(medium, self._rules, self._links, self._jam, self._measured)
         self._reports = Reports(medium, self._links)
@@ -179,7 +176,7 @@ class SignalWay(Way):
         return np.tile(own, len(self._medium.keys)) + np.stack(self._gains)
 
     def _around(self) -> Surroundings:
-        return surroundings_of(self._radio, self._medium.keys, self._radius_m, *self._antennas)
+        return surroundings_of(self._radio, self._medium.keys, self._medium.radius_m, *self._antennas)
 
     def _refresh(self) -> None:
         """Noise, or what it is made of, has changed, or is about to."""

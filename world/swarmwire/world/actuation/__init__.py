@@ -1,0 +1,1 @@
+"""From what agents ask for to what engines are given: limits of the drives, noise of the wheels, lights."""

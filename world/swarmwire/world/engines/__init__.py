@@ -1,0 +1,1 @@
+"""What moves bodies: one small interface, an engine a file."""

@@ -1,0 +1,38 @@
+"""Which engine moves which group: bodies with contacts are the floor engine's, those without and those that fly not."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+from swarmwire.comms.body import Body
+from swarmwire.comms.errors import BadInput
+from swarmwire.world.scenario import Scenario
+
+EngineName = Literal["discs", "pymunk", "kinematic"]
+
+
+def engines_of(scenario: Scenario, bodies: Mapping[str, Body]) -> dict[str, EngineName]:
+    """The engine of each group, by the group's name."""
+    asked = scenario.physics.engine
+    floor: EngineName = asked if asked != "auto" else "pymunk"
+    return {name: floor if body.contacts and body.altitude_m == 0.0 else "kinematic" for name, body in bodies.items()}
+
+
+def movable_in(scenario: Scenario) -> list[int]:
+    """The places of movable obstacles among the scenario's."""
+    return [i for i, table in enumerate(scenario.arena.obstacles) if table.movable]
+
+
+def check_engines(scenario: Scenario, bodies: Mapping[str, Body], where: str) -> None:
+    """Raise BadInput if an engine cannot do what the arena asks of it."""
+    engines = engines_of(scenario, bodies)
+    movable = movable_in(scenario)
+    if movable and scenario.physics.engine == "discs":
+        expected = f"expected auto or pymunk: discs moves no obstacles, and arena.obstacles.{movable[0]} is movable"
+        raise BadInput(where, "physics.engine", expected)
+    if movable and "pymunk" not in engines.values():
+        expected = "expected a robot with contacts that could push it: all robots are moved without contacts"
+        raise BadInput(where, f"arena.obstacles.{movable[0]}.movable", expected)
+    stuck = [group for group, engine in engines.items() if engine != "kinematic"]
+    if scenario.arena.boundary == "torus" and stuck:
+        expected = f"expected walls or open: on a torus no robot has contacts, and those of robots.{stuck[0]} do"
+        raise BadInput(where, "arena.boundary", f"{expected} (physics.engine = {engines[stuck[0]]!r})")

@@ -1,0 +1,72 @@
+"""What every engine is, and what it is told about the arenas and the robots that it is to move."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.geometry import Obstacles
+from swarmwire.comms.truth import Boundary, Group, Obstacle, Static
+from swarmwire.world.drive import Motors, motors_of
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """The arenas and the n robots of each that one engine moves, in the order of its rows."""
+
+    size_m: tuple[float, float]  # full extents of an arena; the origin is its centre
+    boundary: Boundary
+    standing: tuple[tuple[Obstacle, ...], ...]  # the obstacles of each arena, as they stand at the start
+    obstacles: Obstacles  # the same as arrays; what moves is kept up to date in them
+    radius_m: FloatArray  # (n,)
+    bottom_m: FloatArray  # (n,) how high the lower side of a robot is; an obstacle that ends there or below is passed
+    top_m: FloatArray  # (n,) how high its upper side is
+    motors: Motors  # (n,) each
+    tick_s: float
+    steps: int  # physics steps in a tick
+
+
+def setting_of(static: Static, obstacles: Obstacles, groups: Sequence[Group], steps: int) -> Setting:
+    """What an engine is told that is to move these of an arena's groups, in this order."""
+    count = [group.stop - group.start for group in groups]
+    radius_m, bottom_m, height_m = (
+        np.repeat(column, count)
+        for column in zip(*((g.body.radius_m, g.body.altitude_m, g.body.height_m) for g in groups), strict=True)
+    )
+    return Setting(
+        size_m=static.arena_size_m,
+        boundary=static.boundary,
+        standing=static.obstacles,
+        obstacles=obstacles,
+        radius_m=radius_m,
+        bottom_m=bottom_m,
+        top_m=bottom_m + height_m,
+        motors=motors_of(groups),
+        tick_s=1.0 / static.rate_hz,
+        steps=steps,
+    )
+
+
+class Engine(Protocol):
+    """Moves robots in all arenas. An arena moves bit for bit alike alone and beside others.
+
+    It is made by `Engine(setting, pose)`, at rest at `pose` (arenas, n, 3). The arrays are its own, written in place in
+    `tick`, and always show the present.
+    """
+
+    name: ClassVar[str]
+    state: FloatArray  # (arenas, n, 6) x, y in m, heading in rad (not wrapped), m/s, m/s, rad/s; arena frame
+    travel_m: FloatArray  # (arenas, n, 2) how far the left and right wheel have rolled since the start
+    touched: FloatArray  # (arenas, n) 1 for a robot that touched anything in the last tick, else 0
+    braked: BoolArray  # (arenas, n) motors that only resist, if their commands are 0; set from outside, in place
+
+    def tick(self, target: FloatArray) -> IntArray:
+        """Move by one tick towards targets (arenas, n, 3): forward m/s, left turn rad/s, to the left m/s.
+
+        Returns:
+            (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle. A contact begins if a pair
+            touches in this tick and did not in the one before; all walls and obstacles count as one thing.
+        """
+        ...

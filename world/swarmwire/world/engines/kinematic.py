@@ -1,0 +1,94 @@
+"""Bodies that go where they are told: no forces, and no contacts between robots. All arenas in one compiled call.
+
+A robot has its target's speed from the start of a tick on and runs the exact arc; masses and the drive's forces play no
+part. Walls, and obstacles that reach above its lower side, hold it back: it slides along them; lower ones it flies
+over.
+Robots pass through one another; where two begin to overlap at the end of a tick, that counts as a contact that began.
+On a torus positions wrap, velocities go on.
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from typing import ClassVar
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.world.contacts import count_began, mark
+from swarmwire.world.engines.engine import Setting
+from swarmwire.world.engines.held_back import Hindrance, any_near, held_back, shortest
+from swarmwire.world.engines.overlaps import overlaps
+
+PIECE_OF_RADIUS = 0.25  # near obstacles a tick's way is gone in pieces of so much of the radius, so none is jumped over
+
+
+class KinematicEngine:
+    """The bodies of all arenas; see `Engine`."""
+
+    name: ClassVar[str] = "kinematic"
+
+    def __init__(self, setting: Setting, pose: FloatArray) -> None:
+        """Bodies at rest at `pose` (arenas, n, 3)."""
+        arenas, n = pose.shape[:2]
+        self.state = np.zeros((arenas, n, 6))
+        self.state[:, :, :3] = pose
+        self.travel_m = np.zeros((arenas, n, 2))
+        self.touched = np.zeros((arenas, n))
+        self.braked: BoolArray = np.zeros((arenas, n), np.bool_)
+        self._tick_s, self._wheel_base_m = setting.tick_s, setting.motors.wheel_base_m
+        self._disc = setting.radius_m, setting.bottom_m, setting.top_m
+        width, height = setting.size_m
+        walled, wraps = setting.boundary == "walls", setting.boundary == "torus"
+        self._around = Hindrance(0.5 * width, 0.5 * height, walled, wraps, setting.obstacles)
+        self._held: BoolArray = np.zeros((arenas, n), np.bool_)
+        self._touching = np.empty(0, np.int64)
+
+    def tick(self, target: FloatArray) -> IntArray:
+        """Move by one tick at targets (arenas, n, 3), and count the contacts that began, (arenas, 2)."""
+        radius_m, bottom_m, _ = self._disc
+        bodies = self._wheel_base_m, radius_m, bottom_m
+        _move(self._around, *bodies, target, self._tick_s, self.state, self.travel_m, self._held)
+        before, self._touching = self._touching, overlaps(self.state, *self._disc, self._held, self._around)
+        onsets = np.zeros((len(target), 2), np.int64)
+        count_began(self._touching, before, target.shape[1] + 1, onsets)
+        mark(self._touching, self.touched)
+        return onsets
+
+
+@njit(cache=True)
+def _move(around, wheel_base_m, radius_m, bottom_m, target, tick_s, state, travel_m, held):
+    for arena in range(target.shape[0]):
+        for i in range(target.shape[1]):
+            forward, turn, left = target[arena, i, 0], target[arena, i, 1], target[arena, i, 2]
+            x, y, heading = state[arena, i, 0], state[arena, i, 1], state[arena, i, 2]
+            way_m = tick_s * np.sqrt(forward * forward + left * left)
+            near = any_near(around, arena, x, y, radius_m[i] + way_m, bottom_m[i])
+            pieces = max(int(np.ceil(way_m / (PIECE_OF_RADIUS * radius_m[i]))), 1) if near else 1
+            piece_s = tick_s / pieces
+            half = 0.5 * turn * piece_s
+            chord_s = piece_s * np.sin(half) / half if half != 0.0 else piece_s  # a chord is shorter than its arc
+            vx = vy = rolled = 0.0
+            stopped = False
+            for _ in range(pieces):
+                cos, sin = np.cos(heading + half), np.sin(heading + half)
+                dx, dy = (forward * cos - left * sin) * chord_s, (forward * sin + left * cos) * chord_s
+                nx, ny, pushed, free = held_back(around, arena, x + dx, y + dy, radius_m[i], bottom_m[i], near)
+                if not free:  # wedged in
+                    nx, ny = x, y
+                rolled += forward * piece_s + (nx - x - dx) * cos + (ny - y - dy) * sin
+                heading += 2.0 * half
+                vx, vy = (
+                    forward * np.cos(heading) - left * np.sin(heading),
+                    forward * np.sin(heading) + left * np.cos(heading),
+                )
+                if pushed:
+                    vx, vy, stopped = (nx - x) / piece_s, (ny - y) / piece_s, True
+                x, y = nx, ny
+            x, y = shortest(x, around.half_x_m, around.wraps), shortest(y, around.half_y_m, around.wraps)
+            state[arena, i, 0], state[arena, i, 1], state[arena, i, 2] = x, y, heading
+            state[arena, i, 3], state[arena, i, 4], state[arena, i, 5] = vx, vy, turn
+            held[arena, i] = stopped
+            apart = 0.5 * tick_s * turn * wheel_base_m[i]
+            travel_m[arena, i, 0] += rolled - apart
+            travel_m[arena, i, 1] += rolled + apart
