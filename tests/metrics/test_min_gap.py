@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.min_gap import smallest_gap_m
 from tests.metrics.truths import measured, static, truth
 
@@ -37,3 +38,13 @@ def test_it_is_that_of_all_pairs_also_of_different_bodies(robots):
     pairs = [np.hypot(x[i] - x[j], y[i] - y[j]) - radius[i] - radius[j] for i in range(len(robots)) for j in range(i)]
     pose, alive, order = np.stack([x, y, 0 * x], 1), np.ones(len(x), np.bool_), np.arange(len(x))[None]
     assert smallest_gap_m(pose, radius, alive, order) == [pytest.approx(min(pairs), abs=1e-12)]
+
+
+def test_what_it_remembers_of_the_tick_before_changes_nothing():
+    of, rng = static(30, arenas=2), np.random.default_rng(1)
+    metrics = Metrics(["min_gap"])
+    metrics.begin(of)
+    for tick in range(20):
+        seen = truth(of, tick, pose=rng.uniform(-2.0, 2.0, (60, 3)), alive=rng.random(60) < 0.8)
+        metrics.see(seen)
+        assert metrics.latest["min_gap"].tolist() == measured("min_gap", of, seen)

@@ -42,7 +42,7 @@ class Events:
         happened: list[Happened] = []
         if world.batteries.any:  # first, so that who is revived in this tick is not found empty
             happened.extend(self._run_down(start_ns, world.batteries.empty))
-        if self._coming and self._coming[0][0] <= start_ns:
+        if self._evolving or (self._coming and self._coming[0][0] <= start_ns):
             self._swarm = replace(self._swarm, pose=world.pose)
         while self._coming and self._coming[0][0] <= start_ns:
             _, begins, serial = self._coming.popleft()

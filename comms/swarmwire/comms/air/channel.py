@@ -1,4 +1,4 @@
-"""The way from senders' radios to receivers: links in range, then the chain of stages. Keeps no state of its own."""
+"""The way from senders' radios to receivers: links in range, then the chain of stages."""
 
 import numpy as np
 

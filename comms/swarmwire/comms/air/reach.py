@@ -51,7 +51,7 @@ def links_in_reach(near: Reach, robots: int, sender: IntArray, to: IntArray) -> 
 @njit(cache=True)
 def pairs_in_reach(near: Reach, alive: BoolArray) -> IntArray:
     """Robot rows a < b of all pairs alive in range of each other, sorted, (e, 2)."""
-    pair = np.empty((len(near.other) // 2, 2), np.int64)
+    pair = np.empty((len(near.other), 2), np.int64)
     found = 0
     for a in range(len(alive)):
         of_a = found
