@@ -42,7 +42,7 @@ def advance(
         now = met[:count]
         solve(contacts, now, robots, state)
         separate(contacts, now, robots, state, dt_s)
-        note_touches(contacts, now, robots, touched, per_arena, onsets)
+        note_touches(contacts, now, robots, state, dt_s, touched, per_arena, onsets)
         for row in crowd:
             move(robots[row], state[row], travel_m[row], dt_s)
         spread[0] = spread[1] = 0.0

@@ -21,20 +21,22 @@ def begin_tick(contacts, robots, touched):
 
 
 @borrowing()
-def note_touches(contacts, met, robots, touched, per_arena, onsets):
-    """Note what touched in a step: it was pushed, or its gap was next to nothing.
+def note_touches(contacts, met, robots, state, dt_s, touched, per_arena, onsets):
+    """Note what touches at the end of a step: it was pushed, or its gap is next to nothing.
 
     Args:
         contacts: listed, whose bits of touch are set.
         met: places of those that may have met in the step, after their impulses.
         robots: (rows,) whose bits of touching anything fixed are set.
+        state: (rows, 6) after the impulses, before the move.
+        dt_s: length of the step.
         touched: (rows,) set to 1 for who touched.
         per_arena: robots of an arena.
         onsets: (arenas, 2) added to: robot with robot, robot with something fixed.
     """
     for k in met:
         contact = contacts[k]
-        if contact.push_ns <= 0.0 and contact.gap_m > TOUCH_M:
+        if contact.push_ns <= 0.0 and contact.gap_m + dt_s * _parting_mps(contact, state) > TOUCH_M:
             continue
         arena = contact.row // per_arena
         touched[contact.row] = 1.0
@@ -45,3 +47,12 @@ def note_touches(contacts, met, robots, touched, per_arena, onsets):
         else:
             onsets[arena, 1] += robots[contact.row].against_fixed == 0
             robots[contact.row].against_fixed |= NOW
+
+
+@borrowing()
+def _parting_mps(contact, state):
+    """How fast the gap grows."""
+    parting = -(state[contact.row, 3] * contact.nx + state[contact.row, 4] * contact.ny)
+    if contact.kind == ROBOT:
+        parting += state[contact.which, 3] * contact.nx + state[contact.which, 4] * contact.ny
+    return parting
