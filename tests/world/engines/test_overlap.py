@@ -28,7 +28,7 @@ def test_robots_that_meet_stop_each_other(make: Make, steps: int, gap_m: float, 
         deepest.append(overlap_m(engine, R))
     assert max(deepest) <= transient_m(2 * SPEED_MPS, steps)
     if aside_m == 0.0 and steps > 1:
-        assert deepest[-1] >= -0.01 * R and max(deepest[-15:]) <= RESTING
+        assert -0.01 * R <= deepest[-1] and max(deepest[-15:]) <= RESTING
 
 
 @pytest.mark.parametrize("radii_m", [(0.03, 0.15), (0.15, 0.03)])
