@@ -67,6 +67,13 @@ def test_a_wall_seen_at_an_angle_is_where_argos_sees_it(gap_m: float, off_deg: f
     assert np.rad2deg(np.angle(mean_vector(gap_m, np.deg2rad(off_deg)))) == pytest.approx(seen_deg, abs=0.06)
 
 
+def test_a_footbot_answers_to_a_wall_as_in_argos() -> None:
+    for distance_m, value in ((0.0999999, 0.1004), (0.05, 0.2004), (0.02, 0.4986), (0.0098, 1.0), (0.1000001, 0.0)):
+        off_rad = np.deg2rad(-7.5)  # ray 0 looks straight at the wall
+        seen = values(scene([[5.0 - FOOTBOT.radius_m - distance_m, 0.0, off_rad]], FOOTBOT), FOOTBOT)[0, 0]
+        assert seen == pytest.approx(value, abs=6e-5)
+
+
 def test_an_epuck_answers_to_a_wall_by_its_quadratic_curve() -> None:
     for distance_m, value in ((0.005, 0.905), (0.01, 0.743), (0.02, 0.464), (0.03, 0.244), (0.04, 0.084), (0.049, 0.0)):
         off_rad = np.deg2rad(-17)  # ray 0 looks straight at the wall

@@ -75,24 +75,31 @@ def _watch(blobs, crowd, things, mirror, leds, places):
             if robots == 0:
                 continue
             obstacles = near_things(mirror.found, things, arena, x, y, mirror.reach_m, 0.0)
-            c, s = np.cos(crowd.state[arena, own, 2]), np.sin(crowd.state[arena, own, 2])
-            count = 0
-            for at in range(robots):
-                other = crowd.found[at]
-                turn_c, turn_s = np.cos(crowd.state[arena, other, 2]), np.sin(crowd.state[arena, other, 2])
-                for led in range(leds.shape[2]):
-                    if leds[arena, other, led] == 0:
-                        continue
-                    ahead, left, up = places[other, led, 0], places[other, led, 1], places[other, led, 2]
-                    to_x = crowd.found_at[at, 0] + turn_c * ahead - turn_s * left - x
-                    to_y = crowd.found_at[at, 1] + turn_s * ahead + turn_c * left - y
-                    z, apart = crowd.bottom_m[other] + up, np.sqrt(to_x * to_x + to_y * to_y)
-                    if apart > mirror.reach_m or z >= eye_z:
-                        continue
-                    line = SightLine(x, y, eye_z, to_x, to_y, z - eye_z)
-                    if not _is_hidden(line, crowd, robots, things, mirror.found, obstacles):
-                        bearing = np.arctan2(c * to_y - s * to_x, c * to_x + s * to_y)
-                        count = _keep(blobs, arena, i, count, apart, bearing, leds[arena, other, led])
+            eye = x, y, eye_z, crowd.state[arena, own, 2]
+            _tell(blobs, arena, i, eye, crowd, robots, things, obstacles, mirror, leds, places)
+
+
+@borrowing()
+def _tell(blobs, arena, i, eye, crowd, robots, things, obstacles, mirror, leds, places):
+    """Set the blobs of one row: the lit LEDs in sight of the robots that were found."""
+    x, y, eye_z, heading = eye
+    c, s, count = np.cos(heading), np.sin(heading), 0
+    for at in range(robots):
+        other = crowd.found[at]
+        turn_c, turn_s = np.cos(crowd.state[arena, other, 2]), np.sin(crowd.state[arena, other, 2])
+        for led in range(leds.shape[2]):
+            if leds[arena, other, led] == 0:
+                continue
+            ahead, left, up = places[other, led, 0], places[other, led, 1], places[other, led, 2]
+            to_x = crowd.found_at[at, 0] + turn_c * ahead - turn_s * left - x
+            to_y = crowd.found_at[at, 1] + turn_s * ahead + turn_c * left - y
+            z, apart = crowd.bottom_m[other] + up, np.sqrt(to_x * to_x + to_y * to_y)
+            if apart > mirror.reach_m or z >= eye_z:
+                continue
+            line = SightLine(x, y, eye_z, to_x, to_y, z - eye_z)
+            if not _is_hidden(line, crowd, robots, things, mirror.found, obstacles):
+                bearing = np.arctan2(c * to_y - s * to_x, c * to_x + s * to_y)
+                count = _keep(blobs, arena, i, count, apart, bearing, leds[arena, other, led])
 
 
 @borrowing()

@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.cells import Cells, cells_over, column_of, row_of
 from swarmwire.world.sensors.scene import Scene
 
-ROBOTS_PER_CELL = 0.5
+CELLS_PER_ROBOT = 8  # so that few share one where they gather in a corner of a large arena
 
 
 class Crowd(NamedTuple):
@@ -33,7 +33,7 @@ class Crowd(NamedTuple):
 def crowd_of(scene: Scene, reach_m: float) -> Crowd:
     """The robots of a scene, for looking at whose centre is within `reach_m`."""
     arenas, robots = scene.state.shape[:2]
-    per_robot_m = np.sqrt(ROBOTS_PER_CELL * scene.size_m[0] * scene.size_m[1] / robots)
+    per_cell_m = np.sqrt(scene.size_m[0] * scene.size_m[1] / (CELLS_PER_ROBOT * robots))
     torus = scene.boundary == "torus"
     wrap_x, wrap_y = scene.size_m if torus else (0.0, 0.0)
     per_wrap_x, per_wrap_y = (1.0 / wrap_x, 1.0 / wrap_y) if torus else (0.0, 0.0)
@@ -46,7 +46,7 @@ def crowd_of(scene: Scene, reach_m: float) -> Crowd:
         wrap_y,
         per_wrap_x,
         per_wrap_y,
-        cells_over(scene.size_m, max(reach_m, float(per_robot_m)), arenas, arenas * robots),
+        cells_over(scene.size_m, max(reach_m, float(per_cell_m)), arenas, arenas * robots),
         np.empty(robots, np.int64),
         np.empty((robots, 2)),
     )
