@@ -190,8 +190,8 @@ def gaps(world: World, wrapped: bool = False) -> FloatArray:
     return distance[np.triu_indices(len(xy), 1)]
 
 
-RING = {"how": "ring", "inner_radius_m": 1.0, "radius_m": 1.5, "at": [0.5, 0.2]}
-BOX = {"how": "box", "size_m": [1.0, 3.0], "at": [-1.0, 0.2]}
+RING: dict[str, Any] = {"how": "ring", "inner_radius_m": 1.0, "radius_m": 1.5, "at": [0.5, 0.2]}
+BOX: dict[str, Any] = {"how": "box", "size_m": [1.0, 3.0], "at": [-1.0, 0.2]}
 
 
 def test_robots_fill_a_ring_evenly() -> None:
