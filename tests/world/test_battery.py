@@ -118,6 +118,7 @@ def test_the_gauge_tells_charge_and_a_voltage_that_falls_with_it() -> None:
         ("capacity_wh", -1.0, "expected more than 0 Wh, got -1.0"),
         ("capacity_wh", 0, "expected more than 0 Wh, got 0.0"),
         ("idle_w", -0.1, "expected at least 0 W"),
+        ("empty_v", 4.5, "expected at most full_v, 4.2 V; got 4.5"),
         ("start", 1.5, "expected at most 1"),
     ],
 )

@@ -23,3 +23,9 @@ class Battery(Sheet):
     empty_v: float = parameter(3.4, help="voltage when empty; of one lithium cell, if left out", unit="V", at_least=0)
     noise: float = parameter(0.0, help="standard deviation of the charge's error", at_least=0, at_most=1)
     noise_v: float = parameter(0.0, help="standard deviation of the voltage's error", unit="V", at_least=0)
+
+    def fault(self, radius_m: float) -> tuple[str, str] | None:
+        """As `Sheet.fault`."""
+        if self.empty_v > self.full_v:
+            return "empty_v", f"expected at most full_v, {self.full_v:g} V; got {self.empty_v!r}"
+        return None

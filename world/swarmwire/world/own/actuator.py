@@ -13,14 +13,10 @@ class OwnActuator(ABC):
     """What an actuator of your own does. Subclasses are dataclasses: fields made by `parameter` are keys.
 
     One instance serves all robots of a group, in all arenas.
-
-    Attributes:
-        scene: the arenas and all bodies, in `start` and `act`.
-        group: the robots whose actuator it is: of index `group.start` to before `group.stop` in each arena.
     """
 
-    scene: Scene
-    group: Group
+    scene: Scene  # the arenas and all bodies, from `start` on
+    group: Group  # the robots whose actuator it is: of index `group.start` to before `group.stop` in each arena
 
     @property
     def width(self) -> int:

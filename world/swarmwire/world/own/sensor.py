@@ -21,14 +21,10 @@ class OwnSensor(ABC):
 
     One instance serves all robots of a group, in all arenas. Noise, drop-out, rate and delay are not its affair: they
     stand in its `fields` and in the body's sheet.
-
-    Attributes:
-        scene: the arenas and all bodies, in `start`, `truth` and `follow`.
-        group: the robots whose sense it is: of index `group.start` to before `group.stop` in each arena.
     """
 
-    scene: Scene
-    group: Group
+    scene: Scene  # the arenas and all bodies, from `start` on
+    group: Group  # the robots whose sense it is: of index `group.start` to before `group.stop` in each arena
 
     @property
     @abstractmethod
