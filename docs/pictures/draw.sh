@@ -19,3 +19,4 @@ swarmwire run scenarios/warehouse-wifi.toml --quiet --no-rrd --out "$runs/wareho
 swarmwire export "$runs/warehouse" --pdr --to docs/delivery.png
 .ci/uv run --no-sync python docs/pictures/panel.py
 .ci/uv run --no-sync python -m docs.pictures.radio
+.ci/uv run --no-sync python -m docs.pictures.stages

@@ -65,7 +65,9 @@ def plain(actions: Actions) -> list[Any]:
     columns = (actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps)
     sent = by_sender(actions.sent)
     payloads = [sent.payloads.row(i) for i in range(len(sent))]
-    return [*(column[order].tolist() for column in columns), sent.sender.tolist(), sent.to.tolist(), payloads]
+    switched = np.array((actions.leds.rows, actions.leds.which, actions.leds.rgb))
+    leds = sorted(switched.T.tolist())
+    return [*(column[order].tolist() for column in columns), sent.sender.tolist(), sent.to.tolist(), payloads, leds]
 
 
 def one_group(tick: int, rows: list[int]) -> Senses:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.floor import Floor, Patch, packed_image
-from swarmwire.comms.ground import ground_of, shade_at
+from swarmwire.comms.ground import ground_of, shade_at, shades_over
 
 SIZE_M = (4.0, 2.0)
 DISC = Patch("disc", 1.0, 0.0, 0.2, radius_m=0.5)
@@ -27,6 +27,7 @@ def test_a_picture_is_stretched_over_the_arena_top_row_at_the_greatest_y():
     ground = ground_of(Floor(0.5, (), packed_image(GREY)), SIZE_M, "walls")
     x, y = np.arange(-1.5, 2.0), (0.5, -0.5)
     assert [[shade_at(ground, at, up) for at in x] for up in y] == pytest.approx(GREY / 255.0)
+    assert shades_over(ground, x, np.array(y)) == pytest.approx(GREY / 255.0)
     corners = [shade_at(ground, at, up) for at, up in ((-2.0, 1.0), (2.0, 1.0), (-2.0, -1.0), (2.0, -1.0))]
     assert corners == pytest.approx([0.0, 0.6, 1.0, 0.4])
     assert [shade_at(ground, 2.01, 0.0), shade_at(ground, 0.0, -1.01)] == [0.5, 0.5]

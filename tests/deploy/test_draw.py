@@ -40,6 +40,22 @@ def test_every_scenario_can_be_drawn(here, scenario):
     assert (image == E_PUCK_BLUE).all(axis=2).any()
 
 
+def test_the_floor_is_drawn_in_greys(here):
+    draw(ROOT / "scenarios" / "maze.toml", "--to", "maze.png", "--size", "800")
+    spot = (pixels(here / "maze.png") == round(255 * (0.45 + 0.55 * 0.2))).all(axis=2)
+    assert spot.sum() > 1000
+    (here / "half.pgm").write_text("P2 2 1 255 0 255")
+    arena = "arena.size_m=[2, 2]", "arena.obstacles=[]", "arena.boundary='open'", "arena.ground.image='half.pgm'"
+    (here / "own.toml").write_text((ROOT / "scenarios" / "avoidance.toml").read_text())
+    draw("own.toml", "--to", "half.png", "--size", "800", *(part for one in arena for part in ("--set", one)))
+    drawn = pixels(here / "half.png")
+    black, white = ((drawn == round(255 * bright)).all(axis=2) for bright in (0.45, 1.0))
+    left, right = np.flatnonzero(black.sum(axis=0) > 100)[[0, -1]]
+    assert white[:, right + 20].sum() > 100  # the right half, as bright as the page
+    assert black[:, left : right + 1].mean() > 0.5
+    assert right - left == pytest.approx(black.sum(axis=0).max() / 2, abs=20)
+
+
 def test_another_seed_or_setting_is_another_picture(here):
     draw(LOSSY, "--to", "a.png", "--size", "400")
     draw(LOSSY, "--to", "b.png", "--size", "400", "--seed", "2")

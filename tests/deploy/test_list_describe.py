@@ -249,7 +249,7 @@ def test_a_name_may_be_short_or_that_of_ones_own_group(asked, name):
         ("metric:kill", "nothing has this name"),
         ("xyzzy", "nothing is near it"),
         ("blackout", "say which: event:blackout, fate:blackout"),
-        ("size_m", "say which: arena.size_m, arena.obstacles.*.size_m"),
+        ("size_m", "say which: arena.size_m, arena.obstacles.*.within.size_m"),
         ("metrics", "swarmwire list metrics"),
         ("absent.py:Mine", "there is no file"),
         ("swarmwire.agent:Robot", "no Agent or VectorAgent"),

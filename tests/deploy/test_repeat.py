@@ -100,6 +100,9 @@ def test_every_shipped_scenario_survives_being_made_in_python_and_written(tmp_pa
     if changed.radio is not None and changed.radio.trace is not None:  # it lies in the folder now
         trace = replace(changed.radio.trace, file=f"files/{changed.radio.trace.file}")
         changed = changed.model_copy(update={"radio": replace(changed.radio, trace=trace)})
+    if changed.arena.map is not None:
+        table = changed.arena.map.model_copy(update={"image": f"files/{changed.arena.map.image}"})
+        changed = changed.model_copy(update={"arena": changed.arena.model_copy(update={"map": table})})
     assert same_content(again, changed)
     assert not same_content(again, as_read)
 

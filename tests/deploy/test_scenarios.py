@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.deploy import ArenaResult, Result, run
+from swarmwire.deploy import ArenaResult, Result, Simulation, run
 from tests.deploy.commands import ROOT
 
 SEEDS = range(1, 21)
@@ -34,6 +34,20 @@ def test_avoidance_wanderers_neither_touch_nor_flock():
     assert final(result, "wall_contacts") <= 3
     assert (result.metrics["min_gap"].min or 0.0) > 0.0
     assert (result.metrics["order"].mean or 0.0) < 0.5
+
+
+def test_maze_wanderers_keep_to_its_corridors():
+    with Simulation(ROOT / "scenarios" / "maze.toml") as simulation:
+        boxes = simulation.static.obstacles[0]
+        start = simulation.world.pose[:, :2].copy()
+        simulation.run()
+        x, y = simulation.world.pose[:, :2].T
+    assert len(boxes) == 21
+    for box in boxes:
+        beyond = np.maximum(np.abs(x - box.x_m) - box.size_m[0] / 2, np.abs(y - box.y_m) - box.size_m[1] / 2)
+        assert beyond.min() > 0.03  # an e-puck's radius is 0.035
+    assert np.all((np.abs(x) < 1.225) & (np.abs(y) < 0.775))
+    assert np.hypot(*(np.stack([x, y], axis=1) - start).T).max() > 0.3
 
 
 @pytest.mark.parametrize(("name", "pdr", "latency_s"), [("flocking", 1.0, 0.0), ("flocking-lossy", 0.7, 0.11)])

@@ -19,8 +19,10 @@ from swarmwire.comms import errors
 from swarmwire.comms.air.presets import PRESETS
 from swarmwire.comms.air.radio import Gives
 from swarmwire.comms.body import body_names, load_body
+from swarmwire.comms.drives import DRIVES, Holonomic, Twist, Wheels
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.leds import Leds
 from swarmwire.comms.sheets import SHEETS
 from swarmwire.deploy import run
 from swarmwire.deploy.cli import app
@@ -88,13 +90,21 @@ def test_the_events_have_a_section_each(site):
         assert re.search(rf"<h3><code[^>]*><span[^>]*>{kind.__name__.lower()}</span>", text), kind
 
 
-def test_the_bodies_page_names_bodies_senses_and_their_fields(site):
-    named = code(site, "bodies")
+def test_the_senses_page_names_every_sense_its_fields_and_its_keys(site):
+    named = code(site, "senses")
     kinds = [kind for name, kind in vars(readings).items() if name.endswith("Readings")]
     read = {name for kind in kinds for name in (*vars(kind), *(of.name for of in fields(kind))) if name[0] != "_"}
     assert read - {"sheet", "vector_sum"} <= named
     assert {*SHEETS, *(f"radio.{of.name}" for of in fields(Gives))} <= named
-    assert {*body_names(), *(f"[senses.{name}]" for name in SHEETS)} <= named
+    assert {f"[senses.{name}]" for name in SHEETS} <= named
+    assert {of.name for kind in SHEETS.values() for of in fields(kind)} <= named
+
+
+def test_the_bodies_page_names_bodies_and_where_their_figures_come_from(site):
+    named = code(site, "bodies")
+    assert {f'kind = "{name}"' for name in DRIVES} <= named
+    assert {of.name for kind in (Wheels, Twist, Holonomic, Leds) for of in fields(kind)} <= named
+    assert set(body_names()) <= named
     for name in body_names():
         assert html.escape(load_body(name).source, quote=False) in page(site, "bodies")
 

@@ -10,6 +10,7 @@ import pytest
 from nbclient import NotebookClient
 
 from examples.loss_sweep import FLOCK, LOSSES, table
+from swarmwire.deploy import Simulation, repeat, run
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -20,6 +21,39 @@ def test_the_sweep_has_a_row_for_each_loss_and_seed():
     delivered = runs.group_by("loss", maintain_order=True).agg(pl.col("pdr").mean())["pdr"]
     assert delivered.is_sorted(descending=True)
     assert runs.filter(pl.col("loss") == 0.0)["pdr"].to_list() == [1.0, 1.0]
+
+
+GAS = EXAMPLES / "gas" / "gas-leak.toml"
+
+
+def test_robots_with_an_own_sense_and_an_own_actuator_seal_the_leak():
+    with Simulation(GAS) as leaking:
+        for _ in range(leaking.ticks):
+            leaking.step()
+        assert leaking.world.scene.own["leak"].strength[0] < 0.05
+        assert "sealing" in leaking.world.states.names
+
+
+@pytest.mark.parametrize("runners", [3, "per-robot"])
+def test_the_leak_is_the_same_whoever_runs_the_agents(runners):
+    short = ["duration_s=3"]
+    assert run(GAS, overrides=short, runners=runners).trajectory_sha256 == run(GAS, overrides=short).trajectory_sha256
+
+
+def test_the_leak_can_be_repeated_from_its_run_folder_alone(tmp_path):
+    for file in GAS.parent.iterdir():
+        if file.is_file():
+            (tmp_path / file.name).write_bytes(file.read_bytes())
+    run(tmp_path / GAS.name, overrides=["duration_s=3"], out=tmp_path / "run")
+    for file in tmp_path.iterdir():
+        if file.is_file():
+            file.unlink()
+    repetition = repeat(tmp_path / "run")
+    assert repetition.same
+    assert repetition.changes == ()
+    sheet = tmp_path / "run" / "files" / "gas.py"
+    sheet.write_text(sheet.read_text() + "# changed\n")
+    assert repeat(tmp_path / "run").changes == ("files/gas.py is not as the run left it: its sha256 differs",)
 
 
 def test_the_sweep_prints_its_table():

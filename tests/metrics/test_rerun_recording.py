@@ -6,6 +6,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.floor import Floor, Patch
 from swarmwire.comms.truth import Finished, Group, Happened, Light, Obstacle
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.rerun_colors import DEAD, FATES, packed
@@ -69,6 +70,21 @@ def test_a_recording_holds_the_positions_and_headings_of_its_arena(tmp_path, are
         assert positions[seen.tick] == pose[:, :2].astype(np.float32).tolist()
         x, y = np.array(vectors[seen.tick]).T
         np.testing.assert_allclose(np.arctan2(y, x), pose[:, 2], atol=1e-5)
+
+
+def test_lit_leds_are_drawn_where_they_sit_until_they_are_dark(tmp_path):
+    of = static(2)
+    leds = np.zeros((2, 8), np.int64)
+    leds[1, 2] = 0x0080FF  # the one to the left
+    pose = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, np.pi / 2]])
+    dark = truth(of, 3, pose=pose), truth(of, 4, pose=pose)
+    lit = truth(of, 1, pose=pose, leds=leds), truth(of, 2, pose=pose, leds=leds)
+    record(tmp_path / "run.rrd", of, [truth(of, 0, pose=pose), *lit, *dark])
+    positions = column(tmp_path / "run.rrd", "/world/leds", "Points2D:positions")
+    np.testing.assert_allclose(positions.pop(1), [[1.0 - 0.042, 2.0]], atol=1e-6)
+    np.testing.assert_allclose(positions.pop(2), [[1.0 - 0.042, 2.0]], atol=1e-6)
+    assert positions == {3: []}
+    assert column(tmp_path / "run.rrd", "/world/leds", "Points2D:colors")[1] == [0x0080FFFF]
 
 
 def test_links_join_the_positions_of_the_robots_that_an_edge_names(tmp_path):
@@ -280,6 +296,30 @@ def test_obstacles_and_lights_are_drawn_once_where_they_are(tmp_path):
     dark = static(2)
     record(tmp_path / "dark.rrd", dark, moving(dark, 2))
     assert column(tmp_path / "dark.rrd", "/world/lights", "Points2D:positions") == {}
+
+
+def test_movable_obstacles_are_drawn_where_they_are_in_each_tick(tmp_path):
+    pushed = Obstacle("box", 0.0, 0.0, size_m=(2.0, 1.0), mass_kg=1.0)
+    of = static(2, obstacles=(*OBSTACLES, pushed))
+    ticks = (truth(of, tick, movable=np.array([[[tick, 1.0, tick * np.pi / 2]]])) for tick in range(2))
+    record(tmp_path / "run.rrd", of, ticks)
+    (fixed,) = column(tmp_path / "run.rrd", "/world/obstacles", "LineStrips2D:strips").values()
+    assert len(fixed) == len(OBSTACLES)
+    found = column(tmp_path / "run.rrd", "/world/movable", "LineStrips2D:strips")
+    assert np.allclose(found[0], [[[-1.0, 0.5], [1.0, 0.5], [1.0, 1.5], [-1.0, 1.5], [-1.0, 0.5]]])
+    assert np.allclose(found[1], [[[1.5, 0.0], [1.5, 2.0], [0.5, 2.0], [0.5, 0.0], [1.5, 0.0]]])
+
+
+def test_the_floor_is_one_picture_below_all_else(tmp_path):
+    of = replace(static(2), floor=Floor(1.0, (Patch("disc", 4.0, 3.0, 0.0, radius_m=1.0),)))
+    record(tmp_path / "run.rrd", of, moving(of, 2))
+    (buffer,) = column(tmp_path / "run.rrd", "/world/floor", "Image:buffer").values()
+    grey = np.array(buffer).reshape(384, 512)
+    assert (grey[0, 0], grey[-1, -1], grey.min(), grey.max()) == (90, 30, 30, 90)  # the first row is the lowest
+    assert np.mean(grey == 30) == pytest.approx(np.pi / 4 / 48, rel=0.02)
+    bare = static(2)
+    record(tmp_path / "bare.rrd", bare, moving(bare, 2))
+    assert column(tmp_path / "bare.rrd", "/world/floor", "Image:buffer") == {}
 
 
 def test_an_arena_that_is_not_there_is_refused(tmp_path):

@@ -4,11 +4,13 @@ import numpy as np
 import polars as pl
 import pytest
 
+from swarmwire.comms.body import body_from
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Happened
 from swarmwire.metrics.record import recorders, table_writer, tick_recorder
 from swarmwire.metrics.registry import METRICS
 from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.table_faults import table_fault
 from tests.metrics.recorded import links, record, wandering
 from tests.metrics.truths import static
 
@@ -53,6 +55,18 @@ def test_robots_have_a_row_each_per_tick(recorded):
         assert np.array_equal(own["command_turn_radps"], np.array([one.command[at, 1] for one in seen], np.float32))
         assert own["alive"].to_list() == [one.alive[at] for one in seen]
         assert own["state"].to_list() == [one.states[one.state[at]] for one in seen]
+
+
+def test_speeds_to_the_left_are_recorded_of_robots_that_can_move_so(tmp_path):
+    drive = {"kind": "holonomic", "max_speed_mps": 1, "max_angular_radps": 1, "max_force_n": 1, "max_torque_nm": 1}
+    of = static(3, body=body_from({"like": "epuck", "name": "disc", "drive": drive}, "disc.toml"))
+    seen = list(wandering(of, 5))
+    record(tmp_path, of, seen)
+    table = RunFolder(tmp_path).robots()
+    left_mps = np.array([one.command[:, 2] for one in seen], np.float32)
+    assert np.array_equal(table["command_left_mps"], left_mps.ravel())
+    assert "command_left_mps" not in RunFolder(tmp_path).metrics().columns
+    assert table_fault("ticks", pl.scan_parquet(RunFolder(tmp_path).files("ticks")), of) is None
 
 
 def test_metrics_have_a_row_per_tick_and_no_lists(recorded):

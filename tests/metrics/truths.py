@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.body import load_body
+from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.truth import Departed, Finished, Group, Light, Obstacle, Static, Tally, Truth
@@ -18,6 +18,7 @@ def static(
     radio: bool = True,
     obstacles: Sequence[Obstacle] = (),
     lights: Sequence[Sequence[Light]] = (),
+    body: Body | None = None,
 ) -> Static:
     return Static(
         name="test",
@@ -26,7 +27,7 @@ def static(
         arena_size_m=(8.0, 6.0),
         boundary="walls",
         obstacles=(tuple(obstacles),) * arenas,
-        groups=(Group("flock", load_body("epuck"), 0, robots),),
+        groups=(Group("flock", body or load_body("epuck"), 0, robots),),
         robot_names=tuple(f"flock-{i}" for i in range(robots)),
         range_m=2.0 if radio else None,
         lights=tuple(map(tuple, lights)),

@@ -7,23 +7,27 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.body import Body
 from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.ground import ground_of
 from swarmwire.comms.sheets import Sheet
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.sensors import SENSORS, Scene
+from swarmwire.world.sensors.scene import led_places_m
 from swarmwire.world.sensors.staged import Staged
 
 
 def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: float = 10.0, **more: Any) -> Scene:
     """One arena with robots of one body at these poses (robots, 3)."""
     robots = len(poses)
+    boundary = more.get("boundary", "walls")
     state = np.zeros((1, robots, 6))
     state[0, :, :3] = poses
     return Scene(
         keys=np.array([7], np.uint64),
         size_m=(size_m, size_m),
-        walled=more.get("walled", True),
+        boundary=boundary,
         obstacles=obstacle_arrays((obstacles,)),
         lights=(more.get("lights", ()),),
+        ground=ground_of(more.get("floor"), (size_m, size_m), boundary),
         tick_s=more.get("tick_s", 0.1),
         radius_m=np.full(robots, body.radius_m),
         bottom_m=np.zeros(robots),
@@ -31,8 +35,10 @@ def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: 
         state=state,
         travel_m=np.zeros((1, robots, 2)),
         touched=np.zeros((1, robots)),
-        target=np.zeros((1, robots, 2)),
-        leds=np.zeros((1, robots, 0), np.int64),
+        target=np.zeros((1, robots, 3)),
+        charge=np.ones((1, robots)),
+        leds=np.full((1, robots, body.led_count), more.get("colour", 0)),
+        led_places_m=led_places_m((Group("a", body, 0, robots),), body.led_count),
     )
 
 

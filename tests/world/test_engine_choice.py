@@ -1,19 +1,15 @@
 """Who is moved by which engine, engines side by side, and what none of them can do."""
 
 import re
-from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from swarmwire.comms.body import Body, load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.world import checks
-from swarmwire.world import world as world_module
-from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
-from tests.world.samples import SAMPLE, changed, commanded, posed
+from tests.world.samples import commanded, posed
 
 MOVABLE = {"shape": "cylinder", "radius_m": 0.1, "at": [0.0, 0.0], "movable": True, "mass_kg": 0.1}
 ARENA = {"size_m": [4.0, 4.0]}
@@ -83,25 +79,15 @@ def test_robots_without_contacts_may_be_faster_than_physics_steps_allow() -> Non
     posed([[-1.0, 0.0, 0.0]], physics={"steps": 1, "engine": "kinematic"})
 
 
-@pytest.fixture
-def airborne(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Foot-bots fly 1 m above the floor."""
-
-    def load(name: str) -> Body:
-        body = load_body(name)
-        return replace(body, altitude_m=1.0, contacts=False) if name == "footbot" else body
-
-    monkeypatch.setattr(checks, "load_body", load)
-
-
-@pytest.mark.usefixtures("airborne")
-def test_floor_and_air_stand_side_by_side_in_one_arena() -> None:
+def test_floor_and_air_stand_side_by_side_in_one_arena(tmp_path: Path) -> None:
     """Each moves as it does with its own kind alone."""
+    drone = tmp_path / "drone.toml"
+    drone.write_text('like = "footbot"\nname = "drone"\naltitude_m = 1.0\ncontacts = false\n')
     flock = {"body": "epuck", "count": 3, "agent": "x"}
     poses = [[-0.5, 0.0, 0.0], [0.5, 0.0, np.pi], [0.0, 1.0, 0.0]]
     above = {"how": "poses", "poses": [[-0.5, 0.0, 0.0], [0.5, 0.05, np.pi]]}
     robots = {
-        "air": {"body": "footbot", "count": 2, "agent": "x", "place": above},
+        "air": {"body": str(drone), "count": 2, "agent": "x", "place": above},
         "floor": {**flock, "place": {"how": "poses", "poses": poses}},
     }
     both = World(posed([], robots=robots), [1, 2], {})
@@ -121,8 +107,3 @@ def test_floor_and_air_stand_side_by_side_in_one_arena() -> None:
             at = [row % 5 for row in rows[name][: len(rows[name]) // 2]]
             assert np.array_equal(both._physics.touched[:, at], world._physics.touched)
             assert np.array_equal(both._physics.travel_m[:, at], world._physics.travel_m)
-
-
-def test_a_world_runs_alike_with_every_engine_that_can_move_it() -> None:
-    assert world_module.World(scenario_from(SAMPLE, "f"), [1], {}).engines == ("discs",)
-    assert World(scenario_from(changed("physics", {"engine": "pymunk"}), "f"), [1], {}).engines == ("pymunk",)

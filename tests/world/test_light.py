@@ -106,7 +106,7 @@ def test_shadows_are_those_of_a_search_among_all_robots(spread_m: float) -> None
     lights = (*lights, Light(float(poses[0, 0]), -1.0, 20.0), Light(1.0, float(poses[1, 1]), 20.0))  # along the axes
     outcomes = set[bool]()
     for light in lights:
-        seen = values(scene(poses, EPUCK, size_m=5.0, walled=False, lights=(light,))).any(axis=1)
+        seen = values(scene(poses, EPUCK, size_m=5.0, boundary="open", lights=(light,))).any(axis=1)
         to = np.array([light.x_m, light.y_m]) - poses[:, :2]
         length = np.hypot(*to.T)
         apart = poses[None, :, :2] - poses[:, None, :2]  # from robot i to robot j

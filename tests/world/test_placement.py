@@ -1,7 +1,8 @@
 """Things stand apart, where they were asked to, and where the seed alone puts them."""
 
 import copy
-from dataclasses import replace
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,8 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.body import load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Light, Obstacle, Static
-from swarmwire.world import checks
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.world.samples import SAMPLE, changed
@@ -191,8 +190,8 @@ def gaps(world: World, wrapped: bool = False) -> FloatArray:
     return distance[np.triu_indices(len(xy), 1)]
 
 
-RING = {"how": "ring", "inner_radius_m": 1.0, "radius_m": 1.5, "at": [0.5, 0.2]}
-BOX = {"how": "box", "size_m": [1.0, 3.0], "at": [-1.0, 0.2]}
+RING: dict[str, Any] = {"how": "ring", "inner_radius_m": 1.0, "radius_m": 1.5, "at": [0.5, 0.2]}
+BOX: dict[str, Any] = {"how": "box", "size_m": [1.0, 3.0], "at": [-1.0, 0.2]}
 
 
 def test_robots_fill_a_ring_evenly() -> None:
@@ -311,17 +310,26 @@ def test_on_a_torus_a_disc_goes_on_at_the_other_side() -> None:
     }
 
 
-def test_a_torus_is_for_robots_without_contacts() -> None:
+def own_body(folder: Path, **figures: Any) -> str:
+    """An e-puck with other figures, as a sheet of one's own."""
+    path = folder / "own.toml"
+    sheet = {"like": "epuck", "name": "own", "source": "a test", **figures}
+    path.write_text("".join(f"{key} = {json.dumps(value)}\n" for key, value in sheet.items()))
+    return str(path)
+
+
+def test_a_torus_is_for_robots_without_contacts(tmp_path: Path) -> None:
+    mapping = alone({"how": "arena"}, boundary="torus")
     with pytest.raises(BadInput, match=r"^file.toml: arena.boundary: expected walls or open: on a torus no robot"):
-        built(alone({"how": "arena"}, boundary="torus"), 1)
+        built(mapping, 1)
+    mapping["robots"]["flock"]["body"] = own_body(tmp_path, contacts=False)
+    assert built(mapping, 1).static.boundary == "torus"
 
 
-def test_robots_in_the_air_keep_clear_of_what_they_could_touch_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    epuck, high = load_body("epuck"), replace(load_body("epuck"), altitude_m=0.5)
-    monkeypatch.setattr(checks, "load_body", lambda name: high if name == "high" else epuck)
+def test_robots_in_the_air_keep_clear_of_what_they_could_touch_alone(tmp_path: Path) -> None:
     spot = {"how": "poses", "poses": [[1.0, 0.0, 0.0]]}
     mapping = alone(spot, 1, obstacles=[{"shape": "cylinder", "radius_m": 0.2, "at": [0.0, 0.0], "height_m": 0.4}])
-    mapping["robots"]["high"] = {**mapping["robots"]["flock"], "body": "high"}
+    mapping["robots"]["high"] = {**mapping["robots"]["flock"], "body": own_body(tmp_path, altitude_m=0.5)}
     assert np.array_equal(built(mapping, 1).pose[:, :2], [[1.0, 0.0]] * 2)
     over = copy.deepcopy(mapping)
     over["robots"]["high"]["place"] = {"how": "poses", "poses": [[0.1, 0.0, 0.0]]}

@@ -8,6 +8,7 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import RunnerLost
+from swarmwire.comms.led_changes import LedChanges
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions
@@ -107,6 +108,33 @@ def test_of_two_answers_in_a_tick_the_newer_commands_and_both_send() -> None:
     runners.answer("a", said("a", 2, 3.0))
     runners.answer("a", said("a", 3, 9.0, drive=False))  # it has no new command: the one before holds
     assert taken(runners)[0] == {0: 3.0, 2: 3.0}
+
+
+def test_leds_switched_in_answers_between_two_takes_are_all_switched_and_the_newer_colour_counts() -> None:
+    runners = playing()
+    opened(runners, 0)
+    opened(runners, 1)
+    for tick, changes in enumerate(([[0, 2], [3, 3], [7, 8]], [[2, 2], [3, 4], [9, 10]])):
+        rows = np.array(OWN["a"], np.int64)
+        still = np.zeros(len(rows))
+        leds = LedChanges(*np.array(changes))
+        actions = Actions(rows, still.astype(bool), still, still, still, leds=leds)
+        runners.answer("a", encode_actions(tick, actions))
+    got = runners.take().leds
+    assert (got.rows.tolist(), got.which.tolist(), got.rgb.tolist()) == ([0, 2, 2, 2], [3, 3, 3, 4], [7, 8, 9, 10])
+    assert len(runners.take().leds) == 0
+
+
+def test_a_speed_sideways_crosses_with_the_others_and_who_is_stopped_has_none() -> None:
+    runners = playing()
+    rows = np.array(OWN["a"], np.int64)
+    some = np.full(len(rows), 0.5)
+    for tick, expected in ((0, 1.0), (1, 0.0)):
+        opened(runners, tick)
+        runners.answer("a", encode_actions(tick, Actions(rows, some.astype(bool), some, some, 2.0 * some)))
+        if tick:
+            runners._stop(rows)
+        assert runners.take().lateral_mps[rows].tolist() == [expected] * len(rows)
 
 
 @pytest.mark.parametrize("tick", [0, 1, 2, 4])

@@ -136,8 +136,8 @@ def test_what_robots_see_of_each_other_does_not_depend_on_the_frame(x: float, y:
     moved = np.stack(
         [x + c * poses[:, 0] - s * poses[:, 1], y + s * poses[:, 0] + c * poses[:, 1], poses[:, 2] + turn], axis=1
     )
-    before = proximity(scene(poses, EPUCK, walled=False), EPUCK).distance_m()
-    after = proximity(scene(moved, EPUCK, walled=False), EPUCK).distance_m()
+    before = proximity(scene(poses, EPUCK, boundary="open"), EPUCK).distance_m()
+    after = proximity(scene(moved, EPUCK, boundary="open"), EPUCK).distance_m()
     grazing = np.isfinite(before) != np.isfinite(after)  # a ray that just touches or just reaches
     assert np.count_nonzero(grazing) <= 1
     both = np.isfinite(before) & np.isfinite(after)
@@ -149,7 +149,7 @@ def test_proximity_noise_is_uniform_keyed_and_clipped() -> None:
     poses = np.stack([np.linspace(-4, 4, 500), np.zeros(500), np.zeros(500)], axis=1)
     assert EPUCK.proximity is not None
     sheet = replace(EPUCK.proximity, noise=0.05)
-    sensor = staged(scene(poses[::25], EPUCK, walled=False), EPUCK, "proximity", sheet)
+    sensor = staged(scene(poses[::25], EPUCK, boundary="open"), EPUCK, "proximity", sheet)
     draws = np.concatenate([sensor.read(tick)["proximity.value"].ravel() for tick in range(50)])
     assert draws.min() == 0.0
     assert 0.0499 < draws.max() <= 0.05
@@ -238,3 +238,16 @@ def test_odometry_is_the_same_however_often_an_agent_looks() -> None:
 def test_the_sheets_of_the_bodies_have_a_sensor_each() -> None:
     assert EPUCK.senses.keys() == FOOTBOT.senses.keys() == {"proximity", "compass", "odometry", "light", "bumper"}
     assert isinstance(EPUCK.proximity, Proximity)
+
+
+def test_wheels_differ_from_what_their_encoders_take_them_for() -> None:
+    """Drawn once per wheel, so it grows with the way; travel back and forth undoes it."""
+    looked_at = scene(np.zeros((400, 3)), EPUCK)
+    odometry = staged(looked_at, EPUCK, "odometry", Odometry(wheel_error_std=0.02))
+    looked_at.travel_m[0] = 2.0
+    told = odometry.read(1)
+    drawn = normal(7, np.arange(400)[:, None], 0, np.arange(2), purpose("odometry wheel"))
+    for wheel, field in enumerate(("odometry.left_m", "odometry.right_m")):
+        assert told[field] == pytest.approx(2.0 * (1.0 + 0.02 * drawn[:, wheel]))
+    looked_at.travel_m[0] = 0.0
+    assert odometry.read(2)["odometry.left_m"] == pytest.approx(np.zeros(400), abs=1e-12)

@@ -1,48 +1,28 @@
-"""From the text that names an agent to its class.
+"""From the text that names an agent to its class."""
 
-A file is loaded alone: its folder does not come onto `sys.path`, so it imports what is installed and nothing that
-merely lies beside it. Its content is part of its module's name: an edited file is loaded anew, also in a notebook.
-"""
-
-import hashlib
-import importlib
-import importlib.util
-import sys
-from importlib.machinery import SourceFileLoader
-from pathlib import Path
-from types import CodeType
 from typing import Any, cast
 
 from swarmwire.agent.agent import Agent
 from swarmwire.agent.declared import parameters_of
 from swarmwire.agent.vector_agent import VectorAgent
+from swarmwire.comms.loading import NotLoaded, load_named, resolve
 
 AgentClass = type[Agent] | type[VectorAgent[Any]]
+
+__all__ = ["AgentClass", "NoAgent", "load_agent", "resolve"]
 
 
 class NoAgent(ValueError):
     """The text does not lead to an agent class; the message says at which point."""
 
 
-def resolve(spec: str, beside: Path) -> str:
-    """The spec with the path of a file made absolute: "my_agent.py:Mine" lies beside the scenario."""
-    place, _, name = spec.rpartition(":")
-    return f"{(beside / place).resolve()}:{name}" if place.endswith(".py") else spec
-
-
 def load_agent(spec: str) -> AgentClass:
     """The class of "package.module:Class" or "/path/file.py:Class"; NoAgent if it is none."""
-    place, _, name = spec.rpartition(":")
-    if not place or not name.isidentifier():
-        raise NoAgent(f'expected "package.module:Class" or "file.py:Class", got {spec!r}')
-    of_file = place.endswith(".py")
-    if of_file and not Path(place).is_file():
-        raise NoAgent(f"there is no file {place}")
     try:
-        module = _load_file(Path(place)) if of_file else importlib.import_module(place)
-    except (Exception, SystemExit) as error:
-        raise NoAgent(f"{place} does not import: {type(error).__name__}: {error}") from error
-    found: object = getattr(module, name, None)
+        found = load_named(spec)
+    except NotLoaded as error:
+        raise NoAgent(str(error)) from error.__cause__
+    place, _, name = spec.rpartition(":")
     if not isinstance(found, type) or not issubclass(found, Agent | VectorAgent):
         what = "no such name" if found is None else "no Agent or VectorAgent"
         raise NoAgent(f"{place} holds {what}: {name!r}")
@@ -57,30 +37,3 @@ def load_agent(spec: str) -> AgentClass:
     except (TypeError, NameError) as error:
         raise NoAgent(str(error)) from error
     return kind
-
-
-class _SourceLoader(SourceFileLoader):
-    """Neither reads nor leaves bytecode, which knows its source by size and whole seconds, and litters folders."""
-
-    def get_code(self, fullname: str) -> CodeType:
-        """The compiled source, as it is now."""
-        return self.source_to_code(self.get_data(self.path), self.path)
-
-
-def _load_file(path: Path) -> Any:
-    # A name of its own, so that two files called agent.py do not meet in sys.modules.
-    digest = hashlib.sha256(str(path).encode() + b"\0" + path.read_bytes()).hexdigest()
-    name = f"swarmwire_user_{path.stem}_{digest[:12]}"
-    if name in sys.modules:
-        return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, path, loader=_SourceLoader(name, str(path)))
-    if spec is None or spec.loader is None:
-        raise FileNotFoundError(path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except BaseException:  # also an exit or Ctrl-C: a half-imported module must not be found the next time
-        del sys.modules[name]
-        raise
-    return module

@@ -4,18 +4,26 @@ from collections.abc import Iterator
 from typing import Any, TypeVar, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from swarmwire.agent.draw import Draw
 from swarmwire.agent.handle import Handle
 from swarmwire.agent.outcome import Outcome
 from swarmwire.agent.packet import Packet, Packets
 from swarmwire.agent.readings import (
+    BatteryReading,
     BumperReading,
+    CameraReading,
     CompassReading,
+    GroundReading,
+    ImuReading,
+    InfraredReading,
     LightReading,
     OdometryReading,
+    OwnReading,
     PositioningReading,
     ProximityReading,
+    ScanReading,
 )
 from swarmwire.agent.robots import forward_and_turn, had
 from swarmwire.agent.turn import Turn
@@ -69,6 +77,45 @@ class Robot(Handle):
         x, y = self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m")
         return PositioningReading(float(x[self._row]), float(y[self._row]))
 
+    @property
+    def imu(self) -> ImuReading:
+        """Acceleration and turn rate in the body's frame."""
+        turn, row = self._turn, self._row
+        names = "forward_mps2", "left_mps2", "turn_radps"
+        return ImuReading(*(float(turn.field("imu", name)[row]) for name in names))
+
+    @property
+    def battery(self) -> BatteryReading:
+        """Charge, 1 full and 0 empty, and voltage."""
+        charge, voltage = self._turn.field("battery", "charge"), self._turn.field("battery", "voltage_v")
+        return BatteryReading(float(charge[self._row]), float(voltage[self._row]))
+
+    @property
+    def infrared(self) -> InfraredReading:
+        """Light of other robots, by rays around the body: value, distance_m and angle_rad, (rays,)."""
+        return InfraredReading(self._turn.field("infrared", "value")[self._row], had(self.body.infrared))
+
+    @property
+    def scan(self) -> ScanReading:
+        """Laser scan: range_m and angle_rad, (rays,)."""
+        return ScanReading(self._turn.field("scan", "range_m")[self._row], had(self.body.scan))
+
+    @property
+    def ground(self) -> GroundReading:
+        """Shade of the floor under the sensors, (points,)."""
+        return GroundReading(self._turn.field("ground", "shade")[self._row])
+
+    @property
+    def camera(self) -> CameraReading:
+        """LEDs of other robots in sight."""
+        names = "distance_m", "bearing_rad", "colour"
+        return CameraReading.of(*(self._turn.field("camera", name)[self._row] for name in names))
+
+    def sense(self, name: str) -> OwnReading:
+        """What a sense of your own reads: each field as an attribute, a float or an array (width,)."""
+        columns = ((field, values[self._row]) for field, values in self._turn.fields(name).items())
+        return OwnReading(name, {field: value if np.ndim(value) else float(value) for field, value in columns})
+
     def drive(self, linear_mps: float, angular_radps: float, lateral_mps: float = 0.0) -> None:
         """Wanted forward speed and turn rate (positive to the left); they hold until the next call.
 
@@ -89,6 +136,13 @@ class Robot(Handle):
         It holds until the next call. NotFitted if the body has no LEDs, ValueError if it has not that one.
         """
         self._turn.leds(which)[self._row] = rgb_of(red, green, blue)
+
+    def actuate(self, name: str, values: ArrayLike) -> None:
+        """Set an actuator of your own, to one number or as many as it takes; what that does, and how long, it knows.
+
+        NotFitted if the body has none of this name, ValueError if the numbers do not fit or are not finite.
+        """
+        self._turn.actuate(name, np.reshape(values, (1, -1)), slice(self._row, self._row + 1))
 
     def note(self, state: str) -> None:
         """Name what the robot is at ("search", "wait"), for recordings and pictures; it holds until the next call."""

@@ -9,22 +9,29 @@ from swarmwire.agent.draw import Draws
 from swarmwire.agent.handle import Handle
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.readings import (
+    BatteryReadings,
     BumperReadings,
+    CameraReadings,
     CompassReadings,
+    GroundReadings,
+    ImuReadings,
+    InfraredReadings,
     LightReadings,
     OdometryReadings,
+    OwnReading,
     PositioningReadings,
     ProximityReadings,
+    ScanReadings,
 )
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.leds import rgb_of
 from swarmwire.comms.messages import Message, encode_rows
 from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.sheets import Ring
+from swarmwire.comms.sheets import Sheet
 
 M = TypeVar("M", bound=Message)
-S = TypeVar("S", bound=Ring)
+S = TypeVar("S", bound=Sheet)
 N = TypeVar("N", float, FloatArray)
 
 
@@ -72,6 +79,41 @@ class Robots(Handle):
         """Positions in the arena's frame: x_m and y_m (n,)."""
         return PositioningReadings(self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m"))
 
+    @property
+    def imu(self) -> ImuReadings:
+        """Accelerations and turn rates in the bodies' frames: forward_mps2, left_mps2 and turn_radps (n,)."""
+        return ImuReadings(*(self._turn.field("imu", name) for name in ("forward_mps2", "left_mps2", "turn_radps")))
+
+    @property
+    def battery(self) -> BatteryReadings:
+        """Batteries: charge, 1 full and 0 empty, and voltage_v (n,)."""
+        return BatteryReadings(self._turn.field("battery", "charge"), self._turn.field("battery", "voltage_v"))
+
+    @property
+    def infrared(self) -> InfraredReadings:
+        """Light of other robots, by rays around the bodies: value and distance_m (n, rays), angle_rad (rays,)."""
+        return InfraredReadings(self._turn.field("infrared", "value"), had(self.body.infrared))
+
+    @property
+    def scan(self) -> ScanReadings:
+        """Laser scans: range_m (n, rays), angle_rad (rays,)."""
+        return ScanReadings(self._turn.field("scan", "range_m"), had(self.body.scan))
+
+    @property
+    def ground(self) -> GroundReadings:
+        """Shades of the floor under the sensors: shade (n, points)."""
+        return GroundReadings(self._turn.field("ground", "shade"))
+
+    @property
+    def camera(self) -> CameraReadings:
+        """LEDs of other robots in sight: distance_m, bearing_rad and colour (n, most_blobs), count (n,)."""
+        names = "distance_m", "bearing_rad", "colour"
+        return CameraReadings(*(self._turn.field("camera", name) for name in names))
+
+    def sense(self, name: str) -> OwnReading:
+        """What a sense of your own reads: each field as an attribute, (n,) or (n, width)."""
+        return OwnReading(name, self._turn.fields(name))
+
     def drive(
         self,
         linear_mps: ArrayLike,
@@ -110,6 +152,18 @@ class Robots(Handle):
         """
         here = True if rows is None else rows[:, None]
         np.copyto(self._turn.leds(which), rgb_of(red, green, blue)[..., None], where=here)
+
+    def actuate(self, name: str, values: ArrayLike, rows: BoolArray | None = None) -> None:
+        """Set an actuator of your own of the robots of the mask `rows`, or of all.
+
+        To one number, (n,), or (n, width): of robots outside the mask they do not count. What they do, and for how
+        long, is the actuator's to know. NotFitted if the bodies have none of this name, ValueError if the numbers do
+        not fit or are not finite.
+        """
+        if rows is None:
+            self._turn.actuate(name, values, slice(None))
+        else:
+            self._turn.actuate(name, _of(rows, values), rows)
 
     def note(self, state: str, rows: BoolArray | None = None) -> None:
         """Name what the robots of the mask `rows`, or all, are at; for recordings and pictures, until the next call."""

@@ -23,6 +23,7 @@ from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
+from swarmwire.comms.sheets import OwnSheet
 
 RATE_HZ = 10
 GIVEN = ("range_m", "bearing_rad", "rssi_dbm")
@@ -38,7 +39,7 @@ class Trial:
     robots: int = 7
     ticks: int = 12
     seed: int = 1
-    body: str = "epuck"
+    body: str | Body = "epuck"  # one that comes with swarmwire, or any other
     params: dict[str, Any] | None = None  # a list has a value for each robot
 
 
@@ -66,11 +67,15 @@ def assert_rows_independent(vector: type[VectorAgent[Any]], trial: Trial | None 
         show(at_once.sent)
 
 
+def _body(trial: Trial) -> Body:
+    return load_body(trial.body) if isinstance(trial.body, str) else trial.body
+
+
 def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> Hosted:
     keys = np.array([draws.derive_key("trial", trial.seed, int(row)) for row in rows], np.uint64)
     names = tuple(f"robot-{row}" for row in rows)
     params = params_of(trial.params or {}, rows)
-    group = GroupAssignment("trial", "", params, load_body(trial.body), rows, names, keys)
+    group = GroupAssignment("trial", "", params, _body(trial), rows, names, keys)
     return hosted(group, kind)
 
 
@@ -117,7 +122,7 @@ class _Given(NamedTuple):
 def _inputs(trial: Trial) -> Iterator[tuple[_Given, Callable[[Sent], None]]]:
     """What the robots are given, tick by tick, and whom to show what they sent."""
     key = draws.derive_key("inputs", trial.seed)
-    body, ether = load_body(trial.body), _Ether(key)
+    body, ether = _body(trial), _Ether(key)
     for tick in range(trial.ticks):
         rows = np.flatnonzero(_uniform(key, tick, "drop-out", (trial.robots,)) >= DROP_OUT)
         time_ns = tick_start_ns(tick, RATE_HZ)
@@ -143,6 +148,21 @@ def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatA
     if "positioning" in body.senses:
         for axis in ("x_m", "y_m"):
             fields[f"positioning.{axis}"] = _uniform(key, tick, axis, (n,)) * 4.0 - 2.0
+    if "imu" in body.senses:
+        for name in ("forward_mps2", "left_mps2", "turn_radps"):
+            fields[f"imu.{name}"] = _uniform(key, tick, name, (n,)) * 2.0 - 1.0
+    if "battery" in body.senses:
+        charge = _uniform(key, tick, "battery", (n,))
+        fields["battery.charge"], fields["battery.voltage_v"] = charge, 3.4 + 0.8 * charge
+    for name, sheet in body.senses.items():
+        if isinstance(sheet, OwnSheet):
+            for field, width in sheet.fields.items():
+                fields[f"{name}.{field}"] = _uniform(key, tick, f"{name}.{field}", (n, width) if width else (n,))
+    if body.infrared is not None:
+        value = _uniform(key, tick, "infrared", (n, len(body.infrared.angles_deg)))
+        fields["infrared.value"] = np.maximum(value * 2.0 - 1.0, 0.0)
+    if body.scan is not None:
+        fields["scan.range_m"] = _uniform(key, tick, "scan", (n, body.scan.rays)) * body.scan.range_m
     return fields
 
 
@@ -167,6 +187,8 @@ def _assert_same(first: Actions, second: Actions, text: str) -> None:
         raise AssertionError(f"{text}: states\n{_states(first)}\n{_states(second)}")
     if _leds(first) != _leds(second):
         raise AssertionError(f"{text}: leds\n{_leds(first)}\n{_leds(second)}")
+    if _actuations(first) != _actuations(second):
+        raise AssertionError(f"{text}: actuators\n{_actuations(first)}\n{_actuations(second)}")
     if _packets(first.sent) != _packets(second.sent):
         raise AssertionError(f"{text}: packets\n{_packets(first.sent)}\n{_packets(second.sent)}")
 
@@ -180,6 +202,12 @@ def _leds(actions: Actions) -> dict[tuple[int, int], int]:
     """The colours that LEDs were switched to, by robot and LED."""
     rows, which, rgb = actions.leds.rows.tolist(), actions.leds.which.tolist(), actions.leds.rgb.tolist()
     return dict(zip(zip(rows, which, strict=True), rgb, strict=True))
+
+
+def _actuations(actions: Actions) -> dict[tuple[int, int], float]:
+    """What own actuators were set to, by robot and place."""
+    rows, place, value = actions.own.rows.tolist(), actions.own.place.tolist(), actions.own.value.tolist()
+    return dict(zip(zip(rows, place, strict=True), value, strict=True))
 
 
 def _packets(sent: Sent) -> list[tuple[int, int, int, bytes]]:

@@ -3,8 +3,10 @@
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from swarmwire.agent.packet import NotDeclared, Packets
+from swarmwire.comms.actuations import NO_ACTUATIONS, Actuations
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
 from swarmwire.comms.body import NotFitted
@@ -47,12 +49,19 @@ class Turn:
         self._states: dict[str, int] = {}  # that were named in this tick, by code
         self._state: IntArray | None = None  # (n,) codes; -1: none named
         self._leds: IntArray | None = None  # (n, leds) colours; NOT_SWITCHED: none given in this tick
+        self._own: FloatArray | None = None  # (n, numbers of all own actuators); NaN: not set in this tick
         self._packets: dict[type[Message], Packets[Any]] = {}
 
     def field(self, sense: str, name: str) -> FloatArray:
         """A field of a sense, (n, …); NotDeclared if the agent's needs do not name the sense."""
         self._require(sense)
         return self.senses.fields[f"{sense}.{name}"]
+
+    def fields(self, sense: str) -> dict[str, FloatArray]:
+        """All fields of a sense, (n, …) each, by name; NotDeclared if the agent's needs do not name the sense."""
+        self._require(sense)
+        of = f"{sense}."
+        return {name.removeprefix(of): values for name, values in self.senses.fields.items() if name.startswith(of)}
 
     @property
     def outcomes(self) -> Outcomes:
@@ -113,11 +122,35 @@ class Turn:
             self._leds = np.full((self.n, body.led_count), NOT_SWITCHED)
         return self._leds if which is None else self._leds[:, which : which + 1]
 
+    def actuate(self, name: str, values: ArrayLike, rows: IntArray | BoolArray | slice) -> None:
+        """Set an actuator of the user's own of some of the robots to numbers (rows, width), or what goes for all.
+
+        NotFitted if the body has none of this name, ValueError if the numbers do not fit or are not finite.
+        """
+        body = self.group.body
+        if name not in body.actuators:
+            has = ", ".join(body.actuators) or "none"
+            raise NotFitted(f"the body {body.name} has no actuator {name!r} of its own: it has {has}")
+        given, width = np.asarray(values, np.float64), body.actuators[name].width
+        if not np.isfinite(given).all():
+            raise ValueError(f"actuate({name!r}, …): expected finite numbers, got {values!r}")
+        if self._own is None:
+            self._own = np.full((self.n, sum(sheet.width for sheet in body.actuators.values())), np.nan)
+        of = self._own[:, body.actuator_places[name]]
+        shape = of[rows].shape
+        if given.ndim == 1 and width == 1:
+            given = given[:, None]  # (n,) is one number for each robot
+        if given.ndim > 2 or (given.ndim and given.shape[-1] != width) or (given.ndim == 2 and len(given) != shape[0]):
+            raise ValueError(f"actuate({name!r}, …): expected {width} numbers, got the shape {np.shape(values)}")
+        of[rows] = given
+
     def actions(self) -> Actions:
         """What the robots did."""
         sent = Sent.joined(self._outbox)
         command = self.linear_mps, self.angular_radps, self.lateral_mps
-        return Actions(self.senses.rows, self.drive, *command, sent, self._notes(), self._led_changes())
+        return Actions(
+            self.senses.rows, self.drive, *command, sent, self._notes(), self._led_changes(), self._actuations()
+        )
 
     def _require(self, need: str) -> None:
         if need not in self.needs:
@@ -128,6 +161,12 @@ class Turn:
             return NO_LED_CHANGES
         place, which = np.nonzero(self._leds != NOT_SWITCHED)
         return LedChanges(self.senses.rows[place], which, self._leds[place, which])
+
+    def _actuations(self) -> Actuations:
+        if self._own is None:
+            return NO_ACTUATIONS
+        at, place = np.nonzero(~np.isnan(self._own))
+        return Actuations(self.senses.rows[at], place, self._own[at, place])
 
     def _notes(self) -> Notes:
         if self._state is None:

@@ -5,22 +5,26 @@ A sheet with `like = "epuck"` starts from that body's sheet, table by table, and
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from swarmwire.comms.actuator_sheet import ActuatorSheet, actuator_sheet
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.drives import DRIVES, Drive, Holonomic, Twist, Wheels
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.leds import Leds
 from swarmwire.comms.parameters import parameter
-from swarmwire.comms.sheets import SHEETS, Compass, Light, Odometry, Proximity, Sheet
+from swarmwire.comms.sheets import SHEETS, Compass, Infrared, Light, Odometry, OwnSheet, Proximity, Scan, Sheet
+from swarmwire.comms.sheets.own import own_sheet
 from swarmwire.comms.tables import built, mapping_of
 
 S = TypeVar("S", bound=Sheet)
+HERE = Path()
 
 
 class NotFitted(AttributeError):
@@ -41,6 +45,7 @@ class Body:
     contacts: bool = parameter(True, help="whether others and obstacles stop it; false: it passes through them")
     leds: Leds | None = None
     senses: dict[str, Sheet] = field(default_factory=dict[str, Sheet])
+    actuators: dict[str, ActuatorSheet] = field(default_factory=dict[str, ActuatorSheet])  # of the user's own
 
     @cached_property
     def proximity(self) -> Proximity | None:
@@ -61,6 +66,26 @@ class Body:
     def light(self) -> Light | None:
         """The photocells' sheet."""
         return self._sheet(Light)
+
+    @cached_property
+    def infrared(self) -> Infrared | None:
+        """The passive infrared sensor's sheet."""
+        return self._sheet(Infrared)
+
+    @cached_property
+    def scan(self) -> Scan | None:
+        """The laser scanner's sheet."""
+        return self._sheet(Scan)
+
+    @cached_property
+    def actuator_places(self) -> dict[str, slice]:
+        """Where the numbers of each own actuator stand among those of all of them, by its name."""
+        places: dict[str, slice] = {}
+        start = 0
+        for name, sheet in self.actuators.items():
+            places[name] = slice(start, start + sheet.width)
+            start += sheet.width
+        return places
 
     def _sheet(self, kind: type[S]) -> S | None:
         return next((sheet for sheet in self.senses.values() if isinstance(sheet, kind)), None)
@@ -92,6 +117,13 @@ class Body:
         """The fastest it can turn on the spot."""
         return self.drive.max_angular_radps
 
+    @property
+    def told(self) -> "Body":
+        """The body as agents know it: without the keys of own senses and actuators, which may tell of the arena."""
+        senses = {n: replace(s, params={}) if isinstance(s, OwnSheet) else s for n, s in self.senses.items()}
+        actuators = {name: replace(sheet, params={}) for name, sheet in self.actuators.items()}
+        return replace(self, senses=senses, actuators=actuators)
+
     def as_mapping(self) -> dict[str, Any]:
         """The sheet as `body_from` reads it back."""
         return asdict(self)
@@ -107,24 +139,41 @@ def load_body(name: str) -> Body:
     return body_from(_shipped(name, "", "body"), where=f"{name}.toml")
 
 
-def body_from(sheet: Mapping[str, Any], where: str) -> Body:
-    """The body of a data sheet; BadInput names `where` and the key of what is wrong."""
+def body_from(sheet: Mapping[str, Any], where: str, beside: Path = HERE) -> Body:
+    """The body of a data sheet; BadInput names `where` and the key of what is wrong.
+
+    Files of the user's own senses and actuators lie in the folder `beside`.
+    """
     like, rest = sheet.get("like"), {key: value for key, value in sheet.items() if key != "like"}
     if like is not None:
         base = _shipped(like, where, "like")
         if _kind_of(rest, _kind_of(base)) != _kind_of(base):
             base.pop("drive", None)  # of another kind: its limits have other names
-        return body_from(_merged(base, rest), where)
+        return body_from(_merged(base, rest), where, beside)
     senses = mapping_of(where, "senses", rest.pop("senses", {}))
-    unknown = [name for name in senses if name not in SHEETS]
-    if unknown:
-        raise BadInput(where, f"senses.{unknown[0]}", f"unknown sense; expected one of {', '.join(SHEETS)}")
-    rest["senses"] = {name: built(SHEETS[name], value, where, f"senses.{name}") for name, value in senses.items()}
+    rest["senses"] = {name: _sense(name, table, where, beside) for name, table in senses.items()}
+    actuators = mapping_of(where, "actuators", rest.pop("actuators", {}))
+    rest["actuators"] = {name: actuator_sheet(name, table, where, beside) for name, table in actuators.items()}
     if "drive" in rest:
         rest["drive"] = _drive(rest["drive"], where)
     if rest.get("leds") is not None:  # None: a sheet written down as a mapping
         rest["leds"] = built(Leds, rest["leds"], where, "leds")
-    return built(Body, rest, where, "")
+    body: Body = built(Body, rest, where, "")
+    for name, sheet_of in body.senses.items():
+        fault = sheet_of.fault(body.radius_m)
+        if fault:
+            raise BadInput(where, f"senses.{name}.{fault[0]}", fault[1])
+    return body
+
+
+def _sense(name: str, table: object, where: str, beside: Path) -> Sheet:
+    key = f"senses.{name}"
+    if name in SHEETS:
+        return built(SHEETS[name], table, where, key)
+    if "kind" not in mapping_of(where, key, table) or not name.isidentifier():
+        expected = f'expected one of {", ".join(SHEETS)}, or a kind = "file.py:Class" of your own'
+        raise BadInput(where, key, f"unknown sense; {expected}")
+    return own_sheet(table, where, key, beside)
 
 
 def _kind_of(sheet: Mapping[str, Any], otherwise: object = "wheels") -> object:

@@ -75,3 +75,13 @@ def shade_at(ground, x, y):
     elif not (0.0 <= right <= 1.0 and 0.0 <= down <= 1.0):
         return ground.shade
     return ground.grey[min(int(down * rows), rows - 1), min(int(right * columns), columns - 1)] / 255.0
+
+
+@njit(cache=True)
+def shades_over(ground: Ground, x: FloatArray, y: FloatArray) -> FloatArray:
+    """The shade at every x with every y in m, (len(y), len(x)): a picture of the floor."""
+    shades = np.empty((len(y), len(x)))
+    for j in range(len(y)):
+        for i in range(len(x)):
+            shades[j, i] = shade_at(ground, x[i], y[j])
+    return shades

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from swarmwire.comms.actuations import NO_ACTUATIONS, Actuations
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
 from swarmwire.comms.notes import Notes
@@ -33,6 +34,7 @@ class Actions:
     sent: Sent = field(default_factory=Sent.none)
     notes: Notes = field(default_factory=Notes.none)
     leds: LedChanges = NO_LED_CHANGES
+    own: Actuations = NO_ACTUATIONS  # of actuators of the user's own
 
     @classmethod
     def joined(cls, parts: "list[Actions]") -> "Actions":
@@ -52,4 +54,5 @@ class Actions:
             Sent.joined([part.sent for part in parts]),
             Notes.joined([part.notes for part in parts]),
             LedChanges.joined([part.leds for part in parts]),
+            Actuations.joined([part.own for part in parts]),
         )

@@ -29,7 +29,7 @@ def built(kind: type[Any], value: object, where: str, key: str) -> Any:
         if name in given:
             made[name] = _value(hints[name], given[name], where, _join(key, name))
             limits = limits_of(of)
-            fault = fault_of(made[name], limits) if isinstance(made[name], float) else None
+            fault = fault_of(made[name], limits) if isinstance(made[name], float | int) else None
             if limits.choices and made[name] not in limits.choices:
                 fault = f"expected one of {', '.join(limits.choices)}; got {made[name]!r}"
             if fault:
@@ -48,10 +48,14 @@ def _value(hint: Any, value: object, where: str, key: str) -> Any:
         if not isfinite(value):
             raise BadInput(where, key, f"expected a finite number, got {value!r}")
         return float(value)
+    if hint is int and type(value) is not int:
+        raise BadInput(where, key, f"expected a whole number, got {value!r}")
     if get_origin(hint) is tuple:
         if not isinstance(value, list | tuple) or not value:
             raise BadInput(where, key, f"expected a list, got {value!r}")
         items = cast("list[object]", value)
+        if get_args(hint)[-1] is not Ellipsis and len(items) != len(get_args(hint)):
+            raise BadInput(where, key, f"expected {len(get_args(hint))} values, got {value!r}")
         return tuple(_value(get_args(hint)[0], item, where, f"{key}[{i}]") for i, item in enumerate(items))
     if hint is str and not isinstance(value, str):
         raise BadInput(where, key, f"expected a text, got {value!r}")

@@ -191,9 +191,9 @@ class Tally:
 class Happened:
     """An event that began in this tick, or one that ended after its time."""
 
-    serial: int  # its place in the scenario
+    serial: int  # its place in the scenario; -1: it is not of the scenario's making
     at_s: float  # when the scenario lets it begin
-    do: str  # the action
+    do: str  # the action, or run_down: batteries are empty
     ended: bool
     changed: BoolArray  # (rows,) the robots for which it made a difference
 

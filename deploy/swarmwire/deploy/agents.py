@@ -5,8 +5,8 @@ from pathlib import Path
 
 from swarmwire.agent.declared import BadParameter, checked
 from swarmwire.agent.loading import AgentClass, NoAgent, load_agent, resolve
-from swarmwire.comms.body import load_body
 from swarmwire.comms.errors import BadInput
+from swarmwire.world.bodies import bodies_of
 from swarmwire.world.scenario import Scenario
 
 
@@ -30,7 +30,7 @@ def _checked(scenario: Scenario, name: str, spec: str) -> AgentClass:
         raise BadInput(where, f"robots.{name}.agent", str(error)) from error
     except BadParameter as error:
         raise BadInput(where, f"robots.{name}.params.{error.key}", error.expected) from error
-    body = load_body(group.body)
+    body = bodies_of(scenario, where)[name]
     of_radio = scenario.radio.tells if scenario.radio else ()
     for need in kind.needs:
         if need.startswith("radio."):

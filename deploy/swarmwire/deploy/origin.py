@@ -4,7 +4,7 @@ A run that is killed leaves no summary; what stands here is enough to run it aga
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -33,13 +33,13 @@ class Origin:
     cpu: str
     versions: Mapping[str, str]
 
-    def changes(self, folder: Path, agents: Mapping[str, str]) -> list[str]:
-        """What is not as it was when the run of this folder began, a line each; `agents` are their specs by group."""
+    def changes(self, folder: Path, code: Sequence[str]) -> list[str]:
+        """What is not as it was when the run of this folder began, a line each; `code`: specs of users' classes."""
         versions = machine.versions()
         changed = [name for name in self.versions if self.versions[name] != versions.get(name)]
         return [
             *changed_files(self.files, folder),
-            *changed_modules(self.modules, module_digests(agents.values())),
+            *changed_modules(self.modules, module_digests(code)),
             *(f"{name} is {versions.get(name, 'not there')}; it was {self.versions[name]}" for name in changed),
             *([f"the CPU is {machine.cpu()}; it was {self.cpu}"] if machine.cpu() != self.cpu else []),
         ]
@@ -47,7 +47,7 @@ class Origin:
 
 def origin_of(
     scenario: Scenario,
-    agents: Mapping[str, str],
+    code: Sequence[str],
     *,
     seeds: tuple[int, ...],
     ticks: int,
@@ -55,14 +55,17 @@ def origin_of(
     realtime: float | None,
     folder: Path | None,
 ) -> Origin:
-    """The origin of a run that is about to begin; put into its run folder, if it has one, with the copied files."""
+    """The origin of a run that is about to begin; put into its run folder, if it has one, with the copied files.
+
+    `code` are the specs of users' classes.
+    """
     origin = Origin(
         seeds=seeds,
         ticks=ticks,
         runners=runners,
         realtime=realtime,
         files=copy_scenario(scenario, seeds, folder) if folder else (),
-        modules=module_digests(agents.values()),
+        modules=module_digests(code),
         cpu=machine.cpu(),
         versions=machine.versions(),
     )

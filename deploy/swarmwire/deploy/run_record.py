@@ -1,7 +1,7 @@
 """What a run leaves behind: its folder, from the scenario and the first line of the log to the summary."""
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
@@ -64,7 +64,7 @@ class RunRecord:
     def begin(
         self,
         scenario: Scenario,
-        agents: Mapping[str, str],
+        code: Sequence[str],
         seeds: tuple[int, ...],
         *,
         ticks: int,
@@ -73,7 +73,7 @@ class RunRecord:
     ) -> Origin:
         """Put into the folder all that the run is made from; what that is."""
         origin = origin_of(
-            scenario, agents, seeds=seeds, ticks=ticks, runners=runners, realtime=realtime, folder=self.folder
+            scenario, code, seeds=seeds, ticks=ticks, runners=runners, realtime=realtime, folder=self.folder
         )
         what = f"{scenario.name}, seeds {list(seeds)}, {ticks} ticks, {runners} runners"
         self.note(f"swarmwire {version('swarmwire-deploy')}: {what}")

@@ -31,6 +31,7 @@ from swarmwire.deploy.run_record import RunRecord
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.radio_tally import RadioTally
+from swarmwire.world.bodies import own_code
 from swarmwire.world.loop import Loop
 from swarmwire.world.pace import Pace
 from swarmwire.world.realtime_crew import PacedCrew, RealTimeCrew
@@ -62,6 +63,7 @@ class Simulation:
         ticks: of the whole run.
         runners: processes that run the agents; 0: none, they are in this one.
         agents: the spec of each group's agent.
+        code: the specs of all classes of users': agents, own senses and actuators.
         inputs: of a run that is repeated, what came into it from outside.
         interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
         controls: pause, step, speed and end of `run`, for other threads.
@@ -91,6 +93,7 @@ class Simulation:
         self.agents = agent_specs(self.scenario)
         needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
         self.world = World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
+        self.code = tuple(dict.fromkeys([*self.agents.values(), *own_code(self.world.static)]))
         self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else _ticks(self.scenario)
         self.inputs = replay.inputs if replay else None
@@ -163,7 +166,7 @@ class Simulation:
             raise RuntimeError("a simulation runs once; make another one")
         rows, realtime = self.static.arenas * self.static.robots, self._pace.factor if self._pace else None
         self._origin = self._record.begin(
-            self.scenario, self.agents, self.static.seeds, ticks=self.ticks, runners=self.runners, realtime=realtime
+            self.scenario, self.code, self.static.seeds, ticks=self.ticks, runners=self.runners, realtime=realtime
         )
         with ExitStack() as stack:
             stack.push(self._record.failed_to_start)

@@ -13,6 +13,7 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx.util.typing import ExtensionMetadata
 
 from reference import array_names, docstrings, field_comments
+from reference.actuators import drive_tables, led_table
 from reference.behaviours import behaviour_table
 from reference.bodies import body_sources, body_table
 from reference.commands import command_tables
@@ -29,10 +30,12 @@ TABLES: dict[str, Callable[..., str]] = {
     "bodies": body_table,
     "body-sources": body_sources,
     "commands": command_tables,
+    "drives": drive_tables,
     "events": event_tables,
     "fates": fate_table,
     "fields": field_table,
     "keys": key_tables,
+    "leds": led_table,
     "metric-details": metric_details,
     "metrics": metric_table,
     "preset-sources": preset_sources,

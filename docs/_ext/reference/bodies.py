@@ -47,6 +47,10 @@ def _of(sheet: Any, prefix: str, skipped: tuple[str, ...] = ()) -> Iterator[Figu
 
 
 def _value(value: object) -> str:
+    if value is None:
+        return NOTHING
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if isinstance(value, tuple):
         return _ring(cast("tuple[float, ...]", value))
     return number(value) if isinstance(value, int | float) else str(value)

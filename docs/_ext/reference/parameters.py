@@ -23,7 +23,7 @@ def parameter_rows(kind: type[Any], prefix: str = "") -> list[tuple[str, str, st
 def _default(of: "Field[Any]") -> str:
     if of.default is MISSING:
         return "required" if of.default_factory is MISSING else NOTHING
-    return toml_code(of.default)
+    return NOTHING if is_dataclass(of.default) else toml_code(of.default)  # keys of a table have their own
 
 
 def _allowed(limits: Limits) -> str:

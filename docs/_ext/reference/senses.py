@@ -1,17 +1,21 @@
 """The senses that a body may have: what a data sheet says of each."""
 
+from dataclasses import fields
 from inspect import getdoc
 
 from reference.markdown import code, sentence, table
 from reference.parameters import HEAD, parameter_rows
-from swarmwire.comms.sheets import SHEETS
+from swarmwire.comms.sheets import SHEETS, RangedSheet, Sheet
 
 
 def sense_tables() -> str:
-    """Every sense, what it is, and the keys of its table in a body's data sheet."""
-    parts: list[str] = []
+    """The keys that all senses share; then every sense, what it is, and its own keys in a body's data sheet."""
+    shared = [code(of.name) for of in fields(RangedSheet)]
+    parts = ["Keys that every sense has:\n", table(HEAD, parameter_rows(Sheet))]
+    parts += ["And every sense with a range:\n", table(HEAD, parameter_rows(RangedSheet)[len(fields(Sheet)) :])]
     for name, kind in SHEETS.items():
-        rows = parameter_rows(kind)
-        parts.append(f"{code(f'[senses.{name}]')}: {sentence(getdoc(kind) or '')}\n")
-        parts.append(table(HEAD, rows) if rows else "It has no keys.\n")
+        rows = [row for row in parameter_rows(kind) if row[0] not in shared]
+        ranged = " It has a range." if issubclass(kind, RangedSheet) else ""
+        parts.append(f"{code(f'[senses.{name}]')}: {sentence(getdoc(kind) or '')}{ranged}\n")
+        parts.append(table(HEAD, rows) if rows else "It has no keys of its own.\n")
     return "\n".join(parts)

@@ -40,6 +40,7 @@ class DistanceCounts:
 
     def __init__(self, static: Static) -> None:
         self._static = static
+        self._wrap_m = static.arena_size_m if static.boundary == "torus" else (0.0, 0.0)
         across_m = math.hypot(*static.arena_size_m)
         range_m = across_m if static.range_m is None else static.range_m
         self.width_m = bin_width_m(min(max(range_m, across_m / RANGES_ACROSS), across_m))
@@ -55,7 +56,7 @@ class DistanceCounts:
         """Add what a tick brought."""
         shape = self._static.arenas, self._static.robots
         x_m, y_m = truth.pose[:, 0].reshape(shape), truth.pose[:, 1].reshape(shape)
-        self._places[truth.tick] = Places(x_m, y_m, truth.alive.reshape(shape))
+        self._places[truth.tick] = Places(x_m, y_m, truth.alive.reshape(shape), self._wrap_m)
         self._places.pop(truth.tick - int(POSES_KEPT_S * self._static.rate_hz) - 1, None)
         if truth.departed is not None and truth.finished is not None:
             self._add_intended(truth.departed)
@@ -104,11 +105,15 @@ class Places:
     x_m: FloatArray  # (arenas, robots)
     y_m: FloatArray  # (arenas, robots)
     alive: BoolArray  # (arenas, robots)
+    wrap_m: tuple[float, float]  # the sides of a torus, else 0
 
     def apart_m(self, arena: IntArray, a: IntArray, b: IntArray) -> FloatArray:
         """Distances between robots a and b of arenas, in the shape that the three come to together."""
         along_m = self.x_m[arena, b] - self.x_m[arena, a]
         across_m = self.y_m[arena, b] - self.y_m[arena, a]
+        if self.wrap_m[0]:
+            along_m -= self.wrap_m[0] * np.floor(along_m / self.wrap_m[0] + 0.5)
+            across_m -= self.wrap_m[1] * np.floor(across_m / self.wrap_m[1] + 0.5)
         return np.sqrt(along_m * along_m + across_m * across_m)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.shortest import shortest
 
 
 def light_distance(static: Static) -> Callable[[Moment], FloatArray] | None:
@@ -22,7 +23,8 @@ def light_distance(static: Static) -> Callable[[Moment], FloatArray] | None:
         at_m[arena, : len(own)] = np.array([(light.x_m, light.y_m) for light in own]).reshape(-1, 2)
 
     def measure(moment: Moment) -> FloatArray:
-        away = moment.position_m[:, :, None, :] - at_m[:, None, :, :]  # (arenas, robots, lights, 2)
+        # (arenas, robots, lights, 2)
+        away = shortest(moment.position_m[:, :, None, :] - at_m[:, None, :, :], static)
         return np.min(np.hypot(away[..., 0], away[..., 1]), axis=2, initial=np.inf)
 
     return measure

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.geometry import to_nearest
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -30,22 +31,25 @@ class MinGap(Metric):
         """A fresh measure; what it remembers only makes it quick."""
         radius_m = np.concatenate([np.full(g.stop - g.start, g.body.radius_m) for g in static.groups])
         order: IntArray | None = None
+        wrap_m = static.arena_size_m if static.boundary == "torus" else (0.0, 0.0)
 
         def measure(moment: Moment) -> FloatArray:
             nonlocal order
             if order is None:
                 order = np.argsort(moment.position_m[:, :, 0], axis=1)
-            return smallest_gap_m(moment.truth.pose, radius_m, moment.truth.alive, order)
+            return smallest_gap_m(moment.truth.pose, radius_m, moment.truth.alive, order, wrap_m)
 
         return measure
 
 
 @njit(cache=True)
-def smallest_gap_m(pose: FloatArray, radius_m: FloatArray, alive: BoolArray, order: IntArray) -> FloatArray:
+def smallest_gap_m(
+    pose: FloatArray, radius_m: FloatArray, alive: BoolArray, order: IntArray, wrap_m: tuple[float, float] = (0.0, 0.0)
+) -> FloatArray:
     """The smallest gap of each arena, (arenas,), between discs alive at `pose` (rows, 3); NaN with less than two.
 
     A sweep along x. `order` (arenas, robots), some order of each arena's robots, is sorted by x in place: if it is that
-    of the tick before, few have to change places.
+    of the tick before, few have to change places. `wrap_m` are the sides of a torus, 0 where an arena ends.
     """
     arenas, robots = order.shape
     gap_m = np.full(arenas, np.inf)
@@ -60,11 +64,15 @@ def smallest_gap_m(pose: FloatArray, radius_m: FloatArray, alive: BoolArray, ord
                 n += 1
         best_m = np.inf
         for a in range(n):
-            for b in range(a + 1, n):
+            for after in range(a + 1, a + n if wrap_m[0] > 0.0 else n):  # a torus goes on after the last
+                b = after if after < n else after - n
                 along_m, near_m = x[b] - x[a], best_m + radius[a] + radius[b]
+                if after >= n:
+                    along_m += wrap_m[0]
                 if along_m > best_m + radius[a] + largest_m:
                     break
                 across_m = y[b] - y[a]
+                across_m += to_nearest(across_m, wrap_m[1])
                 square = along_m * along_m + across_m * across_m
                 if near_m > 0.0 and square < near_m * near_m:
                     best_m = np.sqrt(square) - max(radius[a], radius[b]) - min(radius[a], radius[b])

@@ -1,4 +1,4 @@
-"""The arena of a recording: boundary, obstacles and lights once; robots, radio links and lost packets per tick."""
+"""The arena of a recording: boundary, obstacles, lights once; robots, their LEDs, links and lost packets per tick."""
 
 from typing import Any
 
@@ -7,9 +7,12 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.truth import Obstacle, Static, Truth
 from swarmwire.metrics.rerun_colors import LIGHT, WALL
+from swarmwire.metrics.rerun_floor import log_floor
+from swarmwire.metrics.rerun_leds import RerunLeds
 from swarmwire.metrics.rerun_lost import begin_lost, log_lost
 from swarmwire.metrics.rerun_robots import RerunRobots
 from swarmwire.metrics.rerun_selected import RerunSelected
+from swarmwire.metrics.shortest import link_lines
 
 LINKS_EVERY_TICK_UP_TO = 200  # robots; links are most of a recording's bytes and time
 THINNED_LINKS_EVERY_TICKS = 10
@@ -29,6 +32,7 @@ class RerunArena:
         self._static, self._arena = static, arena
         self._rows = slice(arena * static.robots, (arena + 1) * static.robots)
         self._robots = RerunRobots(static)
+        self._leds = RerunLeds(static)
         self._selected = RerunSelected(static, arena, selected, self._robots.radius_m, self._robots.heading_m)
         self.links_every_ticks = 1 if static.robots <= LINKS_EVERY_TICK_UP_TO else THINNED_LINKS_EVERY_TICKS
 
@@ -37,6 +41,7 @@ class RerunArena:
         import rerun as rr
 
         rec.log("world", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
+        log_floor(rec, self._static)
         self._log_fixed(rec)
         links = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(0.5), colors=_LINK_COLOR, draw_order=_LINKS)
         rec.log("world/links", links, static=True)
@@ -48,6 +53,7 @@ class RerunArena:
         """Log one tick."""
         full = truth.tick % self.links_every_ticks == 0
         self._robots.log(rec, truth, self._rows, trails=full)
+        self._leds.log(rec, truth.leds[self._rows], truth.pose[self._rows])
         self._selected.log(rec, truth, full=full)
         if truth.movable is not None:
             self._log_movable(rec, truth.movable[self._arena])
@@ -65,7 +71,8 @@ class RerunArena:
 
         if truth.edges is not None:
             ends = self._edges(truth.edges)
-            rec.log("world/links", rr.LineStrips2D.from_fields(strips=position_m[ends].astype(np.float32)))
+            lines = link_lines(position_m, ends, self._static)
+            rec.log("world/links", rr.LineStrips2D.from_fields(strips=lines.astype(np.float32)))
         if truth.finished is not None:
             log_lost(rec, truth.finished, self._arena, position_m)
 

@@ -16,7 +16,7 @@ from swarmwire.metrics.record.packet_columns import packet_schema
 from swarmwire.metrics.record.part_files import parts_of, table_file
 from swarmwire.metrics.record.robot_totals import robot_totals_schema
 from swarmwire.metrics.record.static_file import read_static
-from swarmwire.metrics.record.tick_columns import MOVABLE, ROBOT_COLUMNS
+from swarmwire.metrics.record.tick_columns import movable_columns, robot_columns
 
 if TYPE_CHECKING:
     import polars as pl
@@ -72,10 +72,10 @@ class RunFolder:
         """A row per tick and arena, of one arena or of all; lists with an item per robot in its order.
 
         Columns: tick, time_s, arena, seed; lists x_m, y_m, heading_rad, vx_mps, vy_mps, turn_radps (arena frame),
-        command_forward_mps, command_turn_radps (as applied), all float32, alive, state ("": none named); if obstacles
-        are movable, lists movable_x_m, movable_y_m, movable_heading_rad with an item for each of them in the scenario's
-        order; each metric (a count's total so far; null: undefined); sent, heard, in_range since the tick before (null
-        without a radio).
+        command_forward_mps, command_turn_radps (as applied) and, if a robot can move sideways, command_left_mps, all
+        float32, alive, state ("": none named); if obstacles are movable, lists movable_x_m, movable_y_m,
+        movable_heading_rad with an item for each of them in the scenario's order; each metric (a count's total so far;
+        null: undefined); sent, heard, in_range since the tick before (null without a radio).
         """
         return self._read("ticks", arena)
 
@@ -93,14 +93,14 @@ class RunFolder:
                 *(ticks[name].gather(_repeated(len(ticks), static.robots)) for name in ("tick", "time_s")),
                 names.gather(index).alias("robot"),
                 groups.gather(index).alias("group"),
-                *(ticks[name].explode() for name in ROBOT_COLUMNS),
+                *(ticks[name].explode() for name in robot_columns(static)),
             ]
         )
 
     def metrics(self, arena: int = 0) -> "pl.DataFrame":
         """A row per tick of one arena: tick, time_s, each metric, and the radio's counts."""
-        movable = MOVABLE if self.static.movable else ()
-        return self._read("ticks", self._checked(arena), [*ROBOT_COLUMNS, *movable, "arena", "seed"])
+        lists = (*robot_columns(self.static), *movable_columns(self.static))
+        return self._read("ticks", self._checked(arena), [*lists, "arena", "seed"])
 
     def packets(self, arena: int | None = None) -> "pl.DataFrame":
         """A row per (packet, receiver within reach), of one arena or of all; BadInput if none were recorded.

@@ -33,7 +33,7 @@ def table_fault(name: str, table: "pl.LazyFrame", static: Static | None) -> str 
 def _schema(name: str, static: Static | None) -> "dict[str, Any]":
     if name in SCHEMAS:
         return SCHEMAS[name]()
-    return {} if static is None else tick_schema(static.robots, (), static.movable)
+    return {} if static is None else tick_schema(static, ())
 
 
 def _type_fault(there: "pl.Schema", expected: "dict[str, Any]", may_lack: tuple[str, ...]) -> str | None:

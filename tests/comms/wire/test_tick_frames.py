@@ -9,8 +9,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
+from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.led_changes import LedChanges
 from swarmwire.comms.notes import Notes
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
@@ -139,6 +141,36 @@ def refused(**changes: Any) -> None:
     assert caught.value.fault == "malformed"
 
 
+ACTUATED = Actuations(np.array([4, 4, 9]), np.array([0, 3, 1]), np.array([0.5, -2.0, 1e300]))
+
+
+def test_own_actuators_come_over_whole() -> None:
+    frame = frames.decode(encode_actions(0, replace(sound(), own=ACTUATED)))
+    got = decode_actions(frame, ROWS).own
+    assert all(same(getattr(got, name), getattr(ACTUATED, name)) for name in ("rows", "place", "value"))
+    assert not len(decode_actions(frames.decode(encode_actions(0, sound())), ROWS).own)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"own": np.array([[4, 4, 8], [0, 3, 1]])},  # another runner's robot
+        {"own": np.array([[4, 4, 9], [0, -1, 1]])},
+        {"own": np.array([[4, 9], [0, 1]])},
+        {"own": np.array([[4.0, 4.0, 9.0], [0.0, 3.0, 1.0]])},
+        {"own/value": np.array([0.5, np.nan, 1.0])},
+        {"own/value": np.array([0.5, np.inf, 1.0])},
+        {"own/value": np.array([1, 2, 3])},
+    ],
+    ids=repr,
+)
+def test_own_actuators_that_are_none_are_refused(wrong: Any) -> None:
+    frame = frames.decode(encode_actions(0, replace(sound(), own=ACTUATED)))
+    with pytest.raises(BadFrame) as caught:
+        decode_actions(replace(frame, arrays={**frame.arrays, **wrong}), ROWS)
+    assert caught.value.fault == "malformed"
+
+
 def test_actions_of_a_silent_runner_carry_no_packets() -> None:
     silent = frames.decode(encode_actions(0, replace(sound(), sent=Sent.none())))
     assert len(decode_actions(silent, ROWS).sent) == 0
@@ -211,6 +243,34 @@ def test_packets_without_any_sender_are_none() -> None:
     empty = {"sent": np.empty((2, 0), np.int64), "sent/offset": np.zeros(1, np.int64)}
     arrays = {**frame.arrays, **empty, "sent/data": np.empty(0, np.uint8)}
     assert len(decode_actions(replace(frame, arrays=arrays), ROWS).sent) == 0
+
+
+def switching(leds: LedChanges) -> frames.Frame:
+    return frames.decode(encode_actions(0, replace(sound(), leds=leds)))
+
+
+def test_switched_leds_come_over_whole_and_cost_nothing_otherwise() -> None:
+    leds = LedChanges(np.array([9, 4, 9]), np.array([0, 12, 7]), np.array([0xFFFFFF, 0, 0x123456]))
+    got = decode_actions(switching(leds), ROWS).leds
+    assert all(same(getattr(got, name), getattr(leds, name)) for name in ("rows", "which", "rgb"))
+    assert "leds" not in frames.decode(encode_actions(0, sound())).arrays
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        [[5], [0], [1]],  # another's robot
+        [[4], [-1], [1]],
+        [[4], [0], [-1]],
+        [[4], [0], [0x1000000]],
+        [[4], [0]],
+        [4, 0, 1],
+        [[4.0], [0.0], [1.0]],
+    ],
+    ids=repr,
+)
+def test_leds_that_are_none_are_refused(wrong: list[Any]) -> None:
+    refused(leds=np.array(wrong))
 
 
 def noting(rows: list[int], code: list[int], names: tuple[str, ...]) -> bytes:

@@ -121,6 +121,19 @@ def test_a_glimpse_comes_over_whole(glimpse):
     assert equal(decode_truth(frames.decode(encode_truth(glimpse)), SCENE), glimpse)
 
 
+def test_movable_obstacles_come_over_with_their_poses():
+    box = Obstacle("box", 0.0, 0.0, size_m=(0.2, 0.2), mass_kg=0.5)
+    scene = replace(SCENE, static=replace(STATIC, obstacles=((*OBSTACLES, box), (box,))))
+    assert decode_scene(frames.decode(encode_scene(scene))) == scene
+    glimpse = quiet(movable=np.arange(6.0).reshape(2, 1, 3))
+    assert equal(decode_truth(frames.decode(encode_truth(glimpse)), scene), glimpse)
+    with pytest.raises(BadFrame, match="movable"):
+        decode_truth(frames.decode(encode_truth(quiet())), scene)
+    uneven = replace(SCENE, static=replace(STATIC, obstacles=((*OBSTACLES, box), ())))
+    with pytest.raises(BadFrame, match="as many movable ones"):
+        decode_scene(frames.decode(encode_scene(uneven)))
+
+
 def test_a_scene_comes_over_whole():
     assert decode_scene(frames.decode(encode_scene(SCENE))) == SCENE
 

@@ -20,7 +20,7 @@ def whole(scenario: Scenario, static: Static, agents: Mapping[str, str]) -> Assi
             name=group.name,
             agent=agents[group.name],
             params=params_of(scenario.robots[group.name].params, rows % static.robots - group.start),
-            body=group.body,
+            body=group.body.told,
             rows=rows,
             robot_names=tuple(_name(static, int(row)) for row in rows),
             keys=keys.reshape(-1)[rows],

@@ -6,10 +6,11 @@ import numpy as np
 
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.radio_checks import check_radio, unfit_for_torus
-from swarmwire.comms.body import Body, load_body
+from swarmwire.comms.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
 from swarmwire.world.arena_tables import ObstacleTable
+from swarmwire.world.bodies import bodies_of
 from swarmwire.world.engines.choice import check_engines, engines_of
 from swarmwire.world.layout import read_layout
 from swarmwire.world.obstacles import extent, heading_of, obstacle_at
@@ -32,18 +33,7 @@ def check(scenario: Scenario, where: str) -> None:
         _check_torus(scenario, scenario.radio, where)
     _check_antennas(scenario, where)
     for i, event in enumerate(scenario.events):
-        _check_event(scenario, event, f"events.{i}", where)
-
-
-def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
-    """The body of each group, by the group's name."""
-    bodies: dict[str, Body] = {}
-    for group, table in scenario.robots.items():
-        try:
-            bodies[group] = load_body(table.body)
-        except BadInput as error:
-            raise BadInput(where, f"robots.{group}.body", error.expected) from None
-    return bodies
+        _check_event(scenario, bodies, event, f"events.{i}", where)
 
 
 def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> None:
@@ -88,12 +78,13 @@ def _check_antennas(scenario: Scenario, where: str) -> None:
             raise BadInput(where, f"robots.{group}.radio", f"expected a radio with signals: {why}")
 
 
-def _check_event(scenario: Scenario, event: Event, key: str, where: str) -> None:
+def _check_event(scenario: Scenario, bodies: dict[str, Body], event: Event, key: str, where: str) -> None:
     """An event names robots that there are, and fits the radio, if it needs one."""
     if event.needs_radio and scenario.radio is None:
         raise BadInput(where, f"{key}.do", f"expected a scenario with a [radio] for {event.do!r}")
     try:
         event.check(scenario.groups())
+        event.check_bodies(scenario.groups(), bodies)
         if event.needs_radio and scenario.radio is not None:
             event.check_radio(scenario.radio)
     except BadInput as error:

@@ -8,13 +8,15 @@ import numpy as np
 
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.arrays import KeyArray
-from swarmwire.comms.clock import to_ns
+from swarmwire.comms.arrays import BoolArray, KeyArray
+from swarmwire.comms.clock import to_ns, to_s
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.swarm import Swarm
 from swarmwire.comms.truth import Happened, Static
 from swarmwire.world.world import World
+
+RUN_DOWN = -1  # in place of an event's place in the scenario: batteries that are empty
 
 
 class Events:
@@ -28,6 +30,7 @@ class Events:
         self._swarm = Swarm(groups, static.robots, keys, np.zeros((rows, 3)))
         self._radio = self._tuned = radio
         self._conditions = Conditions(self._swarm.rows)
+        self._evolving: list[int] = []  # places in the scenario of events that go on changing things
         due = [(to_ns(event.at_s), True, serial) for serial, event in enumerate(events)]
         for (at_ns, _, serial), event in zip(tuple(due), events, strict=True):
             if event.lasts_s is not None:
@@ -37,12 +40,17 @@ class Events:
     def apply(self, start_ns: int, world: World, air: Air | None) -> tuple[Happened, ...]:
         """Let happen what is due by the start of a tick, in ns; world and air go on under what holds after that."""
         happened: list[Happened] = []
+        if world.batteries.any:  # first, so that who is revived in this tick is not found empty
+            happened.extend(self._run_down(start_ns, world.batteries.empty))
         self._swarm = replace(self._swarm, pose=world.pose)
         while self._coming and self._coming[0][0] <= start_ns:
             _, begins, serial = self._coming.popleft()
             happened.append(self._happen(serial, begins))
+        for serial in self._evolving:
+            happened.extend(self._go_on(serial, start_ns))
         if happened:
             world.live(self._conditions.alive)
+            world.fail(self._conditions.failed_parts)
             if air:
                 air.disrupt(self._conditions.disruption())
         if air and self._radio:
@@ -56,5 +64,22 @@ class Events:
 
     def _happen(self, serial: int, begins: bool) -> Happened:
         event, conditions = self._events[serial], self._conditions
+        if event.evolves:
+            self._evolving.append(serial)
         changed = event.begin(serial, self._swarm, conditions) if begins else event.end(serial, conditions)
         return Happened(serial, event.at_s, event.do, not begins, changed)
+
+    def _run_down(self, start_ns: int, empty: BoolArray) -> list[Happened]:
+        """Robots (rows,) whose battery is empty are dead, from the first tick on that begins so."""
+        known = self._conditions.kills.get(RUN_DOWN, np.zeros_like(empty))
+        fell = empty & ~known
+        if not fell.any():
+            return []
+        self._conditions.kills[RUN_DOWN] = known | fell
+        return [Happened(RUN_DOWN, to_s(start_ns), "run_down", False, fell)]
+
+    def _go_on(self, serial: int, start_ns: int) -> list[Happened]:
+        event = self._events[serial]
+        began, ended = event.go_on(serial, start_ns, self._swarm, self._conditions)
+        told = ((began, False), (ended, True))
+        return [Happened(serial, event.at_s, event.do, over, rows) for rows, over in told if rows.any()]

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
@@ -76,6 +77,7 @@ class RealTime(Roster[_Slot]):
         self._sent: list[Sent] = []
         self._notes: list[Notes] = []
         self._leds: list[LedChanges] = []
+        self._own: list[Actuations] = []
         self.late, self.watchdog_stops = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
         self.frames_dropped = self.packets_dropped = self.outcomes_dropped = 0
 
@@ -122,10 +124,10 @@ class RealTime(Roster[_Slot]):
         rows = np.arange(len(self._drive))
         linear_mps, angular_radps, lateral_mps = self._command
         sent, notes = Sent.joined(self._sent), self._latest_notes()
-        leds = LedChanges.joined(self._leds)
-        actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, notes, leds)
+        leds, own = LedChanges.joined(self._leds), Actuations.joined(self._own)
+        actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own)
         self._drive, self._command = np.zeros_like(self._drive), np.zeros_like(self._command)
-        self._sent, self._notes, self._leds = [], [], []
+        self._sent, self._notes, self._leds, self._own = [], [], [], []
         return actions
 
     def _acted(self, slot: _Slot, frame: Frame) -> None:
@@ -145,6 +147,7 @@ class RealTime(Roster[_Slot]):
         self._sent.append(actions.sent)
         self._notes.append(actions.notes)
         self._leds.append(actions.leds)
+        self._own.append(actions.own)
 
     def _catch_up(self, slot: _Slot) -> Sequence[bytes]:
         return ()  # the next tick is soon

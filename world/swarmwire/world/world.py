@@ -13,17 +13,25 @@ from swarmwire.comms.body import Body
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.ground import ground_of
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
+from swarmwire.comms.sheets import OwnSheet, Sheet
 from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
+from swarmwire.world.actuation.batteries import Batteries
+from swarmwire.world.actuation.own_actuators import OwnActuators
 from swarmwire.world.angles import wrapped
-from swarmwire.world.checks import bodies_of
+from swarmwire.world.bodies import bodies_of
 from swarmwire.world.engines.choice import engines_of
 from swarmwire.world.layout import read_layout
+from swarmwire.world.own.fitting import made_sensor
+from swarmwire.world.own.sensor import AskedSensor
 from swarmwire.world.physics import Physics
 from swarmwire.world.placement import place
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.sensors import SENSORS, Scene
+from swarmwire.world.sensors.scene import led_places_m
+from swarmwire.world.sensors.sensor import TrueSense
 from swarmwire.world.sensors.staged import Staged
 from swarmwire.world.states import States
 
@@ -41,6 +49,8 @@ class World:
         movable: (arenas, movable obstacles, 3) x, y in m, heading in rad; None: there are none.
         actuators: motors and LEDs: what they were asked for, and what they do.
         alive: (rows,).
+        batteries: of all robots; `charge` may be written to.
+        scene: what sensors look at, always the present.
         sensors: those that agents need, by group and sense; `Staged.failed` may be set.
         states: what each robot is at, as its agent named it.
     """
@@ -75,7 +85,11 @@ class World:
         engines = engines_of(scenario, bodies)
         self._physics = Physics(self.static, self.obstacles, engines, pose, scenario.physics.steps)
         self.actuators = Actuators(groups, self.keys)
-        self.sensors = _sensors(scenario, self._scene(1.0 / scenario.time.rate_hz), groups, needs)
+        tick_s = 1.0 / scenario.time.rate_hz
+        self.batteries = Batteries(groups, self.static.arenas, tick_s)
+        self.scene = self._scene_of(tick_s)
+        self.sensors = _sensors(scenario, self.scene, groups, needs)
+        self._own = OwnActuators(groups, self.scene)
         rows = self.static.arenas * self.static.robots
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
@@ -90,10 +104,27 @@ class World:
 
     def live(self, alive: BoolArray) -> None:
         """These robots (rows,) are alive from now on; the others brake, and resist whatever pushes them."""
-        self.states.forget(alive & ~self.alive)  # a robot that is revived starts afresh
+        revived = alive & ~self.alive  # they start afresh
+        self.states.forget(revived)
+        self.batteries.renew(revived)
         self.alive = alive.copy()
         self.actuators.stop(~alive)
-        self._physics.braked[:] = ~alive.reshape(self.static.arenas, self.static.robots)
+        self._brake()
+
+    def fail(self, failed: Mapping[str, BoolArray]) -> None:
+        """From now on these parts of robots (rows,) do not work, by name: motors, wheels, senses; all others do."""
+        self.actuators.failed.fail(failed)
+        self._brake()
+        shape = self.static.arenas, self.static.robots
+        for group in self.static.groups:
+            for name, sensor in self.sensors[group.name].items():
+                mask = failed[name].reshape(shape)[:, group.start : group.stop] if name in failed else None
+                sensor.failed = mask if mask is not None and mask.any() else None
+
+    def _brake(self) -> None:
+        """The motors of robots that are dead, or whose motors failed, do not drive: they only resist."""
+        dead = ~self.alive.reshape(self.static.arenas, self.static.robots)
+        self._physics.braked[:] = dead | self.actuators.failed.motors
 
     def sense(self, tick: int) -> Senses:
         """What the robots alive that act in a tick sense, by group: rows rising, and the fields that are needed."""
@@ -122,6 +153,10 @@ class World:
         """
         self.actuators.take(actions, self.alive)
         self.states.take(actions.notes, self.alive)
+        if self._own.any:
+            self._own.act(actions.own, self.alive)
+        if self.batteries.any:
+            self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target)
         onsets = self._physics.tick(self.actuators.target)
         self._show()
         return onsets
@@ -134,7 +169,8 @@ class World:
     def counts(self) -> dict[str, int]:
         """What actuators could not follow since the start, by name; states too many."""
         states = {"states_over_limit": self.states.dropped} if self.states.dropped else {}
-        return {**self.actuators.counts(), **states}
+        own = {"actuators_not_there": self._own.not_there} if self._own.not_there else {}
+        return {**self.actuators.counts(), **own, **states}
 
     def _show(self) -> None:
         state = self._physics.state.reshape(-1, 6)
@@ -143,7 +179,7 @@ class World:
         self.velocity: FloatArray = state[:, 3:].copy()
         self.movable: FloatArray | None = self._physics.movable.copy() if self.static.movable else None
 
-    def _scene(self, tick_s: float) -> Scene:
+    def _scene_of(self, tick_s: float) -> Scene:
         static, physics = self.static, self._physics
         counts = [group.stop - group.start for group in static.groups]
         radius_m = np.repeat([group.body.radius_m for group in static.groups], counts)
@@ -152,9 +188,10 @@ class World:
         return Scene(
             keys=self.keys,
             size_m=static.arena_size_m,
-            walled=static.walled,
+            boundary=static.boundary,
             obstacles=self.obstacles,
             lights=static.lights,
+            ground=ground_of(static.floor, static.arena_size_m, static.boundary),
             tick_s=tick_s,
             radius_m=radius_m,
             bottom_m=bottom_m,
@@ -163,7 +200,10 @@ class World:
             travel_m=physics.travel_m,
             touched=physics.touched,
             target=self.actuators.target,
+            charge=self.batteries.charge,
             leds=self.actuators.leds.rgb,
+            led_places_m=led_places_m(static.groups, self.actuators.leds.rgb.shape[2]),
+            obstacles_move=any(obstacle.movable for own in static.obstacles for obstacle in own),
         )
 
 
@@ -190,6 +230,12 @@ def _sensors(
                 expected = f"the agent needs the sense {need!r}; the body {group.body.name} has {has}"
                 raise BadInput(scenario.source, f"robots.{group.name}.agent", expected)
             sheet = group.body.senses[need]
-            truth = SENSORS[need](scene, group, sheet)
+            truth = _truth(need, sheet, scene, group)
             made[group.name][need] = Staged(need, truth, sheet, scene.keys, group, scene.tick_s)
     return made
+
+
+def _truth(name: str, sheet: Sheet, scene: Scene, group: Group) -> TrueSense:
+    if isinstance(sheet, OwnSheet):
+        return AskedSensor(name, made_sensor(sheet), sheet, scene, group)
+    return SENSORS[name](scene, group, sheet)

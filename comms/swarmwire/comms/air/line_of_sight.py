@@ -9,7 +9,7 @@ from swarmwire.comms.air.links import HEARD, Links
 from swarmwire.comms.air.stage import Medium, Stage
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.geometry import is_blocked_on
+from swarmwire.comms.geometry import is_blocked, is_blocked_on
 
 
 def stage(medium: Medium) -> Stage | None:
@@ -40,9 +40,15 @@ class LineOfSight(Stage):
 def blocked(obstacles, robots, wrap_m, pose, sender, receiver, fate):
     """Which of the links under way an obstacle blocks, (k,)."""
     ends = np.zeros(len(sender), np.bool_)
+    wraps = wrap_m[0] > 0.0
     for i in range(len(ends)):
         # From the lower row to the higher: both directions of a link then agree to the last bit.
         a, b = min(sender[i], receiver[i]), max(sender[i], receiver[i])
-        if fate[i] == HEARD:
-            ends[i] = is_blocked_on(obstacles, a // robots, pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1], *wrap_m)
+        if fate[i] != HEARD:
+            continue
+        ax, ay, bx, by = pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1]
+        if wraps:
+            ends[i] = is_blocked_on(obstacles, a // robots, ax, ay, bx, by, *wrap_m)
+        else:
+            ends[i] = is_blocked(obstacles, a // robots, ax, ay, bx, by)
     return ends

@@ -10,6 +10,7 @@ from swarmwire.comms.air.jammers import Jammers
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.tuning import Slope, radio_at
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.events.failing import Failing
 
 
 class Conditions:
@@ -22,6 +23,7 @@ class Conditions:
     def __init__(self, rows: int) -> None:
         self.rows = rows
         self.kills: dict[int, BoolArray] = {}  # by event: (rows,) robots that it holds dead
+        self.failures: dict[int, Failing] = {}  # by event: parts that do not work
         self.blackouts: dict[int, BoolArray] = {}  # by event: (rows,) robots whose radios it holds off
         self.backlogs: dict[int, int] = {}  # by blackout: DROP, NEWEST or ALL
         self.gains: dict[
@@ -36,6 +38,15 @@ class Conditions:
     def alive(self) -> BoolArray:
         """Which robots are alive, (rows,)."""
         return ~self._any(self.kills.values())
+
+    def failed(self, part: str) -> BoolArray:
+        """Of which robots this part does not work, (rows,)."""
+        return self._any(failing.failed for failing in self.failures.values() if failing.part == part)
+
+    @property
+    def failed_parts(self) -> dict[str, BoolArray]:
+        """The parts that some robots may lack, and which, (rows,)."""
+        return {part: self.failed(part) for part in dict.fromkeys(each.part for each in self.failures.values())}
 
     @property
     def radio_on(self) -> BoolArray:

@@ -1,13 +1,14 @@
 """What an event is: a frozen dataclass of parameters that knows how to begin, and how to end if it lasts."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import ClassVar
 
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.swarm import Groups, Swarm
@@ -38,9 +39,25 @@ class Event(ABC):
     def check_radio(self, radio: Radio) -> None:  # noqa: B027 - most events fit any radio
         """Raise BadInput, with a key within the event's table, for what does not fit this radio; it needs one."""
 
+    def check_bodies(self, groups: Groups, bodies: Mapping[str, Body]) -> None:  # noqa: B027 - most fit any body
+        """Raise BadInput, with a key within the event's table, for what does not fit the groups' bodies, by group."""
+
     @abstractmethod
     def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
         """Change `conditions`; `serial` is the event's place in the scenario. Which robots it changed, (rows,)."""
+
+    @property
+    def evolves(self) -> bool:
+        """Whether `go_on` is to be called in every tick after `begin`."""
+        return False
+
+    def go_on(self, serial: int, now_ns: int, swarm: Swarm, conditions: Conditions) -> tuple[BoolArray, BoolArray]:
+        """Change `conditions` as time passes; only called if it evolves.
+
+        Returns:
+            (rows,) robots for which it began, and those for which it ended.
+        """
+        raise TypeError(f"{self.do} does not change by itself")
 
     def end(self, serial: int, conditions: Conditions) -> BoolArray:
         """Undo what `begin` did; only called if the event lasts for a time. Which robots that changed, (rows,)."""

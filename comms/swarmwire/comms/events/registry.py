@@ -5,6 +5,7 @@ What an action changes lies in `Conditions`: a new kind of effect is a new field
 
 from swarmwire.comms.events.blackout import Blackout
 from swarmwire.comms.events.event import Event
+from swarmwire.comms.events.fail import Fail
 from swarmwire.comms.events.gain import Gain
 from swarmwire.comms.events.jammer import Jammer
 from swarmwire.comms.events.kill import Kill
@@ -12,4 +13,4 @@ from swarmwire.comms.events.partition import Partition
 from swarmwire.comms.events.ramp import Ramp
 from swarmwire.comms.events.revive import Revive
 
-ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Blackout, Partition, Ramp, Gain, Jammer)
+ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Fail, Blackout, Partition, Ramp, Gain, Jammer)

@@ -13,7 +13,10 @@ from swarmwire.comms.parameters import parameter
 
 @dataclass(frozen=True, kw_only=True)
 class Revive(Event):
-    """Whatever killed them, the robots are alive again; those that are so already do not notice."""
+    """Whatever killed them, the robots are alive again; those that are so already do not notice.
+
+    One whose battery was empty gets a full one.
+    """
 
     do: str = parameter("revive", help="robots that were killed act again", choices=("revive",))
     robots: Selection = parameter(help="which robots; share and count choose among those dead")

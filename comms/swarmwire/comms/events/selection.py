@@ -59,6 +59,12 @@ class Selection:
             chosen[arena, index[np.argsort(rank, kind="stable")[: self._how_many(len(index))]]] = True
         return chosen.reshape(-1)
 
+    def groups(self, groups: Groups) -> list[str]:
+        """The groups that it may choose from."""
+        if self.names is not None:
+            return list(dict.fromkeys(name.rpartition("-")[0] for name in self.names))
+        return list(groups) if self.group is None else [self.group]
+
     def _indices(self, swarm: Swarm) -> IntArray:
         if self.names is not None:
             found = [index_of(name, swarm.groups) for name in self.names]

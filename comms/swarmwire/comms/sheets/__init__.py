@@ -3,13 +3,21 @@
 A file per sense. A new one: its sheet in a file here, and its line in `SHEETS`.
 """
 
+from swarmwire.comms.sheets.battery import Battery
 from swarmwire.comms.sheets.bumper import Bumper
+from swarmwire.comms.sheets.camera import Camera
 from swarmwire.comms.sheets.compass import Compass
+from swarmwire.comms.sheets.ground import GroundColour
+from swarmwire.comms.sheets.imu import Imu
+from swarmwire.comms.sheets.infrared import Infrared
 from swarmwire.comms.sheets.light import Light
 from swarmwire.comms.sheets.odometry import Odometry
+from swarmwire.comms.sheets.own import OwnSheet
 from swarmwire.comms.sheets.positioning import Positioning
-from swarmwire.comms.sheets.proximity import Proximity, ResponseCurve
+from swarmwire.comms.sheets.proximity import Proximity
+from swarmwire.comms.sheets.rim import ResponseCurve, Rim
 from swarmwire.comms.sheets.ring import Ring
+from swarmwire.comms.sheets.scan import Scan
 from swarmwire.comms.sheets.sheet import RangedSheet, Sheet
 
 SHEETS: dict[str, type[Sheet]] = {
@@ -19,18 +27,32 @@ SHEETS: dict[str, type[Sheet]] = {
     "light": Light,
     "bumper": Bumper,
     "positioning": Positioning,
+    "infrared": Infrared,
+    "scan": Scan,
+    "ground": GroundColour,
+    "camera": Camera,
+    "imu": Imu,
+    "battery": Battery,
 }
 
 __all__ = [
     "SHEETS",
+    "Battery",
     "Bumper",
+    "Camera",
     "Compass",
+    "GroundColour",
+    "Imu",
+    "Infrared",
     "Light",
     "Odometry",
+    "OwnSheet",
     "Positioning",
     "Proximity",
     "RangedSheet",
     "ResponseCurve",
+    "Rim",
     "Ring",
+    "Scan",
     "Sheet",
 ]

@@ -22,6 +22,10 @@ class Sheet:
         0.0, help="readings are rounded to whole multiples of it, in their unit; 0: they are not", at_least=0
     )
 
+    def fault(self, radius_m: float) -> tuple[str, str] | None:
+        """A key whose value does not go with the others or a body of this radius, and what was expected; else None."""
+        return None
+
 
 @dataclass(frozen=True, kw_only=True)
 class RangedSheet(Sheet):

@@ -10,7 +10,7 @@ from swarmwire.comms.body import Body, body_from
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.floor import FloorImage
 from swarmwire.comms.glimpse import Scene
-from swarmwire.comms.truth import Static
+from swarmwire.comms.truth import Obstacle, Static
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame
 
@@ -49,6 +49,7 @@ def _check(static: Static) -> None:
         "rate_hz: expected 1 or more": static.rate_hz < 1,
         "arena_size_m: expected more than 0": min(static.arena_size_m) <= 0,
         "obstacles: expected those of each arena": len(static.obstacles) != static.arenas,
+        "obstacles: expected as many movable ones in each arena": len(set(map(_movable, static.obstacles))) > 1,
         "lights: expected those of each arena": len(static.lights) not in (0, static.arenas),
         "floor.image: expected a grey for each row and column": image is not None and not _is_whole(image),
         "groups: expected each robot in one": [group.start for group in static.groups] != starts[:-1]
@@ -59,6 +60,10 @@ def _check(static: Static) -> None:
     for fault, found in faults.items():
         if found:
             raise BadFrame("malformed", fault)
+
+
+def _movable(obstacles: tuple[Obstacle, ...]) -> int:
+    return sum(obstacle.movable for obstacle in obstacles)
 
 
 def _is_whole(image: FloorImage) -> bool:

@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from swarmwire.comms.actuations import NO_ACTUATIONS, Actuations
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
@@ -85,6 +86,9 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
             arrays["sent/outcome_id"] = actions.sent.outcome_id
     if len(actions.leds):
         arrays["leds"] = np.array((actions.leds.rows, actions.leds.which, actions.leds.rgb))
+    if len(actions.own):
+        arrays["own"] = np.array((actions.own.rows, actions.own.place))
+        arrays["own/value"] = actions.own.value
     values: dict[str, Any] = {"dropped": dropped} if dropped else {}
     if len(actions.notes):
         arrays["notes"] = np.array((actions.notes.rows, actions.notes.code))
@@ -101,7 +105,8 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     sent = _sent(frame, rows) if "sent" in frame.arrays else Sent.none()
     notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
     leds = _leds(frame, rows) if "leds" in frame.arrays else NO_LED_CHANGES
-    return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds)
+    own = _actuations(frame, rows) if "own" in frame.arrays else NO_ACTUATIONS
+    return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own)
 
 
 def _sent(frame: Frame, rows: IntArray) -> Sent:
@@ -145,6 +150,14 @@ def _leds(frame: Frame, rows: IntArray) -> LedChanges:
     if not _own(switched, rows) or (which < 0).any() or (rgb < 0).any() or (rgb > BRIGHTEST).any():
         raise BadFrame("malformed", "leds: expected colours up to 0xFFFFFF of LEDs of the runner's own robots")
     return LedChanges(switched, which, rgb)
+
+
+def _actuations(frame: Frame, rows: IntArray) -> Actuations:
+    actuated, place = checked_array(frame, "own", "<i8", (2, None))
+    value = checked_array(frame, "own/value", "<f8", (len(actuated),))
+    if not _own(actuated, rows) or (place < 0).any() or not np.isfinite(value).all():
+        raise BadFrame("malformed", "own: expected finite numbers for actuators of the runner's own robots")
+    return Actuations(actuated, place, value)
 
 
 def _own(some: IntArray, rows: IntArray) -> bool:

@@ -40,7 +40,7 @@ def encode_truth(glimpse: Glimpse) -> bytes:
         for sense, column in group.fields.items():
             arrays[f"sense/{name}/{sense}"] = column
     if truth.movable is not None:
-        arrays["movable"] = truth.movable
+        arrays["movable"] = truth.movable.reshape(len(truth.movable), -1)
     if truth.edges is not None:
         arrays["edges"] = truth.edges
     if truth.tally is not None:
@@ -89,7 +89,7 @@ def decode_truth(frame: Frame, scene: Scene) -> Glimpse:
         tally=_tally(frame, static.arenas),
         finished=_finished(frame, static),
         events=_events(frame, n),
-        movable=checked_array(frame, "movable", "<f8", (static.arenas, static.movable, 3)) if static.movable else None,
+        movable=_movable(frame, static),
     )
     values = checked_array(frame, "values", "<f8", (len(scene.series), static.arenas))
     serial, ticks = _least(frame.values.get("serial"), 0, "serial"), _least(frame.values.get("ticks"), 1, "ticks")
@@ -122,6 +122,13 @@ def _edges(frame: Frame, n: int) -> AnyArray | None:
     edges = checked_array(frame, "edges", "<i8", (None, 2))
     _within("edges", edges, n)
     return edges
+
+
+def _movable(frame: Frame, static: Static) -> AnyArray | None:
+    if not static.movable:
+        return None
+    poses = checked_array(frame, "movable", "<f8", (static.arenas, 3 * static.movable))
+    return poses.reshape(static.arenas, static.movable, 3)
 
 
 def _tally(frame: Frame, arenas: int) -> Tally | None:

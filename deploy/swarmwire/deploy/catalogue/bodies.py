@@ -4,11 +4,12 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from swarmwire.comms.body import Body, body_names, load_body
+from swarmwire.comms.leds import Leds
 from swarmwire.comms.sheets import SHEETS
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 
-GEOMETRY = ("radius_m", "height_m", "mass_kg")
+GEOMETRY = ("radius_m", "height_m", "mass_kg", "altitude_m", "contacts")
 
 
 def bodies() -> list[Entry]:
@@ -19,6 +20,7 @@ def bodies() -> list[Entry]:
 def _body(body: Body) -> Entry:
     sheet = asdict(body)
     geometry = [key for key in parameters_of_dataclass(Body) if key.name in GEOMETRY]
+    leds = [] if body.leds is None else [_sheet("leds", Leds, sheet["leds"])]
     senses = [_sheet(f"sense: {name}", SHEETS[name], sheet["senses"][name]) for name in body.senses]
     return Entry(
         kind="body",
@@ -33,6 +35,7 @@ def _body(body: Body) -> Entry:
         tables=(
             ParameterTable("geometry", tuple(_with_values(geometry, sheet)), "value"),
             _sheet("drive", type(body.drive), sheet["drive"]),
+            *leds,
             *senses,
         ),
     )

@@ -4,7 +4,7 @@ import math
 
 from swarmwire.comms.body import Body
 from swarmwire.comms.drives import Holonomic, Twist, Wheels
-from swarmwire.comms.sheets import Bumper, Compass, Light, Odometry, Positioning, Proximity, Sheet
+from swarmwire.comms.sheets import Battery, Bumper, Compass, Imu, Light, Odometry, Positioning, Proximity, Sheet
 
 
 def facts_of(body: Body) -> list[tuple[str, str]]:
@@ -18,6 +18,8 @@ def facts_of(body: Body) -> list[tuple[str, str]]:
         ("turns", f"{math.degrees(body.max_angular_radps):.0f} degrees/s"),
         ("drive", f"{drive.max_force_n:g} N, {drive.max_torque_nm:g} N m"),
     ]
+    if body.leds:
+        facts.append(("LEDs", f"{body.led_count}{', the last a beacon' if body.leds.beacon_height_m else ''}"))
     for name, sheet in body.senses.items():
         facts.extend(zip((name, *[""] * 9), _told(sheet), strict=False))
     return facts
@@ -38,6 +40,10 @@ def _told(sheet: Sheet) -> list[str]:
             return [f"error {_length(sheet.noise_m)}"]
         case Bumper():
             return ["the whole rim"]
+        case Imu():
+            return [f"noise {sheet.noise_mps2:.2g} m/s², {math.degrees(sheet.noise_radps):.2g} degrees/s"]
+        case Battery():
+            return [f"{sheet.capacity_wh:g} Wh, {sheet.full_v:g} V"]
         case _:
             return ["yes"]
 

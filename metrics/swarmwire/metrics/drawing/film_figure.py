@@ -23,6 +23,7 @@ from swarmwire.metrics.drawing.radio_range import in_range
 from swarmwire.metrics.drawing.scenery import draw_scale_bar, draw_scenery, place_movable
 from swarmwire.metrics.drawing.swarm import Swarm
 from swarmwire.metrics.film import NO_STATE, Film
+from swarmwire.metrics.shortest import whole_path
 
 TRAIL_S = 5.0
 MOST_TRAIL_POINTS = 64
@@ -90,8 +91,11 @@ class FilmFigure:
         if movable:
             place_movable(self._movable, movable)
         edges: IntArray | None = None
-        if film.static.range_m is not None:
-            edges = in_range(pose[:, :2], alive, film.static.range_m, (*film.static.fixed(film.arena), *movable))
+        static = film.static
+        if static.range_m is not None:
+            torus_m = static.arena_size_m if static.boundary == "torus" else None
+            standing = (*static.fixed(film.arena), *movable)
+            edges = in_range(pose[:, :2], alive, static.range_m, standing, torus_m)
         state = None if self._state is None else self._state[index]
         self._swarm.show(pose, alive, edges, _trail(film, index), state)
         self._time.set_text(f"t = {film.time_s[index]:.1f} s")
@@ -103,7 +107,7 @@ def _trail(film: Film, index: int) -> AnyArray:
     """Where the robots were in the last seconds, (points, n, 2), thinned if the run has many ticks a second."""
     since = film.index_at(float(film.time_s[index]) - TRAIL_S)
     every = max(1, (index - since) // MOST_TRAIL_POINTS)
-    return film.pose[np.arange(index, since - 1, -every)[::-1], :, :2]
+    return whole_path(film.pose[np.arange(index, since - 1, -every)[::-1], :, :2], film.static)
 
 
 def _colored(film: Film) -> IntArray | None:

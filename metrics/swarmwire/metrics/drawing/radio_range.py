@@ -10,19 +10,32 @@ from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Obstacle
 
 
-def in_range(position_m: AnyArray, alive: BoolArray, range_m: float, obstacles: Sequence[Obstacle]) -> IntArray:
+def in_range(
+    position_m: AnyArray,
+    alive: BoolArray,
+    range_m: float,
+    obstacles: Sequence[Obstacle],
+    torus_m: tuple[float, float] | None = None,
+) -> IntArray:
     """Pairs (e, 2) of robots alive that are no farther apart than the range, with no obstacle between their centres.
 
     That is the radio graph of most runs. A run folder holds no links, so partitions, failed radios and radios that
-    need no line of sight are not regarded.
+    need no line of sight are not regarded. `torus_m` are the sides of a torus, whose distances are the shortest.
     """
     living = np.flatnonzero(alive)
-    tree = cast(Any, KDTree)(position_m[living])  # its stub types the answers in part only
+    place = position_m[living].astype(np.float64)
+    if torus_m is not None:
+        place = np.mod(place, torus_m)
+        place[place >= torus_m] = 0.0  # by rounding
+    tree = cast(Any, KDTree)(place, boxsize=torus_m)  # its stub types the answers in part only
     pairs: IntArray = living[tree.query_pairs(range_m, output_type="ndarray")]
     start, end = (position_m[pairs[:, side]].astype(np.float64) for side in (0, 1))
+    over = np.zeros_like(start)
+    if torus_m is not None:
+        over -= torus_m * np.floor((end - start) / torus_m + 0.5)
     clear = np.ones(len(pairs), np.bool_)
     for obstacle in obstacles:
-        clear &= ~_touches(obstacle, start, end)
+        clear &= ~_touches(obstacle, start, end + over) & ~_touches(obstacle, start - over, end)
     return pairs[clear]
 
 

@@ -79,7 +79,7 @@ def _facts(static: Static, duration_s: float, enlarged: float) -> list[tuple[str
         f"{kinds.count(kind)} {kind if kinds.count(kind) == 1 else plural[kind]}" for kind in dict.fromkeys(kinds)
     ]
     facts = [
-        ("arena", f"{across:g} x {up:g} m, " + ("walls" if static.walled else "open")),
+        ("arena", f"{across:g} x {up:g} m, " + static.boundary),
         ("obstacles", obstacles[0] if obstacles else "none"),
         *(("", more) for more in obstacles[1:]),
         ("robots", f"{static.robots}"),

@@ -16,6 +16,7 @@ from swarmwire.metrics.drawing.looks import (
     WALL,
     Look,
 )
+from swarmwire.metrics.drawing.painted_floor import draw_floor
 
 _BAR_BELOW_IN = 0.1
 _GLOW = ((0.045, 0.10), (0.03, 0.16), (0.018, 0.3))  # radius as a share of the arena's longer side, and opacity
@@ -34,6 +35,8 @@ def draw_scenery(axes: Any, static: Static, arena: int) -> Any:
     look = wall if static.walled else edge
     floor = Rectangle((-width / 2, -height / 2), width, height, facecolor=FLOOR, zorder=0, **look)
     axes.add_patch(floor)
+    if static.floor is not None:
+        draw_floor(axes, static.floor, static, floor)
     _add_obstacles(axes, static.fixed(arena))
     movable = _add_obstacles(axes, [obstacle for obstacle in static.obstacles[arena] if obstacle.movable])
     for light in static.lights[arena] if static.lights else ():

@@ -9,6 +9,7 @@ from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.looks import DEAD, LINK, OTHER_STATE, STATE_COLORS, Look, rgb, shade
 from swarmwire.metrics.palette import robot_color
+from swarmwire.metrics.shortest import link_lines
 
 _LEAST, _CROWDED = 0.0105, 0.2  # least radius of a disc by the arena's longer side; and that times sqrt(robots)
 _HEADING_RADII = 2.0  # length of a heading in radii of its disc, from the centre
@@ -28,6 +29,7 @@ class Swarm:
         """Add the collections, empty, to axes in m."""
         from matplotlib.collections import EllipseCollection, LineCollection
 
+        self._static = static
         by_group = [(robot_color(i), group) for i, group in enumerate(static.groups)]
         radius_m = np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for _, group in by_group])
         self._fill = np.array([rgb(color) for color, group in by_group for _ in range(group.start, group.stop)])
@@ -80,7 +82,7 @@ class Swarm:
         ahead = np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])], axis=1)
         ends = position + _HEADING_RADII * self._radius_m[:, None] * ahead
         self._headings.set_segments(np.stack([position, ends], axis=1))
-        self._links.set_segments(_NOBODY if edges is None else position[edges])
+        self._links.set_segments(_NOBODY if edges is None else link_lines(position, edges, self._static))
         self._links.set_alpha(_link_opacity(0 if edges is None else len(edges)))
         self._show_trails(trail)
 

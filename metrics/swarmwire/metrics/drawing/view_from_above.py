@@ -25,6 +25,7 @@ from swarmwire.metrics.drawing.scenery import round_length_m
 from swarmwire.metrics.palette import robot_color
 
 _RAY = "#d1495b"
+_LED = "#7fd14a"
 _COLOR = robot_color(0)
 _ROOM = 1.16  # of what is seen by what is drawn, so that numbers at the rays' ends fit
 _BELOW = -0.035  # where legend and bar are, as a share of the view's height
@@ -43,6 +44,8 @@ def draw_from_above(axes: Any, body: Body) -> None:
     _draw_disc(axes, body)
     if not isinstance(body.drive, Holonomic):
         _draw_wheels(axes, body.radius_m, body.drive.wheel_base_m)
+    if body.led_count:
+        _draw_leds(axes, body.led_places_m)
     for sheet in body.senses.values():
         match sheet:
             case Proximity():
@@ -87,6 +90,11 @@ def _draw_wheels(axes: Any, radius_m: float, wheel_base_m: float) -> None:
         corner = x - wide_m / 2, -long_m / 2
         look: Look = {"facecolor": INK, "edgecolor": INK, "linewidth": 0.5, "zorder": 5}
         axes.add_patch(FancyBboxPatch(corner, wide_m, long_m, boxstyle=style, **look))
+
+
+def _draw_leds(axes: Any, places_m: FloatArray) -> None:
+    look: Look = {"markerfacecolor": _LED, "markeredgecolor": INK, "markeredgewidth": 0.5}
+    axes.plot(-places_m[:, 1], places_m[:, 0], "o", markersize=3.2, zorder=8, label="LED", **look)
 
 
 def _draw_rays(axes: Any, radius_m: float, sheet: Proximity) -> None:

@@ -11,6 +11,7 @@ from swarmwire.comms.draws import LOW32, derive_key, purpose, uniform
 from swarmwire.comms.fates import FATE_NAMES
 from swarmwire.comms.truth import Finished, Static
 from swarmwire.metrics.geometry_tick import geometry_tick
+from swarmwire.metrics.shortest import shortest
 
 if TYPE_CHECKING:
     import polars as pl
@@ -118,7 +119,7 @@ class PacketColumns:
             first = links["arena"][known] * self.static.robots
             sender = place[tick[known], first + links["sender"][known]]
             receiver = place[tick[known], first + links["receiver"][known]]
-            distance_m[known] = np.hypot(*(sender - receiver).T)
+            distance_m[known] = np.hypot(*shortest(sender - receiver, self.static).T)
         return distance_m
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.clock import to_s
+from swarmwire.comms.drives import Holonomic
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.truth import Static, Tally, Truth
 
@@ -16,27 +17,41 @@ if TYPE_CHECKING:
 POSE = ("x_m", "y_m", "heading_rad")  # arena frame
 VELOCITY = ("vx_mps", "vy_mps", "turn_radps")  # arena frame
 COMMAND = ("command_forward_mps", "command_turn_radps")  # as applied
-MOTION = (*POSE, *VELOCITY, *COMMAND)  # lists with a number per robot, float32
-ROBOT_COLUMNS = (*MOTION, "alive", "state")  # lists with an item per robot
-MOVABLE = ("movable_x_m", "movable_y_m", "movable_heading_rad")  # lists with a number per movable obstacle, if any
+SIDEWAYS = "command_left_mps"  # as applied; only where a robot can move so
+MOTION = (*POSE, *VELOCITY, *COMMAND, SIDEWAYS)  # lists with a number per robot, float32
+ROBOT_COLUMNS = (*POSE, *VELOCITY, *COMMAND, "alive", "state")  # lists with an item per robot, in every record
+MOVABLE = ("movable_x_m", "movable_y_m", "movable_heading_rad")  # lists with a number per movable obstacle, float32
 RADIO = ("sent", "heard", "in_range")  # packets; receivers; receivers: since the tick before
 KEYS = ("tick", "time_s", "arena", "seed")
 BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 2
 
 
-def tick_schema(robots: int, metrics: Sequence[str], movable: int) -> "dict[str, Any]":
-    """The type of each column, for so many robots and movable obstacles in an arena, and these metrics."""
+def robot_columns(static: Static) -> tuple[str, ...]:
+    """The columns that are lists with an item per robot."""
+    sideways = any(isinstance(group.body.drive, Holonomic) for group in static.groups)
+    return (*ROBOT_COLUMNS, SIDEWAYS) if sideways else ROBOT_COLUMNS
+
+
+def movable_columns(static: Static) -> tuple[str, ...]:
+    """The columns that are lists with an item per movable obstacle; none if there is none."""
+    return MOVABLE if static.movable else ()
+
+
+def tick_schema(static: Static, metrics: Sequence[str]) -> "dict[str, Any]":
+    """The type of each column, for a run of these robots with these metrics."""
     import polars as pl
 
+    robots = static.robots
+    motion = [name for name in robot_columns(static) if name in MOTION]
     return {
         "tick": pl.Int64,
         "time_s": pl.Float64,
         "arena": pl.Int32,
         "seed": pl.Int64,
-        **dict.fromkeys(MOTION, pl.Array(pl.Float32, robots)),
+        **dict.fromkeys(motion, pl.Array(pl.Float32, robots)),
         "alive": pl.Array(pl.Boolean, robots),
         "state": pl.Array(pl.String, robots),
-        **(dict.fromkeys(MOVABLE, pl.Array(pl.Float32, movable)) if movable else {}),
+        **dict.fromkeys(movable_columns(static), pl.Array(pl.Float32, static.movable)),
         **dict.fromkeys(metrics, pl.Float64),
         **dict.fromkeys(RADIO, pl.Int64),
     }
@@ -55,7 +70,7 @@ class TickColumns:
         # As the truth has them, which copies fastest; the thread that writes puts them in columns.
         self._pose: AnyArray = np.empty((*of_robots, len(POSE)), np.float32)
         self._velocity: AnyArray = np.empty((*of_robots, len(VELOCITY)), np.float32)
-        self._command: AnyArray = np.empty((*of_robots, len(COMMAND)), np.float32)
+        self._command: AnyArray = np.empty((*of_robots, len(COMMAND) + 1), np.float32)
         self._movable: AnyArray = np.empty((*shape, static.movable, len(MOVABLE)), np.float32)
         self._alive: AnyArray = np.empty(of_robots, np.bool_)
         self._state: AnyArray = np.empty(of_robots, np.uint16)
@@ -70,7 +85,7 @@ class TickColumns:
         self._tick[at], self._time_s[at] = truth.tick, to_s(truth.time_ns)
         self._pose[at] = truth.pose.reshape(*shape, -1)
         self._velocity[at] = truth.velocity.reshape(*shape, -1)
-        self._command[at] = truth.command.reshape(*shape, -1)[..., : len(COMMAND)]
+        self._command[at] = truth.command.reshape(*shape, -1)
         if truth.movable is not None:
             self._movable[at] = truth.movable
         self._alive[at] = truth.alive.reshape(shape)
@@ -95,20 +110,21 @@ class TickColumns:
             "arena": np.tile(np.arange(arenas, dtype=np.int32), ticks),
             "seed": np.tile(np.array(self._static.seeds, np.int64), ticks),
         }
-        for names, values in ((POSE, self._pose), (VELOCITY, self._velocity), (COMMAND, self._command)):
+        schema = tick_schema(self._static, self._metrics)
+        command = (*COMMAND, SIDEWAYS) if SIDEWAYS in schema else COMMAND
+        for names, values in ((POSE, self._pose), (VELOCITY, self._velocity), (command, self._command)):
             for place, name in enumerate(names):
                 columns[name] = np.ascontiguousarray(values[:ticks, ..., place]).reshape(per_robot)
         columns["alive"] = self._alive[:ticks].reshape(per_robot)
         columns["state"] = pl.Series(self._states).gather(self._state[:ticks].reshape(-1)).reshape(per_robot)
-        if movable := self._static.movable:
-            for place, name in enumerate(MOVABLE):
-                columns[name] = np.ascontiguousarray(self._movable[:ticks, ..., place]).reshape(-1, movable)
+        for place, name in enumerate(movable_columns(self._static)):
+            columns[name] = np.ascontiguousarray(self._movable[:ticks, ..., place]).reshape(ticks * arenas, -1)
         measured = {name: self._measured[row, :ticks].reshape(-1) for row, name in enumerate(self._metrics)}
         columns |= {name: pl.Series(values).fill_nan(None) for name, values in measured.items()}
         no_radio = pl.Series(np.repeat(~self._has_radio[:ticks], arenas))
         for row, name in enumerate(RADIO):
             columns[name] = pl.Series(self._radio[row, :ticks].reshape(-1)).set(no_radio, None)
-        return pl.DataFrame(columns, schema=tick_schema(robots, self._metrics, self._static.movable))
+        return pl.DataFrame(columns, schema=schema)
 
 
 def _counts(tally: Tally) -> AnyArray:

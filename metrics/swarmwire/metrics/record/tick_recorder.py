@@ -12,10 +12,10 @@ from swarmwire.metrics.record.table_writer import Chunk, TableWriter
 from swarmwire.metrics.record.tick_columns import (
     BYTES_PER_ROBOT,
     KEYS,
-    MOVABLE,
     RADIO,
-    ROBOT_COLUMNS,
     TickColumns,
+    movable_columns,
+    robot_columns,
     tick_schema,
 )
 
@@ -39,12 +39,12 @@ class TickRecorder:
         """Open the table; BadInput if a metric is named like another column."""
         self._names = [metric.name for metric in self._metrics.metrics]
         for name in self._names:
-            if name in (*KEYS, *ROBOT_COLUMNS, *MOVABLE, *RADIO):
+            if name in (*KEYS, *robot_columns(static), *movable_columns(static), *RADIO):
                 raise BadInput("", f"metrics.{name}", "expected another name: ticks.parquet has a column of this name")
         self._static = static
         rows = static.arenas * static.robots
         self._ticks = min(MOST_TICKS, max(1, CHUNK_BYTES // (rows * BYTES_PER_ROBOT)))
-        schema = tick_schema(static.robots, self._names, static.movable)
+        schema = tick_schema(static, self._names)
         self._writer = TableWriter(self._folder, "ticks", schema, self._may_drop)
         self._limit = ChunkLimit(self._ticks, self._clock)
         self._columns = self._new_columns()

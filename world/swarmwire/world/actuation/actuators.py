@@ -7,6 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
 from swarmwire.comms.senses import Actions
 from swarmwire.comms.truth import Group
+from swarmwire.world.actuation.failures import FailedDrives
 from swarmwire.world.actuation.limits import limits_of, take_commands
 from swarmwire.world.actuation.noise import NoisyWheels
 from swarmwire.world.actuation.shown_leds import ShownLeds
@@ -18,8 +19,9 @@ class Actuators:
     Attributes:
         command: (rows, 3) asked for, within the drives' limits: forward m/s, left turn rad/s, to the left m/s; replaced
             in each tick, never written to after.
-        target: (arenas, robots, 3) the same with the wheels' noise: what engines are given; written in place.
+        target: (arenas, robots, 3) the same with noise and failures of wheels: what engines are given; in place.
         leds: what the LEDs show.
+        failed: motors and wheels that do not work.
     """
 
     def __init__(self, groups: Sequence[Group], keys: KeyArray) -> None:
@@ -28,6 +30,7 @@ class Actuators:
         self.command: FloatArray = np.zeros((arenas * robots, 3))
         self.target: FloatArray = np.zeros((arenas, robots, 3))
         self.leds = ShownLeds(groups, arenas)
+        self.failed = FailedDrives(groups, arenas)
         self._limits, self._noise = limits_of(groups), NoisyWheels(groups, keys)
         self._ticks = self._clipped = self._not_finite = 0
 
@@ -40,6 +43,8 @@ class Actuators:
         self.target[:] = self.command.reshape(self.target.shape)
         if self._noise.any:
             self._noise.act(self._ticks, self.target)
+        if self.failed.any:
+            self.failed.act(self.target)
         self.leds.take(actions.leds, alive)
         self._ticks += 1
 

@@ -58,12 +58,15 @@ class KinematicEngine:
 
 @njit(cache=True)
 def _move(around, wheel_base_m, radius_m, bottom_m, target, tick_s, state, travel_m, held):
+    half_x_m, half_y_m, wraps, obstacles = around.half_x_m, around.half_y_m, around.wraps, around.obstacles
     for arena in range(target.shape[0]):
+        circles = obstacles.circle_start[arena + 1] - obstacles.circle_start[arena]
+        empty = circles + obstacles.polygon_start[arena + 1] - obstacles.polygon_start[arena] == 0
         for i in range(target.shape[1]):
             forward, turn, left = target[arena, i, 0], target[arena, i, 1], target[arena, i, 2]
             x, y, heading = state[arena, i, 0], state[arena, i, 1], state[arena, i, 2]
             way_m = tick_s * np.sqrt(forward * forward + left * left)
-            near = any_near(around, arena, x, y, radius_m[i] + way_m, bottom_m[i])
+            near = not empty and any_near(around, arena, x, y, radius_m[i] + way_m, bottom_m[i])
             pieces = max(int(np.ceil(way_m / (PIECE_OF_RADIUS * radius_m[i]))), 1) if near else 1
             piece_s = tick_s / pieces
             half = 0.5 * turn * piece_s
@@ -73,7 +76,10 @@ def _move(around, wheel_base_m, radius_m, bottom_m, target, tick_s, state, trave
             for _ in range(pieces):
                 cos, sin = np.cos(heading + half), np.sin(heading + half)
                 dx, dy = (forward * cos - left * sin) * chord_s, (forward * sin + left * cos) * chord_s
-                nx, ny, pushed, free = held_back(around, arena, x + dx, y + dy, radius_m[i], bottom_m[i], near)
+                nx, ny, pushed, free = x + dx, y + dy, False, True
+                out = abs(nx) + radius_m[i] > half_x_m or abs(ny) + radius_m[i] > half_y_m
+                if near or (around.walled and out):
+                    nx, ny, pushed, free = held_back(around, arena, nx, ny, radius_m[i], bottom_m[i], near)
                 if not free:  # wedged in
                     nx, ny = x, y
                 rolled += forward * piece_s + (nx - x - dx) * cos + (ny - y - dy) * sin
@@ -85,7 +91,7 @@ def _move(around, wheel_base_m, radius_m, bottom_m, target, tick_s, state, trave
                 if pushed:
                     vx, vy, stopped = (nx - x) / piece_s, (ny - y) / piece_s, True
                 x, y = nx, ny
-            x, y = shortest(x, around.half_x_m, around.wraps), shortest(y, around.half_y_m, around.wraps)
+            x, y = shortest(x, half_x_m, wraps), shortest(y, half_y_m, wraps)
             state[arena, i, 0], state[arena, i, 1], state[arena, i, 2] = x, y, heading
             state[arena, i, 3], state[arena, i, 4], state[arena, i, 5] = vx, vy, turn
             held[arena, i] = stopped

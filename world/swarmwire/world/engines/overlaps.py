@@ -23,7 +23,7 @@ def overlaps(state, radius_m, bottom_m, top_m, held, around):
     """
     arenas, n = held.shape
     bodies, widest_m = n + 1, 2.0 * radius_m.max()
-    most = int(np.ceil(np.sqrt(n)))  # cells along a side; smaller ones would be empty
+    most = 2 * int(np.ceil(np.sqrt(n)))  # cells along a side: some four for each robot
     nx = min(max(int(2.0 * around.half_x_m / widest_m), 1), most)
     ny = min(max(int(2.0 * around.half_y_m / widest_m), 1), most)
     cell_x, cell_y = 2.0 * around.half_x_m / nx, 2.0 * around.half_y_m / ny
@@ -37,7 +37,7 @@ def overlaps(state, radius_m, bottom_m, top_m, held, around):
             row = cell_of(y, -around.half_y_m, cell_y, ny)
             for v in range(_first(row, ny, around.wraps), _last(row, ny, around.wraps) + 1):
                 for u in range(_first(column, nx, around.wraps), _last(column, nx, around.wraps) + 1):
-                    j = head[v % ny, u % nx]
+                    j = head[_round(v, ny), _round(u, nx)]
                     while j >= 0:
                         dx = shortest(x - state[arena, j, 0], around.half_x_m, around.wraps)
                         dy = shortest(y - state[arena, j, 1], around.half_y_m, around.wraps)
@@ -56,6 +56,12 @@ def overlaps(state, radius_m, bottom_m, top_m, held, around):
     codes = codes[:found].copy()
     codes.sort()
     return codes
+
+
+@njit(cache=True)
+def _round(cell, cells):
+    """The cell itself, of one counted on beyond the border."""
+    return cell + cells if cell < 0 else cell - cells if cell >= cells else cell
 
 
 @njit(cache=True)

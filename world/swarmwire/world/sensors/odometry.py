@@ -1,4 +1,4 @@
-"""Wheel encoders: travel since the start, with slip and in whole steps."""
+"""Wheel encoders: travel since the start, with errors that add up, in whole steps."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.draws import normal as normals
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 from swarmwire.comms.sheets import Odometry
@@ -13,31 +14,31 @@ from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import Field
 
-SLIP = purpose("odometry slip")
+SLIP, WHEEL = purpose("odometry slip"), purpose("odometry wheel")
 
 
 class OdometrySensor:
     """Sense `odometry`: left_m, right_m (n,), travel since the start, rounded down to whole encoder steps.
 
-    Slip is a property of each tick's travel, so it is part of what is counted, not of a reading.
+    Errors belong to the travel, each tick's slip and each wheel's size, so they are part of what is counted, not of a
+    reading.
     """
-
-    fields = (Field("left_m"), Field("right_m"))
 
     def __init__(self, scene: Scene, group: Group, sheet: Odometry) -> None:
         self._scene, self._group, self._sheet = scene, group, sheet
-        self._rolled_m = self._true()
+        self.fields = (Field("left_m", step=sheet.step), Field("right_m", step=sheet.step))
+        self._rolled_m = scene.travel_m[:, group.start : group.stop].copy()
         self._told_m = self._rolled_m.copy()
-
-    def _true(self) -> FloatArray:
-        return self._scene.travel_m[:, self._group.start : self._group.stop].copy()
+        robots = np.arange(group.start, group.stop)
+        drawn = normals(scene.keys[:, None, None], robots[:, None], 0, np.arange(2), WHEEL)
+        self._scale = 1.0 + sheet.wheel_error_std * drawn  # (arenas, n, wheels)
 
     def follow(self, tick: int) -> None:
         """Add the travel since the last tick, with a slip of its own: how often an agent looks changes nothing."""
-        rolled_m = self._true()
-        new_m, keys = rolled_m - self._rolled_m, self._scene.keys
-        _add_travel(self._told_m, new_m, keys, self._group.start, tick, self._sheet.slip)
-        self._rolled_m = rolled_m
+        scene, start = self._scene, self._group.start
+        _add_travel(
+            self._told_m, self._rolled_m, scene.travel_m, start, self._scale, scene.keys, tick, self._sheet.slip
+        )
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The travel that the encoders of every robot show."""
@@ -48,10 +49,14 @@ class OdometrySensor:
 
 
 @njit(cache=True)
-def _add_travel(told, new, keys, start, tick, slip):
-    """Add the new travel of both wheels to what was told: times 1 + slip x a normal draw for each wheel."""
+def _add_travel(told, rolled, travel, start, scale, keys, tick, slip):
+    """Add the new travel of both wheels to what was told: times the wheel's scale, times 1 + slip x a normal draw."""
     for arena in range(told.shape[0]):
         for i in range(told.shape[1]):
             for wheel in range(2):
-                factor = 1.0 + slip * normal(keys[arena], start + i, tick, wheel, SLIP) if slip > 0.0 else 1.0
-                told[arena, i, wheel] += new[arena, i, wheel] * factor
+                now = travel[arena, start + i, wheel]
+                new = (now - rolled[arena, i, wheel]) * scale[arena, i, wheel]
+                if slip > 0.0:
+                    new *= 1.0 + slip * normal(keys[arena], start + i, tick, wheel, SLIP)
+                told[arena, i, wheel] += new
+                rolled[arena, i, wheel] = now

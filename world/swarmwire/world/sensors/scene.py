@@ -1,10 +1,14 @@
 """What sensors look at."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
 from swarmwire.comms.geometry import Obstacles
-from swarmwire.comms.truth import Light
+from swarmwire.comms.ground import Ground
+from swarmwire.comms.truth import Boundary, Group, Light
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,9 +17,10 @@ class Scene:
 
     keys: KeyArray  # (arenas,)
     size_m: tuple[float, float]  # full extents of an arena
-    walled: bool
+    boundary: Boundary
     obstacles: Obstacles
     lights: tuple[tuple[Light, ...], ...]  # of each arena
+    ground: Ground  # the floor of all arenas
     tick_s: float
     radius_m: FloatArray  # (robots,) of each robot index
     bottom_m: FloatArray  # (robots,) height above the floor of the lower end of the body
@@ -23,5 +28,17 @@ class Scene:
     state: FloatArray  # (arenas, robots, 6) x, y in m, heading in rad (not wrapped), velocities; arena frame
     travel_m: FloatArray  # (arenas, robots, 2) rolled by the left and right wheel since the start
     touched: FloatArray  # (arenas, robots) 1 if it touched anything in the tick before, else 0
-    target: FloatArray  # (arenas, robots, 3) what the motors were told in the tick before
+    target: FloatArray  # (arenas, robots, 3) what the engine was given in the tick before
+    charge: FloatArray  # (arenas, robots) of the battery, 1 full, 0 empty
     leds: IntArray  # (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0 dark
+    led_places_m: FloatArray  # (robots, most LEDs of a robot, 3) x ahead, y to the left, z above the body's lower side
+    obstacles_move: bool = False  # some can be pushed: `obstacles` is written to in each tick
+    own: dict[str, Any] = field(default_factory=dict[str, Any])  # for own senses and actuators, to share what they like
+
+
+def led_places_m(groups: tuple[Group, ...], most: int) -> FloatArray:
+    """Where the LEDs of each robot sit, as a scene has them, with room for so many."""
+    places = np.zeros((groups[-1].stop, most, 3))
+    for group in groups:
+        places[group.start : group.stop, : group.body.led_count] = group.body.led_places_m
+    return places

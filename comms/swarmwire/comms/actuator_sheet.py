@@ -1,0 +1,38 @@
+"""An actuator of the user's own: what its table in a body's sheet says, and what its class tells agents."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parameters import parameter
+from swarmwire.comms.sheets.own import kind_of
+from swarmwire.comms.tables import built, mapping_of
+
+
+@dataclass(frozen=True)
+class ActuatorSheet:
+    """An actuator whose class is the user's own; agents set it by `robot.actuate(name, …)`."""
+
+    kind: str = parameter(
+        help='"file.py:Class" beside the sheet, "package.module:Class", or the name of an entry point'
+    )
+    params: dict[str, Any] = parameter(help="keys of the class, as the sheet gives them; agents are not told")
+    width: int = parameter(0, help="how many numbers it takes; 0: not known yet")
+
+
+def actuator_sheet(name: str, value: object, where: str, beside: Path) -> ActuatorSheet:
+    """The sheet of a table with a `kind`, or of one that `asdict` made; its width is known once the class is."""
+    key = f"actuators.{name}"
+    if not name.isidentifier():
+        raise BadInput(where, key, "expected a name of letters, digits and _, which does not start with a digit")
+    table = mapping_of(where, key, value)
+    if "kind" not in table:
+        raise BadInput(where, f"{key}.kind", "is missing")
+    if "width" in table:
+        mapping_of(where, f"{key}.params", table.get("params"))
+        width = table["width"]
+        if type(width) is not int or width < 0:
+            raise BadInput(where, f"{key}.width", f"expected a whole number from 0, got {width!r}")
+        return built(ActuatorSheet, table, where, key)
+    return built(ActuatorSheet, {"kind": kind_of(table, where, key, beside), "params": table}, where, key)

@@ -1,0 +1,50 @@
+"""A sense of the user's own: what its table in a body's sheet says, and what its class tells agents."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, cast
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.loading import resolve
+from swarmwire.comms.parameters import parameter
+from swarmwire.comms.sheets.sheet import RangedSheet
+from swarmwire.comms.tables import built, mapping_of
+
+
+@dataclass(frozen=True)
+class OwnSheet(RangedSheet):
+    """A sense whose class is the user's own; what is not listed here are keys of that class. Sense: its fields."""
+
+    kind: str = parameter(
+        help='"file.py:Class" beside the sheet, "package.module:Class", or the name of an entry point'
+    )
+    params: dict[str, Any] = parameter(help="keys of the class, as the sheet gives them; agents are not told")
+    fields: dict[str, int] = parameter(help="the class's fields and their widths; 0: a number per robot")
+
+
+def own_sheet(value: object, where: str, key: str, beside: Path) -> OwnSheet:
+    """The sheet of a table with a `kind`, or of one that `asdict` made; its fields are known once the class is."""
+    table = mapping_of(where, key, value)
+    if "fields" in table:
+        return _told(table, where, key)
+    shared = {name: table.pop(name) for name in [of.name for of in fields(RangedSheet)] if name in table}
+    kind = kind_of(table, where, key, beside)
+    return built(OwnSheet, {**shared, "kind": kind, "params": table, "fields": {}}, where, key)
+
+
+def kind_of(table: dict[str, Any], where: str, key: str, beside: Path) -> str:
+    """The `kind` of a table, taken out of it, with the path of a file made absolute; BadInput if it is no text."""
+    kind = table.pop("kind")
+    if not isinstance(kind, str) or not kind:
+        expected = 'expected "file.py:Class", "package.module:Class" or the name of an entry point'
+        raise BadInput(where, f"{key}.kind", f"{expected}; got {kind!r}")
+    return resolve(kind, beside)
+
+
+def _told(table: dict[str, Any], where: str, key: str) -> OwnSheet:
+    mapping_of(where, f"{key}.params", table.get("params"))
+    widths = mapping_of(where, f"{key}.fields", table["fields"])
+    if not all(type(width) is int and width >= 0 for width in cast("Mapping[str, object]", widths).values()):
+        raise BadInput(where, f"{key}.fields", f"expected whole numbers from 0, got {widths!r}")
+    return built(OwnSheet, table, where, key)

@@ -1,0 +1,59 @@
+"""A laser scanner: the distance to the nearest thing on each of many rays."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.parameters import parameter
+from swarmwire.comms.sheets.sheet import RangedSheet
+
+FULL_DEG = 360.0
+
+
+@dataclass(frozen=True)
+class Scan(RangedSheet):
+    """A laser scanner that turns at one height. Sense: range_m (n, rays), inf where nothing is within the range."""
+
+    rays: int = parameter(help="how many rays", at_least=1)
+    range_m: float = parameter(help="length of a ray from the scanner", unit="m", above=0)
+    range_min_m: float = parameter(0.0, help="what is nearer than this reads as if it were there", unit="m", at_least=0)
+    first_deg: float = parameter(0.0, help="where the first ray looks, counter-clockwise from ahead", unit="deg")
+    span_deg: float = parameter(
+        FULL_DEG,
+        help="angle from the first ray to the last; 360: rays all around, the last one step before the first",
+        unit="deg",
+        above=0,
+        at_most=FULL_DEG,
+    )
+    at_m: float = parameter(0.0, help="how far ahead of the body's centre the scanner stands", unit="m")
+    noise_m: float = parameter(0.0, help="standard deviation of the error", unit="m", at_least=0)
+    noise_relative: float = parameter(0.0, help="and that share of the distance", at_least=0, at_most=1)
+
+    def fault(self, radius_m: float) -> tuple[str, str] | None:
+        """As `Sheet.fault`."""
+        if self.range_min_m >= self.range_m:
+            return "range_min_m", f"expected less than range_m, got {self.range_min_m!r}"
+        if abs(self.at_m) > radius_m:
+            return "at_m", f"expected a place on the body, whose radius is {radius_m:g} m; got {self.at_m!r}"
+        return None
+
+    @property
+    def step_rad(self) -> float:
+        """The angle between two rays."""
+        gaps = self.rays if self.span_deg == FULL_DEG else max(self.rays - 1, 1)
+        return float(np.deg2rad(self.span_deg) / gaps)
+
+    @cached_property
+    def angle_rad(self) -> FloatArray:
+        """Where the rays look in the body's frame, in (-pi, pi], (rays,)."""
+        angle = np.deg2rad(self.first_deg) + self.step_rad * np.arange(self.rays)
+        wrapped = np.arctan2(np.sin(angle), np.cos(angle))
+        wrapped.setflags(write=False)
+        return wrapped
+
+    @cached_property
+    def direction(self) -> tuple[FloatArray, FloatArray]:
+        """Cosine and sine of `angle_rad`, (rays,) each."""
+        return np.cos(self.angle_rad), np.sin(self.angle_rad)

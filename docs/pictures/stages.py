@@ -1,0 +1,67 @@
+"""Draws docs/stages.svg: one sense on its way from the truth to what an agent reads."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from pathlib import Path
+
+import numpy as np
+
+from docs.pictures.radio.sheet import line_color, panels, say
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.body import load_body
+from swarmwire.comms.draws import derive_key
+from swarmwire.comms.sheets import RangedSheet
+from swarmwire.comms.truth import Group
+from swarmwire.metrics.drawing.canvas import save
+from swarmwire.metrics.drawing.looks import FAINT
+from swarmwire.world.sensors.sensor import Field, Noise
+from swarmwire.world.sensors.staged import Staged
+
+TO = Path(__file__).parents[1] / "stages.svg"
+TICK_S, TICKS = 0.1, 60
+NOISE, STEP = Noise("normal", 0.04), 0.1
+SHEETS = {
+    "as it is": (RangedSheet(), Field("value", high=1.0)),
+    "noise, outliers": (RangedSheet(outlier=0.08), Field("value", noise=NOISE, low=0.0, high=1.0)),
+    "steps, drop-out": (RangedSheet(outlier=0.08, drop_out=0.1), Field("value", 0, NOISE, STEP, 0.0, 1.0)),
+    "5 Hz, 0.3 s late": (
+        RangedSheet(outlier=0.08, drop_out=0.1, rate_hz=5.0, delay_s=0.3),
+        Field("value", 0, NOISE, STEP, 0.0, 1.0),
+    ),
+}
+
+
+class Wave:
+    """A number that rises and falls."""
+
+    def __init__(self, field: Field) -> None:
+        self.fields = (field,)
+
+    def truth(self, tick: int) -> tuple[FloatArray, ...]:
+        """The number in a tick."""
+        return (np.full((1, 1), 0.5 + 0.4 * np.sin(1.6 * tick * TICK_S)),)
+
+
+def draw(to: Path = TO) -> None:
+    """Write the figure."""
+    figure, row = panels(len(SHEETS), 2.1)
+    at_s = TICK_S * np.arange(TICKS)
+    truth = told("as it is")
+    for i, (axes, title) in enumerate(zip(row, SHEETS, strict=True)):
+        axes.plot(at_s, truth, color=FAINT, lw=1.2)
+        axes.plot(at_s, told(title), ".", ms=2.6, color=line_color(i))
+        axes.set_ylim(-0.05, 1.05)
+        say(axes, title, "time in s", "reading" if i == 0 else "")
+    save(figure, to)
+
+
+def told(name: str) -> FloatArray:
+    """What is read in each tick, nan where it is lost, (ticks,)."""
+    sheet, field = SHEETS[name]
+    keys = np.array([derive_key("figure of stages")], np.uint64)
+    sense = Staged("wave", Wave(field), sheet, keys, Group("a", load_body("epuck"), 0, 1), TICK_S)
+    return np.array([sense.read(tick)["wave.value"][0] for tick in range(TICKS)])
+
+
+if __name__ == "__main__":
+    draw()

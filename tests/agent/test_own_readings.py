@@ -1,0 +1,104 @@
+"""Both kinds of agent read an own sense and set an own actuator alike; what does not fit is refused."""
+
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from swarmwire.agent import Agent, VectorAgent
+from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
+from swarmwire.comms.body import body_from
+from swarmwire.comms.errors import AgentFailed
+
+BODY = body_from(
+    {
+        "like": "epuck",
+        "senses": {
+            "gas": {"kind": "a:B", "params": {}, "fields": {"level": 0, "cells": 3}},
+            "imu": {},
+            "battery": {"capacity_wh": 1.0},
+        },
+        "actuators": {
+            "horn": {"kind": "a:C", "params": {}, "width": 1},
+            "arm": {"kind": "a:D", "params": {}, "width": 3},
+        },
+    },
+    "here",
+)
+TRIAL = Trial(body=BODY)
+
+
+class Sniffer(Agent):
+    """Uses all of it."""
+
+    needs: ClassVar[tuple[str, ...]] = ("gas", "imu", "battery")
+
+    def step(self, robot) -> None:
+        gas, imu = robot.sense("gas"), robot.imu
+        assert type(gas.level) is type(imu.turn_radps) is type(robot.battery.charge) is float
+        assert gas.cells.shape == (3,)
+        robot.drive(0.01 * gas.level * robot.battery.voltage_v, imu.forward_mps2 + imu.left_mps2 + imu.turn_radps)
+        if gas.level > 0.5:
+            robot.actuate("horn", gas.level)
+        robot.actuate("arm", gas.cells * robot.battery.charge)
+
+
+class VectorSniffer(VectorAgent):
+    """The same rule for n robots."""
+
+    needs: ClassVar[tuple[str, ...]] = ("gas", "imu", "battery")
+
+    def step(self, robots, state) -> None:
+        gas, imu = robots.sense("gas"), robots.imu
+        assert gas.cells.shape == (robots.n, 3)
+        turn = imu.forward_mps2 + imu.left_mps2 + imu.turn_radps
+        robots.drive(0.01 * gas.level * robots.battery.voltage_v, turn)
+        robots.actuate("horn", gas.level, rows=gas.level > 0.5)
+        robots.actuate("arm", gas.cells * robots.battery.charge[:, None])
+
+
+def test_one_robot_and_many_do_the_same() -> None:
+    assert_equivalent(Sniffer, VectorSniffer, TRIAL)
+    assert_rows_independent(VectorSniffer, TRIAL)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda robots: robots.sense("gas").colour, "the sense gas has the fields level, cells, not colour"),
+        (lambda robots: robots.sense("compass"), "NotDeclared"),
+        (lambda robots: robots.actuate("leg", 1.0), "NotFitted.* no actuator 'leg' of its own: it has horn, arm"),
+        (lambda robots: robots.actuate("arm", [1.0, 2.0]), "expected 3 numbers, got the shape"),
+        (lambda robots: robots.actuate("horn", np.zeros((2, 2))), "expected 1 numbers, got the shape"),
+        (lambda robots: robots.actuate("horn", np.nan), "expected finite numbers, got nan"),
+    ],
+)
+def test_what_does_not_fit_is_refused(call, said: str) -> None:
+    class Wrong(VectorAgent):
+        needs: ClassVar[tuple[str, ...]] = ("gas",)
+
+        def step(self, robots, state) -> None:
+            call(robots)
+
+    with pytest.raises(AgentFailed, match=said):
+        assert_rows_independent(Wrong, TRIAL)
+
+
+def test_one_number_or_a_vector_goes_for_all_robots() -> None:
+    class One(VectorAgent):
+        def step(self, robots, state) -> None:
+            robots.actuate("horn", 0.5)
+            robots.actuate("arm", [1.0, 2.0, 3.0])
+
+    class Many(VectorAgent):
+        def step(self, robots, state) -> None:
+            robots.actuate("horn", np.full(robots.n, 0.5))
+            robots.actuate("arm", np.tile([1.0, 2.0, 3.0], (robots.n, 1)))
+
+    class Each(Agent):
+        def step(self, robot) -> None:
+            robot.actuate("horn", 0.5)
+            robot.actuate("arm", (1.0, 2.0, 3.0))
+
+    for vector in (One, Many):
+        assert_equivalent(Each, vector, TRIAL)

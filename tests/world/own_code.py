@@ -1,0 +1,121 @@
+"""Own senses and actuators for tests, good ones and bad ones."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swarmwire.world.own import Field, Noise, OwnActuator, OwnSensor, parameter
+
+
+@dataclass
+class Paint(OwnSensor):
+    """How far the robot's painter has got, and its tick in three cells."""
+
+    scale: float = parameter(1.0, help="by which what is told is multiplied", above=0)
+    noise: float = parameter(0.0, help="of the amount", at_least=0)
+    cells: int = parameter(3, help="how many", at_least=1)
+
+    @property
+    def fields(self) -> Any:
+        return Field("amount", noise=Noise("normal", self.noise)), Field("ticks", self.cells, low=0.0, blank=-1.0)
+
+    def start(self) -> None:
+        self.scene.own.setdefault("painted", np.zeros(self.scene.touched.shape))
+        self.followed = 0
+
+    def follow(self, tick: int) -> None:
+        self.followed += 1
+
+    def truth(self, tick: int) -> Any:
+        amount = self.scale * self.scene.own["painted"][:, self.group.start : self.group.stop]
+        return amount, np.full((*amount.shape, self.cells), tick + self.followed)
+
+
+@dataclass
+class Painter(OwnActuator):
+    """Adds up what it is set to; set to a negative first number it stops the robot."""
+
+    gain: float = parameter(1.0, help="of what is added", above=0)
+
+    @property
+    def width(self) -> Any:
+        return 2
+
+    def act(self, tick: int, rows: Any, values: Any) -> None:
+        arena, robot = self.at(rows)
+        painted = self.scene.own.setdefault("painted", np.zeros(self.scene.touched.shape))
+        painted[arena, robot] += self.gain * values[:, 1]
+        stopped = values[:, 0] < 0.0
+        self.scene.target[arena[stopped], robot[stopped]] = 0.0
+
+
+@dataclass
+class Alone(OwnSensor):
+    """A single field needs no tuple."""
+
+    @property
+    def fields(self) -> Any:
+        return (Field("x"),)
+
+    def truth(self, tick: int) -> Any:
+        return self.pose[:, :, 0]
+
+
+@dataclass
+class Raises(Alone):
+    def truth(self, tick: int) -> Any:
+        return 1 / tick
+
+
+@dataclass
+class WrongShape(Alone):
+    def truth(self, tick: int) -> Any:
+        return np.zeros(3)
+
+
+@dataclass
+class NoTruth(OwnSensor):
+    @property
+    def fields(self) -> Any:
+        return (Field("x"),)
+
+
+@dataclass
+class NoFields(Alone):
+    @property
+    def fields(self) -> Any:
+        return "x"
+
+
+@dataclass
+class Twice(Alone):
+    @property
+    def fields(self) -> Any:
+        return (Field("x"), Field("x"))
+
+
+@dataclass
+class Refuses(Alone):
+    def __post_init__(self) -> None:
+        raise ValueError("no")
+
+
+class Plain(Alone):
+    """No dataclass of its own, but below one."""
+
+
+@dataclass
+class NoWidth(Painter):
+    @property
+    def width(self) -> Any:
+        return 0
+
+
+@dataclass
+class Breaks(OwnActuator):
+    def act(self, tick: int, rows: Any, values: Any) -> None:
+        raise RuntimeError("jammed")
+
+
+NOTHING = 1

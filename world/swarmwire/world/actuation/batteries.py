@@ -1,0 +1,76 @@
+"""Batteries: what robots draw from them in a tick. Compiled."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from collections.abc import Sequence
+from math import inf
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.sheets import Battery
+from swarmwire.comms.truth import Group
+from swarmwire.world.actuation.limits import HOLONOMIC, limits_of
+
+PER_HOUR = 3600.0
+MAINS = Battery(capacity_wh=inf)  # of a body without a battery: its charge never falls
+
+
+class Batteries:
+    """The batteries of all robots of all arenas; `any` tells whether there are some.
+
+    Attributes:
+        charge: (arenas, robots) 1 full, 0 empty; always 1 for a body without a battery. Changed in place, and may be.
+    """
+
+    def __init__(self, groups: Sequence[Group], arenas: int, tick_s: float) -> None:
+        """Charged as their data sheets say."""
+        sizes = [group.stop - group.start for group in groups]
+        sheets = [next((s for s in group.body.senses.values() if isinstance(s, Battery)), MAINS) for group in groups]
+        self.any = any(sheet is not MAINS for sheet in sheets)
+        self.charge: FloatArray = np.tile(np.repeat([sheet.start for sheet in sheets], sizes), (arenas, 1))
+        draw = [(sheet.idle_w, sheet.drive_w_per_mps, sheet.led_w) for sheet in sheets]
+        share = tick_s / PER_HOUR / np.array([sheet.capacity_wh for sheet in sheets])  # of a charge, per W and tick
+        self._draw = np.repeat(np.array(draw) * share[:, None], sizes, axis=0)  # (robots, 3) in a tick
+        limits = limits_of(groups)
+        self._half_base_m, self._holonomic = limits.half_base_m, limits.kind == HOLONOMIC
+
+    @property
+    def empty(self) -> BoolArray:
+        """Robots without charge, (rows,)."""
+        return self.charge.ravel() <= 0.0
+
+    def renew(self, rows: BoolArray) -> None:
+        """Those of these robots (rows,) that are empty get a full battery."""
+        self.charge[(rows & self.empty).reshape(self.charge.shape)] = 1.0
+
+    def drain(self, alive: BoolArray, leds: IntArray, target: FloatArray) -> None:
+        """Draw what a tick takes.
+
+        Args:
+            alive: (rows,) the others are switched off, and draw nothing.
+            leds: (arenas, robots, LEDs) 0 dark.
+            target: (arenas, robots, 3) what engines are given.
+        """
+        _drain(self.charge, self._draw, self._half_base_m, self._holonomic, alive, leds, target)
+
+
+@njit(cache=True)
+def _drain(charge, draw, half_base_m, holonomic, alive, leds, target):
+    robots = charge.shape[1]
+    for arena in range(charge.shape[0]):
+        for i in range(robots):
+            if not alive[arena * robots + i]:
+                continue
+            forward, turn, left = target[arena, i]
+            if holonomic[i]:
+                speed = np.hypot(forward, left)
+            else:
+                rim = half_base_m[i] * turn
+                speed = 0.5 * (abs(forward - rim) + abs(forward + rim))
+            lit = 0
+            for led in leds[arena, i]:
+                lit += led != 0
+            used = draw[i, 0] + draw[i, 1] * speed + draw[i, 2] * lit
+            charge[arena, i] = max(charge[arena, i] - used, 0.0)

@@ -1,0 +1,95 @@
+"""Own senses and actuators at the door: their classes are found, and their keys checked, before a run."""
+
+from collections.abc import Mapping
+from dataclasses import is_dataclass, replace
+from importlib.metadata import entry_points
+from typing import Any, TypeVar, cast
+
+from swarmwire.comms.actuator_sheet import ActuatorSheet
+from swarmwire.comms.body import Body
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.loading import NotLoaded, load_named
+from swarmwire.comms.sheets import OwnSheet, Sheet
+from swarmwire.comms.tables import built
+from swarmwire.world.own.actuator import OwnActuator
+from swarmwire.world.own.sensor import OwnSensor
+from swarmwire.world.sensors.sensor import Field
+
+K = TypeVar("K", OwnSensor, OwnActuator)
+SENSORS, ACTUATORS = "swarmwire.sensors", "swarmwire.actuators"  # groups of entry points
+
+
+def fitted(body: Body, where: str) -> Body:
+    """The body with what the classes of its own senses and actuators tell agents; BadInput names what is wrong."""
+    senses = {name: _sense(sheet, where, f"senses.{name}") for name, sheet in body.senses.items()}
+    actuators = {name: _actuator(sheet, where, f"actuators.{name}") for name, sheet in body.actuators.items()}
+    return replace(body, senses=senses, actuators=actuators)
+
+
+def made_sensor(sheet: OwnSheet) -> OwnSensor:
+    """A new instance of the class of a sheet that is `fitted`."""
+    return _made(OwnSensor, sheet.kind, sheet.params, "", "")
+
+
+def made_actuator(sheet: ActuatorSheet) -> OwnActuator:
+    """A new instance of the class of a sheet that is `fitted`."""
+    return _made(OwnActuator, sheet.kind, sheet.params, "", "")
+
+
+def _sense(sheet: Sheet, where: str, key: str) -> Sheet:
+    if not isinstance(sheet, OwnSheet):
+        return sheet
+    sheet = replace(sheet, kind=_entry_point(sheet.kind, SENSORS))
+    own = _made(OwnSensor, sheet.kind, sheet.params, where, key)
+    found: Any = _asked(own, "fields", where, key)
+    if not isinstance(found, tuple | list) or not found or not all(isinstance(of, Field) for of in cast(Any, found)):
+        raise BadInput(where, f"{key}.kind", f"expected fields as a tuple of Field; {type(own).__name__} has {found!r}")
+    fields = cast("tuple[Field, ...]", found)
+    unfit = [of.name for of in fields if not of.name.isidentifier() or type(of.width) is not int or of.width < 0]
+    if unfit or len({of.name for of in fields}) < len(fields):
+        expected = "expected fields with names of their own and widths from 0"
+        raise BadInput(where, f"{key}.kind", f"{expected}; got {', '.join(unfit or [of.name for of in fields])}")
+    return replace(sheet, fields={of.name: of.width for of in fields})
+
+
+def _actuator(sheet: ActuatorSheet, where: str, key: str) -> ActuatorSheet:
+    sheet = replace(sheet, kind=_entry_point(sheet.kind, ACTUATORS))
+    own = _made(OwnActuator, sheet.kind, sheet.params, where, key)
+    width: Any = _asked(own, "width", where, key)
+    if type(width) is not int or width < 1:
+        raise BadInput(where, f"{key}.kind", f"expected a width from 1; {type(own).__name__} has {width!r}")
+    return replace(sheet, width=width)
+
+
+def _entry_point(kind: str, group: str) -> str:
+    """The "package.module:Class" that an entry point of this name stands for; any other text as it is."""
+    found = () if ":" in kind else tuple(entry_points(group=group, name=kind))
+    return found[0].value if found else kind
+
+
+def _asked(own: object, name: str, where: str, key: str) -> object:
+    try:
+        return getattr(own, name)
+    except Exception as error:
+        expected = f"{type(own).__name__}.{name} fails: {type(error).__name__}: {error}"
+        raise BadInput(where, f"{key}.kind", expected) from error
+
+
+def _made(base: type[K], kind: str, params: Mapping[str, Any], where: str, key: str) -> K:
+    """An instance of the class `kind` below `base`; BadInput if it is none, or does not take these parameters."""
+    try:
+        found = load_named(kind)
+    except NotLoaded as error:
+        raise BadInput(where, f"{key}.kind", str(error)) from error
+    if not isinstance(found, type) or not issubclass(found, base) or not is_dataclass(found):
+        what = "not there" if found is None else f"{cast('object', found)!r}"
+        raise BadInput(where, f"{key}.kind", f"expected a dataclass below {base.__name__}; {kind} is {what}")
+    missing: frozenset[str] = getattr(found, "__abstractmethods__", frozenset())
+    if missing:
+        raise BadInput(where, f"{key}.kind", f"{found.__name__} has no {', '.join(sorted(missing))}")
+    try:
+        return built(found, params, where, key)
+    except BadInput:
+        raise
+    except Exception as error:  # of its own __post_init__
+        raise BadInput(where, key, f"{found.__name__} refuses: {type(error).__name__}: {error}") from error

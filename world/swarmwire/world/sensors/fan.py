@@ -1,0 +1,170 @@
+"""A few rays from the rim of each robot, and the nearest thing on each. Compiled; for active and passive infrared."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.cells import sort
+from swarmwire.comms.geometry import ray_to_circle
+from swarmwire.comms.obstacle_cells import near_things, ray_to_thing
+from swarmwire.comms.sheets import Rim
+from swarmwire.comms.truth import Group
+from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest
+from swarmwire.world.sensors.scene import Scene
+from swarmwire.world.sensors.standing import Standing
+
+MARGIN_M = 1e-9  # a disc farther than that from a ray is missed, however numbers are rounded
+
+
+class Fan(NamedTuple):
+    """The sheet as kernels take it, and room for what they find out of one robot."""
+
+    first: int  # robot of the group
+    cos: FloatArray  # (rays,) directions in the body's frame
+    sin: FloatArray  # (rays,)
+    range_m: float
+    half_x: float  # where walls stand; inf: nowhere
+    half_y: float
+    rational: bool  # form of the response; `ResponseCurve` says what the numbers mean
+    a: float
+    b: float
+    c: float
+    full_m: float
+    reach_m: float
+    dx: FloatArray  # (rays,) directions in the arena's frame
+    dy: FloatArray  # (rays,)
+    hidden_m: FloatArray  # (rays,) how far one sees
+    found: IntArray  # (things,)
+
+
+class FanSight:
+    """What the rays of a group's robots meet: everything if they are active, else only robots in sight."""
+
+    def __init__(self, scene: Scene, group: Group, sheet: Rim, active: bool) -> None:
+        reach_m = group.body.radius_m + sheet.range_m
+        self._shape = len(scene.keys), group.stop - group.start, len(sheet.angle_rad)
+        self._active, curve = active, sheet.response
+        self._crowd = crowd_of(scene, reach_m + float(scene.radius_m.max()))
+        self._standing = Standing(scene, reach_m)
+        walled, (width, height) = scene.boundary == "walls", scene.size_m
+        self._fan = Fan(
+            group.start,
+            np.cos(sheet.angle_rad),
+            np.sin(sheet.angle_rad),
+            sheet.range_m,
+            0.5 * width if walled else np.inf,
+            0.5 * height if walled else np.inf,
+            curve.kind == "rational",
+            curve.a,
+            curve.b,
+            curve.c,
+            curve.full_m,
+            curve.reach_m,
+            np.empty(self._shape[2]),
+            np.empty(self._shape[2]),
+            np.empty(self._shape[2]),
+            np.empty(len(self._standing.now().shape), np.int64),
+        )
+
+    def answer(self) -> FloatArray:
+        """What an ideal sensor answers to what each ray meets, (arenas, n, rays), 0 to 1."""
+        value = np.zeros(self._shape)
+        _look(value, self._crowd, self._standing.now(), self._fan, self._active, True)
+        return value
+
+    def distance_m(self) -> FloatArray:
+        """The distance along each ray from the rim, (arenas, n, rays) in m; inf where nothing is within the range."""
+        near = np.full(self._shape, np.inf)
+        _look(near, self._crowd, self._standing.now(), self._fan, self._active, False)
+        return near
+
+
+@borrowing()
+def _look(value, crowd, things, fan, active, answers):
+    """Set value (arenas, n, rays) of robots that have anything near; with `answers` the response to the distance."""
+    sort(crowd.cells, crowd.state)
+    for arena in range(value.shape[0]):
+        for i in range(value.shape[1]):
+            own = fan.first + i
+            x = nearest(0.0, crowd.state[arena, own, 0], crowd.wrap_x, crowd.per_wrap_x)
+            y = nearest(0.0, crowd.state[arena, own, 1], crowd.wrap_y, crowd.per_wrap_y)
+            rim = crowd.radius_m[own]
+            reach = rim + fan.range_m
+            low, high = crowd.bottom_m[own], crowd.top_m[own]
+            robots = near_robots(crowd, arena, own, x, y, reach, low, high)
+            if not active and robots == 0:
+                continue
+            count = near_things(fan.found, things, arena, x, y, reach, low)
+            at_wall = abs(x) + reach >= fan.half_x or abs(y) + reach >= fan.half_y
+            if robots == 0 and count == 0 and not at_wall:
+                continue
+            _turn(fan, crowd.state[arena, own, 2])
+            near = value[arena, i]
+            near[:] = np.inf
+            if at_wall:
+                _meet_walls(near, x, y, rim, fan)
+            _meet_things(near, x, y, rim, fan, things, count)
+            if not active:
+                for ray in range(len(near)):
+                    fan.hidden_m[ray], near[ray] = near[ray], np.inf
+            _meet_robots(near, x, y, rim, fan, crowd, robots)
+            for ray in range(len(near)):
+                d = near[ray]
+                if d > fan.range_m or (not active and d > fan.hidden_m[ray]):
+                    d = np.inf
+                near[ray] = _answer(d, fan) if answers else d
+
+
+@borrowing()
+def _turn(fan, heading):
+    """Set the directions of the rays of a robot."""
+    c, s = np.cos(heading), np.sin(heading)
+    for ray in range(len(fan.dx)):
+        fan.dx[ray] = c * fan.cos[ray] - s * fan.sin[ray]
+        fan.dy[ray] = s * fan.cos[ray] + c * fan.sin[ray]
+
+
+@borrowing()
+def _meet_walls(near, x, y, rim, fan):
+    for ray in range(len(near)):
+        for at, step, end in ((x, fan.dx[ray], fan.half_x), (y, fan.dy[ray], fan.half_y)):
+            if step != 0.0:
+                wall = end if step > 0.0 else -end
+                near[ray] = min(near[ray], max((wall - at - rim * step) / step, 0.0))
+
+
+@borrowing()
+def _meet_things(near, x, y, rim, fan, things, count):
+    for at in range(count):
+        for ray in range(len(near)):
+            dx, dy = fan.dx[ray], fan.dy[ray]
+            near[ray] = min(near[ray], ray_to_thing(x + rim * dx, y + rim * dy, dx, dy, things, fan.found[at]))
+
+
+@borrowing()
+def _meet_robots(near, x, y, rim, fan, crowd, count):
+    for at in range(count):
+        cx, cy, radius = crowd.found_at[at, 0], crowd.found_at[at, 1], crowd.radius_m[crowd.found[at]]
+        ox, oy = cx - x, cy - y
+        for ray in range(len(near)):
+            dx, dy = fan.dx[ray], fan.dy[ray]
+            if abs(ox * dy - oy * dx) <= radius + MARGIN_M:
+                near[ray] = min(near[ray], ray_to_circle(x + rim * dx, y + rim * dy, dx, dy, cx, cy, radius))
+
+
+@borrowing()
+def _answer(distance, fan):
+    """What a sensor answers to a distance (`ResponseCurve.value`)."""
+    if distance > fan.reach_m:
+        return 0.0
+    if not fan.rational:
+        value = fan.a * distance * distance + fan.b * distance + fan.c
+    elif distance < fan.full_m:
+        value = 1.0
+    else:
+        value = fan.a / (distance + fan.b)
+    return min(max(value, 0.0), 1.0)

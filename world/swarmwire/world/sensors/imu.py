@@ -1,0 +1,72 @@
+"""The IMU: what a body feels of its own motion, with a bias that each robot has for itself and that drifts.
+
+Accelerations are the change of velocity over the tick before, seen in the frame of the body half way through it: a
+robot that drives a circle feels v w to the inside. The turn rate is the change of heading over that tick. The bias
+begins as a normal draw once per robot and field, and takes a normal step of drift x sqrt(tick) in each tick.
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.draws import normal as normals
+from swarmwire.comms.draws import purpose
+from swarmwire.comms.draws_compiled import normal
+from swarmwire.comms.sheets import Imu
+from swarmwire.comms.truth import Group
+from swarmwire.world.sensors.scene import Scene
+from swarmwire.world.sensors.sensor import Field, Noise
+
+BIAS, DRIFT = purpose("imu bias"), purpose("imu drift")
+
+
+class ImuSensor:
+    """Sense `imu`: forward_mps2, left_mps2 and turn_radps (n,), in the body's frame; 0 but for errors in tick 0."""
+
+    def __init__(self, scene: Scene, group: Group, sheet: Imu) -> None:
+        self._scene, self._group = scene, group
+        acceleration, turn = Noise("normal", sheet.noise_mps2), Noise("normal", sheet.noise_radps)
+        self.fields = (
+            Field("forward_mps2", noise=acceleration, step=sheet.step),
+            Field("left_mps2", noise=acceleration, step=sheet.step),
+            Field("turn_radps", noise=turn, step=sheet.step),
+        )
+        robots = np.arange(group.start, group.stop)
+        spread = np.array([sheet.bias_std_mps2, sheet.bias_std_mps2, sheet.bias_std_radps])
+        drawn = normals(scene.keys[:, None, None], robots[:, None], 0, np.arange(3), BIAS)
+        self._bias = spread * drawn  # (arenas, n, fields)
+        drift = np.array([sheet.drift_mps2, sheet.drift_mps2, sheet.drift_radps])
+        self._drift = drift * np.sqrt(scene.tick_s)  # (fields,) in a tick
+        self._before = scene.state[:, group.start : group.stop, 2:5].copy()  # heading and velocity
+        self._felt = np.zeros_like(self._bias)
+
+    def follow(self, tick: int) -> None:
+        """Feel the tick before, and let the bias drift."""
+        scene, start = self._scene, self._group.start
+        _feel(self._felt, self._before, self._bias, self._drift, scene.state, start, scene.keys, tick, scene.tick_s)
+
+    def truth(self, tick: int) -> tuple[FloatArray, ...]:
+        """What every robot felt in the tick before, with its bias."""
+        self.follow(tick)
+        felt = self._felt
+        return felt[:, :, 0].copy(), felt[:, :, 1].copy(), felt[:, :, 2].copy()
+
+
+@njit(cache=True)
+def _feel(felt, before, bias, drift, state, start, keys, tick, tick_s):
+    for arena in range(felt.shape[0]):
+        for i in range(felt.shape[1]):
+            was, now = before[arena, i], state[arena, start + i]
+            half_way = 0.5 * (was[0] + now[2])
+            ax, ay = (now[3] - was[1]) / tick_s, (now[4] - was[2]) / tick_s
+            c, s = np.cos(half_way), np.sin(half_way)
+            felt[arena, i, 0] = c * ax + s * ay
+            felt[arena, i, 1] = c * ay - s * ax
+            felt[arena, i, 2] = (now[2] - was[0]) / tick_s
+            was[:] = now[2:5]
+            for k in range(3):
+                if drift[k] > 0.0 and tick > 0:
+                    bias[arena, i, k] += drift[k] * normal(keys[arena], start + i, tick, k, DRIFT)
+                felt[arena, i, k] += bias[arena, i, k]

@@ -1,0 +1,174 @@
+"""Laser scan: many rays of one origin. Each near thing is tested against the rays that may meet it alone. Compiled."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.cells import sort
+from swarmwire.comms.geometry import ray_to_circle, ray_to_polygon
+from swarmwire.comms.obstacle_cells import near_things
+from swarmwire.comms.sheets import Scan
+from swarmwire.comms.truth import Group
+from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest
+from swarmwire.world.sensors.scene import Scene
+from swarmwire.world.sensors.sensor import Field, Noise
+from swarmwire.world.sensors.standing import Standing
+
+TURN_RAD = 2.0 * np.pi
+SLACK = 1e-6  # of the angle between two rays: a ray that grazes a thing is tested, however numbers are rounded
+
+
+class Laser(NamedTuple):
+    """The sheet as kernels take it, and room for what they find out of one robot."""
+
+    first: int  # robot of the group
+    cos: FloatArray  # (rays,) directions in the body's frame
+    sin: FloatArray  # (rays,)
+    first_rad: float
+    step_rad: float
+    range_m: float
+    at_m: float
+    half_x: float  # where walls stand; inf: nowhere
+    half_y: float
+    dx: FloatArray  # (rays,) directions in the arena's frame
+    dy: FloatArray  # (rays,)
+    found: IntArray  # (things,)
+
+
+class ScanSensor:
+    """Sense `scan`: range_m (n, rays) from the scanner, inf where nothing is within its range. Noise is normal."""
+
+    def __init__(self, scene: Scene, group: Group, sheet: Scan) -> None:
+        noise = Noise("normal", sheet.noise_m, sheet.noise_relative)
+        self.fields = (
+            Field("range_m", sheet.rays, noise, sheet.step, low=sheet.range_min_m, high=sheet.range_m, blank=np.inf),
+        )
+        self._shape = len(scene.keys), group.stop - group.start, sheet.rays
+        self._crowd = crowd_of(scene, sheet.range_m + float(scene.radius_m.max()))
+        self._standing = Standing(scene, sheet.range_m)
+        walled, (width, height) = scene.boundary == "walls", scene.size_m
+        self._laser = Laser(
+            group.start,
+            *sheet.direction,
+            np.deg2rad(sheet.first_deg),
+            sheet.step_rad,
+            sheet.range_m,
+            sheet.at_m,
+            0.5 * width if walled else np.inf,
+            0.5 * height if walled else np.inf,
+            np.empty(sheet.rays),
+            np.empty(sheet.rays),
+            np.empty(len(self._standing.now().shape), np.int64),
+        )
+
+    def truth(self, tick: int) -> tuple[FloatArray, ...]:
+        """The distance along every ray of every robot of the group."""
+        near = np.empty(self._shape)
+        _scan(near, self._crowd, self._standing.now(), self._laser)
+        return (near,)
+
+
+@borrowing()
+def _scan(near, crowd, things, laser):
+    """Set near (arenas, n, rays)."""
+    sort(crowd.cells, crowd.state)
+    for arena in range(near.shape[0]):
+        for i in range(near.shape[1]):
+            own, rays = laser.first + i, near[arena, i]
+            heading = crowd.state[arena, own, 2]
+            c, s, low, high = np.cos(heading), np.sin(heading), crowd.bottom_m[own], crowd.top_m[own]
+            x = crowd.state[arena, own, 0] + laser.at_m * c
+            y = crowd.state[arena, own, 1] + laser.at_m * s
+            x = nearest(0.0, x, crowd.wrap_x, crowd.per_wrap_x)
+            y = nearest(0.0, y, crowd.wrap_y, crowd.per_wrap_y)
+            for ray in range(len(rays)):
+                laser.dx[ray] = c * laser.cos[ray] - s * laser.sin[ray]
+                laser.dy[ray] = s * laser.cos[ray] + c * laser.sin[ray]
+                rays[ray] = np.inf
+            _meet_walls(rays, x, y, laser)
+            for at in range(near_things(laser.found, things, arena, x, y, laser.range_m, low)):
+                k = laser.found[at]
+                if things.side_start[k] == things.side_start[k + 1]:
+                    _meet_disc(rays, x, y, heading, laser, things.shape[k, 0], things.shape[k, 1], things.shape[k, 2])
+                else:
+                    _meet_polygon(rays, x, y, heading, laser, things, k)
+            for at in range(near_robots(crowd, arena, own, x, y, laser.range_m, low, high)):
+                radius = crowd.radius_m[crowd.found[at]]
+                _meet_disc(rays, x, y, heading, laser, crowd.found_at[at, 0], crowd.found_at[at, 1], radius)
+            for ray in range(len(rays)):
+                if rays[ray] > laser.range_m:
+                    rays[ray] = np.inf
+
+
+@borrowing()
+def _meet_walls(rays, x, y, laser):
+    if abs(x) + laser.range_m >= laser.half_x:
+        for ray in range(len(rays)):
+            step = laser.dx[ray]
+            if step != 0.0:
+                rays[ray] = max((np.copysign(laser.half_x, step) - x) / step, 0.0)
+    if abs(y) + laser.range_m >= laser.half_y:
+        for ray in range(len(rays)):
+            step = laser.dy[ray]
+            if step != 0.0:
+                rays[ray] = min(rays[ray], max((np.copysign(laser.half_y, step) - y) / step, 0.0))
+
+
+@borrowing()
+def _meet_disc(rays, x, y, heading, laser, cx, cy, radius):
+    ox, oy = cx - x, cy - y
+    apart = np.sqrt(ox * ox + oy * oy)
+    right, width = 0.0, TURN_RAD
+    if apart > radius:
+        half = np.arcsin(radius / apart)
+        right, width = np.arctan2(oy, ox) - half, 2.0 * half
+    for past_last in range(2):
+        first, stop = _span(right - heading, width, past_last, laser)
+        for ray in range(first, stop):
+            rays[ray] = min(rays[ray], ray_to_circle(x, y, laser.dx[ray], laser.dy[ray], cx, cy, radius))
+
+
+@borrowing()
+def _meet_polygon(rays, x, y, heading, laser, things, k):
+    right, width = _seen(x, y, things, k)
+    for past_last in range(2):
+        first, stop = _span(right - heading, width, past_last, laser)
+        for ray in range(first, stop):
+            rays[ray] = min(rays[ray], ray_to_polygon(x, y, laser.dx[ray], laser.dy[ray], things, k))
+
+
+@borrowing()
+def _span(right, width, past_last, laser):
+    """The rays from the angle `right` in the body's frame on that a thing of this width may meet, as a range.
+
+    They may go on at ray 0: those are the ones `past_last`.
+    """
+    per_turn = TURN_RAD / laser.step_rad
+    first = (right - laser.first_rad) / laser.step_rad
+    first -= per_turn * (np.floor(first / per_turn) + past_last)
+    last = first + width / laser.step_rad
+    return max(int(np.ceil(first - SLACK)), 0), min(int(np.floor(last + SLACK)) + 1, len(laser.dx))
+
+
+@borrowing()
+def _seen(x, y, things, k):
+    """The direction of the rightmost corner of a polygon, and how wide it looks; all around from inside."""
+    begin, end = things.side_start[k], things.side_start[k + 1]
+    outside = False
+    right_x, right_y = things.side[begin, 0] - x, things.side[begin, 1] - y
+    left_x, left_y = right_x, right_y
+    for i in range(begin, end):
+        outside = outside or things.side[i, 2] * x + things.side[i, 3] * y > things.side[i, 4]
+        cx, cy = things.side[i, 0] - x, things.side[i, 1] - y
+        if right_x * cy - right_y * cx < 0.0:
+            right_x, right_y = cx, cy
+        if left_x * cy - left_y * cx > 0.0:
+            left_x, left_y = cx, cy
+    if not outside:
+        return 0.0, TURN_RAD
+    width = np.arctan2(right_x * left_y - right_y * left_x, right_x * left_x + right_y * left_y)
+    return np.arctan2(right_y, right_x), abs(width)
