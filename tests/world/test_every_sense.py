@@ -80,7 +80,7 @@ def test_some_readings_are_there_and_some_are_lost(told: list[dict[str, Any]], n
     fields = [field for field in told[0] if field.startswith(f"{name}.")]
     assert fields
     for field in fields:
-        first, later = told[0][field], told[12][field]
+        first, later = told[0][field], np.stack([tick[field] for tick in told[3:]])
         assert first.flags.c_contiguous
         assert len(np.unique(first)) == 1  # nothing was shown so far: all are blank
         assert len(np.unique(later)) > 1

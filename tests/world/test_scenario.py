@@ -111,7 +111,7 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("robots.flock.count", "x", f"robots.flock.count: {COUNT}, got 'x'"),
     ("robots.flock.count", 0, f"robots.flock.count: {COUNT}, got 0"),
     ("robots.flock.count", True, f"robots.flock.count: {COUNT}, got True"),
-    ("robots.flock.body", "car", "robots.flock.body: expected one of epuck, epuck-gps, footbot; got 'car'"),
+    ("robots.flock.body", "car", "robots.flock.body: expected one of epuck, epuck-gps, epuck2, flockbot, "),
     (
         "robots.flock.colour",
         "red",

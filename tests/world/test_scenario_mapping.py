@@ -27,7 +27,7 @@ def test_a_scenario_that_was_changed_in_python_says_what_it_is_now(path):
     changed = load_scenario(path).model_copy(update={"duration_s": 1.5})
     mapping = mapping_of(changed)
     assert mapping["duration_s"] == 1.5
-    assert same_content(scenario_from(mapping, "a test"), changed)
+    assert same_content(scenario_from(mapping, str(path)), changed)  # beside the pictures that it names
 
 
 def test_the_mapping_is_the_callers_own():
