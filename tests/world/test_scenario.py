@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.air.radio import BearingGiven, Gives, Radio, RangeGiven
+from swarmwire.comms.body import body_names
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario, scenario_from, scenario_schema
@@ -111,7 +112,7 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("robots.flock.count", "x", f"robots.flock.count: {COUNT}, got 'x'"),
     ("robots.flock.count", 0, f"robots.flock.count: {COUNT}, got 0"),
     ("robots.flock.count", True, f"robots.flock.count: {COUNT}, got True"),
-    ("robots.flock.body", "car", "robots.flock.body: expected one of epuck, epuck-gps, epuck2, flockbot, "),
+    ("robots.flock.body", "car", f"robots.flock.body: expected one of {', '.join(body_names())}; got 'car'"),
     (
         "robots.flock.colour",
         "red",
