@@ -35,10 +35,9 @@ class DiscsEngine:
         self.braked: BoolArray = np.zeros((arenas, robots), np.bool_)
         self._robots = robots_of(setting, arenas)
         self._widest_m = float(setting.radius_m.max(initial=0.0))
-        self._spread = np.zeros(2)
         self._contacts = np.zeros(0, CONTACT)
         self._set_margin(MARGIN * self._widest_m)
-        self._list_near()
+        self._list_near(0.0)
 
     def tick(self, target: FloatArray) -> IntArray:
         """Move by one tick towards targets (arenas, robots, 3): see `Engine`."""
@@ -48,27 +47,27 @@ class DiscsEngine:
         step_s, half_size_m = setting.tick_s / setting.steps, (0.5 * setting.size_m[0], 0.5 * setting.size_m[1])
         step = 0
         while True:
-            step = advance(
+            step, fastest_mps = advance(
                 step, setting.steps, step_s, self._margin_m, self._widest_m, half_size_m, per_arena,
                 self._robots, self.state.reshape(rows, 6), self.travel_m.reshape(rows, 2), self.touched.reshape(rows),
-                self.braked.reshape(rows), target.reshape(rows, 3), self._spread, self._contacts, self._met,
+                self.braked.reshape(rows), target.reshape(rows, 3), self._contacts, self._met,
                 self._crowd, self._loners, obstacles.circle, obstacles.side_start, obstacles.side,
                 onsets,
             )  # fmt: skip
             if step == setting.steps:
                 return onsets
-            self._list_near()
+            self._list_near(fastest_mps)
 
     def _set_margin(self, margin_m: float) -> None:
         self._margin_m = margin_m
         # The cell of a robot's middle lists what its rim may reach.
         self._cells = obstacle_cells(self._setting.obstacles, self._setting.size_m, self._widest_m + margin_m)
 
-    def _list_near(self) -> None:
+    def _list_near(self, fastest_mps: float) -> None:
         """List what is near each robot, with a margin that lasts for a tick at least."""
         setting, (arenas, per_arena) = self._setting, self.touched.shape
         step_s = setting.tick_s / setting.steps
-        needed_m = needed_margin_m(self._spread[1], self._widest_m, step_s, setting.steps)
+        needed_m = needed_margin_m(fastest_mps, self._widest_m, step_s, setting.steps)
         if needed_m > self._margin_m:
             self._set_margin(1.5 * needed_m)
         robots, state, margin_m = self._robots, self.state.reshape(arenas * per_arena, 6), self._margin_m
@@ -80,4 +79,3 @@ class DiscsEngine:
         self._met = np.zeros(len(self._contacts), np.int64)
         self._crowd, self._loners = crowd_of(len(state), self._contacts)
         robots["listed_x_m"], robots["listed_y_m"] = state[:, 0], state[:, 1]
-        self._spread[0] = 0.0

@@ -20,22 +20,23 @@ def needed_margin_m(fastest_mps, widest_m, dt_s, steps):
 @borrowing()
 def advance(
     step, steps, dt_s, margin_m, widest_m, half_size_m, per_arena, robots, state, travel_m, touched, braked, target,
-    spread, contacts, met, crowd, loners, circle, side_start, side, onsets,
+    contacts, met, crowd, loners, circle, side_start, side, onsets,
 ):  # fmt: skip
     """Move all robots from this step of the tick on, to its end or until near things have to be listed anew.
 
     Returns:
-        The step that was reached. `spread` (2,) then tells how far any robot is from where it was listed, and the
-        greatest speed of any.
+        The step that was reached, and the greatest speed that any robot had or was asked for.
     """
-    fastest_mps = max(spread[1], _fastest_mps(target))
-    if spread[0] + needed_margin_m(fastest_mps, widest_m, dt_s, steps - step) > margin_m:
-        spread[1] = fastest_mps
-        return step
+    asked_mps = _fastest_mps(target)
+    far_m, fastest_mps = _spread(crowd, robots, state, 0.0, asked_mps)
+    far_m, fastest_mps = _spread(loners, robots, state, far_m, fastest_mps)
+    if far_m + needed_margin_m(fastest_mps, widest_m, dt_s, steps - step) > margin_m:
+        return step, fastest_mps
     if step == 0:
         begin_tick(contacts, robots, touched)
     first = step
-    while step < steps and spread[0] + needed_margin_m(fastest_mps, widest_m, dt_s, 0) <= margin_m:
+    # With `not` and `>` a speed that is no number ends the tick instead of asking for new lists for ever.
+    while step < steps and not far_m + needed_margin_m(fastest_mps, widest_m, dt_s, 0) > margin_m:
         for row in crowd:
             drive(robots[row], state[row], target[row], braked[row], dt_s)
         count = find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, circle, side_start, side)
@@ -45,14 +46,11 @@ def advance(
         note_touches(contacts, now, robots, state, dt_s, touched, per_arena, onsets)
         for row in crowd:
             move(robots[row], state[row], travel_m[row], dt_s)
-        spread[0] = spread[1] = 0.0
-        _note_spread(crowd, robots, state, spread)
-        fastest_mps = max(fastest_mps, spread[1])
+        far_m, fastest_mps = _spread(crowd, robots, state, 0.0, fastest_mps)
         step += 1
     # Only contacts make a robot faster than it was and was asked to be, so no loner has left its margin.
     follow_targets(loners, step - first, dt_s, robots, state, target, braked, travel_m)
-    _note_spread(loners, robots, state, spread)
-    return step
+    return step, fastest_mps
 
 
 @borrowing()
@@ -64,11 +62,11 @@ def _fastest_mps(target):
 
 
 @borrowing()
-def _note_spread(rows, robots, state, spread):
-    """Raise `spread` to the greatest distance of these rows from where they were listed, and their greatest speed."""
-    far2, fast2 = spread[0] * spread[0], spread[1] * spread[1]
+def _spread(rows, robots, state, far_m, fastest_mps):
+    """The greatest distance of these rows from where they were listed, and their greatest speed; no less than given."""
+    far2, fastest2 = far_m * far_m, fastest_mps * fastest_mps
     for row in rows:
         dx, dy = state[row, 0] - robots[row].listed_x_m, state[row, 1] - robots[row].listed_y_m
         far2 = max(far2, dx * dx + dy * dy)
-        fast2 = max(fast2, state[row, 3] * state[row, 3] + state[row, 4] * state[row, 4])
-    spread[0], spread[1] = np.sqrt(far2), np.sqrt(fast2)
+        fastest2 = max(fastest2, state[row, 3] * state[row, 3] + state[row, 4] * state[row, 4])
+    return np.sqrt(far2), np.sqrt(fastest2)
