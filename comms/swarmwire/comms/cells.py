@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.borrowing import borrowing
 
 MOST_PER_SIDE = 512
 SLACK = 1.0 + 1e-9  # two things at just the reach may be rounded apart

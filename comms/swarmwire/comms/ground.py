@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.floor import Floor
 from swarmwire.comms.geometry import sides_of
 from swarmwire.comms.truth import Boundary

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.cells import Cells, cells_over, column_of, row_of
 from swarmwire.comms.geometry import Obstacles, ray_to_circle, ray_to_polygon
 

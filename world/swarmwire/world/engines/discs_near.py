@@ -10,8 +10,8 @@ L. Verlet (1967), Computer "experiments" on classical fluids, Phys. Rev. 159, 98
 
 import numpy as np
 
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry import Obstacles
 from swarmwire.comms.grid import build, cell_of
 from swarmwire.world.engines.discs_fixed import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, gap_to_fixed, gap_to_wall

@@ -14,7 +14,7 @@ impulses, Game Developers Conference.
 
 # pyright: basic, reportUnknownMemberType=false
 
-from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.world.engines.discs_fixed import ROBOT
 
 SWEEPS = 10

@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.world.engines.discs_contacts import LOOK_AHEAD, find_contacts
 from swarmwire.world.engines.discs_motion import drive, follow_targets, move
 from swarmwire.world.engines.discs_solver import separate, solve

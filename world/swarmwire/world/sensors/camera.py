@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.cells import sort
 from swarmwire.comms.obstacle_cells import near_things
 from swarmwire.comms.sheets import Camera

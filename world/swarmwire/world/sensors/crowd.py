@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.cells import Cells, cells_over, column_of, row_of
 from swarmwire.world.sensors.scene import Scene
 

@@ -4,8 +4,8 @@
 
 import numpy as np
 
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.ground import shade_at
 from swarmwire.comms.sheets import GroundColour
 from swarmwire.comms.truth import Group

@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from swarmwire.comms.air.signal.borrowing import borrowing
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry import ray_to_circle
 from swarmwire.comms.obstacle_cells import ray_to_thing
 from swarmwire.world.sensors.crowd import nearest

@@ -13,8 +13,8 @@ another robot that is at the same height.
 
 import numpy as np
 
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.cells import sort
 from swarmwire.comms.sheets import Light
 from swarmwire.comms.truth import Group

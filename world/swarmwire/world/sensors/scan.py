@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.cells import sort
 from swarmwire.comms.geometry import ray_to_circle, ray_to_polygon
 from swarmwire.comms.obstacle_cells import near_things

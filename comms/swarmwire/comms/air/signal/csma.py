@@ -5,9 +5,9 @@
 import numpy as np
 
 from swarmwire.comms.air.signal import on_air
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import LISTENED, SEND, TIMER, schedule
 from swarmwire.comms.air.signal.tables import BACKING_OFF, LISTENING, SILENT, TURNING
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.borrowing import borrowing
 
 # In the order in which events of one moment happen: a frame that ends makes room for one that starts.
 OFF_AIR, LISTENED, TIMER, SEND, ANSWER, ENTER = range(6)

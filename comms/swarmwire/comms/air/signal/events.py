@@ -3,9 +3,9 @@
 # pyright: basic, reportUnknownMemberType=false
 
 from swarmwire.comms.air.signal import dcf, jamming, on_air, service
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import ENTER, LISTENED, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY, RECEIVING, SILENT
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.fates import Fate
 
 SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_DEAD), int(Fate.BLACKOUT)

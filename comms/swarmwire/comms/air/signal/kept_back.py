@@ -3,9 +3,9 @@
 # pyright: basic, reportUnknownMemberType=false
 
 from swarmwire.comms.air.signal import service
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import LISTENED, SEND, TIMER, cancel
 from swarmwire.comms.air.signal.tables import BACKING_OFF, HELD, KEPT_ALL, SILENT, TURNING
+from swarmwire.comms.borrowing import borrowing
 
 
 @borrowing()

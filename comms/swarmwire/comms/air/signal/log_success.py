@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.reception.reception import Model, Receiver, chunk_success
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.borrowing import borrowing
 
 LEAST_OCTAVE, MOST_OCTAVE, ROWS = -10, 12, 256
 LEAST, MOST = 2.0**LEAST_OCTAVE, 2.0**MOST_OCTAVE

@@ -10,10 +10,10 @@ from numba import njit
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.fixed_loss import LOSS
 from swarmwire.comms.air.reception.burst_states import takes
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.log_success import NEVER, log_success
 from swarmwire.comms.air.signal.tables import ACKNOWLEDGEMENT, DATA, NOBODY
 from swarmwire.comms.air.trace import TRACE
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.fates import Fate

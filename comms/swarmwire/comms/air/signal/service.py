@@ -3,7 +3,6 @@
 # pyright: basic, reportUnknownMemberType=false
 
 from swarmwire.comms.air.signal import csma, dcf, on_air, telling
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import ANSWER, ENTER, LISTENED, SEND, TIMER, cancel, schedule
 from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import (
@@ -22,6 +21,7 @@ from swarmwire.comms.air.signal.tables import (
     SILENT,
     TURNING,
 )
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.outcomes import SendResult
 

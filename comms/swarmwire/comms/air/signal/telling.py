@@ -4,9 +4,9 @@
 
 import numpy as np
 
-from swarmwire.comms.air.signal.borrowing import borrowing
 from swarmwire.comms.air.signal.event_queue import ANSWER, schedule
 from swarmwire.comms.air.signal.tables import HELD, NOBODY, NOTHING
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.fates import Fate
 
 HEARD, BLOCKED, BLACKOUT = int(Fate.HEARD), int(Fate.BLOCKED), int(Fate.BLACKOUT)
