@@ -96,5 +96,6 @@ def test_the_record_and_its_pictures_show_it_where_it_is(scenario: Path, tmp_pat
 
 def test_runs_with_movable_obstacles_are_the_same_in_every_layout(scenario: Path) -> None:
     alone = run(scenario, seeds=[7])
+    assert alone.ended == "duration"
     assert run(scenario, seeds=[7], runners=2).trajectory_sha256 == alone.trajectory_sha256
     assert run(scenario, seeds=[5, 7]).trajectory_sha256[1:] == alone.trajectory_sha256
