@@ -13,6 +13,8 @@ swarmwire screenshot "$runs/flocking-disrupted" --tick 300 --to docs/rerun.png
 swarmwire export "$runs/flocking-disrupted" --gif --to docs/demo.gif
 swarmwire export "$runs/split" --png 35 --to docs/split.png
 swarmwire export "$runs/pso" --png 55 --to docs/pso.png
+swarmwire run scenarios/drones.toml --quiet --no-rrd --out "$runs/drones"
+swarmwire export "$runs/drones" --png 50 --to docs/drones.png
 for body in epuck epuck2 flockbot footbot kilobot point turtlebot3-burger; do
   swarmwire draw "$body" --size 900 --to "docs/bodies/$body.png"
 done
