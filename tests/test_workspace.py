@@ -102,7 +102,8 @@ for heavy in {HEAVY}:
     sys.modules[heavy] = None  # importing it raises ImportError
 import swarmwire.agent, swarmwire.comms
 
-kernels = ("swarmwire.comms.air", "swarmwire.comms.draws_compiled", "swarmwire.comms.geometry", "swarmwire.comms.grid")
+compiled = "air borrowing cells draws_compiled geometry grid ground obstacle_cells"
+kernels = tuple("swarmwire.comms." + name for name in compiled.split())
 for package in (swarmwire.agent, swarmwire.comms):
     for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
         if not module.name.startswith(kernels):

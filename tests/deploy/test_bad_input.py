@@ -110,11 +110,11 @@ WIDER = [
     ("events=3", "events: expected a list, got 3"),
     (
         "events=[{at_s=1}]",
-        "events.0.do: is missing; expected one of blackout, gain, jammer, kill, partition, ramp, revive",
+        "events.0.do: is missing; expected one of blackout, fail, gain, jammer, kill, partition, ramp, revive",
     ),
     (
         "events=[{at_s=1, do='burn'}]",
-        "events.0.do: expected one of blackout, gain, jammer, kill, partition, ramp, revive; got 'burn'",
+        "events.0.do: expected one of blackout, fail, gain, jammer, kill, partition, ramp, revive; got 'burn'",
     ),
     (
         "events=[{at_s=nan, do='kill', robots={count=1}}]",
@@ -159,7 +159,7 @@ WIDER = [
     ),
     (
         "arena.lights=[{intensity=1, at=[0, 0], colour='red'}]",
-        "arena.lights.0.colour: unknown key; expected one of at, place, count, intensity",
+        "arena.lights.0.colour: unknown key; expected one of at, place, count, within, apart_m, intensity",
     ),
     (
         "arena.lights=[{intensity=1, at=[9, 0]}]",

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from swarmwire.comms.body import body_names
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli import app
 from tests.deploy.commands import LOSSY, ROOT, swarmwire
@@ -82,7 +83,7 @@ def test_a_picture_may_be_of_lines(here):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["blimp"], "blimp: expected a scenario's or a body's .toml, or one of epuck, epuck-gps, footbot"),
+        (["blimp"], f"blimp: expected a scenario's or a body's .toml, or one of {', '.join(body_names())}"),
         (["absent.toml"], "absent.toml: expected a readable file: No such file or directory"),
         (["epuck", "--seed", "2"], "--seed: expected a scenario; a body has nothing to set"),
         (["epuck", "--set", "mass_kg=2"], "--set: expected a scenario; a body has nothing to set"),

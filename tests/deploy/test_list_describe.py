@@ -138,8 +138,8 @@ def test_a_body_tells_its_figures_units_senses_and_source(name):
             value = getattr(sheet, of.name)
             figure = "" if is_dataclass(value) else json.dumps(value)
             assert_tells(section, [(of.name, limits_of(of).unit, figure, limits_of(of).help)])
-    assert body.proximity is not None
-    assert_tells(text, [("response.reach_m", f"{body.proximity.response.reach_m}")])
+    if body.proximity:
+        assert_tells(text, [("response.reach_m", f"{body.proximity.response.reach_m}")])
     assert f"{body.radius_m}" in text
     assert f"{body.max_linear_mps:.4g} m/s" in text
 

@@ -24,7 +24,7 @@ def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
 
     if not LEAST_SIZE_PX <= size_px <= GREATEST_SIZE_PX:
         raise BadInput("--size", "", f"expected {LEAST_SIZE_PX} to {GREATEST_SIZE_PX} pixels, got {size_px}")
-    dpi = size_px / LONG_SIDE_IN
+    dpi = size_px / max(width_in, height_in, LONG_SIDE_IN)
     # A hundredth more, since the canvas cuts off what is after the point.
     even = [(2 * round(side * dpi / 2) + 0.01) / dpi for side in (width_in, height_in)]
     figure = Figure(figsize=(even[0], even[1]), dpi=dpi, facecolor=PAPER)
