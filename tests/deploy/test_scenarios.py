@@ -11,8 +11,8 @@ from tests.deploy.commands import ROOT
 
 SEEDS = range(1, 21)
 # 5th percentile of the final orders of five-percent.toml without deaths, seeds 1 to 20: the slow test measures it anew.
-# The 95th is 0.99941. Seed 1 ends with 0.999407, so close below it that another machine's last bits may decide.
-UNHARMED_LOW = 0.9977
+# The 95th is 0.99937. Of the twenty seeds with deaths eighteen end within; seed 1, with 0.9975, is one of the two that do not.
+UNHARMED_LOW = 0.99765
 EVERYBODY_MUTE = ["events.0.do='blackout'", "events.0.robots={group='flock'}"]
 
 
