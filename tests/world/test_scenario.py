@@ -112,6 +112,11 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("robots.flock.count", "x", f"robots.flock.count: {COUNT}, got 'x'"),
     ("robots.flock.count", 0, f"robots.flock.count: {COUNT}, got 0"),
     ("robots.flock.count", True, f"robots.flock.count: {COUNT}, got True"),
+    (
+        "robots.flock.body",
+        "\0.toml",
+        "robots.flock.body: expected the name of a body or of a file, got a text with a zero byte",
+    ),
     ("robots.flock.body", "car", f"robots.flock.body: expected one of {', '.join(body_names())}; got 'car'"),
     (
         "robots.flock.colour",

@@ -13,10 +13,10 @@ class WheelNoise:
     wheels are asked to stand still they do.
     """
 
-    bias_mps: float = parameter(0.0, help="mean of the bias b", unit="m/s")
-    bias_std_mps: float = parameter(0.0, help="standard deviation of the bias b", unit="m/s", at_least=0)
-    factor: float = parameter(1.0, help="mean of the factor f", at_least=0)
-    factor_std: float = parameter(0.0, help="standard deviation of the factor f", at_least=0)
+    bias_mps: float = parameter(0.0, help="mean of the bias b", unit="m/s", at_least=-0.1, at_most=0.1)
+    bias_std_mps: float = parameter(0.0, help="standard deviation of the bias b", unit="m/s", at_least=0, at_most=0.1)
+    factor: float = parameter(1.0, help="mean of the factor f", at_least=0, at_most=2)
+    factor_std: float = parameter(0.0, help="standard deviation of the factor f", at_least=0, at_most=0.5)
 
 
 NO_WHEEL_NOISE = WheelNoise()

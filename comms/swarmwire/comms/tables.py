@@ -8,6 +8,8 @@ from typing import Any, cast, get_args, get_origin, get_type_hints
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import fault_of, limits_of
 
+GREATEST = 1e9  # of any number of a sheet: nothing on a robot is that large in its unit
+
 
 def mapping_of(where: str, key: str, value: object) -> dict[str, Any]:
     """A table; BadInput names `where` and `key` if it is none."""
@@ -45,8 +47,10 @@ def _value(hint: Any, value: object, where: str, key: str) -> Any:
     if hint is float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise BadInput(where, key, f"expected a number, got {value!r}")
-        if not isfinite(value):
+        if isinstance(value, float) and not isfinite(value):
             raise BadInput(where, key, f"expected a finite number, got {value!r}")
+        if abs(value) > GREATEST:
+            raise BadInput(where, key, f"expected a number of at most {GREATEST:g} in size, got {str(value)[:40]}")
         return float(value)
     if hint is int and type(value) is not int:
         raise BadInput(where, key, f"expected a whole number, got {value!r}")

@@ -96,3 +96,24 @@ def test_at_a_rate_nobody_has_failed_when_it_begins(part: str):
     assert began.any()
     assert not ended.any()
     assert (conditions.alive == ~began).all() if part == "battery" else conditions.alive.all()
+
+
+def test_a_battery_that_fails_at_a_rate_may_fail_again_after_its_robot_was_revived():
+    conditions, of = Conditions(ROBOTS), swarm(7)
+    event, everybody = fail("battery", per_hour=1000.0), Revive(at_s=20.0, robots=Selection(group="a"))
+    event.begin(0, of, conditions)
+    first, _ = event.go_on(0, to_ns(20.0), of, conditions)
+    everybody.begin(1, of, conditions)
+    assert conditions.alive.all()
+    again, mended = event.go_on(0, to_ns(20.0), of, conditions)
+    assert not again.any()
+    assert (mended == first).all()
+    later, _ = event.go_on(0, to_ns(60.0), of, conditions)
+    assert (later & first).any()
+
+
+def test_a_robot_that_is_revived_has_a_battery_whose_gauge_works():
+    conditions, of = Conditions(4), swarm(7, robots=4)
+    fail("battery").begin(0, of, conditions)
+    Revive(at_s=11.0, robots=Selection(names=("a-1",))).begin(1, of, conditions)
+    assert conditions.failed("battery").tolist() == [True, False, True, True]

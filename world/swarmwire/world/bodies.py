@@ -39,6 +39,8 @@ def own_code(static: Static) -> tuple[str, ...]:
 
 
 def _body(name: str, where: str, key: str) -> Body:
+    if "\0" in name:
+        raise BadInput(where, key, "expected the name of a body or of a file, got a text with a zero byte")
     path = sheet_path(name, where)
     if path is None:
         try:

@@ -9,6 +9,7 @@ from swarmwire.comms.air.radio_checks import check_radio, unfit_for_torus
 from swarmwire.comms.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
+from swarmwire.world.actuation.noise import noise_of
 from swarmwire.world.arena_tables import ObstacleTable
 from swarmwire.world.bodies import bodies_of
 from swarmwire.world.engines.choice import check_engines, engines_of
@@ -39,7 +40,7 @@ def check(scenario: Scenario, where: str) -> None:
 def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> None:
     for group, engine in engines_of(scenario, bodies).items():
         body = bodies[group]
-        tick_m = body.max_linear_mps / scenario.time.rate_hz
+        tick_m = body.max_linear_mps * max(1.0, noise_of(body.drive).factor) / scenario.time.rate_hz
         needed = math.ceil(tick_m / (MOST_OF_RADIUS * body.radius_m) - 1e-9)
         if engine != "kinematic" and scenario.physics.steps < needed:
             text = f"so that a robot of {group} at full speed moves at most a quarter of its radius in one step"

@@ -68,7 +68,9 @@ class Event(ABC):
 class LastingEvent(Event):
     """An event that may be undone after a time."""
 
-    for_s: float | None = parameter(None, help="undone after this time; never if left out", unit="s", above=0)
+    for_s: float | None = parameter(
+        None, help="undone after this time; never if left out", unit="s", above=0, at_most=1e9
+    )
 
     @property
     def lasts_s(self) -> float | None:

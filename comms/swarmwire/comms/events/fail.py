@@ -10,13 +10,13 @@ from swarmwire.comms.drives import Holonomic
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.event import LastingEvent
-from swarmwire.comms.events.failing import Failing, Lifetimes
+from swarmwire.comms.events.failing import BATTERY, Failing, Lifetimes
 from swarmwire.comms.events.kill import check_robots
 from swarmwire.comms.events.selection import Selection
 from swarmwire.comms.events.swarm import Groups, Swarm
 from swarmwire.comms.parameters import parameter
 
-BATTERY, MOTORS, WHEELS = "battery", "motors", ("left_wheel", "right_wheel")
+MOTORS, WHEELS = "motors", ("left_wheel", "right_wheel")
 
 
 @dataclass(frozen=True, kw_only=True)

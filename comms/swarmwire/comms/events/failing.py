@@ -7,6 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, IntArray, KeyArray
 from swarmwire.comms.draws import purpose, uniform
 
+BATTERY = "battery"  # the part without which a robot is dead
 LIFETIME = purpose("time to failure")
 NEVER_NS = np.iinfo(np.int64).max
 HOUR_NS = 3600 * 10**9
@@ -25,6 +26,13 @@ class Failing:
         self.part, self.failed = part, failed
         self.next_ns: IntArray = np.full(len(failed), NEVER_NS)
         self.lives: IntArray = np.zeros(len(failed), np.int64)
+
+    def renew(self, rows: BoolArray, now_ns: int) -> None:
+        """Let the part of these robots (rows,) work again; one that fails at a rate is due to be mended now."""
+        down = rows & self.failed
+        at_rate = self.lives > 0
+        self.next_ns[down & at_rate] = now_ns
+        self.failed[down & ~at_rate] = False
 
 
 @dataclass(frozen=True, slots=True)

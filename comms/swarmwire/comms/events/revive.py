@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 
 from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.clock import to_ns
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.event import Event
+from swarmwire.comms.events.failing import BATTERY
 from swarmwire.comms.events.kill import check_robots
 from swarmwire.comms.events.selection import Selection
 from swarmwire.comms.events.swarm import Groups, Swarm
@@ -31,4 +33,7 @@ class Revive(Event):
         chosen = self.robots.rows(serial, swarm, dead)
         for held in conditions.kills.values():
             held[chosen] = False
+        for failing in conditions.failures.values():
+            if failing.part == BATTERY:
+                failing.renew(chosen, to_ns(self.at_s))
         return chosen & dead
