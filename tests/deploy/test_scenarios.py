@@ -11,7 +11,7 @@ from tests.deploy.commands import ROOT
 
 SEEDS = range(1, 21)
 # 5th percentile of the final orders of five-percent.toml without deaths, seeds 1 to 20: the slow test measures it anew.
-# The 95th is 0.99937. With deaths eighteen of twenty seeds end within; seed 1, with 0.9975, is one of the two that do not.
+# The 95th is 0.99937. With deaths eighteen of twenty seeds end within; seed 1, with 0.9975, is one of the two others.
 UNHARMED_LOW = 0.99765
 EVERYBODY_MUTE = ["events.0.do='blackout'", "events.0.robots={group='flock'}"]
 

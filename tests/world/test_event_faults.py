@@ -40,7 +40,7 @@ FAULTS: list[tuple[Any, str]] = [
     ),
     ({"do": "revive", "robots": FLOCK}, "events.0.at_s: is missing; expected a number of at least 0 and at most 10"),
     (event(at_s=-1.0, robots=FLOCK), "events.0.at_s: expected a number of at least 0 and at most 1000000000 (s), got"),
-    (event(robots=FLOCK, for_s=-1.0), "events.0.for_s: expected a number above 0 (s), got -1.0"),
+    (event(robots=FLOCK, for_s=-1.0), "events.0.for_s: expected a number above 0 and at most 1000000000 (s), got -1.0"),
     (event("revive", robots=FLOCK, for_s=1.0), "events.0.for_s: unknown key; expected one of at_s, do, robots"),
     (event(), "events.0.robots: is missing; expected a table"),
     (kill(), "events.0.robots: expected group, names, share or count"),
