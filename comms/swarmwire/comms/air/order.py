@@ -46,7 +46,7 @@ def _counting_sort(order, key, keys):
 
 @njit(cache=True)
 def _parts_of_time(order, at_ns):
-    """In which of about as many equal parts of their time as there are rows each falls, and how many parts there are."""
+    """Into which of equal parts of time each row falls, about as many as rows, and how many parts there are."""
     first_ns = last_ns = at_ns[order[0]]
     for row in order:
         first_ns, last_ns = min(first_ns, at_ns[row]), max(last_ns, at_ns[row])
