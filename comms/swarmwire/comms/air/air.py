@@ -153,17 +153,17 @@ class Air:
             self._take(*self._way.disrupt(until_ns, self._coming, self._lives))
             self._cut_off(until_ns)
         self._lives.forget(self._way.queued.epoch)
-        final = self._links.final_at_ns <= until_ns
-        ended = self._links if final.all() else self._links.select(np.flatnonzero(final))
-        self._accounts.settle(ended)
+        links, packets, robots = self._links, self._on_air, self._robots
+        rows = news.parted(links.fate, links.receiver, links.final_at_ns, until_ns)
+        self._accounts.settle(links, until_ns)
         told = News(
-            news.heard(ended, self._on_air, self.radio.gives.columns, self._robots, len(self._others_alive)),
-            news.finished(ended, self._on_air, self._robots, self.radio.is_signal),
-            news.departed(ended, self._on_air, self._robots),
+            news.heard(rows.heard, links, packets, self.radio.gives.columns, robots, len(self._others_alive)),
+            news.finished(rows.finished, links, packets, robots, self.radio.is_signal),
+            news.departed(rows.departed, links, packets, robots),
             self._accounts.close(),
             self._way.outcomes(self._coming.alive),
         )
-        self._keep(np.flatnonzero(~final))
+        self._keep(rows.open)
         return told
 
     def end(self) -> Tally:
