@@ -51,20 +51,27 @@ def links_in_reach(near: Reach, robots: int, sender: IntArray, to: IntArray) -> 
 @njit(cache=True)
 def pairs_in_reach(near: Reach, alive: BoolArray) -> IntArray:
     """Robot rows a < b of all pairs alive in range of each other, sorted, (e, 2)."""
-    pair = np.empty((len(near.other), 2), np.int64)
+    first, other = near.first, near.other.view(np.uint64)
+    pair = np.empty((len(other) + 1, 2), np.int64)
     found = 0
     for a in range(len(alive)):
         of_a = found
-        for k in range(near.first[a], near.first[a + 1] if alive[a] else near.first[a]):
-            b = near.other[k]
-            if b > a and alive[b]:
-                place = found
-                while place > of_a and pair[place - 1, 1] > b:  # a few: sorted by insertion
-                    pair[place, 1] = pair[place - 1, 1]
-                    place -= 1
-                pair[found, 0], pair[place, 1] = a, b
-                found += 1
+        for k in range(np.uint64(first[a]), np.uint64(first[a + 1] if alive[a] else first[a])):
+            b = other[k]
+            pair[np.uint64(found), 0], pair[np.uint64(found), 1] = a, b
+            found += (b > np.uint64(a)) & alive[b]
+        _sort(pair[of_a:found, 1])
     return pair[:found]
+
+
+@njit(cache=True)
+def _sort(few):
+    for k in range(1, len(few)):
+        moved, place = few[k], k
+        while place > 0 and few[place - 1] > moved:
+            few[place] = few[place - 1]
+            place -= 1
+        few[place] = moved
 
 
 @njit(cache=True)
