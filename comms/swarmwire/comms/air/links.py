@@ -63,7 +63,7 @@ class Links(NamedTuple):
             packet, receiver, sender, sequence, off_air_at_ns, packets.intended, packets.fate, in_range
         )
         rows = numbers.shape[1]
-        return cls(*numbers, np.full(rows, np.nan), np.zeros((rows, columns)))
+        return cls._make([*numbers, np.full(rows, np.nan), np.zeros((rows, columns))])
 
     @classmethod
     def none(cls, columns: int) -> "Links":

@@ -63,48 +63,20 @@ def heard(
 
 def finished(index: IntArray, links: Links, packets: Transmissions, robots: int, has_strength: bool) -> Finished:
     """The fates of the links `index` are final, those of packets that never went on air among them."""
-    arena = packets.sender // robots
-    numbers = _finished(
-        index,
-        links.packet,
-        links.receiver,
-        links.receivers,
-        links.final_at_ns,
-        links.fate,
-        arena,
-        packets.sender,
-        packets.to,
-        packets.sequence,
-        packets.sent_at_ns,
-        packets.on_air_at_ns,
-        packets.payloads.offset,
-        packets.tag,
-        robots,
-    )
-    *told, payload = numbers
+    arena, size_bytes = packets.sender // robots, packets.payloads.sizes
+    of_link = links.packet, links.receiver, links.receivers, links.final_at_ns, links.fate
+    times = packets.sent_at_ns, packets.on_air_at_ns
+    of_packet = arena, packets.sender, packets.to, packets.sequence, *times, size_bytes, packets.tag
+    *told, payload = _finished(index, of_link, of_packet, robots)
     rssi_dbm = links.rssi_dbm.take(index) if has_strength else None
     return Finished(*told, rssi_dbm=rssi_dbm, payload=payload, payloads=packets.payloads)
 
 
 @njit(cache=True)
-def _finished(
-    index,
-    packet,
-    receiver,
-    receivers,
-    final_at_ns,
-    fate,
-    arena,
-    sender,
-    to,
-    sequence,
-    sent_at_ns,
-    on_air_at_ns,
-    offset,
-    tag,
-    robots,
-):
-    """The columns of `Finished` that are whole numbers, in their order, then that of payloads."""
+def _finished(index, of_link, of_packet, robots):
+    """The columns of `Finished` that are whole numbers, in their order, then that of payloads, (13, k)."""
+    packet, receiver, receivers, final_at_ns, fate = of_link
+    arena, sender, to, sequence, sent_at_ns, on_air_at_ns, size_bytes, tag = of_packet
     told = np.empty((13, len(index)), np.int64)
     for k in range(len(index)):
         row = np.uint64(index[k])
@@ -114,8 +86,7 @@ def _finished(
         told[2, k] = THE_REST if receiver[row] == THE_REST else receiver[row] - first_row
         told[3, k], told[4, k], told[5, k] = receivers[row], to[p], sequence[p]
         told[6, k], told[7, k], told[8, k] = sent_at_ns[p], on_air_at_ns[p], final_at_ns[row]
-        told[9, k], told[10, k], told[11, k] = fate[row], offset[p + np.uint64(1)] - offset[p], tag[p]
-        told[12, k] = packet[row]
+        told[9, k], told[10, k], told[11, k], told[12, k] = fate[row], size_bytes[p], tag[p], packet[row]
     return told
 
 

@@ -42,7 +42,7 @@ class Transmissions(NamedTuple):
         """The packets of `index`, in its order."""
         if len(index) == len(self.sender) and (index[1:] > index[:-1]).all():  # then it is all of them, in order
             return self
-        return Transmissions(*_taken(self[:-1], index), self.payloads.rows(index))
+        return Transmissions._make([*_taken(self[:-1], index), self.payloads.rows(index)])
 
     def parted(self, which: BoolArray) -> "tuple[Transmissions, Transmissions]":
         """Those of the packets `which` (k,), and the others."""
