@@ -98,7 +98,7 @@ class Air:
         self._others_alive = np.zeros(rows, np.int64)
         self._now_ns = 0
         self._on_air = Transmissions.none()  # packets of `_links`
-        self._links = Links.none(len(radio.gives.columns))
+        self._links = self._no_links = Links.none(len(radio.gives.columns))
 
     def hold(self, pose: FloatArray, alive: BoolArray) -> None:
         """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive.
@@ -206,7 +206,7 @@ class Air:
     def _keep(self, index: IntArray) -> None:
         """Keep these links and their packets only."""
         if not len(index):
-            self._links, self._on_air = Links.none(len(self.radio.gives.columns)), Transmissions.none()
+            self._links, self._on_air = self._no_links, Transmissions.none()
             return
         kept, packet = news.compacted(self._links.packet[index], len(self._on_air.sender))
         self._links = self._links.select(index)._replace(packet=packet)

@@ -71,13 +71,14 @@ class Channel:
     def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
         """Pairs of robot rows a < b joined in the radio graph at a time, sorted, (e, 2)."""
         pair = pairs_in_reach(self._reach(pose), alive)
-        if not self._stages:
+        stages = [stage for stage in self._stages if not stage.lets_all_pass]
+        if not stages:
             return pair
         zero = np.zeros(len(pair), np.int64)
         a, b = np.ascontiguousarray(pair.T)
         links = Links.under_way(zero, a, b, zero, np.full(len(pair), at_ns), 0)
         probability = np.ones(len(pair))
-        for stage in self._stages:
+        for stage in stages:
             probability *= stage.delivery(links, pose)
         joined = probability >= self._radio.min_delivery - ROUNDING
         return pair if joined.all() else pair[joined]

@@ -90,7 +90,7 @@ def _within(x, y, robots, cells, range_m):
                 other[np.uint64(found)] = r
                 found += (r != own) & (dx * dx + dy * dy <= square_m2)
         first[s + 1] = found
-    return first, other[:found].view(np.int64).copy()
+    return first, other[:found].view(np.int64)
 
 
 @njit(cache=True)
