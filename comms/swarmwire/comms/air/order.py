@@ -34,13 +34,13 @@ def _counting_sort(order, key, keys):
     places = key.view(np.uint64)
     for row in order:
         start[places[row] + np.uint64(1)] += 1
-    for place in range(keys):
+    for place in range(len(start) - 1):
         start[place + 1] += start[place]
     out = np.empty_like(order)
     for row in order:
-        place = places[row]
-        out[np.uint64(start[place])] = row
-        start[place] += 1
+        place = np.uint64(start[places[row]])
+        start[places[row]] += 1  # before `out` is written, or the processor waits to see whether that changed it
+        out[place] = row
     return out
 
 
