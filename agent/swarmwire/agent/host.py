@@ -21,6 +21,8 @@ from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 
+NOT_OWN = -1
+
 
 class Host:
     """The agents of all robots of an assignment."""
@@ -159,10 +161,12 @@ def _own(heard: Heard, rows: IntArray) -> Heard:
     """What the robots `rows` heard, with the receiver as a place in `rows`."""
     if not len(heard):
         return heard
-    if not len(rows):
-        return heard.select(np.empty(0, np.int64))
-    place = np.searchsorted(rows, heard.receiver)
-    if place[-1] == len(rows) or not (rows[place] == heard.receiver).all():  # some is for robots of other groups
-        mine = np.flatnonzero(np.isin(heard.receiver, rows))
-        heard, place = heard.select(mine), place[mine]
+    most = max(int(heard.receiver[-1]), int(rows[-1]) if len(rows) else 0)  # both rise
+    places = np.full(most + 1, NOT_OWN)
+    places[rows] = np.arange(len(rows))
+    place = places.take(heard.receiver)
+    mine = place != NOT_OWN
+    if not mine.all():  # some is for robots of other groups
+        index = np.flatnonzero(mine)
+        heard, place = heard.select(index), place.take(index)
     return Heard(place, heard.sender, heard.sequence, heard.heard_at_ns, heard.given, heard.payload, heard.payloads)

@@ -120,7 +120,7 @@ def decode_alike(kind: type[Message], payloads: Payloads, index: IntArray) -> di
     table = payloads.data.view(kind.on_air)
     if (table["tag"] != kind.tag).any():
         return None
-    return {name: table[name][index].astype(np.float64) for name in kind.ranges}
+    return {name: table[name].astype(np.float64).take(index) for name in kind.ranges}
 
 
 def decode_rows(kind: type[Message], payloads: Payloads, index: IntArray) -> dict[str, FloatArray]:

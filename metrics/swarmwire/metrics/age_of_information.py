@@ -62,7 +62,8 @@ class Newest:
         receivers = -(-robots // self._every)
         index = np.arange(robots)
         self._place: IntArray = np.where(index % self._every == 0, index // self._every, NOT_COUNTED)  # as a receiver
-        self._sent_at_ns: IntArray = np.full((arenas, receivers, robots), NEVER, np.int64)
+        # By sender first: rows of a packet stand together, and so do the places that they write to.
+        self._sent_at_ns: IntArray = np.full((arenas, robots, receivers), NEVER, np.int64)
         self._alive: BoolArray = np.ones((arenas, robots), np.bool_)
         self._pairs: IntArray = np.zeros(arenas, np.int64)
         self._total_ns = [0] * arenas  # Python's whole numbers: a day of a million pairs is beyond 64 bits
@@ -88,10 +89,10 @@ class Newest:
 
     def _count_again(self) -> None:
         counts = self._sent_at_ns != NEVER
-        counts &= self._alive[:, :: self._every, None] & self._alive[:, None, :]
+        counts &= self._alive[:, :, None] & self._alive[:, None, :: self._every]
         self._pairs = np.count_nonzero(counts, axis=(1, 2))
-        by_receiver_ns = np.sum(self._sent_at_ns, axis=2, where=counts)
-        self._total_ns = [sum(own) for own in by_receiver_ns.tolist()]
+        by_sender_ns = np.sum(self._sent_at_ns, axis=2, where=counts)
+        self._total_ns = [sum(own) for own in by_sender_ns.tolist()]
 
 
 @njit(cache=True)
@@ -101,10 +102,10 @@ def _take(fate, arena, receiver, sender, sent_at_ns, place, alive, newest_ns, pa
         if fate[i] != HEARD or place[receiver[i]] == NOT_COUNTED:
             continue
         a, r, s = arena[i], receiver[i], sender[i]
-        before_ns = newest_ns[a, place[r], s]
+        before_ns = newest_ns[a, s, place[r]]
         if sent_at_ns[i] <= before_ns:
             continue
-        newest_ns[a, place[r], s] = sent_at_ns[i]
+        newest_ns[a, s, place[r]] = sent_at_ns[i]
         if alive[a, r] and alive[a, s]:
             pairs[a] += before_ns == NEVER
             gained_ns[a] += sent_at_ns[i] - (0 if before_ns == NEVER else before_ns)

@@ -1,8 +1,11 @@
 """The radio's account of a run: what became of every packet, the delivery ratio, and how late packets were."""
 
+# pyright: basic, reportUnknownMemberType=false
+
 from typing import Any
 
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.fates import FATE_NAMES, Fate
@@ -10,6 +13,7 @@ from swarmwire.comms.truth import Finished, Static, Tally, Truth
 from swarmwire.metrics.log_histogram import LogHistogram
 from swarmwire.metrics.plain import plain
 
+HEARD = int(Fate.HEARD)
 PERCENTS = (50.0, 90.0, 99.0)
 
 
@@ -55,11 +59,12 @@ class RadioTally:
         self._fates += tally.fates
 
     def _time(self, finished: Finished, tick: int) -> None:
-        heard = np.flatnonzero(finished.fate == Fate.HEARD)
-        arena, sent_at_ns = finished.arena[heard], finished.sent_at_ns[heard]
-        self._air.add(arena, finished.final_at_ns[heard] - sent_at_ns)
         acts_at_ns = -(-tick // self._act_every_ticks) * self._act_every_ticks * NS_PER_S // self._rate_hz
-        self._agent.add(arena, acts_at_ns[finished.receiver[heard]] - sent_at_ns)
+        ended = finished.fate, finished.receiver, finished.sent_at_ns, finished.final_at_ns
+        heard, air_ns, agent_ns = _latencies_ns(*ended, acts_at_ns)
+        arena = finished.arena.take(heard)
+        self._air.add(arena, air_ns)
+        self._agent.add(arena, agent_ns)
 
     def _arena(self, arena: int) -> dict[str, Any]:
         fates = [int(count) for count in self._fates[arena]]
@@ -78,3 +83,16 @@ class RadioTally:
 def _percentiles_s(histogram: LogHistogram, arena: int) -> dict[str, float | None]:
     found_ns = histogram.percentiles_ns(arena, PERCENTS)
     return {f"p{percent:g}": plain(ns / NS_PER_S) for percent, ns in zip(PERCENTS, found_ns, strict=True)}
+
+
+@njit(cache=True)
+def _latencies_ns(fate, receiver, sent_at_ns, final_at_ns, acts_at_ns):
+    """Of the links that were heard, their rows, and how long until they were, and until their receivers act, (k,)."""
+    heard, air_ns, agent_ns = np.empty_like(fate), np.empty_like(fate), np.empty_like(fate)
+    found = 0
+    for row in range(len(fate)):
+        if fate[row] == HEARD:
+            heard[found], air_ns[found] = row, final_at_ns[row] - sent_at_ns[row]
+            agent_ns[found] = acts_at_ns[receiver[row]] - sent_at_ns[row]
+            found += 1
+    return heard[:found], air_ns[:found], agent_ns[:found]

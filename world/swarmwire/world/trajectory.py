@@ -1,8 +1,11 @@
 """The trajectory hash: equal exactly where two runs of an arena moved and heard the same, bit for bit."""
 
+# pyright: basic, reportUnknownMemberType=false
+
 import hashlib
 
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.packets import Heard
@@ -20,11 +23,9 @@ class TrajectoryHash:
         """One tick; tables have a row per robot of all arenas, `heard` is sorted by receiver."""
         self._add(np.concatenate([pose, velocity, command], axis=1), self._first_row)
         if len(heard):
-            packets = np.empty((len(heard), 4), np.int64)
-            arena = heard.receiver // self._robots
-            packets[:, 0] = heard.receiver - arena * self._robots
-            packets[:, 1], packets[:, 2], packets[:, 3] = heard.sender, heard.sequence, heard.heard_at_ns
-            self._add(packets, np.searchsorted(arena, np.arange(len(self._hashes) + 1)).tolist())
+            first = np.searchsorted(heard.receiver, self._first_row)
+            packets = _packets(heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, first, self._robots)
+            self._add(packets, first.tolist())
 
     def _add(self, table: AnyArray, first: list[int]) -> None:
         """The rows first[a] to first[a + 1] - 1 of a table go into the hash of arena a."""
@@ -35,3 +36,14 @@ class TrajectoryHash:
     def hexdigests(self) -> list[str]:
         """The hash of each arena so far."""
         return [digest.hexdigest() for digest in self._hashes]
+
+
+@njit(cache=True)
+def _packets(receiver, sender, sequence, heard_at_ns, first, robots):
+    """What was heard, (k, 4), receivers as indices in their arenas, which begin at the rows `first`."""
+    table = np.empty((len(receiver), 4), np.int64)
+    for arena in range(len(first) - 1):
+        for k in range(first[arena], first[arena + 1]):
+            table[k, 0], table[k, 1] = receiver[k] - arena * robots, sender[k]
+            table[k, 2], table[k, 3] = sequence[k], heard_at_ns[k]
+    return table

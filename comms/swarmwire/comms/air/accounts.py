@@ -30,9 +30,10 @@ class Accounts:
         np.add.at(self._sent, arena, 1)
         np.add.at(self._intended, arena, packets.intended)
 
-    def settle(self, ended: Links) -> None:
-        """Count fates that became final."""
-        _settle(ended.sender, self._robots, ended.fate, ended.receivers, ended.in_range, self._fates, self._in_range)
+    def settle(self, links: Links, until_ns: int) -> None:
+        """Count the fates of links that are final by `until_ns`."""
+        columns = links.sender, links.final_at_ns, links.fate, links.receivers, links.in_range
+        _settle(*columns, until_ns, self._robots, self._fates, self._in_range)
 
     def strand(self, links: Links, queued: Transmissions) -> None:
         """Count what the end of the run leaves under way or queued."""
@@ -51,8 +52,9 @@ class Accounts:
 
 
 @njit(cache=True)
-def _settle(sender, robots, fate, receivers, in_range, fates_out, in_range_out):
+def _settle(sender, final_at_ns, fate, receivers, in_range, until_ns, robots, fates_out, in_range_out):
     for i in range(len(sender)):
-        arena = sender[i] // robots
-        fates_out[arena, fate[i]] += receivers[i]
-        in_range_out[arena] += in_range[i]
+        if final_at_ns[i] <= until_ns:
+            arena = sender[i] // robots
+            fates_out[arena, fate[i]] += receivers[i]
+            in_range_out[arena] += in_range[i]

@@ -98,7 +98,7 @@ class Air:
         self._others_alive = np.zeros(rows, np.int64)
         self._now_ns = 0
         self._on_air = Transmissions.none()  # packets of `_links`
-        self._links = Links.none(len(radio.gives.columns))
+        self._links = self._no_links = Links.none(len(radio.gives.columns))
 
     def hold(self, pose: FloatArray, alive: BoolArray) -> None:
         """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive.
@@ -153,17 +153,17 @@ class Air:
             self._take(*self._way.disrupt(until_ns, self._coming, self._lives))
             self._cut_off(until_ns)
         self._lives.forget(self._way.queued.epoch)
-        final = self._links.final_at_ns <= until_ns
-        ended = self._links if final.all() else self._links.select(np.flatnonzero(final))
-        self._accounts.settle(ended)
+        links, packets, robots = self._links, self._on_air, self._robots
+        rows = news.parted(links.fate, links.receiver, links.final_at_ns, until_ns)
+        self._accounts.settle(links, until_ns)
         told = News(
-            news.heard(ended, self._on_air, self.radio.gives.columns, self._robots, len(self._others_alive)),
-            news.finished(ended, self._on_air, self._robots, self.radio.is_signal),
-            news.departed(ended, self._on_air, self._robots),
+            news.heard(rows.heard, links, packets, self.radio.gives.columns, robots, len(self._others_alive)),
+            news.finished(rows.finished, links, packets, robots, self.radio.is_signal),
+            news.departed(rows.departed, links, packets, robots),
             self._accounts.close(),
             self._way.outcomes(self._coming.alive),
         )
-        self._keep(np.flatnonzero(~final))
+        self._keep(rows.open)
         return told
 
     def end(self) -> Tally:
@@ -206,7 +206,7 @@ class Air:
     def _keep(self, index: IntArray) -> None:
         """Keep these links and their packets only."""
         if not len(index):
-            self._links, self._on_air = Links.none(len(self.radio.gives.columns)), Transmissions.none()
+            self._links, self._on_air = self._no_links, Transmissions.none()
             return
         kept, packet = news.compacted(self._links.packet[index], len(self._on_air.sender))
         self._links = self._links.select(index)._replace(packet=packet)

@@ -41,6 +41,8 @@ def newest_only(queued: Transmissions, which: BoolArray, at_ns: IntArray) -> Tra
 
     Older ones end as BLACKOUT at `at_ns` (rows,), by sender: it is the radio that is off that they are lost to.
     """
+    if not which.any():
+        return queued
     waiting = np.flatnonzero((queued.on_air_at_ns >= FAR_NS) & which[queued.sender])
     newest = np.zeros(len(which), np.int64)
     np.maximum.at(newest, queued.sender[waiting], waiting)

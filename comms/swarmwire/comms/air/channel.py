@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarmwire.comms.air.links import HEARD, THE_REST, Links
+from swarmwire.comms.air.links import HEARD, Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.reach import Reach, links_in_reach, pairs_in_reach, reach
 from swarmwire.comms.air.reach_torus import reach_on_torus
@@ -46,38 +46,39 @@ class Channel:
         if lives.any_dead:
             meant = lives.intended(packets.epoch[packet], receiver) | (packets.to[packet] != BROADCAST)
             packet, receiver = packet[meant], receiver[meant]
-        columns = packets.sender, packets.sequence, packets.off_air_at_ns
-        sender, sequence, end_ns = (column.take(packet) for column in columns)
-        links = Links.under_way(packet, sender, receiver, sequence, end_ns, self._columns)
-        refused = packets.fate != HEARD
-        in_range = np.zeros(len(packets.sender), np.int64)
+        refused, in_range = packets.fate != HEARD, np.zeros(len(packets.sender), np.int64)
         if refused.any():
-            never = refused[links.packet]
-            in_range = self._would_reach(links.select(np.flatnonzero(never)), pose, len(in_range))
-            links = links.select(np.flatnonzero(~never))
+            never = refused[packet]
+            in_range = self._would_reach(packets, packet[never], receiver[never], pose)
+            packet, receiver = packet[~never], receiver[~never]
+        links = Links.with_the_rest(packets, packet, receiver, in_range, self._columns)
+        under_way = links.first(len(packet))
         for stage in self._stages:
-            stage.decide(links, pose)
-        return with_the_rest(links, packets, in_range, self._columns)
+            stage.decide(under_way, pose)
+        return links
 
-    def _would_reach(self, links: Links, pose: FloatArray, packets: int) -> IntArray:
+    def _would_reach(self, packets: Transmissions, packet: IntArray, receiver: IntArray, pose: FloatArray) -> IntArray:
         """How many receivers in range packets would have that never go on air, (packets,)."""
+        zero = np.zeros(len(packets.sender), np.int64)
+        links = Links.with_the_rest(packets, packet, receiver, zero, self._columns).first(len(packet))
         for stage in self._stages:
             if not stage.remembers:
                 stage.decide(links, pose)
-        found = np.zeros(packets, np.int64)
+        found = zero.copy()
         np.add.at(found, links.packet, links.in_range)
         return found
 
     def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
         """Pairs of robot rows a < b joined in the radio graph at a time, sorted, (e, 2)."""
         pair = pairs_in_reach(self._reach(pose), alive)
-        if not self._stages:
+        stages = [stage for stage in self._stages if not stage.lets_all_pass]
+        if not stages:
             return pair
         zero = np.zeros(len(pair), np.int64)
         a, b = np.ascontiguousarray(pair.T)
         links = Links.under_way(zero, a, b, zero, np.full(len(pair), at_ns), 0)
         probability = np.ones(len(pair))
-        for stage in self._stages:
+        for stage in stages:
             probability *= stage.delivery(links, pose)
         joined = probability >= self._radio.min_delivery - ROUNDING
         return pair if joined.all() else pair[joined]
@@ -89,18 +90,3 @@ class Channel:
             self._known = self._find_reach(pose, self._arenas, self._size_m, self._radio.range_m)
             self._known_pose = pose
         return self._known
-
-
-def with_the_rest(links: Links, packets: Transmissions, in_range: IntArray, columns: int) -> Links:
-    """The links of packets that went on air, then a row per packet for all its other intended receivers.
-
-    `in_range` (packets,) are those that a packet would have reached that never went on air, else 0.
-    """
-    k = len(packets.sender)
-    others = packets.intended - np.bincount(links.packet, minlength=k)
-    fate = np.where(packets.fate != HEARD, packets.fate, Fate.OUT_OF_RANGE)
-    receiver, rssi_dbm, given = np.full(k, THE_REST), np.full(k, np.nan), np.zeros((k, columns))
-    sender, sequence, final_at_ns = packets.sender, packets.sequence, packets.off_air_at_ns
-    return links.followed_by(
-        Links(np.arange(k), sender, receiver, sequence, others, in_range, fate, final_at_ns, rssi_dbm, given)
-    )

@@ -32,9 +32,11 @@ class Disrupted(Stage):
         ):
             links.fate[under_way & ends] = fate
 
-    def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
+    @property
+    def lets_all_pass(self) -> bool:
+        """As it mostly is."""
+        return not self._disruption.anything
+
+    def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
         """0 where a radio is off or a partition between, be it one-way, else 1; the radio graph knows the dead."""
-        now = self._disruption
-        if not now.anything:
-            return 1.0
-        return now.joined(links.sender, links.receiver).astype(np.float64)
+        return self._disruption.joined(links.sender, links.receiver).astype(np.float64)

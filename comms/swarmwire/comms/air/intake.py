@@ -1,6 +1,9 @@
 """Intake: what agents sent becomes numbered packets at their radios."""
 
+# pyright: basic, reportUnknownMemberType=false
+
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import IntArray
@@ -20,30 +23,34 @@ class Intake:
         `sent_at_ns` (rows,) is when each robot sends, `others_alive` (rows,) whom a robot's broadcast intends: those of
         the epoch.
         """
-        # By sender, so that nothing depends on how the crew was divided.
-        order = np.argsort(sent.sender, kind="stable")
-        sequence = self._numbers(sent.sender[order])
-        somewhere = sent.to[order] != NOWHERE
+        if (sent.sender[1:] < sent.sender[:-1]).any():  # nothing may depend on how the crew was divided
+            sent = sent.select(np.argsort(sent.sender, kind="stable"))
+        sequence = _numbers(sent.sender.copy(), self._sent_before)
+        somewhere = sent.to != NOWHERE
         if not somewhere.all():
-            order, sequence = order[somewhere], sequence[somewhere]
-        sender, to, payloads = sent.sender[order], sent.to[order], sent.payloads.rows(order)
+            sent, sequence = sent.select(np.flatnonzero(somewhere)), sequence[somewhere]
+        sender, to = sent.sender.copy(), sent.to.copy()
         return Transmissions(
             sender=sender,
             to=to,
             sequence=sequence,
             intended=np.where(to == BROADCAST, others_alive[sender], 1),
             epoch=np.full(len(sender), epoch),
-            tag=payloads.tags(),
+            tag=sent.payloads.tags(),
             sent_at_ns=sent_at_ns[sender],
             on_air_at_ns=sent_at_ns[sender],
             off_air_at_ns=sent_at_ns[sender],
             fate=np.full(len(sender), int(Fate.HEARD)),
-            outcome_id=sent.outcome_ids[order],
-            payloads=payloads,
+            outcome_id=sent.outcome_ids.copy(),
+            payloads=sent.payloads,
         )
 
-    def _numbers(self, sender: IntArray) -> IntArray:
-        """The sequence numbers of packets sorted by sender."""
-        sequence = self._sent_before[sender] + np.arange(len(sender)) - np.searchsorted(sender, sender)
-        self._sent_before += np.bincount(sender, minlength=len(self._sent_before))
-        return sequence
+
+@njit(cache=True)
+def _numbers(sender, sent_before):
+    """The sequence number of each packet, (k,); `sent_before` (rows,) counts on."""
+    sequence = np.empty(len(sender), np.int64)
+    for p in range(len(sender)):
+        sequence[p] = sent_before[sender[p]]
+        sent_before[sender[p]] += 1
+    return sequence

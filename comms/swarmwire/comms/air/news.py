@@ -1,58 +1,93 @@
 """What the air tells after time has passed: packets heard, and links whose fate became final."""
 
-import numpy as np
+# pyright: basic, reportUnknownMemberType=false
 
-from swarmwire.comms.air.links import HEARD, THE_REST, Links
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.air.links import HEARD, OUT_OF_RANGE, THE_REST, Links
 from swarmwire.comms.air.order import by_receiver
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.truth import Departed, Finished
 
-OUT_OF_RANGE = int(Fate.OUT_OF_RANGE)
+
+class Parted(NamedTuple):
+    """Rows of links by what is to be told of them, rising; one may be in several."""
+
+    heard: IntArray
+    finished: IntArray  # final, but for receivers out of range
+    departed: IntArray  # final, of packets that left their sender's radio: each has one row for the rest
+    open: IntArray  # not final yet
 
 
-def heard(ended: Links, packets: Transmissions, gives: tuple[str, ...], robots: int, rows: int) -> Heard:
-    """The links that were heard, sorted by (receiver, heard_at, sender, sequence)."""
-    index = np.flatnonzero(ended.fate == HEARD)
+@njit(cache=True)
+def parted(fate: IntArray, receiver: IntArray, final_at_ns: IntArray, until_ns: int) -> Parted:
+    """The rows of links of which something is final by `until_ns`, and the others."""
+    k = len(fate)
+    heard, finished = np.empty(k, np.int64), np.empty(k, np.int64)
+    departed, still_open = np.empty(k, np.int64), np.empty(k, np.int64)
+    h, f, d, o = 0, 0, 0, 0
+    for row in range(k):
+        # Written first and kept if it counts, so that there is no branch to guess.
+        heard[h], finished[f], departed[d], still_open[o] = row, row, row, row
+        final = final_at_ns[row] <= until_ns
+        h += final & (fate[row] == HEARD)
+        f += final & (fate[row] != OUT_OF_RANGE)
+        d += final & (receiver[row] == THE_REST)
+        o += not final
+    return Parted(heard[:h], finished[:f], departed[:d], still_open[:o])
+
+
+def heard(
+    index: IntArray, links: Links, packets: Transmissions, gives: tuple[str, ...], robots: int, rows: int
+) -> Heard:
+    """The links `index` were heard; sorted by (receiver, heard_at, sender, sequence)."""
     if not len(index):
         return Heard.none(gives)
-    index = by_receiver(index, ended.receiver, ended.final_at_ns, ended.sender, rows)
-    kept, payload = compacted(ended.packet.take(index), len(packets.sender))
+    index = by_receiver(index, links.receiver, links.final_at_ns, links.sender, rows)
+    kept, payload = compacted(links.packet.take(index), len(packets.sender))
     return Heard(
-        receiver=ended.receiver.take(index),
-        sender=in_arena(ended.sender.take(index), robots),
-        sequence=ended.sequence.take(index),
-        heard_at_ns=ended.final_at_ns.take(index),
-        given={name: ended.given[:, column].take(index) for column, name in enumerate(gives)},
+        receiver=links.receiver.take(index),
+        sender=in_arena(links.sender.take(index), robots),
+        sequence=links.sequence.take(index),
+        heard_at_ns=links.final_at_ns.take(index),
+        given={name: links.given[:, column].take(index) for column, name in enumerate(gives)},
         payload=payload,
         payloads=packets.payloads.rows(kept),
     )
 
 
-def finished(ended: Links, packets: Transmissions, robots: int, has_strength: bool) -> Finished:
-    """The links whose fate is final, and packets that never went on air; not receivers out of range."""
-    index = np.flatnonzero(ended.fate != OUT_OF_RANGE)
-    packet, row, receiver = ended.packet.take(index), ended.sender.take(index), ended.receiver.take(index)
-    arena = row // robots
-    return Finished(
-        arena=arena,
-        sender=row - arena * robots,
-        receiver=np.where(receiver == THE_REST, THE_REST, receiver - arena * robots),
-        receivers=ended.receivers.take(index),
-        to=packets.to.take(packet),
-        sequence=ended.sequence.take(index),
-        sent_at_ns=packets.sent_at_ns.take(packet),
-        on_air_at_ns=packets.on_air_at_ns.take(packet),
-        final_at_ns=ended.final_at_ns.take(index),
-        fate=ended.fate.take(index),
-        size_bytes=packets.payloads.sizes.take(packet),
-        tag=packets.tag.take(packet),
-        rssi_dbm=ended.rssi_dbm.take(index) if has_strength else None,
-        payload=packet,
-        payloads=packets.payloads,
-    )
+def finished(index: IntArray, links: Links, packets: Transmissions, robots: int, has_strength: bool) -> Finished:
+    """The fates of the links `index` are final, those of packets that never went on air among them."""
+    arena, size_bytes = packets.sender // robots, packets.payloads.sizes
+    of_link = links.packet, links.receiver, links.receivers, links.final_at_ns, links.fate
+    times = packets.sent_at_ns, packets.on_air_at_ns
+    of_packet = arena, packets.sender, packets.to, packets.sequence, *times, size_bytes, packets.tag
+    *told, payload = _finished(index, of_link, of_packet, robots)
+    rssi_dbm = links.rssi_dbm.take(index) if has_strength else None
+    return Finished(*told, rssi_dbm=rssi_dbm, payload=payload, payloads=packets.payloads)
+
+
+@njit(cache=True)
+def _finished(index, of_link, of_packet, robots):
+    """The columns of `Finished` that are whole numbers, in their order, then that of payloads, (13, k)."""
+    packet, receiver, receivers, final_at_ns, fate = of_link
+    arena, sender, to, sequence, sent_at_ns, on_air_at_ns, size_bytes, tag = of_packet
+    told = np.empty((13, len(index)), np.int64)
+    for k in range(len(index)):
+        row = np.uint64(index[k])
+        p = np.uint64(packet[row])
+        first_row = arena[p] * robots
+        told[0, k], told[1, k] = arena[p], sender[p] - first_row
+        told[2, k] = THE_REST if receiver[row] == THE_REST else receiver[row] - first_row
+        told[3, k], told[4, k], told[5, k] = receivers[row], to[p], sequence[p]
+        told[6, k], told[7, k], told[8, k] = sent_at_ns[p], on_air_at_ns[p], final_at_ns[row]
+        told[9, k], told[10, k], told[11, k], told[12, k] = fate[row], size_bytes[p], tag[p], packet[row]
+    return told
 
 
 def in_arena(row: IntArray, robots: int) -> IntArray:
@@ -60,26 +95,32 @@ def in_arena(row: IntArray, robots: int) -> IntArray:
     return row - row // robots * robots
 
 
-def departed(ended: Links, packets: Transmissions, robots: int) -> Departed:
-    """The packets that left their sender's radio: each has one row for the rest of its receivers."""
-    index = np.flatnonzero(ended.receiver == THE_REST)
-    packet, row = ended.packet.take(index), ended.sender.take(index)
+def departed(index: IntArray, links: Links, packets: Transmissions, robots: int) -> Departed:
+    """The packets of the links `index` left their sender's radio."""
+    packet, row = links.packet.take(index), links.sender.take(index)
     arena = row // robots
     return Departed(
         arena=arena,
         sender=row - arena * robots,
         to=packets.to.take(packet),
-        sequence=ended.sequence.take(index),
+        sequence=links.sequence.take(index),
         intended=packets.intended.take(packet),
-        out_of_range=np.where(ended.fate.take(index) == OUT_OF_RANGE, ended.receivers.take(index), 0),
+        out_of_range=np.where(links.fate.take(index) == OUT_OF_RANGE, links.receivers.take(index), 0),
         fate=packets.fate.take(packet),
         on_air_at_ns=packets.on_air_at_ns.take(packet),
         off_air_at_ns=packets.off_air_at_ns.take(packet),
     )
 
 
+@njit(cache=True)
 def compacted(index: IntArray, rows: int) -> tuple[IntArray, IntArray]:
     """Which of `rows` rows are referred to, rising, and `index` renumbered to refer to these only."""
-    used = np.zeros(rows, np.bool_)
-    used[index] = True
-    return np.flatnonzero(used), (np.cumsum(used) - 1).take(index)
+    place, kept = np.full(rows, -1), np.empty(rows, np.int64)
+    for one in index:
+        place[one] = 0
+    found = 0
+    for row in range(rows):
+        if place[row] == 0:
+            kept[found], place[row] = row, found
+            found += 1
+    return kept[:found], place[index]

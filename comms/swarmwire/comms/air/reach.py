@@ -51,48 +51,60 @@ def links_in_reach(near: Reach, robots: int, sender: IntArray, to: IntArray) -> 
 @njit(cache=True)
 def pairs_in_reach(near: Reach, alive: BoolArray) -> IntArray:
     """Robot rows a < b of all pairs alive in range of each other, sorted, (e, 2)."""
-    pair = np.empty((len(near.other), 2), np.int64)
+    first, other = near.first, near.other.view(np.uint64)
+    pair = np.empty((len(other) + 1, 2), np.int64)
     found = 0
     for a in range(len(alive)):
         of_a = found
-        for k in range(near.first[a], near.first[a + 1] if alive[a] else near.first[a]):
-            b = near.other[k]
-            if b > a and alive[b]:
-                place = found
-                while place > of_a and pair[place - 1, 1] > b:  # a few: sorted by insertion
-                    pair[place, 1] = pair[place - 1, 1]
-                    place -= 1
-                pair[found, 0], pair[place, 1] = a, b
-                found += 1
+        for k in range(np.uint64(first[a]), np.uint64(first[a + 1] if alive[a] else first[a])):
+            b = other[k]
+            pair[np.uint64(found), 0], pair[np.uint64(found), 1] = a, b
+            found += (b > np.uint64(a)) & alive[b]
+        _sort(pair[of_a:found, 1])
     return pair[:found]
+
+
+@njit(cache=True)
+def _sort(few):
+    for k in range(1, len(few)):
+        moved, place = few[k], k
+        while place > 0 and few[place - 1] > moved:
+            few[place] = few[place - 1]
+            place -= 1
+        few[place] = moved
 
 
 @njit(cache=True)
 def _within(x, y, robots, cells, range_m):
     # In the grid's order, so that the strips around a robot are read from end to end.
-    order, there_x, there_y = cells.order, x[cells.order], y[cells.order]
+    order, there_x, there_y = cells.order.view(np.uint64), x[cells.order], y[cells.order]
     begin, stop = _strips(x, y, robots, cells)
-    first, other = np.zeros(len(x) + 1, np.int64), np.empty((stop - begin).sum(), np.int64)
+    first, other = np.zeros(len(x) + 1, np.int64), np.empty((stop - begin).sum(), np.uint64)
     found, square_m2 = 0, range_m * range_m
     for s in range(len(x)):
-        own_x, own_y = x[s], y[s]
+        own_x, own_y, own = x[s], y[s], np.uint64(s)
         for j in range(3):
-            for k in range(begin[s, j], stop[s, j]):
+            for k in range(np.uint64(begin[s, j]), np.uint64(stop[s, j])):
                 dx, dy, r = there_x[k] - own_x, there_y[k] - own_y, order[k]
                 # Written first and kept if it counts: a branch would be guessed wrong a third of the time.
-                other[found] = r
-                found += (r != s) & (dx * dx + dy * dy <= square_m2)
+                other[np.uint64(found)] = r
+                found += (r != own) & (dx * dx + dy * dy <= square_m2)
         first[s + 1] = found
-    return first, other[:found].copy()
+    return first, other[:found].view(np.int64)
 
 
 @njit(cache=True)
 def _strips(x, y, robots, cells):
-    """The strips below, at and above each robot row: first and stop, (rows, 3) each."""
-    first, stop = np.empty((len(x), 3), np.int64), np.empty((len(x), 3), np.int64)
+    """The strips below, at and above each robot row: first and stop in the grid's order, (rows, 3) each."""
+    first, stop = np.zeros((len(x), 3), np.int64), np.zeros((len(x), 3), np.int64)
+    nx, ny, start = cells.nx, cells.ny, cells.start  # out of the tuple once, which costs as much as the rest
     for row in range(len(x)):
-        for j in range(3):
-            first[row, j], stop[row, j] = strip(x[row], y[row], row // robots, cells, j - 1)
+        i = grid.cell_of(x[row], cells.left_m, cells.cell_m, nx)
+        j = grid.cell_of(y[row], cells.bottom_m, cells.cell_m, ny)
+        for below in range(max(j - 1, 0), min(j + 2, ny)):
+            left = ((row // robots) * ny + below) * nx
+            strip = below - j + 1
+            first[row, strip], stop[row, strip] = start[left + max(i - 1, 0)], start[left + min(i + 1, nx - 1) + 1]
     return first, stop
 
 
@@ -108,9 +120,3 @@ def strip(x, y, arena, cells, row):
         return 0, 0
     left = (arena * cells.ny + j) * cells.nx
     return cells.start[left + max(i - 1, 0)], cells.start[left + min(i + 1, cells.nx - 1) + 1]
-
-
-@njit(cache=True)
-def _joined(x, y, alive, range_m, s, r):
-    dx, dy = x[r] - x[s], y[r] - y[s]
-    return (r != s) & alive[r] & (dx * dx + dy * dy <= range_m * range_m)

@@ -50,10 +50,10 @@ class Senders:
         unless it is kept back.
         """
         packets = self._taken(self.queued.on_air_at_ns < until_ns)
+        if not now.anyone_out:
+            return packets
         accepted = packets.fate == access.ACCEPTED
         off, dead = accepted & ~now.radio_on[packets.sender], accepted & ~now.alive[packets.sender]
-        if not (off | dead).any():
-            return packets
         fate = np.where(dead, Fate.SENDER_DEAD, np.where(off, Fate.BLACKOUT, packets.fate))
         off_air_at_ns = np.where(off | dead, packets.on_air_at_ns, packets.off_air_at_ns)
         return packets._replace(fate=fate, off_air_at_ns=off_air_at_ns)

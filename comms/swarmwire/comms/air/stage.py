@@ -49,6 +49,11 @@ class Stage(ABC):
     def go_on_from(self, before: "Stage", at_ns: int) -> None:  # noqa: B027 - most stages remember nothing
         """Remember what a stage of the same kind did, whose radio had other numbers until `at_ns`."""
 
+    @property
+    def lets_all_pass(self) -> bool:
+        """Whether `delivery` would be 1 for everybody at the moment: then it is not asked."""
+        return False
+
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
         """With which probability lone packets pass, fast fading apart, (k,) or one for all: for the radio graph.
 

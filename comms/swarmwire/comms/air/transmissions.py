@@ -1,8 +1,11 @@
 """Packets at or beyond their sender's radio, as a table."""
 
+# pyright: basic, reportUnknownMemberType=false
+
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.packets import Payloads
@@ -39,7 +42,7 @@ class Transmissions(NamedTuple):
         """The packets of `index`, in its order."""
         if len(index) == len(self.sender) and (index[1:] > index[:-1]).all():  # then it is all of them, in order
             return self
-        return Transmissions._make([*(column.take(index) for column in self[:-1]), self.payloads.rows(index)])
+        return Transmissions._make([*_taken(self[:-1], index), self.payloads.rows(index)])
 
     def parted(self, which: BoolArray) -> "tuple[Transmissions, Transmissions]":
         """Those of the packets `which` (k,), and the others."""
@@ -55,3 +58,14 @@ class Transmissions(NamedTuple):
             return self or later
         columns = [np.concatenate(pair) for pair in zip(self[:-1], later[:-1], strict=True)]
         return Transmissions._make([*columns, Payloads.joined([self.payloads, later.payloads])])
+
+
+@njit(cache=True)
+def _taken(columns, index):
+    """The rows of `index` of all columns, (columns, k)."""
+    out = np.empty((len(columns), len(index)), np.int64)
+    for c in range(len(columns)):
+        column = columns[c]
+        for k in range(len(index)):
+            out[c, k] = column[index[k]]
+    return out

@@ -4,7 +4,6 @@
 
 import numpy as np
 
-from swarmwire.comms.air.channel import with_the_rest
 from swarmwire.comms.air.links import HEARD, Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.signal.links_held import LinksHeld
@@ -54,26 +53,24 @@ class Reports:
             kept &= _meant(queued, row, lives)
         if not kept.all():
             row = Told._make([*(column[kept] for column in row[:-1]), row.count])
-        links = self._as_links(row, packet, local, poses)
-        decided = with_the_rest(links, packets, self._would_reach(packets, lives), self._columns)
-        return packets, decided
+        in_range = self._would_reach(packets, lives)
+        links = Links.with_the_rest(packets, local[row.packet], row.receiver, in_range, self._columns)
+        self._tell(links.first(len(row.packet)), row, poses)
+        return packets, links
 
-    def _as_links(self, row: Told, packet: Table, local: IntArray, poses: Poses) -> Links:
-        """Links from rows that were told, after the stages that follow reception."""
-        sender, sequence = packet["sender"][row.packet], packet["sequence"][row.packet]
-        links = Links.under_way(local[row.packet], sender, row.receiver, sequence, row.final_at_ns, self._columns)
+    def _tell(self, links: Links, row: Told, poses: Poses) -> None:
+        """Put into links what was told of them, and let them pass the stages that follow reception."""
+        links.in_range[:], links.fate[:], links.final_at_ns[:] = row.in_range, row.fate, row.final_at_ns
         with np.errstate(divide="ignore"):
-            rssi_dbm = 10.0 * np.log10(row.power_mw)
-        links = links._replace(in_range=row.in_range, fate=row.fate, rssi_dbm=rssi_dbm)
+            links.rssi_dbm[:] = 10.0 * np.log10(row.power_mw)
         if not self._stages:
-            return links
+            return
         for hold in np.unique(row.hold).tolist():
             index = np.flatnonzero(row.hold == hold)
             of_hold = links.select(index)
             for stage in self._stages:
                 stage.decide(of_hold, poses[hold])
             links.final_at_ns[index], links.given[index] = of_hold.final_at_ns, of_hold.given
-        return links
 
     def _would_reach(self, packets: Transmissions, lives: Lives) -> IntArray:
         """How many receivers in range packets would have that never went on air, (packets,)."""
