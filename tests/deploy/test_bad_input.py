@@ -122,7 +122,7 @@ WIDER = [
     ),
     (
         "events=[{at_s=1, do='kill', robots={count=1}, for_s=0}]",
-        "events.0.for_s: expected a number above 0 (s), got 0",
+        "events.0.for_s: expected a number above 0 and at most 1000000000 (s), got 0",
     ),
     ("events=[{at_s=1, do='kill', robots=3}]", "events.0.robots: expected a table, got 3"),
     (
