@@ -118,4 +118,16 @@ class Breaks(OwnActuator):
         raise RuntimeError("jammed")
 
 
+@dataclass
+class Bursts(OwnActuator):
+    """Writes what is not finite to where robot 1 reads what it should do, or to its charge."""
+
+    where: str = parameter(help="target or charge")
+    value: str = parameter(help="what it writes, as a text: no sheet holds what is not finite")
+
+    def act(self, tick: int, rows: Any, values: Any) -> None:
+        if tick == 1:
+            getattr(self.scene, self.where)[0, 1] = float(self.value)
+
+
 NOTHING = 1

@@ -115,6 +115,17 @@ def test_an_actuator_that_fails_says_which_it_is(tmp_path: Path) -> None:
         of.move(commanded(of, 0.0, 0.0))
 
 
+@pytest.mark.parametrize("where", ["target", "charge"])
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf"])
+def test_an_actuator_that_writes_what_is_not_finite_is_named(tmp_path: Path, where: str, value: str) -> None:
+    bursts = f'[actuators.x]\nkind = "{CODE}:Bursts"\nwhere = "{where}"\nvalue = "{value}"\n'
+    of = world(tmp_path, BOTH + bursts, needs=())
+    of.move(commanded(of, 0.1, 0.0))
+    said = rf"finite numbers in scene.{where}, got .*{value}.* of robot 1 in arena 0"
+    with pytest.raises(OwnCodeFailed, match=rf"the actuator x of a \(.*Bursts\) failed:\n.*{said}"):
+        of.move(commanded(of, 0.1, 0.0))
+
+
 SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
 
 
