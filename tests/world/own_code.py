@@ -130,4 +130,13 @@ class Bursts(OwnActuator):
             getattr(self.scene, self.where)[0, 1] = float(self.value)
 
 
+@dataclass
+class Flashes(OwnActuator):
+    """Switches the first LED of whoever sets it."""
+
+    def act(self, tick: int, rows: Any, values: Any) -> None:
+        arena, robot = self.at(rows)
+        self.scene.leds[arena, robot, 0] = values[:, 0].astype(np.int64)
+
+
 NOTHING = 1
