@@ -168,6 +168,13 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
             "[senses.x]\nscale = 1",
             'senses.x: unknown sense; expected one of .*, or a kind = "file.py:Class" of your own',
         ),
+        *(
+            (
+                f'[senses.{name}]\nkind = "{PAINT}"',
+                f"senses.{name}: expected another name: {name} is a part of the drive",
+            )
+            for name in ("motors", "left_wheel", "right_wheel")
+        ),
         ('[senses."x.y"]\nkind = "a"', "senses.x.y: unknown sense"),
         (ACTUATOR + f'"{PAINT}"', "actuators.x.kind: expected a dataclass below OwnActuator"),
         (ACTUATOR + f'"{CODE}:NoWidth"', "actuators.x.kind: expected a width from 1; NoWidth has 0"),

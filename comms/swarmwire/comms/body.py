@@ -25,6 +25,7 @@ from swarmwire.comms.tables import built, mapping_of
 
 S = TypeVar("S", bound=Sheet)
 HERE = Path()
+MOTORS, WHEELS = "motors", ("left_wheel", "right_wheel")  # parts that can fail as senses can: no sense is named so
 
 
 class NotFitted(AttributeError):
@@ -168,6 +169,8 @@ def body_from(sheet: Mapping[str, Any], where: str, beside: Path = HERE) -> Body
 
 def _sense(name: str, table: object, where: str, beside: Path) -> Sheet:
     key = f"senses.{name}"
+    if name in (MOTORS, *WHEELS):
+        raise BadInput(where, key, f"expected another name: {name} is a part of the drive, which the event fail names")
     if name in SHEETS:
         return built(SHEETS[name], table, where, key)
     if "kind" not in mapping_of(where, key, table) or not name.isidentifier():
