@@ -1,5 +1,6 @@
 """Both kinds of agent read an own sense and set an own actuator alike; what does not fit is refused."""
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -7,23 +8,21 @@ import pytest
 
 from swarmwire.agent import Agent, VectorAgent
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
-from swarmwire.comms.body import body_from
+from swarmwire.comms.actuator_sheet import ActuatorSheet
+from swarmwire.comms.body import load_body
 from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.sheets import Battery, Imu, OwnSheet
 
-BODY = body_from(
-    {
-        "like": "epuck",
-        "senses": {
-            "gas": {"kind": "a:B", "params": {}, "fields": {"level": 0, "cells": 3}},
-            "imu": {},
-            "battery": {"capacity_wh": 1.0},
-        },
-        "actuators": {
-            "horn": {"kind": "a:C", "params": {}, "width": 1},
-            "arm": {"kind": "a:D", "params": {}, "width": 3},
-        },
+EPUCK = load_body("epuck")
+BODY = replace(
+    EPUCK,
+    senses={
+        **EPUCK.senses,
+        "gas": OwnSheet(kind="a:B", params={}, fields={"level": 0, "cells": 3}),
+        "imu": Imu(),
+        "battery": Battery(capacity_wh=1.0),
     },
-    "here",
+    actuators={"horn": ActuatorSheet("a:C", {}, 1), "arm": ActuatorSheet("a:D", {}, 3)},
 )
 TRIAL = Trial(body=BODY)
 

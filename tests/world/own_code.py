@@ -139,4 +139,19 @@ class Flashes(OwnActuator):
         self.scene.leds[arena, robot, 0] = values[:, 0].astype(np.int64)
 
 
+@dataclass
+class Keyed(Alone):
+    """A key that is named as one of told sheets."""
+
+    params: int = parameter(1, help="a number")
+
+
+@dataclass
+class Wide(Breaks):
+    """How many numbers it takes is a key."""
+
+    width: int = parameter(1, help="how many numbers it takes")
+    params: int = parameter(1, help="a number")
+
+
 NOTHING = 1

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.actuations import Actuations
-from swarmwire.comms.body import body_from, load_body
+from swarmwire.comms.body import body_from_mapping, load_body
 from swarmwire.comms.errors import BadInput, OwnCodeFailed
 from swarmwire.comms.senses import Actions
 from swarmwire.world.scenario import Scenario
@@ -139,6 +139,15 @@ def test_observers_are_told_of_leds_that_an_own_actuator_switches(tmp_path: Path
     assert (before.any(), lit[1, 0]) == (False, 255)  # what was told is never written to
 
 
+def test_keys_of_own_classes_may_be_named_as_those_of_told_sheets(tmp_path: Path) -> None:
+    sense = f'[senses.x]\nkind = "{CODE}:Keyed"\nparams = 2\n'
+    actuator = f'[actuators.x]\nkind = "{CODE}:Wide"\nwidth = 3\nparams = 4\n'
+    body = world(tmp_path, f'like = "epuck"\n{sense}{actuator}', needs=("x",)).static.groups[0].body
+    assert (body.senses["x"].params, body.senses["x"].fields) == ({"params": 2}, {"x": 0})
+    assert (body.actuators["x"].params, body.actuators["x"].width) == ({"width": 3, "params": 4}, 3)
+    assert body_from_mapping(body.as_mapping(), "static.json") == body
+
+
 SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
 
 
@@ -180,6 +189,8 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
         (ACTUATOR + f'"{CODE}:NoWidth"', "actuators.x.kind: expected a width from 1; NoWidth has 0"),
         (ACTUATOR + f'"{PAINTER}"\ngain = -1', "actuators.x.gain: expected more than 0, got -1.0"),
         ("[actuators.x]\ngain = 1", "actuators.x.kind: is missing"),
+        (SENSE + f'"{PAINT}"\nparams = {{}}\nfields = {{}}', "senses.x.params: unknown key; expected one of scale"),
+        (ACTUATOR + f'"{PAINTER}"\nparams = {{}}\nwidth = 2', "actuators.x.params: unknown key; expected one of gain"),
         ('[actuators."x y"]\nkind = "a:B"', "actuators.x y: expected a name of letters"),
     ],
 )
@@ -218,8 +229,8 @@ def test_agents_know_names_and_widths_and_nothing_of_the_keys(tmp_path: Path) ->
     body = world(tmp_path).static.groups[0].body
     sheet = body.senses["paint"]
     assert (sheet.fields, sheet.params) == ({"amount": 0, "ticks": 3}, {"scale": 2.0})
-    told = body_from(body.told.as_mapping(), "assignment")
+    told = body_from_mapping(body.told.as_mapping(), "assignment")
     assert (told.senses["paint"].fields, told.senses["paint"].params) == ({"amount": 0, "ticks": 3}, {})
     assert (told.actuators["painter"].width, told.actuators["painter"].params) == (2, {})
-    assert body_from(body.as_mapping(), "static.json") == body
+    assert body_from_mapping(body.as_mapping(), "static.json") == body
     assert load_body("epuck").told == load_body("epuck")
