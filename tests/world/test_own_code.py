@@ -225,12 +225,14 @@ def test_an_entry_point_is_a_kind_of_its_name(tmp_path: Path, monkeypatch: pytes
     assert of.static.groups[0].body.senses["mine"].kind == "painted_code:Paint"
 
 
-def test_agents_know_names_and_widths_and_nothing_of_the_keys(tmp_path: Path) -> None:
+def test_agents_know_names_and_widths_and_nothing_of_classes_and_keys(tmp_path: Path) -> None:
     body = world(tmp_path).static.groups[0].body
     sheet = body.senses["paint"]
     assert (sheet.fields, sheet.params) == ({"amount": 0, "ticks": 3}, {"scale": 2.0})
     told = body_from_mapping(body.told.as_mapping(), "assignment")
     assert (told.senses["paint"].fields, told.senses["paint"].params) == ({"amount": 0, "ticks": 3}, {})
     assert (told.actuators["painter"].width, told.actuators["painter"].params) == (2, {})
+    assert (told.senses["paint"].kind, told.actuators["painter"].kind) == ("", "")
+    assert str(CODE.parent) not in str(told.as_mapping())
     assert body_from_mapping(body.as_mapping(), "static.json") == body
     assert load_body("epuck").told == load_body("epuck")

@@ -120,9 +120,13 @@ class Body:
 
     @property
     def told(self) -> "Body":
-        """The body as agents know it: without the keys of own senses and actuators, which may tell of the arena."""
-        senses = {n: replace(s, params={}) if isinstance(s, OwnSheet) else s for n, s in self.senses.items()}
-        actuators = {name: replace(sheet, params={}) for name, sheet in self.actuators.items()}
+        """The body as agents know it: without the classes of own senses and actuators, and without their keys.
+
+        Keys may tell of the arena, and where a file lies tells of the machine that it lies on.
+        """
+        hidden: dict[str, Any] = {"kind": "", "params": {}}
+        senses = {n: replace(s, **hidden) if isinstance(s, OwnSheet) else s for n, s in self.senses.items()}
+        actuators = {name: replace(sheet, **hidden) for name, sheet in self.actuators.items()}
         return replace(self, senses=senses, actuators=actuators)
 
     def as_mapping(self) -> dict[str, Any]:
