@@ -1,6 +1,6 @@
 """Own senses and actuators for tests, good ones and bad ones."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -141,17 +141,19 @@ class Flashes(OwnActuator):
 
 @dataclass
 class Keyed(Alone):
-    """A key that is named as one of told sheets."""
+    """A key that is named as one of told sheets, and one that may be anything."""
 
     params: int = parameter(1, help="a number")
+    any: Any = field(default=None)
 
 
 @dataclass
 class Wide(Breaks):
     """How many numbers it takes is a key."""
 
-    width: int = parameter(1, help="how many numbers it takes")
+    width: int = parameter(1, help="how many numbers it takes")  # pyright: ignore[reportIncompatibleMethodOverride]
     params: int = parameter(1, help="a number")
+    any: Any = field(default=None)
 
 
 NOTHING = 1

@@ -140,10 +140,13 @@ def test_observers_are_told_of_leds_that_an_own_actuator_switches(tmp_path: Path
 
 
 def test_keys_of_own_classes_may_be_named_as_those_of_told_sheets(tmp_path: Path) -> None:
-    sense = f'[senses.x]\nkind = "{CODE}:Keyed"\nparams = 2\n'
+    sense = f'[senses.x]\nkind = "{CODE}:Keyed"\nparams = 2\nany = [{{a = 1}}, "b", false, -0.5]\n'
     actuator = f'[actuators.x]\nkind = "{CODE}:Wide"\nwidth = 3\nparams = 4\n'
     body = world(tmp_path, f'like = "epuck"\n{sense}{actuator}', needs=("x",)).static.groups[0].body
-    assert (body.senses["x"].params, body.senses["x"].fields) == ({"params": 2}, {"x": 0})
+    assert (body.senses["x"].params, body.senses["x"].fields) == (
+        {"params": 2, "any": [{"a": 1}, "b", False, -0.5]},
+        {"x": 0},
+    )
     assert (body.actuators["x"].params, body.actuators["x"].width) == ({"width": 3, "params": 4}, 3)
     assert body_from_mapping(body.as_mapping(), "static.json") == body
 
@@ -183,6 +186,19 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
                 f"senses.{name}: expected another name: {name} is a part of the drive",
             )
             for name in ("motors", "left_wheel", "right_wheel")
+        ),
+        *(
+            (f"{table}any = {value}", f"{key}.any{inner}: expected {expected}")
+            for table, key in (
+                (SENSE + f'"{CODE}:Keyed"\n', "senses.x"),
+                (ACTUATOR + f'"{CODE}:Wide"\n', "actuators.x"),
+            )
+            for value, inner, expected in (
+                ("2026-01-02", "", r"a number, text, .*, got datetime.date\(2026, 1, 2\)"),
+                ("[0, {a = 10:20:30}]", r"\[1\].a", r"a number, text, .*, got datetime.time"),
+                ("[1.0, inf]", r"\[1\]", "a finite number, got inf"),
+                ("0x1_0000_0000_0000_0000", "", "a whole number of 64 bits, got 18446744073709551616"),
+            )
         ),
         ('[senses."x.y"]\nkind = "a"', "senses.x.y: unknown sense"),
         (ACTUATOR + f'"{PAINT}"', "actuators.x.kind: expected a dataclass below OwnActuator"),

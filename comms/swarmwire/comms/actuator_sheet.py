@@ -6,6 +6,7 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import parameter
+from swarmwire.comms.plain_values import check_plain
 from swarmwire.comms.sheets.own import kind_of
 from swarmwire.comms.tables import built, mapping_of
 
@@ -26,7 +27,9 @@ def actuator_sheet(value: object, where: str, key: str, beside: Path) -> Actuato
     table = mapping_of(where, key, value)
     if "kind" not in table:
         raise BadInput(where, f"{key}.kind", "is missing")
-    return built(ActuatorSheet, {"kind": kind_of(table, where, key, beside), "params": table}, where, key)
+    kind = kind_of(table, where, key, beside)
+    check_plain(table, where, key)
+    return built(ActuatorSheet, {"kind": kind, "params": table}, where, key)
 
 
 def told_actuator_sheet(value: object, where: str, key: str) -> ActuatorSheet:

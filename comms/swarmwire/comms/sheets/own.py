@@ -8,6 +8,7 @@ from typing import Any, cast
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.loading import resolve
 from swarmwire.comms.parameters import parameter
+from swarmwire.comms.plain_values import check_plain
 from swarmwire.comms.sheets.sheet import RangedSheet
 from swarmwire.comms.tables import built, mapping_of
 
@@ -28,6 +29,7 @@ def own_sheet(value: object, where: str, key: str, beside: Path) -> OwnSheet:
     table = mapping_of(where, key, value)
     shared = {name: table.pop(name) for name in [of.name for of in fields(RangedSheet)] if name in table}
     kind = kind_of(table, where, key, beside)
+    check_plain(table, where, key)
     return built(OwnSheet, {**shared, "kind": kind, "params": table, "fields": {}}, where, key)
 
 
