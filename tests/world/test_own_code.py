@@ -167,7 +167,7 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
         (SENSE + f'"{CODE}:NoFields"', "senses.x.kind: expected fields as a tuple of Field; NoFields has 'x'"),
         (
             SENSE + f'"{CODE}:Twice"',
-            "senses.x.kind: expected fields with names of their own and widths from 0; got x, x",
+            "senses.x.kind: expected fields with names of their own, of letters, digits and _; got x, x",
         ),
         (SENSE + f'"{CODE}:Refuses"', "senses.x: Refuses refuses: ValueError: no"),
         (SENSE + f'"{PAINT}"\nscale = 0', "senses.x.scale: expected more than 0, got 0.0"),
