@@ -1,6 +1,6 @@
 """Own senses and actuators for tests, good ones and bad ones."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -116,6 +116,44 @@ class NoWidth(Painter):
 class Breaks(OwnActuator):
     def act(self, tick: int, rows: Any, values: Any) -> None:
         raise RuntimeError("jammed")
+
+
+@dataclass
+class Bursts(OwnActuator):
+    """Writes what is not finite to where robot 1 reads what it should do, or to its charge."""
+
+    where: str = parameter(help="target or charge")
+    value: str = parameter(help="what it writes, as a text: no sheet holds what is not finite")
+
+    def act(self, tick: int, rows: Any, values: Any) -> None:
+        if tick == 1:
+            getattr(self.scene, self.where)[0, 1] = float(self.value)
+
+
+@dataclass
+class Flashes(OwnActuator):
+    """Switches the first LED of whoever sets it."""
+
+    def act(self, tick: int, rows: Any, values: Any) -> None:
+        arena, robot = self.at(rows)
+        self.scene.leds[arena, robot, 0] = values[:, 0].astype(np.int64)
+
+
+@dataclass
+class Keyed(Alone):
+    """A key that is named as one of told sheets, and one that may be anything."""
+
+    params: int = parameter(1, help="a number")
+    any: Any = field(default=None)
+
+
+@dataclass
+class Wide(Breaks):
+    """How many numbers it takes is a key."""
+
+    width: int = parameter(1, help="how many numbers it takes")  # pyright: ignore[reportIncompatibleMethodOverride]
+    params: int = parameter(1, help="a number")
+    any: Any = field(default=None)
 
 
 NOTHING = 1

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.actuations import Actuations
-from swarmwire.comms.body import body_from, load_body
+from swarmwire.comms.body import body_from_mapping, load_body
 from swarmwire.comms.errors import BadInput, OwnCodeFailed
 from swarmwire.comms.senses import Actions
 from swarmwire.world.scenario import Scenario
@@ -115,6 +115,42 @@ def test_an_actuator_that_fails_says_which_it_is(tmp_path: Path) -> None:
         of.move(commanded(of, 0.0, 0.0))
 
 
+@pytest.mark.parametrize("where", ["target", "charge"])
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf"])
+def test_an_actuator_that_writes_what_is_not_finite_is_named(tmp_path: Path, where: str, value: str) -> None:
+    bursts = f'[actuators.x]\nkind = "{CODE}:Bursts"\nwhere = "{where}"\nvalue = "{value}"\n'
+    of = world(tmp_path, BOTH + bursts, needs=())
+    of.move(commanded(of, 0.1, 0.0))
+    said = rf"finite numbers in scene.{where}, got .*{value}.* of robot 1 in arena 0"
+    with pytest.raises(OwnCodeFailed, match=rf"the actuator x of a \(.*Bursts\) failed:\n.*{said}"):
+        of.move(commanded(of, 0.1, 0.0))
+
+
+def test_observers_are_told_of_leds_that_an_own_actuator_switches(tmp_path: Path) -> None:
+    of = world(tmp_path, f'like = "epuck"\n[actuators.x]\nkind = "{CODE}:Flashes"\n', needs=())
+    before = of.actuators.leds.told
+    of.move(actuated(of, [1], [0], [255.0]))
+    lit = of.actuators.leds.told
+    assert lit[:, 0].tolist() == [0, 255]
+    of.move(commanded(of, 0.0, 0.0))
+    assert of.actuators.leds.told is lit
+    of.move(actuated(of, [1], [0], [0.0]))
+    assert not of.actuators.leds.told.any()
+    assert (before.any(), lit[1, 0]) == (False, 255)  # what was told is never written to
+
+
+def test_keys_of_own_classes_may_be_named_as_those_of_told_sheets(tmp_path: Path) -> None:
+    sense = f'[senses.x]\nkind = "{CODE}:Keyed"\nparams = 2\nany = [{{a = 1}}, "b", false, -0.5]\n'
+    actuator = f'[actuators.x]\nkind = "{CODE}:Wide"\nwidth = 3\nparams = 4\n'
+    body = world(tmp_path, f'like = "epuck"\n{sense}{actuator}', needs=("x",)).static.groups[0].body
+    assert (body.senses["x"].params, body.senses["x"].fields) == (
+        {"params": 2, "any": [{"a": 1}, "b", False, -0.5]},
+        {"x": 0},
+    )
+    assert (body.actuators["x"].params, body.actuators["x"].width) == ({"width": 3, "params": 4}, 3)
+    assert body_from_mapping(body.as_mapping(), "static.json") == body
+
+
 SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
 
 
@@ -131,7 +167,7 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
         (SENSE + f'"{CODE}:NoFields"', "senses.x.kind: expected fields as a tuple of Field; NoFields has 'x'"),
         (
             SENSE + f'"{CODE}:Twice"',
-            "senses.x.kind: expected fields with names of their own and widths from 0; got x, x",
+            "senses.x.kind: expected fields with names of their own, of letters, digits and _; got x, x",
         ),
         (SENSE + f'"{CODE}:Refuses"', "senses.x: Refuses refuses: ValueError: no"),
         (SENSE + f'"{PAINT}"\nscale = 0', "senses.x.scale: expected more than 0, got 0.0"),
@@ -144,11 +180,33 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
             "[senses.x]\nscale = 1",
             'senses.x: unknown sense; expected one of .*, or a kind = "file.py:Class" of your own',
         ),
+        *(
+            (
+                f'[senses.{name}]\nkind = "{PAINT}"',
+                f"senses.{name}: expected another name: {name} is a part of the drive",
+            )
+            for name in ("motors", "left_wheel", "right_wheel")
+        ),
+        *(
+            (f"{table}any = {value}", f"{key}.any{inner}: expected {expected}")
+            for table, key in (
+                (SENSE + f'"{CODE}:Keyed"\n', "senses.x"),
+                (ACTUATOR + f'"{CODE}:Wide"\n', "actuators.x"),
+            )
+            for value, inner, expected in (
+                ("2026-01-02", "", r"a number, text, .*, got datetime.date\(2026, 1, 2\)"),
+                ("[0, {a = 10:20:30}]", r"\[1\].a", r"a number, text, .*, got datetime.time"),
+                ("[1.0, inf]", r"\[1\]", "a finite number, got inf"),
+                ("0x1_0000_0000_0000_0000", "", "a whole number of 64 bits, got 18446744073709551616"),
+            )
+        ),
         ('[senses."x.y"]\nkind = "a"', "senses.x.y: unknown sense"),
         (ACTUATOR + f'"{PAINT}"', "actuators.x.kind: expected a dataclass below OwnActuator"),
         (ACTUATOR + f'"{CODE}:NoWidth"', "actuators.x.kind: expected a width from 1; NoWidth has 0"),
         (ACTUATOR + f'"{PAINTER}"\ngain = -1', "actuators.x.gain: expected more than 0, got -1.0"),
         ("[actuators.x]\ngain = 1", "actuators.x.kind: is missing"),
+        (SENSE + f'"{PAINT}"\nparams = {{}}\nfields = {{}}', "senses.x.params: unknown key; expected one of scale"),
+        (ACTUATOR + f'"{PAINTER}"\nparams = {{}}\nwidth = 2', "actuators.x.params: unknown key; expected one of gain"),
         ('[actuators."x y"]\nkind = "a:B"', "actuators.x y: expected a name of letters"),
     ],
 )
@@ -183,12 +241,14 @@ def test_an_entry_point_is_a_kind_of_its_name(tmp_path: Path, monkeypatch: pytes
     assert of.static.groups[0].body.senses["mine"].kind == "painted_code:Paint"
 
 
-def test_agents_know_names_and_widths_and_nothing_of_the_keys(tmp_path: Path) -> None:
+def test_agents_know_names_and_widths_and_nothing_of_classes_and_keys(tmp_path: Path) -> None:
     body = world(tmp_path).static.groups[0].body
     sheet = body.senses["paint"]
     assert (sheet.fields, sheet.params) == ({"amount": 0, "ticks": 3}, {"scale": 2.0})
-    told = body_from(body.told.as_mapping(), "assignment")
+    told = body_from_mapping(body.told.as_mapping(), "assignment")
     assert (told.senses["paint"].fields, told.senses["paint"].params) == ({"amount": 0, "ticks": 3}, {})
     assert (told.actuators["painter"].width, told.actuators["painter"].params) == (2, {})
-    assert body_from(body.as_mapping(), "static.json") == body
+    assert (told.senses["paint"].kind, told.actuators["painter"].kind) == ("", "")
+    assert str(CODE.parent) not in str(told.as_mapping())
+    assert body_from_mapping(body.as_mapping(), "static.json") == body
     assert load_body("epuck").told == load_body("epuck")

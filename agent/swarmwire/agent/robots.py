@@ -156,14 +156,11 @@ class Robots(Handle):
     def actuate(self, name: str, values: ArrayLike, rows: BoolArray | None = None) -> None:
         """Set an actuator of your own of the robots of the mask `rows`, or of all.
 
-        To one number, (n,), or (n, width): of robots outside the mask they do not count. What they do, and for how
-        long, is the actuator's to know. NotFitted if the bodies have none of this name, ValueError if the numbers do
-        not fit or are not finite.
+        To one number, (n,), (n, width), or, of more than one, (width,) for each of them: of robots outside the mask
+        they do not count. What they do, and for how long, is the actuator's to know. NotFitted if the bodies have none
+        of this name, ValueError if the numbers do not fit or are not finite.
         """
-        if rows is None:
-            self._turn.actuate(name, values, slice(None))
-        else:
-            self._turn.actuate(name, _of(rows, values), rows)
+        self._turn.actuate(name, values, slice(None), rows)
 
     def note(self, state: str, rows: BoolArray | None = None) -> None:
         """Name what the robots of the mask `rows`, or all, are at; for recordings and pictures, until the next call."""

@@ -122,9 +122,10 @@ class Turn:
             self._leds = np.full((self.n, body.led_count), NOT_SWITCHED)
         return self._leds if which is None else self._leds[:, which : which + 1]
 
-    def actuate(self, name: str, values: ArrayLike, rows: IntArray | BoolArray | slice) -> None:
+    def actuate(self, name: str, values: ArrayLike, rows: slice, mask: BoolArray | None = None) -> None:
         """Set an actuator of the user's own of some of the robots to numbers (rows, width), or what goes for all.
 
+        With a mask (rows,) it is set for the robots of the mask alone, and the numbers of others are not looked at.
         NotFitted if the body has none of this name, ValueError if the numbers do not fit or are not finite.
         """
         body = self.group.body
@@ -132,17 +133,18 @@ class Turn:
             has = ", ".join(body.actuators) or "none"
             raise NotFitted(f"the body {body.name} has no actuator {name!r} of its own: it has {has}")
         given, width = np.asarray(values, np.float64), body.actuators[name].width
-        if not np.isfinite(given).all():
-            raise ValueError(f"actuate({name!r}, …): expected finite numbers, got {values!r}")
         if self._own is None:
             self._own = np.full((self.n, sum(sheet.width for sheet in body.actuators.values())), np.nan)
-        of = self._own[:, body.actuator_places[name]]
-        shape = of[rows].shape
+        of = self._own[rows, body.actuator_places[name]]
         if given.ndim == 1 and width == 1:
             given = given[:, None]  # (n,) is one number for each robot
-        if given.ndim > 2 or (given.ndim and given.shape[-1] != width) or (given.ndim == 2 and len(given) != shape[0]):
+        if given.ndim > 2 or (given.ndim and given.shape[-1] != width) or (given.ndim == 2 and len(given) != len(of)):
             raise ValueError(f"actuate({name!r}, …): expected {width} numbers, got the shape {np.shape(values)}")
-        of[rows] = given
+        here = np.ones(len(of), np.bool_) if mask is None else mask
+        given = np.broadcast_to(given, of.shape)[here]
+        if not np.isfinite(given).all():
+            raise ValueError(f"actuate({name!r}, …): expected finite numbers, got {values!r}")
+        of[here] = given
 
     def actions(self) -> Actions:
         """What the robots did."""

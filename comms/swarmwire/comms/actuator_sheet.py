@@ -6,6 +6,7 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import parameter
+from swarmwire.comms.plain_values import check_plain
 from swarmwire.comms.sheets.own import kind_of
 from swarmwire.comms.tables import built, mapping_of
 
@@ -21,18 +22,21 @@ class ActuatorSheet:
     width: int = parameter(0, help="how many numbers it takes; 0: not known yet")
 
 
-def actuator_sheet(name: str, value: object, where: str, beside: Path) -> ActuatorSheet:
-    """The sheet of a table with a `kind`, or of one that `asdict` made; its width is known once the class is."""
-    key = f"actuators.{name}"
-    if not name.isidentifier():
-        raise BadInput(where, key, "expected a name of letters, digits and _, which does not start with a digit")
+def actuator_sheet(value: object, where: str, key: str, beside: Path) -> ActuatorSheet:
+    """The sheet of a user's table, which has a `kind`; its width is known once the class is."""
     table = mapping_of(where, key, value)
     if "kind" not in table:
         raise BadInput(where, f"{key}.kind", "is missing")
-    if "width" in table:
-        mapping_of(where, f"{key}.params", table.get("params"))
-        width = table["width"]
-        if type(width) is not int or width < 0:
-            raise BadInput(where, f"{key}.width", f"expected a whole number from 0, got {width!r}")
-        return built(ActuatorSheet, table, where, key)
-    return built(ActuatorSheet, {"kind": kind_of(table, where, key, beside), "params": table}, where, key)
+    kind = kind_of(table, where, key, beside)
+    check_plain(table, where, key)
+    return built(ActuatorSheet, {"kind": kind, "params": table}, where, key)
+
+
+def told_actuator_sheet(value: object, where: str, key: str) -> ActuatorSheet:
+    """The sheet that `asdict` made into this table; only that knows `params` and `width` from keys of the class."""
+    table = mapping_of(where, key, value)
+    mapping_of(where, f"{key}.params", table.get("params"))
+    width = table.get("width")
+    if type(width) is not int or width < 0:
+        raise BadInput(where, f"{key}.width", f"expected a whole number from 0, got {width!r}")
+    return built(ActuatorSheet, table, where, key)

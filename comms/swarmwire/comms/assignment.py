@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray, KeyArray
-from swarmwire.comms.body import Body, body_from
+from swarmwire.comms.body import Body, body_from_mapping
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Assignment:
                 name=group["name"],
                 agent=group["agent"],
                 params=group["params"],
-                body=body_from(group["body"], where="assignment"),
+                body=body_from_mapping(group["body"], where="assignment"),
                 rows=np.array(group["rows"], np.int64),
                 robot_names=tuple(group["robot_names"]),
                 keys=np.array(group["keys"], np.uint64),

@@ -13,18 +13,19 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from swarmwire.comms.actuator_sheet import ActuatorSheet, actuator_sheet
+from swarmwire.comms.actuator_sheet import ActuatorSheet, actuator_sheet, told_actuator_sheet
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.drives import DRIVES, Drive, Holonomic, Twist, Wheels
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.leds import Leds
 from swarmwire.comms.parameters import parameter
 from swarmwire.comms.sheets import SHEETS, Compass, Infrared, Light, Odometry, OwnSheet, Proximity, Scan, Sheet
-from swarmwire.comms.sheets.own import own_sheet
+from swarmwire.comms.sheets.own import own_sheet, told_own_sheet
 from swarmwire.comms.tables import built, mapping_of
 
 S = TypeVar("S", bound=Sheet)
 HERE = Path()
+MOTORS, WHEELS = "motors", ("left_wheel", "right_wheel")  # parts that can fail as senses can: no sense is named so
 
 
 class NotFitted(AttributeError):
@@ -119,13 +120,17 @@ class Body:
 
     @property
     def told(self) -> "Body":
-        """The body as agents know it: without the keys of own senses and actuators, which may tell of the arena."""
-        senses = {n: replace(s, params={}) if isinstance(s, OwnSheet) else s for n, s in self.senses.items()}
-        actuators = {name: replace(sheet, params={}) for name, sheet in self.actuators.items()}
+        """The body as agents know it: without the classes of own senses and actuators, and without their keys.
+
+        Keys may tell of the arena, and where a file lies tells of the machine that it lies on.
+        """
+        hidden: dict[str, Any] = {"kind": "", "params": {}}
+        senses = {n: replace(s, **hidden) if isinstance(s, OwnSheet) else s for n, s in self.senses.items()}
+        actuators = {name: replace(sheet, **hidden) for name, sheet in self.actuators.items()}
         return replace(self, senses=senses, actuators=actuators)
 
     def as_mapping(self) -> dict[str, Any]:
-        """The sheet as `body_from` reads it back."""
+        """The sheet as `body_from_mapping` reads it back."""
         return asdict(self)
 
 
@@ -150,10 +155,20 @@ def body_from(sheet: Mapping[str, Any], where: str, beside: Path = HERE) -> Body
         if _kind_of(rest, _kind_of(base)) != _kind_of(base):
             base.pop("drive", None)  # of another kind: its limits have other names
         return body_from(_merged(base, rest), where, beside)
+    return _body(rest, where, beside)
+
+
+def body_from_mapping(mapping: Mapping[str, Any], where: str) -> Body:
+    """The body that `as_mapping` wrote down; BadInput names `where` and the key of what is wrong."""
+    return _body(dict(mapping), where, None)
+
+
+def _body(rest: dict[str, Any], where: str, beside: Path | None) -> Body:
+    """The body of a whole sheet, or, with nothing `beside`, of one that `as_mapping` wrote down."""
     senses = mapping_of(where, "senses", rest.pop("senses", {}))
     rest["senses"] = {name: _sense(name, table, where, beside) for name, table in senses.items()}
     actuators = mapping_of(where, "actuators", rest.pop("actuators", {}))
-    rest["actuators"] = {name: actuator_sheet(name, table, where, beside) for name, table in actuators.items()}
+    rest["actuators"] = {name: _actuator(name, table, where, beside) for name, table in actuators.items()}
     if "drive" in rest:
         rest["drive"] = _drive(rest["drive"], where)
     if rest.get("leds") is not None:  # None: a sheet written down as a mapping
@@ -166,14 +181,23 @@ def body_from(sheet: Mapping[str, Any], where: str, beside: Path = HERE) -> Body
     return body
 
 
-def _sense(name: str, table: object, where: str, beside: Path) -> Sheet:
+def _sense(name: str, table: object, where: str, beside: Path | None) -> Sheet:
     key = f"senses.{name}"
+    if name in (MOTORS, *WHEELS):
+        raise BadInput(where, key, f"expected another name: {name} is a part of the drive, which the event fail names")
     if name in SHEETS:
         return built(SHEETS[name], table, where, key)
     if "kind" not in mapping_of(where, key, table) or not name.isidentifier():
         expected = f'expected one of {", ".join(SHEETS)}, or a kind = "file.py:Class" of your own'
         raise BadInput(where, key, f"unknown sense; {expected}")
-    return own_sheet(table, where, key, beside)
+    return told_own_sheet(table, where, key) if beside is None else own_sheet(table, where, key, beside)
+
+
+def _actuator(name: str, table: object, where: str, beside: Path | None) -> ActuatorSheet:
+    key = f"actuators.{name}"
+    if not name.isidentifier():
+        raise BadInput(where, key, "expected a name of letters, digits and _, which does not start with a digit")
+    return told_actuator_sheet(table, where, key) if beside is None else actuator_sheet(table, where, key, beside)
 
 
 def _kind_of(sheet: Mapping[str, Any], otherwise: object = "wheels") -> object:

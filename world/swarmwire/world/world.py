@@ -155,6 +155,7 @@ class World:
         self.states.take(actions.notes, self.alive)
         if self._own.any:
             self._own.act(actions.own, self.alive)
+            self.actuators.leds.tell()
         if self.batteries.any:
             self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target)
         onsets = self._physics.tick(self.actuators.target)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.body import Body
+from swarmwire.comms.body import MOTORS, WHEELS, Body
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.drives import Holonomic
 from swarmwire.comms.errors import BadInput
@@ -15,8 +15,6 @@ from swarmwire.comms.events.kill import check_robots
 from swarmwire.comms.events.selection import Selection
 from swarmwire.comms.events.swarm import Groups, Swarm
 from swarmwire.comms.parameters import parameter
-
-MOTORS, WHEELS = "motors", ("left_wheel", "right_wheel")
 
 
 @dataclass(frozen=True, kw_only=True)

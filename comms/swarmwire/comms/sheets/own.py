@@ -8,6 +8,7 @@ from typing import Any, cast
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.loading import resolve
 from swarmwire.comms.parameters import parameter
+from swarmwire.comms.plain_values import check_plain
 from swarmwire.comms.sheets.sheet import RangedSheet
 from swarmwire.comms.tables import built, mapping_of
 
@@ -24,12 +25,11 @@ class OwnSheet(RangedSheet):
 
 
 def own_sheet(value: object, where: str, key: str, beside: Path) -> OwnSheet:
-    """The sheet of a table with a `kind`, or of one that `asdict` made; its fields are known once the class is."""
+    """The sheet of a user's table, which has a `kind`; its fields are known once the class is."""
     table = mapping_of(where, key, value)
-    if "fields" in table:
-        return _told(table, where, key)
     shared = {name: table.pop(name) for name in [of.name for of in fields(RangedSheet)] if name in table}
     kind = kind_of(table, where, key, beside)
+    check_plain(table, where, key)
     return built(OwnSheet, {**shared, "kind": kind, "params": table, "fields": {}}, where, key)
 
 
@@ -42,9 +42,11 @@ def kind_of(table: dict[str, Any], where: str, key: str, beside: Path) -> str:
     return resolve(kind, beside)
 
 
-def _told(table: dict[str, Any], where: str, key: str) -> OwnSheet:
+def told_own_sheet(value: object, where: str, key: str) -> OwnSheet:
+    """The sheet that `asdict` made into this table; only that knows `params` and `fields` from keys of the class."""
+    table = mapping_of(where, key, value)
     mapping_of(where, f"{key}.params", table.get("params"))
-    widths = mapping_of(where, f"{key}.fields", table["fields"])
+    widths = mapping_of(where, f"{key}.fields", table.get("fields"))
     if not all(type(width) is int and width >= 0 for width in cast("Mapping[str, object]", widths).values()):
         raise BadInput(where, f"{key}.fields", f"expected whole numbers from 0, got {widths!r}")
     return built(OwnSheet, table, where, key)

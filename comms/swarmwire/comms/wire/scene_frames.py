@@ -6,7 +6,7 @@ from math import inf, isfinite
 from types import NoneType, UnionType
 from typing import Any, Literal, cast, get_args, get_origin, get_type_hints
 
-from swarmwire.comms.body import Body, body_from
+from swarmwire.comms.body import Body, body_from_mapping
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.floor import FloorImage
 from swarmwire.comms.glimpse import Scene
@@ -116,6 +116,6 @@ def _body(value: object, key: str) -> Body:
     if type(value) is not dict:
         raise BadFrame("malformed", f"{key}: expected a body")
     try:
-        return body_from(cast("dict[str, Any]", value), where=key)
+        return body_from_mapping(cast("dict[str, Any]", value), where=key)
     except BadInput as error:
         raise BadFrame("malformed", str(error)) from error

@@ -7,7 +7,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.body import body_from
+from swarmwire.comms.body import body_from_mapping
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.floor import Floor, FloorImage, Patch
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
@@ -55,7 +55,7 @@ def _floor(item: Mapping[str, Any]) -> Floor:
 
 
 def _group(item: Mapping[str, Any], where: str) -> Group:
-    fields: dict[str, Any] = {**item, "body": body_from(item["body"], where)}
+    fields: dict[str, Any] = {**item, "body": body_from_mapping(item["body"], where)}
     return Group(**fields)
 
 

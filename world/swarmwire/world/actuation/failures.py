@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.body import MOTORS, WHEELS
 from swarmwire.comms.drives import Holonomic
-from swarmwire.comms.events.fail import MOTORS, WHEELS
 from swarmwire.comms.truth import Group
 
 

@@ -24,6 +24,7 @@ class OwnActuators:
 
     def __init__(self, groups: Sequence[Group], scene: Scene) -> None:
         """Each is started; OwnCodeFailed if one raises."""
+        self._scene = scene
         self._fitted: list[tuple[str, OwnActuator, slice]] = []
         for group in groups:
             for name, sheet in group.body.actuators.items():
@@ -40,7 +41,7 @@ class OwnActuators:
         self._ticks = self.not_there = 0
 
     def act(self, actuations: Actuations, alive: BoolArray) -> None:
-        """Let all of them act in a tick, those of the dead not."""
+        """Let all of them act in a tick, those of the dead not; OwnCodeFailed if one raises or leaves inf or nan."""
         rows, place = actuations.rows, actuations.place
         there = place < self._places[rows]
         self.not_there += int(np.count_nonzero(~there))
@@ -52,7 +53,18 @@ class OwnActuators:
             values = asked[:, places]
             set_ = np.flatnonzero(here & ~np.isnan(values).any(axis=1))
             _call(what, own.act, self._ticks, set_, values[set_])
+            self._check(what)
         self._ticks += 1
+
+    def _check(self, what: str) -> None:
+        """After each of them: later nobody could tell whose number made poses nan."""
+        for name, values in (("target", self._scene.target), ("charge", self._scene.charge)):
+            finite = np.isfinite(values)
+            if not finite.all():
+                arena, robot = np.argwhere(~finite)[0, :2]
+                value = values[arena, robot].tolist()
+                said = f"expected finite numbers in scene.{name}, got {value} of robot {robot} in arena {arena}"
+                raise OwnCodeFailed(what, f"act: {said}")
 
 
 def _call(what: str, method: Any, *args: Any) -> None:

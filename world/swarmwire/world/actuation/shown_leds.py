@@ -35,6 +35,11 @@ class ShownLeds:
         self._row[changes.rows[there], changes.which[there]] = changes.rgb[there]
         self.told = self._row.copy()
 
+    def tell(self) -> None:
+        """Tell observers what was written to `rgb`."""
+        if not np.array_equal(self._row, self.told):
+            self.told = self._row.copy()
+
     def darken(self, rows: BoolArray) -> None:
         """These robots (rows,) go dark."""
         if self._row[rows].any():

@@ -12,6 +12,7 @@ from swarmwire.comms.loading import NotLoaded, load_named
 from swarmwire.comms.sheets import OwnSheet, Sheet
 from swarmwire.comms.tables import built
 from swarmwire.world.own.actuator import OwnActuator
+from swarmwire.world.own.field_faults import field_fault
 from swarmwire.world.own.sensor import OwnSensor
 from swarmwire.world.sensors.sensor import Field
 
@@ -45,10 +46,14 @@ def _sense(sheet: Sheet, where: str, key: str) -> Sheet:
     if not isinstance(found, tuple | list) or not found or not all(isinstance(of, Field) for of in cast(Any, found)):
         raise BadInput(where, f"{key}.kind", f"expected fields as a tuple of Field; {type(own).__name__} has {found!r}")
     fields = cast("tuple[Field, ...]", found)
-    unfit = [of.name for of in fields if not of.name.isidentifier() or type(of.width) is not int or of.width < 0]
-    if unfit or len({of.name for of in fields}) < len(fields):
-        expected = "expected fields with names of their own and widths from 0"
-        raise BadInput(where, f"{key}.kind", f"{expected}; got {', '.join(unfit or [of.name for of in fields])}")
+    names: list[Any] = [of.name for of in fields]
+    if not all(isinstance(name, str) and name.isidentifier() for name in names) or len(set(names)) < len(names):
+        expected = "expected fields with names of their own, of letters, digits and _"
+        raise BadInput(where, f"{key}.kind", f"{expected}; got {', '.join(map(str, names))}")
+    for field in fields:
+        fault = field_fault(field)
+        if fault:
+            raise BadInput(where, f"{key}.kind", f"the field {field.name} of {type(own).__name__}: {fault}")
     return replace(sheet, fields={of.name: of.width for of in fields})
 
 
