@@ -65,12 +65,20 @@ def test_robots_are_held_back_bit_for_bit_as_if_all_obstacles_were_looked_at(bou
     assert held_alike(rng, tuple(crowded(rng, some) for some in (count, 0, count // 2)), boundary, 40)
 
 
-def test_who_is_pushed_far_is_pushed_on_from_there() -> None:
-    rng = np.random.default_rng(5)
-    tower = Obstacle("cylinder", 1.1, 0.0, radius_m=1.0)  # pushes through the wall, where posts push on
-    at = rng.uniform([1.9, -1.5], [2.3, 1.5], (100, 2)).tolist()
-    posts = tuple(Obstacle("cylinder", x, y, radius_m=0.06) for x, y in at)
-    assert held_alike(rng, ((tower, *posts),) * 8, "walls", 2)
+def test_who_is_pushed_far_is_pushed_on_from_there_before_the_wall_holds_it() -> None:
+    posts = tuple(
+        Obstacle("cylinder", *at, radius_m=0.02) for at in np.linspace([-1.9, -1.0], [-1.0, 1.0], 120).tolist()
+    )
+    tower, beyond = Obstacle("cylinder", 1.0, 0.0, radius_m=1.0), Obstacle("cylinder", 2.02, 0.1, radius_m=0.3)
+    standing = ((tower, beyond, *posts),)
+    towards = np.array([0.97, 0.243]) / np.hypot(0.97, 0.243)
+    pose = np.zeros((1, 1, 3))
+    pose[0, 0, :2] = [1.0, 0.0] + 0.1 * towards
+    moved = engine(pose, standing, obstacle_arrays(standing), "walls")
+    moved.tick(np.zeros((1, 1, 3)))
+    out = [1.0, 0.0] + 1.02 * towards  # of the tower
+    away = out - [2.02, 0.1]
+    assert moved.state[0, 0, :2] == pytest.approx([2.02, 0.1] + 0.32 * away / np.hypot(*away), abs=1e-12)
 
 
 def test_an_obstacle_that_is_pushed_holds_back_where_it_then_is() -> None:
