@@ -73,10 +73,10 @@ class Sample:
                 for robot in range(group.start, group.stop):
                     yield arena, group, robot
 
-    def robots(self, arena: int, but: int) -> list[Thing]:
+    def robots(self, arena: int, but: int, living: tuple[bool, ...] = (True, False)) -> list[Thing]:
         scene, found = self.scene, list[Thing]()
         for j in range(len(scene.radius_m)):
-            if j != but:
+            if j != but and bool(scene.alive[arena, j]) in living:
                 x, y = scene.state[arena, j, :2].tolist()
                 heights = float(scene.bottom_m[j]), float(scene.top_m[j])
                 found += self.copies(Thing(x, y, float(scene.radius_m[j]), (), *heights))
@@ -143,6 +143,7 @@ def sample(seed: int, boundary: Boundary, each: int = 12) -> Sample:
         travel_m=np.zeros((2, 3 * each, 2)),
         touched=np.zeros((2, 3 * each)),
         target=np.zeros((2, 3 * each, 3)),
+        alive=random.random((2, 3 * each)) < 0.8,
         charge=np.ones((2, 3 * each)),
         leds=leds,
         led_places_m=led_places_m(groups, most),
@@ -166,16 +167,16 @@ def obstacle(random: np.random.Generator, size_m: tuple[float, float]) -> Obstac
 
 
 def rim_rays(of: Sample, active: bool, angle_rad: FloatArray, range_m: float) -> FloatArray:
-    """The distance along each ray from the rim of each row, (rows, rays); passive rays see robots alone."""
+    """The distance along each ray from the rim of each row, (rows, rays); passive rays see robots alive alone."""
     found = np.full((len(list(of.rows())), len(angle_rad)), inf)
     for row, (arena, _, robot) in enumerate(of.rows()):
         x, y, heading = of.scene.state[arena, robot, :3].tolist()
-        robots, fixed, rim = of.robots(arena, robot), of.fixed(arena), float(of.scene.radius_m[robot])
-        robots, fixed = of.beside(robots, robot), of.beside(fixed, robot)
+        rim, dead = float(of.scene.radius_m[robot]), of.robots(arena, robot, (False,))
+        robots, fixed = of.beside(of.robots(arena, robot, (True,)), robot), of.beside(of.fixed(arena) + dead, robot)
         for ray, angle in enumerate(heading + angle_rad):
             px, py = x + rim * cos(angle), y + rim * sin(angle)
             solid = min([t.distance(px, py, angle) for t in fixed] + [of.wall(px, py, angle)])
-            near = min(t.distance(px, py, angle) for t in robots)
+            near = min((t.distance(px, py, angle) for t in robots), default=inf)
             if active:
                 near = min(near, solid)
             found[row, ray] = near if near <= min(range_m, solid) else inf

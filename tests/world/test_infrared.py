@@ -9,6 +9,8 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.body import load_body
 from swarmwire.comms.sheets import Infrared, Proximity, ResponseCurve
 from swarmwire.comms.truth import Obstacle
+from swarmwire.world.world import World
+from tests.world.samples import posed
 from tests.world.scenes import read, scene
 
 EPUCK = load_body("epuck")
@@ -60,3 +62,22 @@ def test_an_obstacle_hides_the_robot_behind_it_and_one_behind_the_robot_does_not
 def test_the_reach_is_counted_from_rim_to_rim(gap_m: float, in_reach: bool) -> None:
     passive = seen([[0.0, 0.0, 0.0], [2 * EPUCK.radius_m + gap_m, 0.0, 0.0]], boundary="open")[1]
     assert bool(passive.any()) is in_reach
+
+
+def test_a_dead_robot_is_dark_and_hides_the_one_behind_it_and_proximity_sees_it_as_ever() -> None:
+    poses = [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.3, 0.0, 0.0]]
+    active, passive = seen(poses, boundary="open")
+    felt, dark = seen(poses, boundary="open", alive=[True, False, True])
+    assert passive[1] == active[1] == felt[1] > 0.0
+    assert not dark.any()
+    assert np.array_equal(seen(poses, boundary="open", alive=[True, True, False])[1], passive)
+
+
+def test_the_world_tells_its_sensors_who_is_alive() -> None:
+    world = World(posed([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]]), [1, 2], {})
+    alive = world.scene.alive
+    assert alive.all()
+    world.live(np.array([True, False, True, True]))
+    assert alive.tolist() == [[True, False], [True, True]]
+    world.live(np.ones(4, np.bool_))
+    assert alive.all()

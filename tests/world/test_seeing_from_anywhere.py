@@ -81,6 +81,7 @@ def test_a_group_of_many_arenas_sees_what_it_sees_alone(name: str) -> None:
         state=state,
         leds=np.repeat(many.leds, 3, axis=0),
         lights=many.lights * 3,
+        alive=np.ones((3, many.state.shape[1]), np.bool_),
         obstacles=many.obstacles._replace(circle_start=np.zeros(4, np.int64), polygon_start=np.zeros(4, np.int64)),
     )
     group = Group("a", FOOTBOT, 3, 9)

@@ -39,7 +39,7 @@ from swarmwire.world.states import States
 class World:
     """Arenas side by side, one per seed; robot row r is robot r % robots of arena r // robots.
 
-    Each tick: `sense`, then `move`. The arrays below are replaced in each tick, never written to after.
+    Each tick: `sense`, then `move`. The arrays below but `alive` are replaced in each tick, never written to after.
 
     Attributes:
         static: what does not change.
@@ -48,7 +48,7 @@ class World:
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
         movable: (arenas, movable obstacles, 3) x, y in m, heading in rad; None: there are none.
         actuators: motors and LEDs: what they were asked for, and what they do.
-        alive: (rows,).
+        alive: (rows,); written in place, by `live`.
         batteries: of all robots; `charge` may be written to.
         scene: what sensors look at, always the present.
         sensors: those that agents need, by group and sense; `Staged.failed` may be set.
@@ -87,14 +87,13 @@ class World:
         self.actuators = Actuators(groups, self.keys)
         tick_s = 1.0 / scenario.time.rate_hz
         self.batteries = Batteries(groups, self.static.arenas, tick_s)
+        self.alive: BoolArray = np.ones(self.static.arenas * self.static.robots, np.bool_)
         self.scene = self._scene_of(tick_s)
         self.sensors = _sensors(scenario, self.scene, groups, needs)
         self._own = OwnActuators(groups, self.scene)
-        rows = self.static.arenas * self.static.robots
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
-        self.alive: BoolArray = np.ones(rows, np.bool_)
-        self.states = States(rows)
+        self.states = States(len(self.alive))
         self._show()
 
     @property
@@ -107,7 +106,7 @@ class World:
         revived = alive & ~self.alive  # they start afresh
         self.states.forget(revived)
         self.batteries.renew(revived)
-        self.alive = alive.copy()
+        self.alive[:] = alive
         self.actuators.stop(~alive)
         self._brake()
 
@@ -199,6 +198,7 @@ class World:
             travel_m=physics.travel_m,
             touched=physics.touched,
             target=self.actuators.target,
+            alive=self.alive.reshape(static.arenas, static.robots),  # the same memory
             charge=self.batteries.charge,
             leds=self.actuators.leds.rgb,
             led_places_m=led_places_m(static.groups, self.actuators.leds.rgb.shape[2]),

@@ -1,6 +1,7 @@
 """Where a disc ends up that must not stand in obstacles or walls: pushed out the shortest way, so that it slides along.
 
-Compiled.
+Compiled. Only obstacles that are listed for the disc's cell are looked at, in their order: the same ones push, and in
+the same order, as if all were.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -10,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.cells import Cells, column_of, row_of
 from swarmwire.comms.geometry import Obstacles
 
 PASSES = 8  # in a corner, what one thing pushes out of itself another may push back
@@ -17,13 +20,14 @@ EPSILON_M = 1e-9  # touching by rounding is no overlap
 
 
 class Hindrance(NamedTuple):
-    """What holds discs back in every arena."""
+    """What holds discs back in every arena, as kernels take it."""
 
     half_x_m: float
     half_y_m: float
     walled: bool
     wraps: bool
     obstacles: Obstacles
+    cells: Cells  # each lists, rising, circle k as k and polygon k as k + circles: those whose circle is within reach
 
 
 @njit(cache=True)
@@ -32,30 +36,40 @@ def shortest(apart_m, half_m, wraps):
     return apart_m - 2.0 * half_m * np.floor((apart_m + half_m) / (2.0 * half_m)) if wraps else apart_m
 
 
-@njit(cache=True)
+@borrowing()
 def any_near(around, arena, x, y, reach_m, bottom_m):
-    """Whether the circle around any obstacle that is taller than `bottom_m` lies within reach of a point."""
-    obstacles = around.obstacles
-    for k in range(obstacles.circle_start[arena], obstacles.circle_start[arena + 1]):
-        if obstacles.circle_top_m[k] > bottom_m and _within(around, obstacles.circle[k], x, y, reach_m):
-            return True
-    for k in range(obstacles.polygon_start[arena], obstacles.polygon_start[arena + 1]):
-        if obstacles.polygon_top_m[k] > bottom_m and _within(around, obstacles.polygon[k], x, y, reach_m):
+    """Whether the circle around any obstacle that is taller than `bottom_m` lies within reach of a point.
+
+    The reach is at most that for which the obstacles were listed.
+    """
+    cells, obstacles, circles = around.cells, around.obstacles, len(around.obstacles.circle)
+    c = _cell(cells, arena, x, y)
+    for at in range(cells.start[c], cells.start[c + 1]):
+        k = cells.item[at]
+        if k < circles:
+            near = obstacles.circle_top_m[k] > bottom_m and _within(around, obstacles.circle, k, x, y, reach_m)
+        else:
+            k -= circles
+            near = obstacles.polygon_top_m[k] > bottom_m and _within(around, obstacles.polygon, k, x, y, reach_m)
+        if near:
             return True
     return False
 
 
-@njit(cache=True)
-def _within(around, circle, x, y, reach_m):
-    dx, dy = (
-        shortest(x - circle[0], around.half_x_m, around.wraps),
-        shortest(y - circle[1], around.half_y_m, around.wraps),
-    )
-    reach = reach_m + circle[2]
+@borrowing()
+def _cell(cells, arena, x, y):
+    return (arena * cells.ny + row_of(cells, y)) * cells.nx + column_of(cells, x)
+
+
+@borrowing()
+def _within(around, circle, k, x, y, reach_m):
+    dx = shortest(x - circle[k, 0], around.half_x_m, around.wraps)
+    dy = shortest(y - circle[k, 1], around.half_y_m, around.wraps)
+    reach = reach_m + circle[k, 2]
     return dx * dx + dy * dy < reach * reach
 
 
-@njit(cache=True)
+@borrowing()
 def held_back(around, arena, x, y, radius_m, bottom_m, near):
     """The place x, y of a disc after it is pushed out, whether it was, and whether it is free there.
 
@@ -75,30 +89,56 @@ def held_back(around, arena, x, y, radius_m, bottom_m, near):
     return x, y, True, False
 
 
-@njit(cache=True)
+@borrowing()
 def _out_of_obstacles(around, arena, x, y, radius_m, bottom_m):
-    obstacles = around.obstacles
-    for k in range(obstacles.circle_start[arena], obstacles.circle_start[arena + 1]):
-        if obstacles.circle_top_m[k] > bottom_m:
-            cx, cy, apart = obstacles.circle[k, 0], obstacles.circle[k, 1], radius_m + obstacles.circle[k, 2]
-            dx, dy = shortest(x - cx, around.half_x_m, around.wraps), shortest(y - cy, around.half_y_m, around.wraps)
-            distance = np.sqrt(dx * dx + dy * dy)
-            if 0.0 < distance < apart:
-                x, y = x + dx / distance * (apart - distance), y + dy / distance * (apart - distance)
-    for k in range(obstacles.polygon_start[arena], obstacles.polygon_start[arena + 1]):
-        if obstacles.polygon_top_m[k] > bottom_m and _within(around, obstacles.polygon[k], x, y, radius_m):
-            # The image of the disc that is nearest to the polygon.
-            cx, cy = obstacles.polygon[k, 0], obstacles.polygon[k, 1]
-            px = cx + shortest(x - cx, around.half_x_m, around.wraps)
-            py = cy + shortest(y - cy, around.half_y_m, around.wraps)
-            dx, dy = _out_of_polygon(
-                obstacles.side, obstacles.side_start[k], obstacles.side_start[k + 1], px, py, radius_m
-            )
-            x, y = x + dx, y + dy
+    """Out of one obstacle after the other; who is pushed into another cell goes on with what is listed there."""
+    cells, circles = around.cells, len(around.obstacles.circle)
+    c = _cell(cells, arena, x, y)
+    at = cells.start[c]
+    while at < cells.start[c + 1]:
+        k = cells.item[at]
+        at += 1
+        if k < circles:
+            out_x, out_y = _out_of_circle(around, k, x, y, radius_m, bottom_m)
+        else:
+            out_x, out_y = _out_of_sides(around, k - circles, x, y, radius_m, bottom_m)
+        if out_x == x and out_y == y:
+            continue
+        x, y, before = out_x, out_y, c
+        c = _cell(cells, arena, x, y)
+        if c != before:
+            at = cells.start[c]
+            while at < cells.start[c + 1] and cells.item[at] <= k:
+                at += 1
     return x, y
 
 
-@njit(cache=True)
+@borrowing()
+def _out_of_circle(around, k, x, y, radius_m, bottom_m):
+    obstacles = around.obstacles
+    dx = shortest(x - obstacles.circle[k, 0], around.half_x_m, around.wraps)
+    dy = shortest(y - obstacles.circle[k, 1], around.half_y_m, around.wraps)
+    apart, distance = radius_m + obstacles.circle[k, 2], np.sqrt(dx * dx + dy * dy)
+    if obstacles.circle_top_m[k] <= bottom_m or not 0.0 < distance < apart:
+        return x, y
+    return x + dx / distance * (apart - distance), y + dy / distance * (apart - distance)
+
+
+@borrowing()
+def _out_of_sides(around, k, x, y, radius_m, bottom_m):
+    obstacles = around.obstacles
+    if obstacles.polygon_top_m[k] <= bottom_m or not _within(around, obstacles.polygon, k, x, y, radius_m):
+        return x, y
+    # The image of the disc that is nearest to the polygon.
+    cx, cy = obstacles.polygon[k, 0], obstacles.polygon[k, 1]
+    px = cx + shortest(x - cx, around.half_x_m, around.wraps)
+    py = cy + shortest(y - cy, around.half_y_m, around.wraps)
+    start, stop = obstacles.side_start[k], obstacles.side_start[k + 1]
+    dx, dy = _out_of_polygon(obstacles.side, start, stop, px, py, radius_m)
+    return x + dx, y + dy
+
+
+@borrowing()
 def _out_of_polygon(side, start, stop, x, y, radius_m):
     """The shortest way by which a disc leaves a convex polygon, (0, 0) if it is clear."""
     beyond, outer = -np.inf, start  # the side that the centre is furthest beyond, or least behind

@@ -12,12 +12,13 @@ On a torus positions wrap, velocities go on.
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.world.contacts import count_began, mark
 from swarmwire.world.engines.engine import Setting
-from swarmwire.world.engines.held_back import Hindrance, any_near, held_back, shortest
+from swarmwire.world.engines.held_back import any_near, held_back, shortest
+from swarmwire.world.engines.hindrances import Hindrances
 from swarmwire.world.engines.overlaps import overlaps
 
 PIECE_OF_RADIUS = 0.25  # near obstacles a tick's way is gone in pieces of so much of the radius, so none is jumped over
@@ -38,9 +39,7 @@ class KinematicEngine:
         self.braked: BoolArray = np.zeros((arenas, n), np.bool_)
         self._tick_s, self._wheel_base_m = setting.tick_s, setting.motors.wheel_base_m
         self._disc = setting.radius_m, setting.bottom_m, setting.top_m
-        width, height = setting.size_m
-        walled, wraps = setting.boundary == "walls", setting.boundary == "torus"
-        self._around = Hindrance(0.5 * width, 0.5 * height, walled, wraps, setting.obstacles)
+        self._hindrances = Hindrances(setting)
         self._held: BoolArray = np.zeros((arenas, n), np.bool_)
         self._touching = np.empty(0, np.int64)
 
@@ -48,25 +47,25 @@ class KinematicEngine:
         """Move by one tick at targets (arenas, n, 3), and count the contacts that began, (arenas, 2)."""
         radius_m, bottom_m, _ = self._disc
         bodies = self._wheel_base_m, radius_m, bottom_m
-        _move(self._around, *bodies, target, self._tick_s, self.state, self.travel_m, self._held)
-        before, self._touching = self._touching, overlaps(self.state, *self._disc, self._held, self._around)
+        way_m = self._tick_s * float(np.hypot(target[:, :, 0], target[:, :, 2]).max())
+        around = self._hindrances.within(float(radius_m.max()) + way_m)
+        _move(around, *bodies, target, self._tick_s, self.state, self.travel_m, self._held)
+        before, self._touching = self._touching, overlaps(self.state, *self._disc, self._held, around)
         onsets = np.zeros((len(target), 2), np.int64)
         count_began(self._touching, before, target.shape[1] + 1, onsets)
         mark(self._touching, self.touched)
         return onsets
 
 
-@njit(cache=True)
+@borrowing()
 def _move(around, wheel_base_m, radius_m, bottom_m, target, tick_s, state, travel_m, held):
-    half_x_m, half_y_m, wraps, obstacles = around.half_x_m, around.half_y_m, around.wraps, around.obstacles
+    half_x_m, half_y_m, wraps = around.half_x_m, around.half_y_m, around.wraps
     for arena in range(target.shape[0]):
-        circles = obstacles.circle_start[arena + 1] - obstacles.circle_start[arena]
-        empty = circles + obstacles.polygon_start[arena + 1] - obstacles.polygon_start[arena] == 0
         for i in range(target.shape[1]):
             forward, turn, left = target[arena, i, 0], target[arena, i, 1], target[arena, i, 2]
             x, y, heading = state[arena, i, 0], state[arena, i, 1], state[arena, i, 2]
             way_m = tick_s * np.sqrt(forward * forward + left * left)
-            near = not empty and any_near(around, arena, x, y, radius_m[i] + way_m, bottom_m[i])
+            near = any_near(around, arena, x, y, radius_m[i] + way_m, bottom_m[i])
             pieces = max(int(np.ceil(way_m / (PIECE_OF_RADIUS * radius_m[i]))), 1) if near else 1
             piece_s = tick_s / pieces
             half = 0.5 * turn * piece_s

@@ -44,12 +44,12 @@ class Fan(NamedTuple):
 
 
 class FanSight:
-    """What the rays of a group's robots meet: everything if they are active, else only robots in sight."""
+    """What the rays of a group's robots meet: everything if they are active, else only robots alive and in sight."""
 
     def __init__(self, scene: Scene, group: Group, sheet: Rim, active: bool) -> None:
         reach_m = group.body.radius_m + sheet.range_m
         self._shape = len(scene.keys), group.stop - group.start, len(sheet.angle_rad)
-        self._active, curve = active, sheet.response
+        self._active, self._alive, curve = active, scene.alive, sheet.response
         self._crowd = crowd_of(scene, reach_m + float(scene.radius_m.max()))
         self._standing = Standing(scene, reach_m)
         walled, (width, height) = scene.boundary == "walls", scene.size_m
@@ -75,18 +75,18 @@ class FanSight:
     def answer(self) -> FloatArray:
         """What an ideal sensor answers to what each ray meets, (arenas, n, rays), 0 to 1."""
         value = np.zeros(self._shape)
-        _look(value, self._crowd, self._standing.now(), self._fan, self._active, True)
+        _look(value, self._crowd, self._alive, self._standing.now(), self._fan, self._active, True)
         return value
 
     def distance_m(self) -> FloatArray:
         """The distance along each ray from the rim, (arenas, n, rays) in m; inf where nothing is within the range."""
         near = np.full(self._shape, np.inf)
-        _look(near, self._crowd, self._standing.now(), self._fan, self._active, False)
+        _look(near, self._crowd, self._alive, self._standing.now(), self._fan, self._active, False)
         return near
 
 
 @borrowing()
-def _look(value, crowd, things, fan, active, answers):
+def _look(value, crowd, alive, things, fan, active, answers):
     """Set value (arenas, n, rays) of robots that have anything near; with `answers` the response to the distance."""
     sort(crowd.cells, crowd.state)
     for arena in range(value.shape[0]):
@@ -110,10 +110,11 @@ def _look(value, crowd, things, fan, active, answers):
             if at_wall:
                 _meet_walls(near, x, y, rim, fan)
             _meet_things(near, x, y, rim, fan, things, count)
+            _meet_robots(near, x, y, rim, fan, crowd, robots, alive[arena], False)
             if not active:
                 for ray in range(len(near)):
                     fan.hidden_m[ray], near[ray] = near[ray], np.inf
-            _meet_robots(near, x, y, rim, fan, crowd, robots)
+            _meet_robots(near, x, y, rim, fan, crowd, robots, alive[arena], True)
             for ray in range(len(near)):
                 d = near[ray]
                 if d > fan.range_m or (not active and d > fan.hidden_m[ray]):
@@ -148,8 +149,11 @@ def _meet_things(near, x, y, rim, fan, things, count):
 
 
 @borrowing()
-def _meet_robots(near, x, y, rim, fan, crowd, count):
+def _meet_robots(near, x, y, rim, fan, crowd, count, alive, living):
+    """Those of the robots found that are alive, or those that are dead."""
     for at in range(count):
+        if alive[crowd.found[at]] != living:
+            continue
         cx, cy, radius = crowd.found_at[at, 0], crowd.found_at[at, 1], crowd.radius_m[crowd.found[at]]
         ox, oy = cx - x, cy - y
         for ray in range(len(near)):

@@ -1,4 +1,4 @@
-"""Passive infrared: rays from the rim that end at the nearest robot, unless an obstacle stands before it."""
+"""Passive infrared: rays from the rim that end at the nearest robot alive, unless something stands before it."""
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.sheets import Infrared

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.geometry import Obstacles
 from swarmwire.comms.ground import Ground
 from swarmwire.comms.truth import Boundary, Group, Light
@@ -29,6 +29,7 @@ class Scene:
     travel_m: FloatArray  # (arenas, robots, 2) rolled by the left and right wheel since the start
     touched: FloatArray  # (arenas, robots) 1 if it touched anything in the tick before, else 0
     target: FloatArray  # (arenas, robots, 3) what the engine was given in the tick before
+    alive: BoolArray  # (arenas, robots) the dead stand where they are, dark
     charge: FloatArray  # (arenas, robots) of the battery, 1 full, 0 empty
     leds: IntArray  # (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0 dark
     led_places_m: FloatArray  # (robots, most LEDs of a robot, 3) x ahead, y to the left, z above the body's lower side
