@@ -177,7 +177,17 @@ def changed(path: str, value: object) -> dict[str, Any]:
             "response.kind: expected one of rational, inverse_square, quadratic; got 'cubic'",
         ),
         ("senses.proximity.angles_deg", 17, "senses.proximity.angles_deg: expected a list, got 17"),
-        ("senses.proximity.angles_deg", [], "senses.proximity.angles_deg: expected a list, got []"),
+        ("senses.proximity.angles_deg", [], "senses.proximity.angles_deg: expected at least one item"),
+        ("senses.proximity.angles_deg", [1] * 1001, "angles_deg: expected at most 1000 items, got 1001"),
+        ("leds.angles_deg", [1] * 1001, "leds.angles_deg: expected at most 1000 items, got 1001"),
+        ("senses.ground.points_m", [[0, 0]] * 1001, "points_m: expected at most 1000 items, got 1001"),
+        ("senses.scan", {"rays": 10_001, "range_m": 1}, "senses.scan.rays: expected at most 10000, got 10001"),
+        ("senses.camera.most_blobs", 1001, "senses.camera.most_blobs: expected at most 1000, got 1001"),
+        (
+            "actuators.arm",
+            {"kind": "a:B", "params": {}, "width": 10_001},
+            "actuators.arm.width: expected a whole number from 0 to 10000, got 10001",
+        ),
         ("senses.proximity.angles_deg", [1, "x"], "senses.proximity.angles_deg[1]: expected a number, got 'x'"),
     ],
 )

@@ -96,6 +96,13 @@ class Twice(Alone):
 
 
 @dataclass
+class WideField(Alone):
+    @property
+    def fields(self) -> Any:
+        return (Field("x", 10_001),)
+
+
+@dataclass
 class Refuses(Alone):
     def __post_init__(self) -> None:
         raise ValueError("no")
@@ -110,6 +117,13 @@ class NoWidth(Painter):
     @property
     def width(self) -> Any:
         return 0
+
+
+@dataclass
+class TooWide(Painter):
+    @property
+    def width(self) -> Any:
+        return 10_001
 
 
 @dataclass

@@ -6,7 +6,7 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import parameter
-from swarmwire.comms.sheets.own import kind_of
+from swarmwire.comms.sheets.own import MOST_WIDE, kind_of
 from swarmwire.comms.tables import built, mapping_of
 
 
@@ -32,7 +32,7 @@ def actuator_sheet(name: str, value: object, where: str, beside: Path) -> Actuat
     if "width" in table:
         mapping_of(where, f"{key}.params", table.get("params"))
         width = table["width"]
-        if type(width) is not int or width < 0:
-            raise BadInput(where, f"{key}.width", f"expected a whole number from 0, got {width!r}")
+        if type(width) is not int or not 0 <= width <= MOST_WIDE:
+            raise BadInput(where, f"{key}.width", f"expected a whole number from 0 to {MOST_WIDE}, got {width!r}")
         return built(ActuatorSheet, table, where, key)
     return built(ActuatorSheet, {"kind": kind_of(table, where, key, beside), "params": table}, where, key)

@@ -11,6 +11,8 @@ from swarmwire.comms.parameters import parameter
 from swarmwire.comms.sheets.sheet import RangedSheet
 from swarmwire.comms.tables import built, mapping_of
 
+MOST_WIDE = 10_000  # numbers of a field, or of an actuator, of one robot
+
 
 @dataclass(frozen=True)
 class OwnSheet(RangedSheet):
@@ -45,6 +47,7 @@ def kind_of(table: dict[str, Any], where: str, key: str, beside: Path) -> str:
 def _told(table: dict[str, Any], where: str, key: str) -> OwnSheet:
     mapping_of(where, f"{key}.params", table.get("params"))
     widths = mapping_of(where, f"{key}.fields", table["fields"])
-    if not all(type(width) is int and width >= 0 for width in cast("Mapping[str, object]", widths).values()):
-        raise BadInput(where, f"{key}.fields", f"expected whole numbers from 0, got {widths!r}")
+    known = cast("Mapping[str, object]", widths).values()
+    if not all(type(width) is int and 0 <= width <= MOST_WIDE for width in known):
+        raise BadInput(where, f"{key}.fields", f"expected whole numbers from 0 to {MOST_WIDE}, got {widths!r}")
     return built(OwnSheet, table, where, key)

@@ -10,6 +10,7 @@ from swarmwire.comms.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.loading import NotLoaded, load_named
 from swarmwire.comms.sheets import OwnSheet, Sheet
+from swarmwire.comms.sheets.own import MOST_WIDE
 from swarmwire.comms.tables import built
 from swarmwire.world.own.actuator import OwnActuator
 from swarmwire.world.own.sensor import OwnSensor
@@ -45,9 +46,9 @@ def _sense(sheet: Sheet, where: str, key: str) -> Sheet:
     if not isinstance(found, tuple | list) or not found or not all(isinstance(of, Field) for of in cast(Any, found)):
         raise BadInput(where, f"{key}.kind", f"expected fields as a tuple of Field; {type(own).__name__} has {found!r}")
     fields = cast("tuple[Field, ...]", found)
-    unfit = [of.name for of in fields if not of.name.isidentifier() or type(of.width) is not int or of.width < 0]
+    unfit = [of.name for of in fields if not of.name.isidentifier() or not _is_width(of.width, 0)]
     if unfit or len({of.name for of in fields}) < len(fields):
-        expected = "expected fields with names of their own and widths from 0"
+        expected = f"expected fields with names of their own and widths from 0 to {MOST_WIDE}"
         raise BadInput(where, f"{key}.kind", f"{expected}; got {', '.join(unfit or [of.name for of in fields])}")
     return replace(sheet, fields={of.name: of.width for of in fields})
 
@@ -56,9 +57,15 @@ def _actuator(sheet: ActuatorSheet, where: str, key: str) -> ActuatorSheet:
     sheet = replace(sheet, kind=_entry_point(sheet.kind, ACTUATORS))
     own = _made(OwnActuator, sheet.kind, sheet.params, where, key)
     width: Any = _asked(own, "width", where, key)
-    if type(width) is not int or width < 1:
-        raise BadInput(where, f"{key}.kind", f"expected a width from 1; {type(own).__name__} has {width!r}")
+    if not _is_width(width, 1):
+        raise BadInput(
+            where, f"{key}.kind", f"expected a width from 1 to {MOST_WIDE}; {type(own).__name__} has {width!r}"
+        )
     return replace(sheet, width=width)
+
+
+def _is_width(width: object, least: int) -> bool:
+    return type(width) is int and least <= width <= MOST_WIDE
 
 
 def _entry_point(kind: str, group: str) -> str:
