@@ -75,6 +75,30 @@ class WrongShape(Alone):
 
 
 @dataclass
+class TellsNothing(Alone):
+    def truth(self, tick: int) -> Any:
+        return None
+
+
+@dataclass
+class TellsANumber(Alone):
+    def truth(self, tick: int) -> Any:
+        return 3
+
+
+@dataclass
+class TellsWords(Alone):
+    def truth(self, tick: int) -> Any:
+        return ([["near", "far"]],)
+
+
+@dataclass
+class TellsNan(Alone):
+    def truth(self, tick: int) -> Any:
+        return np.full((1, 2), np.nan)
+
+
+@dataclass
 class NoTruth(OwnSensor):
     @property
     def fields(self) -> Any:

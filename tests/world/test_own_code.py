@@ -101,12 +101,24 @@ def test_one_field_needs_no_tuple_and_is_copied(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "said"), [("Raises", "ZeroDivisionError"), ("WrongShape", r"expected x of shape \(1, 2\), got \(3,\)")]
+    ("name", "said"),
+    [
+        ("Raises", "ZeroDivisionError"),
+        ("WrongShape", r"expected x of shape \(1, 2\), got \(3,\)"),
+        ("TellsNothing", "expected an array, or a tuple of arrays, got None"),
+        ("TellsANumber", "expected an array, or a tuple of arrays, got 3"),
+        ("TellsWords", "expected numbers as x: could not convert"),
+    ],
 )
 def test_a_sense_that_fails_says_which_it_is(tmp_path: Path, name: str, said: str) -> None:
     of = world(tmp_path, f'like = "epuck"\n[senses.x]\nkind = "{CODE}:{name}"\n', needs=("x",))
     with pytest.raises(OwnCodeFailed, match=rf"the sense x of a \(.*own_code.py:{name}\) failed:[\s\S]*{said}"):
         of.sense(0)
+
+
+def test_a_sense_may_tell_that_it_knows_nothing(tmp_path: Path) -> None:
+    of = world(tmp_path, f'like = "epuck"\n[senses.x]\nkind = "{CODE}:TellsNan"\n', needs=("x",))
+    assert np.isnan(of.sense(0)["a"].fields["x.x"]).all()
 
 
 def test_an_actuator_that_fails_says_which_it_is(tmp_path: Path) -> None:
