@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 class EventRecorder:
     """Observer that writes `events.parquet`; what happens in a tick is on disk soon after.
 
-    Columns: at_s (of the scenario; of what happens singly, the tick's start), tick and time_s (in which it took effect),
-    do, part (that fails, else empty), ended (whether it was undone then), arena, robots (the names of those it changed
-    there). Of what happens singly, arenas in which nobody changed have no row. Summary part: `record_events`: rows written and dropped.
+    Columns: at_s (of the scenario; of what happens singly, the tick's start), tick and time_s (in which it took
+    effect), do, part (that fails, else empty), ended (whether it was undone then), arena, robots (the names of those
+    it changed there). Of what happens singly, arenas in which nobody changed have no row. Summary part:
+    `record_events`: rows written and dropped.
     """
 
     def __init__(self, folder: Path, may_drop: bool = False) -> None:
