@@ -47,7 +47,8 @@ def test_it_is_that_of_all_pairs_also_of_different_bodies(robots):
     ]
     pose, alive, order = np.stack([x, y, 0 * x], 1), np.ones(len(x), np.bool_), np.arange(len(x))[None]
     nearest = min(pairs, default=np.nan)
-    assert smallest_gap_m(pose, radius, span, alive, order) == [pytest.approx(nearest, abs=1e-12, nan_ok=True)]
+    (told,) = smallest_gap_m(pose, radius, span, alive, order).tolist()
+    assert told == pytest.approx(nearest, abs=1e-12, nan_ok=True)
 
 
 def test_a_drone_above_a_robot_is_not_near_it():

@@ -57,9 +57,10 @@ def smallest_gap_m(
 ) -> FloatArray:
     """The smallest gap of each arena, (arenas,), between discs alive at `pose` (rows, 3).
 
-    `span_m` (robots, 2) is how high each robot's lower and upper side are:
-    NaN where no two of them overlap. A sweep along x. `order` (arenas, robots), some order of each arena's robots, is
-    sorted by x in place: if it is that of the tick before, few have to change places. `wrap_m` are the sides of a torus, 0 where an arena ends.
+    `span_m` (robots, 2) is how high each robot's lower and upper side are; NaN where no two of them overlap.
+
+    A sweep along x. `order` (arenas, robots), some order of each arena's robots, is sorted by x in place: if it is that
+    of the tick before, few have to change places. `wrap_m` are the sides of a torus, 0 where an arena ends.
     """
     arenas, robots = order.shape
     gap_m = np.full(arenas, np.inf)
