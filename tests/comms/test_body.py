@@ -181,7 +181,27 @@ def changed(path: str, value: object) -> dict[str, Any]:
             "response.kind: expected one of rational, inverse_square, quadratic; got 'cubic'",
         ),
         ("senses.proximity.angles_deg", 17, "senses.proximity.angles_deg: expected a list, got 17"),
-        ("senses.proximity.angles_deg", [], "senses.proximity.angles_deg: expected a list, got []"),
+        ("senses.proximity.angles_deg", [], "senses.proximity.angles_deg: expected at least one item"),
+        ("senses.proximity.angles_deg", [1] * 1001, "angles_deg: expected at most 1000 items, got 1001"),
+        ("leds.angles_deg", [1] * 1001, "leds.angles_deg: expected at most 1000 items, got 1001"),
+        ("senses.ground.points_m", [[0, 0]] * 1001, "points_m: expected at most 1000 items, got 1001"),
+        ("senses.scan", {"rays": 10_001, "range_m": 1}, "senses.scan.rays: expected at most 10000, got 10001"),
+        ("senses.camera.most_blobs", 1001, "senses.camera.most_blobs: expected at most 1000, got 1001"),
+        (
+            "actuators.arm",
+            {"kind": "a:B", "params": {}, "width": 10_001},
+            "actuators.arm.width: expected a whole number from 0 to 10000, got 10001",
+        ),
+        ("drive.wheel_base_m", 0.0701, "drive.wheel_base_m: expected at most the body's diameter, 0.07 m; got 0.0701"),
+        ("leds.radius_m", 0.044, "leds.radius_m: expected at most 0.04375 m, 1.25 times the body's radius; got 0.044"),
+        ("leds.height_m", 0.173, "leds.height_m: expected at most 0.172 m, twice the body's height; got 0.173"),
+        ("leds.beacon_height_m", 1, "leds.beacon_height_m: expected at most 0.172 m, twice the body's height; got 1.0"),
+        ("altitude_m", 0.5, "senses.ground: expected altitude_m = 0: it looks at the floor right below, not from 0.5"),
+        (
+            "drive",
+            {"kind": "holonomic", "max_speed_mps": 1, "max_angular_radps": 1, "max_force_n": 1, "max_torque_nm": 1},
+            "senses.odometry: expected a drive with wheels: holonomic has no wheels",
+        ),
         ("senses.proximity.angles_deg", [1, "x"], "senses.proximity.angles_deg[1]: expected a number, got 'x'"),
     ],
 )
@@ -222,3 +242,13 @@ def test_photocells_are_argos_s() -> None:
     assert epuck.angles_deg == tuple(22.5 + 45.0 * k for k in range(8))
     assert footbot.angles_deg == proximity_of("footbot").angles_deg
     assert (epuck.noise, footbot.noise) == (0.05, 0.0)
+
+
+def test_a_body_like_another_does_not_take_over_senses_that_it_cannot_have() -> None:
+    forces = {"max_force_n": 1.0, "max_torque_nm": 1.0}
+    drive = {"kind": "holonomic", "max_speed_mps": 1.0, "max_angular_radps": 1.0, **forces}
+    sheet = {"like": "epuck", "name": "drone", "altitude_m": 1.0, "drive": drive}
+    drone = body_from(sheet, "drone.toml")
+    assert set(load_body("epuck").senses) - set(drone.senses) == {"odometry", "ground"}
+    with pytest.raises(BadInput, match=r"drone\.toml: senses\.ground: expected altitude_m = 0"):
+        body_from({**sheet, "senses": {"ground": {"noise": 0.1}}}, "drone.toml")

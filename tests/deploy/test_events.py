@@ -53,7 +53,8 @@ def test_the_summary_tells_what_happened_when_and_to_whom(local, tmp_path):
     run(DISRUPTED, overrides=SHORT, out=tmp_path / "run")
     told = json.loads((tmp_path / "run" / "summary.json").read_text())["events"]
     killed = local.events[1].robots[0]
-    assert told[1] == {"at_s": 0.6, "tick": 6, "do": "kill", "ended": False, "robots": killed}
+    expected = {"at_s": 0.6, "tick": 6, "do": "kill", "part": "", "ended": False, "singly": False, "robots": killed}
+    assert told[1] == expected
     assert len(killed) == 4
     assert [len(event["robots"]) for event in told if event["do"] == "partition"] == [10, 10]
 

@@ -107,6 +107,7 @@ def test_the_bodies_page_names_bodies_and_where_their_figures_come_from(site):
     assert set(body_names()) <= named
     for name in body_names():
         assert html.escape(load_body(name).source, quote=False) in page(site, "bodies")
+    assert "{}" not in page(site, "bodies"), "an empty table is no figure"
 
 
 def test_the_summary_page_names_every_metric_fate_and_key(site):

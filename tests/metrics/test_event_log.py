@@ -1,10 +1,12 @@
 """Events as observers tell them."""
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.truth import Happened
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.record.event_recorder import EventRecorder
 from swarmwire.metrics.rerun_recording import RerunRecording
 from tests.metrics.test_rerun_recording import column
 from tests.metrics.truths import static, truth
@@ -21,8 +23,31 @@ def test_the_summary_names_the_robots_of_each_arena():
     log.see(truth(of, 2, events=(kill(True, False, True, True), kill(False, True, False, False, ended=True))))
     first, second = log.end(None)["events"]
     robots = [["flock-0"], ["flock-0", "flock-1"]]
-    assert first == {"at_s": 0.15, "tick": 2, "do": "kill", "ended": False, "robots": robots}
+    expected = {"at_s": 0.15, "tick": 2, "do": "kill", "part": "", "ended": False, "singly": False, "robots": robots}
+    assert first == expected
     assert (second["ended"], second["robots"]) == (True, [["flock-1"], []])
+
+
+def broken(*changed: bool) -> Happened:
+    return Happened(1, 0.2, "fail", False, np.array(changed), "motors", singly=True)
+
+
+def test_what_failed_is_told_with_its_part():
+    log, of = EventLog(), static(2)
+    log.begin(of)
+    log.see(truth(of, 2, events=(broken(True, False),)))
+    (told,) = log.end(None)["events"]
+    assert (told["do"], told["part"], told["singly"]) == ("fail", "motors", True)
+    assert [event.words for event in (broken(True, True), kill(True, ended=True))] == ["fail motors", "kill ended"]
+
+
+def test_what_happens_singly_has_rows_of_those_arenas_alone_in_which_somebody_changed(tmp_path):
+    of, recorder = static(2, arenas=2), EventRecorder(tmp_path)
+    recorder.begin(of)
+    recorder.see(truth(of, 2, events=(broken(False, False, False, True), kill(True, False, False, False))))
+    assert recorder.end(None)["record_events"]["rows"] == 3
+    rows = pl.read_parquet(tmp_path / "events.parquet").select("do", "part", "arena", "robots").rows()
+    assert rows == [("fail", "motors", 1, ["flock-1"]), ("kill", "", 0, ["flock-0"]), ("kill", "", 1, [])]
 
 
 def test_a_recording_says_what_happened_in_its_arena(tmp_path):
@@ -30,8 +55,11 @@ def test_a_recording_says_what_happened_in_its_arena(tmp_path):
     recording = RerunRecording(tmp_path / "run.rrd", metrics, arena=1)
     metrics.begin(of)
     recording.begin(of)
-    for one in (truth(of), truth(of, 1, events=(kill(True, False, True, True),))):
+    elsewhere, here = broken(True, True, False, False), broken(False, False, True, False)
+    happened = truth(of, 1, events=(kill(True, False, True, True), elsewhere)), truth(of, 2, events=(here, elsewhere))
+    for one in (truth(of), *happened):
         metrics.see(one)
         recording.see(one)
     recording.end(None)
-    assert column(tmp_path / "run.rrd", "/events", "TextLog:text")[1] == ["kill: flock-0, flock-1"]
+    texts = column(tmp_path / "run.rrd", "/events", "TextLog:text")
+    assert (texts[1], texts[2]) == (["kill: flock-0, flock-1"], ["fail motors: flock-0"])

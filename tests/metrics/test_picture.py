@@ -58,3 +58,10 @@ def test_a_tick_that_was_not_recorded_is_refused(rrd, tick):
 def test_a_recording_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(BadInput, match=r"none\.rrd: there is no such recording"):
         render_png(tmp_path / "none.rrd", tmp_path / "none.png")
+
+
+@pytest.mark.parametrize("name", ["x.txt", "x", "x.jpg"])
+def test_what_is_no_png_by_name_is_refused(rrd, name):
+    with pytest.raises(BadInput, match=rf"{name}: expected a file name that ends in \.png$"):
+        render_png(rrd, rrd.with_name(name))
+    assert not rrd.with_name(name).exists()

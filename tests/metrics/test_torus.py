@@ -32,7 +32,9 @@ def test_the_smallest_gap_is_that_of_all_pairs_across_the_seam_too(robots):
     at = np.stack([x, y], axis=1)
     pairs = [apart(at[i], at[j]) - radius[i] - radius[j] for i in range(len(at)) for j in range(i)]
     pose, alive, order = np.stack([x, y, 0 * x], 1), np.ones(len(x), np.bool_), np.arange(len(x))[None]
-    assert smallest_gap_m(pose, radius, alive, order, SIZE_M) == [pytest.approx(min(pairs), abs=1e-9)]
+    assert smallest_gap_m(pose, radius, np.tile([0.0, 0.1], (len(pose), 1)), alive, order, SIZE_M) == [
+        pytest.approx(min(pairs), abs=1e-9)
+    ]
 
 
 def test_the_metric_asks_for_it():

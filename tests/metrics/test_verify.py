@@ -56,6 +56,25 @@ def fill(folder, **given):
     (folder / "trajectory.digests").write_bytes(bytes(8 * (TICKS - 1)) + DIGEST)
 
 
+def test_events_of_single_robots_are_counted_by_the_arenas_that_they_concern(tmp_path):
+    fill(tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    path = tmp_path / "events.parquet"
+    table = pl.read_parquet(path)
+    table.slice(1).write_parquet(path)
+    assert states(tmp_path) == {"events": State.DIFFERS}
+    summary["events"][0] |= {"singly": True, "robots": [[], ["flock-1"]]}
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    assert states(tmp_path) == {}
+
+
+def test_events_recorded_before_parts_were_are_whole(tmp_path):
+    fill(tmp_path)
+    path = tmp_path / "events.parquet"
+    pl.read_parquet(path).drop("part").write_parquet(path)
+    assert states(tmp_path) == {}
+
+
 def states(folder):
     return {finding.part: finding.state for finding in verify(folder) if not finding.good}
 

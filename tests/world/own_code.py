@@ -75,6 +75,30 @@ class WrongShape(Alone):
 
 
 @dataclass
+class TellsNothing(Alone):
+    def truth(self, tick: int) -> Any:
+        return None
+
+
+@dataclass
+class TellsANumber(Alone):
+    def truth(self, tick: int) -> Any:
+        return 3
+
+
+@dataclass
+class TellsWords(Alone):
+    def truth(self, tick: int) -> Any:
+        return ([["near", "far"]],)
+
+
+@dataclass
+class TellsNan(Alone):
+    def truth(self, tick: int) -> Any:
+        return np.full((1, 2), np.nan)
+
+
+@dataclass
 class NoTruth(OwnSensor):
     @property
     def fields(self) -> Any:
@@ -96,6 +120,13 @@ class Twice(Alone):
 
 
 @dataclass
+class WideField(Alone):
+    @property
+    def fields(self) -> Any:
+        return (Field("x", 10_001),)
+
+
+@dataclass
 class Refuses(Alone):
     def __post_init__(self) -> None:
         raise ValueError("no")
@@ -110,6 +141,13 @@ class NoWidth(Painter):
     @property
     def width(self) -> Any:
         return 0
+
+
+@dataclass
+class TooWide(Painter):
+    @property
+    def width(self) -> Any:
+        return 10_001
 
 
 @dataclass

@@ -73,6 +73,18 @@ def test_contradictions_are_refused_with_file_key_and_reason(
         posed([[-1.0, 0.0, 0.0]], physics=physics, arena={**ARENA, **arena})
 
 
+@pytest.mark.parametrize("engine", ["discs", "pymunk"])
+def test_an_engine_that_could_move_nobody_is_refused(engine: str, tmp_path: Path) -> None:
+    drone = tmp_path / "drone.toml"
+    drone.write_text('like = "epuck"\nname = "drone"\naltitude_m = 1.0\n')
+    table = {"count": 1, "agent": "x"}
+    ghosts, air, floor = ({**table, "body": body} for body in ("point", str(drone), "epuck"))
+    told = "expected auto or kinematic: no robot could be moved by"
+    with pytest.raises(BadInput, match=rf"physics\.engine: {told} {engine}: a has no contacts, b flies$"):
+        posed([], robots={"a": ghosts, "b": air}, physics={"engine": engine})
+    posed([], robots={"a": ghosts, "b": floor}, physics={"engine": engine})
+
+
 def test_robots_without_contacts_may_be_faster_than_physics_steps_allow() -> None:
     with pytest.raises(BadInput, match=r"physics\.steps: expected at least 2"):
         posed([[-1.0, 0.0, 0.0]], physics={"steps": 1})

@@ -224,3 +224,17 @@ def test_the_draw_belongs_to_arena_and_event():
     assert [chosen(swarm(key, robots=40), count=10)[0] for key in range(8)] == drawn
     assert len({tuple(own) for own in drawn}) == 8
     assert chosen(many, serial=1, count=10)[0] != drawn[0]
+
+
+def test_failures_at_a_rate_are_told_when_they_happen_and_not_before_with_their_part():
+    event = at("fail", 0.4, "a-0", "a-1", part="motors", per_hour=3000.0, for_s=0.5)
+    seen = ran(TWO, [event])
+    told = [(truth, happened) for truth in seen for happened in truth.events]
+    assert {happened.words for _, happened in told} == {"fail motors", "fail motors ended"}
+    assert all(happened.singly and happened.changed.any() for _, happened in told)
+    assert all(happened.at_s == truth.time_ns / 1e9 >= 0.4 for truth, happened in told)
+
+
+def test_a_failure_of_all_at_once_is_told_at_the_scenarios_time():
+    told = [happened for truth in ran(TWO, [at("fail", 0.45, "a-1", part="compass")]) for happened in truth.events]
+    assert [(happened.at_s, happened.words, happened.singly) for happened in told] == [(0.45, "fail compass", False)]

@@ -58,7 +58,7 @@ def test_noise_is_uniform_keyed_and_clipped() -> None:
     [
         ([[0.0, 0.0], [0.03, 0.03]], r"points_m\[1\]: expected a point under the body"),
         ([[0.0, 0.0, 0.0]], r"points_m\[0\]: expected 2 values"),
-        ([], "points_m: expected a list"),
+        ([], "points_m: expected at least one item"),
     ],
 )
 def test_points_that_are_not_under_the_body_are_refused(points: Any, text: str) -> None:

@@ -101,12 +101,24 @@ def test_one_field_needs_no_tuple_and_is_copied(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "said"), [("Raises", "ZeroDivisionError"), ("WrongShape", r"expected x of shape \(1, 2\), got \(3,\)")]
+    ("name", "said"),
+    [
+        ("Raises", "ZeroDivisionError"),
+        ("WrongShape", r"expected x of shape \(1, 2\), got \(3,\)"),
+        ("TellsNothing", "expected an array, or a tuple of arrays, got None"),
+        ("TellsANumber", "expected an array, or a tuple of arrays, got 3"),
+        ("TellsWords", "expected numbers as x: could not convert"),
+    ],
 )
 def test_a_sense_that_fails_says_which_it_is(tmp_path: Path, name: str, said: str) -> None:
     of = world(tmp_path, f'like = "epuck"\n[senses.x]\nkind = "{CODE}:{name}"\n', needs=("x",))
     with pytest.raises(OwnCodeFailed, match=rf"the sense x of a \(.*own_code.py:{name}\) failed:[\s\S]*{said}"):
         of.sense(0)
+
+
+def test_a_sense_may_tell_that_it_knows_nothing(tmp_path: Path) -> None:
+    of = world(tmp_path, f'like = "epuck"\n[senses.x]\nkind = "{CODE}:TellsNan"\n', needs=("x",))
+    assert np.isnan(of.sense(0)["a"].fields["x.x"]).all()
 
 
 def test_an_actuator_that_fails_says_which_it_is(tmp_path: Path) -> None:
@@ -202,7 +214,9 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
         ),
         ('[senses."x.y"]\nkind = "a"', "senses.x.y: unknown sense"),
         (ACTUATOR + f'"{PAINT}"', "actuators.x.kind: expected a dataclass below OwnActuator"),
-        (ACTUATOR + f'"{CODE}:NoWidth"', "actuators.x.kind: expected a width from 1; NoWidth has 0"),
+        (ACTUATOR + f'"{CODE}:NoWidth"', "actuators.x.kind: expected a width from 1 to 10000; NoWidth has 0"),
+        (ACTUATOR + f'"{CODE}:TooWide"', "actuators.x.kind: expected a width from 1 to 10000; TooWide has 10001"),
+        (SENSE + f'"{CODE}:WideField"', "senses.x.kind: the field x of WideField: expected a width from 0 to 10000"),
         (ACTUATOR + f'"{PAINTER}"\ngain = -1', "actuators.x.gain: expected more than 0, got -1.0"),
         ("[actuators.x]\ngain = 1", "actuators.x.kind: is missing"),
         (SENSE + f'"{PAINT}"\nparams = {{}}\nfields = {{}}', "senses.x.params: unknown key; expected one of scale"),

@@ -7,7 +7,7 @@ from typing import Any
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import parameter
 from swarmwire.comms.plain_values import check_plain
-from swarmwire.comms.sheets.own import kind_of
+from swarmwire.comms.sheets.own import MOST_WIDE, kind_of
 from swarmwire.comms.tables import built, mapping_of
 
 
@@ -37,6 +37,6 @@ def told_actuator_sheet(value: object, where: str, key: str) -> ActuatorSheet:
     table = mapping_of(where, key, value)
     mapping_of(where, f"{key}.params", table.get("params"))
     width = table.get("width")
-    if type(width) is not int or width < 0:
-        raise BadInput(where, f"{key}.width", f"expected a whole number from 0, got {width!r}")
+    if type(width) is not int or not 0 <= width <= MOST_WIDE:
+        raise BadInput(where, f"{key}.width", f"expected a whole number from 0 to {MOST_WIDE}, got {width!r}")
     return built(ActuatorSheet, table, where, key)

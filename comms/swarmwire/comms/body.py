@@ -15,6 +15,7 @@ import numpy as np
 
 from swarmwire.comms.actuator_sheet import ActuatorSheet, actuator_sheet, told_actuator_sheet
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.body_faults import fault_of_body, unfit_senses
 from swarmwire.comms.drives import DRIVES, Drive, Holonomic, Twist, Wheels
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.leds import Leds
@@ -154,7 +155,7 @@ def body_from(sheet: Mapping[str, Any], where: str, beside: Path = HERE) -> Body
         base = _shipped(like, where, "like")
         if _kind_of(rest, _kind_of(base)) != _kind_of(base):
             base.pop("drive", None)  # of another kind: its limits have other names
-        return body_from(_merged(base, rest), where, beside)
+        return body_from(_like(base, rest), where, beside)
     return _body(rest, where, beside)
 
 
@@ -174,11 +175,21 @@ def _body(rest: dict[str, Any], where: str, beside: Path | None) -> Body:
     if rest.get("leds") is not None:  # None: a sheet written down as a mapping
         rest["leds"] = built(Leds, rest["leds"], where, "leds")
     body: Body = built(Body, rest, where, "")
-    for name, sheet_of in body.senses.items():
-        fault = sheet_of.fault(body.radius_m)
-        if fault:
-            raise BadInput(where, f"senses.{name}.{fault[0]}", fault[1])
+    fault = fault_of_body(body)
+    if fault:
+        raise BadInput(where, *fault)
     return body
+
+
+def _like(base: dict[str, Any], rest: Mapping[str, Any]) -> dict[str, Any]:
+    """`base` with what `rest` says; senses that do not go with it any more are not taken over."""
+    both = _merged(base, rest)
+    own = rest.get("senses", {})
+    if isinstance(both.get("senses"), dict):
+        for name in unfit_senses(_kind_of(both), both.get("altitude_m", 0.0)):
+            if name not in own:
+                both["senses"].pop(name, None)
+    return both
 
 
 def _sense(name: str, table: object, where: str, beside: Path | None) -> Sheet:

@@ -9,6 +9,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import fault_of, limits_of
 
 GREATEST = 1e9  # of any number of a sheet: nothing on a robot is that large in its unit
+MOST_ITEMS = 1000  # of a list: what is told of each is kept for every robot
 
 
 def mapping_of(where: str, key: str, value: object) -> dict[str, Any]:
@@ -55,9 +56,13 @@ def _value(hint: Any, value: object, where: str, key: str) -> Any:
     if hint is int and type(value) is not int:
         raise BadInput(where, key, f"expected a whole number, got {value!r}")
     if get_origin(hint) is tuple:
-        if not isinstance(value, list | tuple) or not value:
+        if not isinstance(value, list | tuple):
             raise BadInput(where, key, f"expected a list, got {value!r}")
         items = cast("list[object]", value)
+        if not items:
+            raise BadInput(where, key, "expected at least one item")
+        if len(items) > MOST_ITEMS:
+            raise BadInput(where, key, f"expected at most {MOST_ITEMS} items, got {len(items)}")
         if get_args(hint)[-1] is not Ellipsis and len(items) != len(get_args(hint)):
             raise BadInput(where, key, f"expected {len(get_args(hint))} values, got {value!r}")
         return tuple(_value(get_args(hint)[0], item, where, f"{key}[{i}]") for i, item in enumerate(items))

@@ -192,10 +192,17 @@ class Happened:
     """An event that began in this tick, or one that ended after its time."""
 
     serial: int  # its place in the scenario; -1: it is not of the scenario's making
-    at_s: float  # when the scenario lets it begin
+    at_s: float  # when the scenario lets it begin; of what happens singly, the tick's start
     do: str  # the action, or run_down: batteries are empty
     ended: bool
     changed: BoolArray  # (rows,) the robots for which it made a difference
+    part: str = ""  # that fails; of other actions empty
+    singly: bool = False  # each robot at a time of its own: an arena in which nobody changed has no part in it
+
+    @property
+    def words(self) -> str:
+        """What happened: the action, its part if it has one, and whether it ended."""
+        return f"{self.do}{f' {self.part}' if self.part else ''}{' ended' if self.ended else ''}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -116,7 +116,7 @@ def _words(event: Happened, time_ns: int, static: Static) -> str:
     else:
         more = len(robots) - NAMED
         who = ", ".join(robots[:NAMED]) + (f" and {more} more" if more > 0 else "") or "no robot"
-    return f"{to_s(time_ns):.1f} s  {event.do}{' ended' if event.ended else ''}: {who}"
+    return f"{to_s(time_ns):.1f} s  {event.words}: {who}"
 
 
 def _mean(values: list[float]) -> float:

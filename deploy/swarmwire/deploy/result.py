@@ -59,10 +59,12 @@ class ArenaResult:
 class EventResult:
     """An event that took effect, or ended after its time."""
 
-    at_s: float  # of the scenario
+    at_s: float  # of the scenario; of what happens singly, the tick's start
     tick: int  # in which it did
     do: str
+    part: str  # that fails; of other actions empty
     ended: bool
+    singly: bool  # each robot at a time of its own: batteries that run down, failures at a rate
     robots: list[list[str]]  # names of those that it changed, per arena
 
 

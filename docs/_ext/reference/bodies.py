@@ -42,7 +42,7 @@ def _of(sheet: Any, prefix: str, skipped: tuple[str, ...] = ()) -> Iterator[Figu
         value = getattr(sheet, of.name)
         if is_dataclass(value):
             yield from _of(value, f"{prefix}{of.name}.")
-        elif of.name not in skipped and value != of.default:
+        elif of.name not in skipped and value != of.default and value != {}:
             yield prefix + of.name, limits_of(of).unit, value
 
 

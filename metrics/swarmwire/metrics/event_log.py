@@ -10,8 +10,9 @@ from swarmwire.comms.truth import Happened, Static, Tally, Truth
 class EventLog:
     """Observer that keeps what happened. Summary part: `events`, in order.
 
-    Each: at_s (of the scenario), tick (in which it took effect), do, ended (whether it was undone then) and robots: the
-    names of those it changed, a list per arena.
+    Each: at_s (of the scenario; of what happens singly, the tick's start), tick (in which it took effect), do, part
+    (that fails, else empty), ended (whether it was undone then), singly (each robot at a time of its own) and robots:
+    the names of those it changed, a list per arena.
     """
 
     def begin(self, static: Static) -> None:
@@ -24,7 +25,15 @@ class EventLog:
         for event in truth.events:
             robots = names(event, self._static)
             self._events.append(
-                {"at_s": event.at_s, "tick": truth.tick, "do": event.do, "ended": event.ended, "robots": robots}
+                {
+                    "at_s": event.at_s,
+                    "tick": truth.tick,
+                    "do": event.do,
+                    "part": event.part,
+                    "ended": event.ended,
+                    "singly": event.singly,
+                    "robots": robots,
+                }
             )
 
     def end(self, last: Tally | None) -> dict[str, Any]:

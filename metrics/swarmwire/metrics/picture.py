@@ -33,6 +33,8 @@ def render_png(rrd: Path, png: Path, tick: int | None = None, size: tuple[int, i
     without a Vulkan driver; SwarmwireError if the viewer fails otherwise.
     """
     need_view_extra("picture")
+    if png.suffix.lower() != ".png":
+        raise BadInput(str(png), "", "expected a file name that ends in .png")
     if not rrd.is_file():
         raise BadInput(str(rrd), "", "there is no such recording")
     if not png.parent.is_dir():

@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.fates import FATE_NAMES, Fate
-from swarmwire.comms.truth import Static, Truth
+from swarmwire.comms.truth import Happened, Static, Truth
 from swarmwire.metrics.palette import Color
 from swarmwire.metrics.plotted import Plotted
 from swarmwire.metrics.rerun_colors import FATES, MARK
@@ -31,6 +31,7 @@ class RerunPlots:
     def __init__(self, static: Static, metrics: Sequence[Plotted], arena: int) -> None:
         """Plots of one arena."""
         self._arena, self._rate_hz, self._radio = arena, static.rate_hz, static.range_m is not None
+        self._robots = static.robots
         self._names = {"shares": [m.name for m in metrics if _plot(m) == "shares"]}
         self._names |= {plot: [m.name for m in metrics if _plot(m) == plot] for plot in (*_PLOTS.values(), "numbers")}
         fates: dict[str, Color] = {_FATES[fate]: color for fate, color in FATES.items()}
@@ -59,7 +60,7 @@ class RerunPlots:
             numbers["packets"] = self._by_name(per_second)
         for plot, value in numbers.items():
             self._series[plot].add(rec, truth.tick, truth.time_ns, value)
-        if truth.events:
+        if any(self._concerns(event) for event in truth.events):
             rec.log("plots/shares/event", rr.Scalars(_EVENT_MARK))
         if truth.tick >= self._send_at_tick:
             self._send_at_tick = truth.tick + self.send_every_ticks
@@ -69,6 +70,10 @@ class RerunPlots:
         """Send the numbers that were not yet."""
         for series in self._series.values():
             series.flush(rec)
+
+    def _concerns(self, event: Happened) -> bool:
+        own = slice(self._arena * self._robots, (self._arena + 1) * self._robots)
+        return not event.singly or bool(event.changed[own].any())
 
     def _per_second(self, truth: Truth) -> tuple[FloatArray, float]:
         """Receivers per second over the last one: by fate, (fates,), and in range."""

@@ -72,7 +72,9 @@ class RerunRecording:
         self._ticks += 1
         for event in truth.events:
             robots = ", ".join(names(event, self._static)[self._arena])
-            self._rec.log("events", rr.TextLog(f"{event.do}{' ended' if event.ended else ''}: {robots or 'no robot'}"))
+            if event.singly and not robots:
+                continue
+            self._rec.log("events", rr.TextLog(f"{event.words}: {robots or 'no robot'}"))
         self._plots.log(self._rec, self._metrics.latest, truth)
 
     def _connect(self, layout: Any) -> None:

@@ -113,7 +113,11 @@ class RunFolder:
         return self._read("packets", arena)
 
     def events(self, arena: int | None = None) -> "pl.DataFrame":
-        """A row per event and arena: at_s, tick, time_s, do, ended, arena, robots (names of those it changed)."""
+        """A row per event and arena: at_s, tick, time_s, do, part, ended, arena, robots (names of those it changed).
+
+        `part` is what fails, else empty; records of old lack it. What happens to each robot at a time of its own
+        (`singly` in the summary) has no row of an arena in which nobody changed.
+        """
         return self._read("events", arena)
 
     def radio_robots(self, arena: int | None = None) -> "pl.DataFrame":

@@ -10,7 +10,7 @@ from swarmwire.metrics.run_folder import SCHEMAS
 if TYPE_CHECKING:
     import polars as pl
 
-LATER_COLUMNS = {"packets": ("to", "payload")}  # which older records lack
+LATER_COLUMNS = {"packets": ("to", "payload"), "events": ("part",)}  # which older records lack
 MAY_BE_NULL = {
     "packets": ("receiver", "to", "rssi_dbm", "distance_m", "payload"),
     "radio_distances": ("pdr",),

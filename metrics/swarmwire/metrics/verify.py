@@ -15,7 +15,7 @@ from swarmwire.metrics.record.tick_columns import ROBOT_COLUMNS
 from swarmwire.metrics.recording_check import check_recording
 from swarmwire.metrics.run_folder import SCHEMAS, RunFolder
 from swarmwire.metrics.table_check import check_table
-from swarmwire.metrics.table_faults import table_fault
+from swarmwire.metrics.table_faults import LATER_COLUMNS, table_fault
 
 Agreement = Callable[[list[Path], Mapping[str, Any] | None], Verdict]
 TABLES: dict[str, Agreement] = {
@@ -102,7 +102,9 @@ def _fault(folder: RunFolder, name: str, files: list[Path]) -> str | None:
 
 
 def _columns(name: str) -> Collection[str]:
-    return SCHEMAS[name]() if name in SCHEMAS else ("tick", "time_s", "arena", *ROBOT_COLUMNS)
+    if name not in SCHEMAS:
+        return ("tick", "time_s", "arena", *ROBOT_COLUMNS)
+    return [column for column in SCHEMAS[name]() if column not in LATER_COLUMNS.get(name, ())]
 
 
 def _reach(name: str, files: list[Path]) -> str:

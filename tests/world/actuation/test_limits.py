@@ -22,7 +22,7 @@ SPEEDS = st.floats(-1e3, 1e3)
 
 def group(kind: str, start: int = 0, robots: int = 1) -> Group:
     drive = {"kind": kind, **DRIVES[kind]}
-    return Group(kind, body_from({"like": "epuck", "name": kind, "drive": drive}, kind), start, start + robots)
+    return Group(kind, body_from({"like": "footbot", "name": kind, "drive": drive}, kind), start, start + robots)
 
 
 def taken(kind: str, linear_mps: float, angular_radps: float, lateral_mps: float) -> tuple[list[float], int]:

@@ -46,7 +46,7 @@ class Events:
             self._swarm = replace(self._swarm, pose=world.pose)
         while self._coming and self._coming[0][0] <= start_ns:
             _, begins, serial = self._coming.popleft()
-            happened.append(self._happen(serial, begins))
+            happened.extend(self._happen(serial, begins))
         for serial in self._evolving:
             happened.extend(self._go_on(serial, start_ns))
         if happened:
@@ -63,12 +63,14 @@ class Events:
             air.tune(radio)
             self._tuned = radio
 
-    def _happen(self, serial: int, begins: bool) -> Happened:
+    def _happen(self, serial: int, begins: bool) -> list[Happened]:
         event, conditions = self._events[serial], self._conditions
         if event.evolves:
             self._evolving.append(serial)
         changed = event.begin(serial, self._swarm, conditions) if begins else event.end(serial, conditions)
-        return Happened(serial, event.at_s, event.do, not begins, changed)
+        if event.evolves and not changed.any():  # what it does is yet to come
+            return []
+        return [Happened(serial, event.at_s, event.do, not begins, changed, event.failing_part)]
 
     def _run_down(self, start_ns: int, empty: BoolArray) -> list[Happened]:
         """Robots (rows,) whose battery is empty are dead, from the first tick on that begins so."""
@@ -77,10 +79,10 @@ class Events:
         if not fell.any():
             return []
         self._conditions.kills[RUN_DOWN] = known | fell
-        return [Happened(RUN_DOWN, to_s(start_ns), "run_down", False, fell)]
+        return [Happened(RUN_DOWN, to_s(start_ns), "run_down", False, fell, singly=True)]
 
     def _go_on(self, serial: int, start_ns: int) -> list[Happened]:
         event = self._events[serial]
         began, ended = event.go_on(serial, start_ns, self._swarm, self._conditions)
-        told = ((began, False), (ended, True))
-        return [Happened(serial, event.at_s, event.do, over, rows) for rows, over in told if rows.any()]
+        at_s, part, told = to_s(start_ns), event.failing_part, ((began, False), (ended, True))
+        return [Happened(serial, at_s, event.do, over, rows, part, True) for rows, over in told if rows.any()]

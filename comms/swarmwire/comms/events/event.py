@@ -32,6 +32,11 @@ class Event(ABC):
         """How long until it is undone; None: never."""
         return None
 
+    @property
+    def failing_part(self) -> str:
+        """The part of a robot that it makes fail; empty if it does not."""
+        return ""
+
     @abstractmethod
     def check(self, groups: Groups) -> None:
         """Raise BadInput, with a key within the event's table, for what does not fit these groups of robots."""

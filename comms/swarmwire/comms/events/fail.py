@@ -42,6 +42,11 @@ class Fail(LastingEvent):
         """Whether robots fail after the event has begun."""
         return self.per_hour is not None
 
+    @property
+    def failing_part(self) -> str:
+        """`part`."""
+        return self.part
+
     def check(self, groups: Groups) -> None:
         """Raise BadInput for robots that there are not."""
         check_robots(self.robots, groups)

@@ -12,6 +12,8 @@ from swarmwire.comms.plain_values import check_plain
 from swarmwire.comms.sheets.sheet import RangedSheet
 from swarmwire.comms.tables import built, mapping_of
 
+MOST_WIDE = 10_000  # numbers of a field, or of an actuator, of one robot
+
 
 @dataclass(frozen=True)
 class OwnSheet(RangedSheet):
@@ -47,6 +49,7 @@ def told_own_sheet(value: object, where: str, key: str) -> OwnSheet:
     table = mapping_of(where, key, value)
     mapping_of(where, f"{key}.params", table.get("params"))
     widths = mapping_of(where, f"{key}.fields", table.get("fields"))
-    if not all(type(width) is int and width >= 0 for width in cast("Mapping[str, object]", widths).values()):
-        raise BadInput(where, f"{key}.fields", f"expected whole numbers from 0, got {widths!r}")
+    known = cast("Mapping[str, object]", widths).values()
+    if not all(type(width) is int and 0 <= width <= MOST_WIDE for width in known):
+        raise BadInput(where, f"{key}.fields", f"expected whole numbers from 0 to {MOST_WIDE}, got {widths!r}")
     return built(OwnSheet, table, where, key)

@@ -20,6 +20,7 @@ from swarmwire.comms.wire.scene_frames import OBSERVED_VERSION, check_version
 
 _FINISHED = tuple(of.name for of in fields(Finished) if of.name not in ("rssi_dbm", "payload", "payloads"))
 _COUNTED = ("sent", "intended", "in_range")  # a row each; the fates have an array of their own
+_EVENT = [int, float, str, bool, str, bool]  # serial, at_s, do, ended, part, singly
 
 
 def encode_truth(glimpse: Glimpse) -> bytes:
@@ -58,7 +59,9 @@ def encode_truth(glimpse: Glimpse) -> bytes:
         "serial": glimpse.serial,
         "ticks": glimpse.ticks,
         "states": truth.states,
-        "events": [(event.serial, float(event.at_s), event.do, event.ended) for event in truth.events],
+        "events": [
+            (event.serial, float(event.at_s), event.do, event.ended, event.part, event.singly) for event in truth.events
+        ],
     }
     return frames.encode("truth", truth.tick, arrays, values)
 
@@ -165,10 +168,10 @@ def _events(frame: Frame, n: int) -> tuple[Happened, ...]:
 
 
 def _event(item: object, changed: AnyArray) -> Happened:
-    if type(item) is list and [type(part) for part in cast("list[object]", item)] == [int, float, str, bool]:
-        serial, at_s, do, ended = cast("tuple[int, float, str, bool]", item)
-        return Happened(serial, at_s, do, ended, changed)
-    raise BadFrame("malformed", "events: expected serial, at_s, do and ended of each")
+    if type(item) is list and [type(part) for part in cast("list[object]", item)] == _EVENT:
+        serial, at_s, do, ended, failed, singly = cast("tuple[int, float, str, bool, str, bool]", item)
+        return Happened(serial, at_s, do, ended, changed, failed, singly)
+    raise BadFrame("malformed", "events: expected serial, at_s, do, ended, part and singly of each")
 
 
 def _senses(frame: Frame, static: Static) -> Senses:

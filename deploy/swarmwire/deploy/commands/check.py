@@ -11,6 +11,7 @@ def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     from swarmwire.world.scenario_file import load_scenario
 
     checked = load_scenario(scenario, overrides or [])
-    static = Simulation(checked).static
+    simulation = Simulation(checked)
+    static, engines = simulation.static, " and ".join(simulation.world.engines)
     groups = ", ".join(f"{group.stop - group.start} {group.body.name} ({group.name})" for group in static.groups)
-    typer.echo(f"{scenario}: good: {groups}, {checked.duration_s:g} s at {static.rate_hz} Hz")
+    typer.echo(f"{scenario}: good: {groups}, {checked.duration_s:g} s at {static.rate_hz} Hz, engine {engines}")

@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 class EventRecorder:
     """Observer that writes `events.parquet`; what happens in a tick is on disk soon after.
 
-    Columns: at_s (of the scenario), tick and time_s (in which it took effect), do, ended (whether it was undone then),
-    arena, robots (the names of those it changed there). Summary part: `record_events`: rows written and dropped.
+    Columns: at_s (of the scenario; of what happens singly, the tick's start), tick and time_s (in which it took
+    effect), do, part (that fails, else empty), ended (whether it was undone then), arena, robots (the names of those
+    it changed there). Of what happens singly, arenas in which nobody changed have no row. Summary part:
+    `record_events`: rows written and dropped.
     """
 
     def __init__(self, folder: Path, may_drop: bool = False) -> None:
@@ -38,12 +40,14 @@ class EventRecorder:
                 "tick": truth.tick,
                 "time_s": to_s(truth.time_ns),
                 "do": event.do,
+                "part": event.part,
                 "ended": event.ended,
                 "arena": arena,
                 "robots": robots,
             }
             for event in truth.events
             for arena, robots in enumerate(names(event, self._static))
+            if robots or not event.singly
         ]
         self._writer.put(Chunk(len(rows), partial(_frame, rows)))
 
@@ -62,6 +66,7 @@ def event_schema() -> "dict[str, Any]":
         "tick": pl.Int64,
         "time_s": pl.Float64,
         "do": pl.String,
+        "part": pl.String,
         "ended": pl.Boolean,
         "arena": pl.Int32,
         "robots": pl.List(pl.String),

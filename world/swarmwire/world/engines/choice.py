@@ -32,6 +32,12 @@ def check_engines(scenario: Scenario, bodies: Mapping[str, Body], where: str) ->
     if movable and "pymunk" not in engines.values():
         expected = "expected a robot with contacts that could push it: all robots are moved without contacts"
         raise BadInput(where, f"arena.obstacles.{movable[0]}.movable", expected)
+    asked = scenario.physics.engine
+    if asked != "auto" and asked not in engines.values():
+        why = ", ".join(f"{name} {_why_not(bodies[name])}" for name in engines)
+        raise BadInput(
+            where, "physics.engine", f"expected auto or kinematic: no robot could be moved by {asked}: {why}"
+        )
     stuck = [group for group, engine in engines.items() if engine != "kinematic"]
     if scenario.arena.boundary == "torus" and stuck:
         body = bodies[stuck[0]].name
@@ -39,3 +45,8 @@ def check_engines(scenario: Scenario, bodies: Mapping[str, Body], where: str) ->
         raise BadInput(
             where, "arena.boundary", f'{expected}; physics.engine = "kinematic" takes them all off the floor'
         )
+
+
+def _why_not(body: Body) -> str:
+    """Why the kinematic engine alone can move a body."""
+    return "flies" if body.altitude_m > 0.0 else "has no contacts"

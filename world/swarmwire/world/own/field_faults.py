@@ -5,6 +5,7 @@ from math import isfinite, isnan
 from numbers import Real
 from typing import Any, Literal, cast, get_args, get_type_hints
 
+from swarmwire.comms.sheets.own import MOST_WIDE
 from swarmwire.world.sensors.sensor import Field, Noise
 
 KINDS: tuple[Literal["uniform", "normal"], ...] = get_args(get_type_hints(Noise)["kind"])
@@ -13,8 +14,8 @@ KINDS: tuple[Literal["uniform", "normal"], ...] = get_args(get_type_hints(Noise)
 def field_fault(field: Field) -> str | None:
     """What was expected of one of its values, and which there is; None if all are well. Its name may be anything."""
     of: Any = field  # what a user wrote may be of any type
-    if type(of.width) is not int or of.width < 0:
-        return f"expected a width from 0; got {of.width!r}"
+    if type(of.width) is not int or not 0 <= of.width <= MOST_WIDE:
+        return f"expected a width from 0 to {MOST_WIDE}; got {of.width!r}"
     if not isinstance(of.noise, Noise):
         return f"expected noise as a Noise; got {of.noise!r}"
     if of.noise.kind not in KINDS:

@@ -10,6 +10,7 @@ from swarmwire.comms.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.loading import NotLoaded, load_named
 from swarmwire.comms.sheets import OwnSheet, Sheet
+from swarmwire.comms.sheets.own import MOST_WIDE
 from swarmwire.comms.tables import built
 from swarmwire.world.own.actuator import OwnActuator
 from swarmwire.world.own.field_faults import field_fault
@@ -61,9 +62,12 @@ def _actuator(sheet: ActuatorSheet, where: str, key: str) -> ActuatorSheet:
     sheet = replace(sheet, kind=_entry_point(sheet.kind, ACTUATORS))
     own = _made(OwnActuator, sheet.kind, sheet.params, where, key)
     width: Any = _asked(own, "width", where, key)
-    if type(width) is not int or width < 1:
-        raise BadInput(where, f"{key}.kind", f"expected a width from 1; {type(own).__name__} has {width!r}")
+    if type(width) is not int or not 1 <= width <= MOST_WIDE:
+        raise BadInput(
+            where, f"{key}.kind", f"expected a width from 1 to {MOST_WIDE}; {type(own).__name__} has {width!r}"
+        )
     return replace(sheet, width=width)
+
 
 
 def _entry_point(kind: str, group: str) -> str:

@@ -4,7 +4,7 @@ import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -64,7 +64,10 @@ class AskedSensor:
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The truth about each field."""
         told: Any = self._call(self._own.truth, tick)
-        arrays: tuple[Any, ...] = (told,) if type(told) is np.ndarray else tuple(told)
+        if not isinstance(cast("object", told), np.ndarray | tuple | list):
+            raise OwnCodeFailed(self._what, f"truth: expected an array, or a tuple of arrays, got {told!r:.80}")
+        single = isinstance(cast("object", told), np.ndarray)
+        arrays: tuple[Any, ...] = (told,) if single else tuple(told)
         if len(arrays) != len(self._shapes):
             raise OwnCodeFailed(self._what, f"truth: expected {len(self._shapes)} arrays, got {len(arrays)}")
         return tuple(self._checked(*each) for each in zip(self.fields, arrays, self._shapes, strict=True))
@@ -74,9 +77,13 @@ class AskedSensor:
         self._call(self._own.follow, tick)
 
     def _checked(self, field: Field, array: Any, shape: tuple[int, ...]) -> FloatArray:
-        if np.shape(array) != shape:
-            raise OwnCodeFailed(self._what, f"truth: expected {field.name} of shape {shape}, got {np.shape(array)}")
-        return np.array(array, np.float64, order="C")
+        try:
+            numbers = np.array(array, np.float64, order="C")
+        except (TypeError, ValueError) as error:
+            raise OwnCodeFailed(self._what, f"truth: expected numbers as {field.name}: {error}") from error
+        if numbers.shape != shape:
+            raise OwnCodeFailed(self._what, f"truth: expected {field.name} of shape {shape}, got {numbers.shape}")
+        return numbers
 
     def _call(self, method: Any, *args: int) -> Any:
         try:
