@@ -52,6 +52,26 @@ def test_the_facts_are_those_of_the_data_sheet():
     assert dict(facts_of(load_body("epuck-gps")))["positioning"] == "error 1 cm"
 
 
+def test_each_fact_has_a_name_of_its_own():
+    for name in body_names():
+        names = [fact for fact, _ in facts_of(load_body(name)) if fact]
+        assert len(names) == len(set(names)), name
+    assert dict(facts_of(load_body("footbot")))["LEDs"] == "13, the last a beacon"
+
+
+def test_own_senses_and_actuators_are_facts_by_their_class():
+    sheet = {"like": "epuck", "name": "sealer", "actuators": {"sealer": {"kind": "gas.py:Sealer"}}}
+    sheet["senses"] = {"gas": {"kind": "gas.py:Sniffer"}}
+    facts = dict(facts_of(body_from(sheet, "sealer.toml")))
+    assert (facts["gas"], facts["sealer"]) == ("by gas.py:Sniffer", "by gas.py:Sealer")
+
+
+def test_only_a_body_that_flies_is_told_to():
+    flying = body_from({"like": "epuck", "name": "flying", "altitude_m": 1.0}, "flying.toml")
+    assert dict(facts_of(flying))["flies"] == "1 m up"
+    assert "flies" not in dict(facts_of(load_body("epuck")))
+
+
 def test_a_size_that_nobody_could_look_at_is_refused(tmp_path):
     with pytest.raises(BadInput, match="--size: expected 100 to 8000 pixels, got 9000"):
         draw_body(load_body("epuck"), tmp_path / "a.png", 9000)
