@@ -104,6 +104,33 @@ def test_a_trail_follows_a_robot_that_moved_and_fades():
     assert beyond == FLOOR  # more than five seconds ago
 
 
+def flying(altitude_m: float) -> Film:
+    """A film in which the first robot, of a group of its own, hovers at this height below one of another group."""
+    body = replace(load_body("footbot"), radius_m=0.4)
+    groups = (Group("air", replace(body, altitude_m=altitude_m), 0, 1), Group("floor", body, 1, 3))
+    static = replace(two_groups(), groups=groups, robot_names=("air-0", "floor-0", "floor-1"))
+    of = film(static=static)
+    of.pose[:, 1, :2] = of.pose[:, 0, :2] + (0.15, 0.15)
+    return of
+
+
+def test_robots_that_fly_lie_above_those_on_the_floor():
+    assert robots_shown(flying(1.0), 0)[0] == robot_color(0)
+    assert robots_shown(flying(0.0), 0)[0] == robot_color(1)
+
+
+def test_only_robots_that_fly_cast_a_shadow():
+    beneath = (-2.7, -1.375)  # just outside the disc
+    (shadow,), (floor,) = shown(flying(1.0), 0, beneath), shown(flying(0.0), 0, beneath)
+    assert floor == FLOOR
+    assert sum(shadow) < sum(FLOOR) - 60
+
+
+def test_the_legend_tells_how_high_a_group_flies():
+    legend = FilmFigure(flying(1.0), SIZE_PX)._figure.legends[0]
+    assert [text.get_text() for text in legend.get_texts()][:2] == ["air (1), 1 m up", "floor (2)"]
+
+
 @pytest.mark.parametrize("index", [0, 30])
 def test_a_saved_picture_shows_what_the_frame_does(tmp_path, index):
     from PIL import Image

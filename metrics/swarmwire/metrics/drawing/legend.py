@@ -92,7 +92,8 @@ def add_legend(figure: Any, entries: list[Any], left: float, top: float, columns
 
 def _named(group: Group, body: bool) -> str:
     count = group.stop - group.start
-    return f"{group.name}: {count} {group.body.name}" if body else f"{group.name} ({count})"
+    up = f", {group.body.altitude_m:g} m up" if group.body.altitude_m else ""
+    return (f"{group.name}: {count} {group.body.name}" if body else f"{group.name} ({count})") + up
 
 
 def _disc(label: str, fill: Color | None, rim: Color) -> Any:
