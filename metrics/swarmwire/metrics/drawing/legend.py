@@ -10,6 +10,9 @@ from swarmwire.metrics.drawing.looks import (
     LIGHT,
     LIGHT_EDGE,
     LINK,
+    MOVABLE,
+    MOVABLE_DASHES,
+    MOVABLE_EDGE,
     OTHER_STATE,
     PAPER,
     STATE_COLORS,
@@ -55,6 +58,13 @@ def light_entry() -> Any:
 
     look: Look = {"markerfacecolor": LIGHT, "markeredgecolor": LIGHT_EDGE, "markersize": 4.5}
     return Line2D([], [], linestyle="none", marker="o", label="light", **look)
+
+
+def movable_entry() -> Any:
+    """The entry of obstacles that robots can push."""
+    from matplotlib.patches import Patch
+
+    return Patch(facecolor=MOVABLE, edgecolor=MOVABLE_EDGE, linestyle=MOVABLE_DASHES, lw=0.8, label="movable")
 
 
 def columns_in(entries: list[Any], width_in: float) -> int:
