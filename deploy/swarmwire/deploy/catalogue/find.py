@@ -21,7 +21,7 @@ def kind_named(name: str) -> Kind:
 
 
 def find(name: str) -> Entry:
-    """What `name` names: alone, as "kind:name", an agent as "module:Class" or "file.py:Class", or a body as "sheet.toml".
+    """What `name` names: alone, as "kind:name", an agent as "module:Class" or "file.py:Class", a body as "sheet.toml".
 
     Keys of a scenario may leave out how they begin, as far as that is clear, and may hold a group's name for `*`.
     BadInput if nothing has the name, with the nearest that there are, or if several things have it.
