@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any, cast
 
 from reference.markdown import NOTHING, code, number, table
+from reference.parameters import HEAD, parameter_rows
 from swarmwire.comms.body import Body, body_names, load_body
 from swarmwire.comms.parameters import limits_of
 
@@ -26,6 +27,14 @@ def body_table() -> str:
 def body_sources() -> str:
     """Where each body's figures come from."""
     return "".join(f"- {code(name)}: {load_body(name).source}\n" for name in body_names())
+
+
+def body_keys() -> str:
+    """The keys that stand in a sheet before its first table."""
+    tables = ("drive", "leds", "senses", "actuators")
+    rows = [row for row in parameter_rows(Body) if row[0].strip("`").partition(".")[0] not in tables]
+    like = (code("like"), "", "a body's name", NOTHING, "Body that this one starts from.")
+    return table(HEAD, [like, *rows])
 
 
 def _figures(body: Body) -> Iterator[Figure]:
