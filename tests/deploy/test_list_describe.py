@@ -13,9 +13,11 @@ from swarmwire.agent.declared import REQUIRED, parameters_of
 from swarmwire.comms.air.radio import Gives, Radio
 from swarmwire.comms.air.stages import ORDER
 from swarmwire.comms.body import body_names, load_body
+from swarmwire.comms.drives import DRIVES
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.fates import FATE_NAMES
+from swarmwire.comms.leds import Leds
 from swarmwire.comms.parameters import limits_of
 from swarmwire.comms.sheets import SHEETS
 from swarmwire.deploy.catalogue.entry import Entry
@@ -25,9 +27,11 @@ from swarmwire.deploy.catalogue.units import unit_of
 from swarmwire.deploy.catalogue_text import print_entry, print_list
 from swarmwire.metrics.order import Order
 from swarmwire.metrics.registry import METRICS
+from swarmwire.world.scenario import PhysicsTable
 from swarmwire.world.scenario_file import scenario_schema
 from swarmwire.world.schema import written_form
 from tests.deploy.commands import called
+from tests.docs.pages import ROOT
 
 ACTION_OF = {next(of.default for of in fields(kind) if of.name == "do"): kind for kind in ACTIONS}
 DEFINITIONS = scenario_schema()["$defs"]
@@ -90,6 +94,9 @@ def assert_tells(text: str, wanted: list[tuple[str, ...]]) -> None:
         ("bodies", body_names()),
         ("senses", [*SHEETS, *(f"radio.{of.name}" for of in fields(Gives)), "radio.outcomes"]),
         ("behaviours", behaviours.__all__),
+        ("drives", list(DRIVES)),
+        ("sheets", ["name", "source", "radius_m", "height_m", "mass_kg", "altitude_m", "contacts", "leds"]),
+        ("engines", list(get_args(PhysicsTable.model_fields["engine"].annotation))),
         ("events", list(ACTION_OF)),
         ("metrics", list(METRICS)),
         ("stages", [module.__name__.rpartition(".")[2] for module in ORDER]),
@@ -142,6 +149,36 @@ def test_a_body_tells_its_figures_units_senses_and_source(name):
         assert_tells(text, [("response.reach_m", f"{body.proximity.response.reach_m}")])
     assert f"{body.radius_m}" in text
     assert f"{body.max_linear_mps:.4g} m/s" in text
+
+
+def test_a_body_of_ones_own_tells_what_one_that_comes_along_does(tmp_path):
+    sheet = tmp_path / "mine.toml"
+    sheet.write_text('like = "epuck"\nmass_kg = 0.7\n[senses.proximity]\nnoise = 0.25\n')
+    mine, epuck = find(str(sheet)), find("body:epuck")
+    changed = [
+        (now.name, now.value)
+        for table, before in zip(mine.tables, epuck.tables, strict=True)
+        for now, was in zip(table.parameters, before.parameters, strict=True)
+        if now != was
+    ]
+    assert changed == [("mass_kg", 0.7), ("noise", 0.25)]
+    assert mine.facts[1:] == epuck.facts[1:]
+
+
+def test_a_body_of_ones_own_tells_its_own_senses_and_actuators():
+    text = told(str(ROOT / "examples" / "gas" / "sniffer.toml"))
+    gas, sealer = text[text.index("\nsense: gas\n") :], text[text.index("\nactuator: sealer\n") :]
+    assert_tells(gas, [("kind", "gas.py:Gas"), ("rate_hz", "5.0"), ("reach_m", "m", "1.0")])
+    assert_tells(sealer, [("kind", "gas.py:Sealer"), ("y_m", "m", "0.5")])
+
+
+@pytest.mark.parametrize("name", DRIVES)
+def test_a_drive_tells_the_keys_of_its_table(name):
+    assert_tells(told(name), lines_of(DRIVES[name]))
+
+
+def test_the_leds_of_a_sheet_tell_their_keys():
+    assert_tells(told("leds"), lines_of(Leds))
 
 
 @pytest.mark.parametrize("name", SHEETS)
@@ -251,6 +288,7 @@ def test_a_name_may_be_short_or_that_of_ones_own_group(asked, name):
         ("blackout", "say which: event:blackout, fate:blackout"),
         ("size_m", "say which: arena.size_m, arena.obstacles.*.within.size_m"),
         ("metrics", "swarmwire list metrics"),
+        ("absent.toml", "expected a readable file"),
         ("absent.py:Mine", "there is no file"),
         ("swarmwire.agent:Robot", "no Agent or VectorAgent"),
     ],

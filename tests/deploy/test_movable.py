@@ -83,13 +83,13 @@ def test_the_record_and_its_pictures_show_it_where_it_is(scenario: Path, tmp_pat
     assert "movable_x_m" not in folder.metrics().columns
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
     from swarmwire.metrics.drawing.film_figure import FilmFigure
-    from tests.metrics.test_film_figure import FLOOR, OBSTACLE, color_at
+    from tests.metrics.test_film_figure import FLOOR, MOVABLE, color_at
 
     figure = FilmFigure(film, 640)
     side_m = 0.15  # along the box from its middle: there the pusher does not hide it
     c, s = np.cos(box.heading_rad), np.sin(box.heading_rad)
     places = (0.0, side_m), (box.x_m - s * side_m, box.y_m + c * side_m)
-    for index, colors in ((0, [OBSTACLE, FLOOR]), (119, [FLOOR, OBSTACLE])):
+    for index, colors in ((0, [MOVABLE, FLOOR]), (119, [FLOOR, MOVABLE])):
         image = figure.frame(index).copy()
         assert [color_at(figure, image, *place) for place in places] == colors
 

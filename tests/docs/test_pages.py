@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from swarmwire.comms.body import body_from
 from tests.docs.pages import PAGES, ROOT, Command, blocks_of, commands_of, files_of, first_not_printed
 
 WITH_COMMANDS = [page for page in PAGES if commands_of(page)]
@@ -78,6 +79,13 @@ def test_code_is_in_a_file_that_the_page_names_and_uses(page):
         users = [command.line for command in commands_of(page)] + [files[other] for other in files if other != name]
         assert any(name in user for user in users), name
         assert f"`{name}`" in (ROOT / page).read_text(), name
+
+
+def test_the_sheets_on_the_page_about_bodies_are_bodies():
+    sheets = [tomllib.loads(block.text) for block in blocks_of("docs/bodies.md", "toml")]
+    assert {"like" in sheet for sheet in sheets} == {True, False}
+    for sheet in sheets:
+        assert body_from(sheet, "docs/bodies.md").name == sheet["name"]
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -18,7 +18,7 @@ from swarmwire.agent.declared import parameters_of
 from swarmwire.comms import errors
 from swarmwire.comms.air.presets import PRESETS
 from swarmwire.comms.air.radio import Gives
-from swarmwire.comms.body import body_names, load_body
+from swarmwire.comms.body import Body, body_names, load_body
 from swarmwire.comms.drives import DRIVES, Holonomic, Twist, Wheels
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.fates import Fate
@@ -104,6 +104,7 @@ def test_the_bodies_page_names_bodies_and_where_their_figures_come_from(site):
     named = code(site, "bodies")
     assert {f'kind = "{name}"' for name in DRIVES} <= named
     assert {of.name for kind in (Wheels, Twist, Holonomic, Leds) for of in fields(kind)} <= named
+    assert {"like", *(of.name for of in fields(Body) if of.type in {"str", "float", "bool", str, float, bool})} <= named
     assert set(body_names()) <= named
     for name in body_names():
         assert html.escape(load_body(name).source, quote=False) in page(site, "bodies")

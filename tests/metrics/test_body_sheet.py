@@ -42,6 +42,19 @@ def test_rays_start_at_the_rim_and_end_at_their_range_with_the_front_up():
     np.testing.assert_allclose(ahead_deg, body.proximity.angles_deg)
 
 
+@pytest.mark.parametrize(("range_m", "faint"), [(0.12, 1.0), (2.0, 0.1)])
+def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells_their_range(range_m, faint):
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
+
+    senses = {"scan": {"rays": 1, "range_m": range_m}}
+    axes = Figure().add_axes((0, 0, 1, 1))
+    draw_from_above(axes, body_from({"like": "epuck", "name": "a", "senses": senses}, "a.toml"))
+    drawn = [artist for artist in axes.collections if isinstance(artist, LineCollection)][1:]
+    assert min(part.get_alpha() for part in drawn) == pytest.approx(faint)
+    assert f"range finder, to {range_m:g} m" in [text.get_text() for text in axes.get_legend().get_texts()]
+
+
 def test_the_facts_are_those_of_the_data_sheet():
     facts = dict(facts_of(load_body("epuck")))
     assert facts["size"] == "7 cm across, 8.6 cm high"
@@ -50,6 +63,26 @@ def test_the_facts_are_those_of_the_data_sheet():
     assert facts["odometry"] == "slip 5 %, step 0.13 mm"
     assert "positioning" not in facts
     assert dict(facts_of(load_body("epuck-gps")))["positioning"] == "error 1 cm"
+
+
+def test_each_fact_has_a_name_of_its_own():
+    for name in body_names():
+        names = [fact for fact, _ in facts_of(load_body(name)) if fact]
+        assert len(names) == len(set(names)), name
+    assert dict(facts_of(load_body("footbot")))["LEDs"] == "13, the last a beacon"
+
+
+def test_own_senses_and_actuators_are_facts_by_their_class():
+    sheet = {"like": "epuck", "name": "sealer", "actuators": {"sealer": {"kind": "gas.py:Sealer"}}}
+    sheet["senses"] = {"gas": {"kind": "gas.py:Sniffer"}}
+    facts = dict(facts_of(body_from(sheet, "sealer.toml")))
+    assert (facts["gas"], facts["sealer"]) == ("by gas.py:Sniffer", "by gas.py:Sealer")
+
+
+def test_only_a_body_that_flies_is_told_to():
+    flying = body_from({"like": "epuck", "name": "flying", "altitude_m": 1.0}, "flying.toml")
+    assert dict(facts_of(flying))["flies"] == "1 m up"
+    assert "flies" not in dict(facts_of(load_body("epuck")))
 
 
 def test_a_size_that_nobody_could_look_at_is_refused(tmp_path):

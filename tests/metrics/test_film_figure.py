@@ -7,16 +7,17 @@ import pytest
 
 from swarmwire.comms.body import load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Group, Obstacle
+from swarmwire.comms.truth import Group, Obstacle, Static
 from swarmwire.metrics.drawing.film_figure import FilmFigure
 from swarmwire.metrics.drawing.looks import DEAD, OTHER_STATE, STATE_COLORS
+from swarmwire.metrics.drawing.scenario_sheet import _facts
 from swarmwire.metrics.film import NO_STATE, Film
 from swarmwire.metrics.palette import robot_color
 from tests.metrics.films import LIGHT, OBSTACLES, film, two_groups
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
 SIZE_PX = 640
-FLOOR, OBSTACLE = (0xF4, 0xF6, 0xF9), (0xD3, 0xD8, 0xDF)
+FLOOR, OBSTACLE, MOVABLE = (0xF4, 0xF6, 0xF9), (0xD3, 0xD8, 0xDF), (0xEA, 0xD9, 0xBD)
 
 
 def color_at(figure: FilmFigure, image: np.ndarray, x_m: float, y_m: float) -> tuple[int, ...]:
@@ -29,6 +30,14 @@ def shown(of: Film, index: int, *places_m) -> list[tuple[int, ...]]:
     figure = FilmFigure(of, SIZE_PX)
     image = figure.frame(index)
     return [color_at(figure, image, *place_m) for place_m in places_m]
+
+
+def legend_of(of: Film) -> list[str]:
+    return [text.get_text() for text in FilmFigure(of, SIZE_PX)._figure.legends[0].get_texts()]
+
+
+def facts_of_scenario(static: Static) -> list[tuple[str, str]]:
+    return _facts(static, 1.0, 1.0)
 
 
 def robots_shown(of: Film, index: int) -> list[tuple[int, ...]]:
@@ -80,6 +89,18 @@ def test_obstacles_of_every_shape_and_lights_stand_where_they_are():
     assert seen == [OBSTACLE, OBSTACLE, OBSTACLE, (0xFF, 0xD2, 0x3F), FLOOR]
 
 
+def test_obstacles_that_robots_push_look_otherwise_than_fixed_ones_and_the_legend_tells():
+    pillar, box, _ = OBSTACLES
+    static = replace(two_groups(), obstacles=((pillar, replace(box, mass_kg=0.2)),))
+    movable = np.broadcast_to([box.x_m, box.y_m, box.heading_rad], (31, 1, 3))
+    of = film(static=static, movable=movable)
+    assert shown(of, 0, (pillar.x_m, pillar.y_m), (box.x_m, box.y_m)) == [OBSTACLE, MOVABLE]
+    assert "movable" in legend_of(of)
+    assert "movable" not in legend_of(film())
+    assert dict(facts_of_scenario(static))["obstacles"] == "1 cylinder"
+    assert ("", "1 movable box") in facts_of_scenario(static)
+
+
 @pytest.mark.parametrize(
     ("given", "joined"),
     [
@@ -102,6 +123,32 @@ def test_a_trail_follows_a_robot_that_moved_and_fades():
     near, far, beyond = shown(of, 100, *((pose[0] - behind, pose[1]) for behind in (0.4, 2.0, 3.0)))
     assert sum(near) < sum(far) < sum(FLOOR)
     assert beyond == FLOOR  # more than five seconds ago
+
+
+def flying(altitude_m: float) -> Film:
+    """A film in which the first robot, of a group of its own, hovers at this height below one of another group."""
+    body = replace(load_body("footbot"), radius_m=0.4)
+    groups = (Group("air", replace(body, altitude_m=altitude_m), 0, 1), Group("floor", body, 1, 3))
+    static = replace(two_groups(), groups=groups, robot_names=("air-0", "floor-0", "floor-1"))
+    of = film(static=static)
+    of.pose[:, 1, :2] = of.pose[:, 0, :2] + (0.15, 0.15)
+    return of
+
+
+def test_robots_that_fly_lie_above_those_on_the_floor():
+    assert robots_shown(flying(1.0), 0)[0] == robot_color(0)
+    assert robots_shown(flying(0.0), 0)[0] == robot_color(1)
+
+
+def test_only_robots_that_fly_cast_a_shadow():
+    beneath = (-2.7, -1.375)  # just outside the disc
+    (shadow,), (floor,) = shown(flying(1.0), 0, beneath), shown(flying(0.0), 0, beneath)
+    assert floor == FLOOR
+    assert sum(shadow) < sum(FLOOR) - 60
+
+
+def test_the_legend_tells_how_high_a_group_flies():
+    assert legend_of(flying(1.0))[:2] == ["air (1), 1 m up", "floor (2)"]
 
 
 @pytest.mark.parametrize("index", [0, 30])

@@ -38,8 +38,8 @@ def fit(monkeypatch: pytest.MonkeyPatch, *fields: Field) -> dict[str, int]:
         ({"noise": Noise(kind="gaussian")}, "expected noise of the kind uniform or normal; got 'gaussian'"),  # pyright: ignore[reportArgumentType]
         ({"noise": Noise(size=-1.0)}, "expected noise.size as a finite number from 0; got -1.0"),
         ({"noise": Noise(relative=inf)}, "expected noise.relative as a finite number from 0; got inf"),
-        ({"width": -1}, "expected a width from 0; got -1"),
-        ({"width": 1.5}, "expected a width from 0; got 1.5"),
+        ({"width": -1}, "expected a width from 0 to 10000; got -1"),
+        ({"width": 1.5}, "expected a width from 0 to 10000; got 1.5"),
         ({"span": (1.0, 0.0)}, "expected span as two finite numbers that do not fall; got (1.0, 0.0)"),
         ({"span": (0.0, inf)}, "expected span as two finite numbers that do not fall; got (0.0, inf)"),
         ({"span": 3}, "expected span as two finite numbers that do not fall; got 3"),

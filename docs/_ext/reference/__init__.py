@@ -15,7 +15,7 @@ from sphinx.util.typing import ExtensionMetadata
 from reference import array_names, docstrings, field_comments
 from reference.actuators import drive_tables, led_table
 from reference.behaviours import behaviour_table
-from reference.bodies import body_sources, body_table
+from reference.bodies import body_keys, body_sources, body_table
 from reference.commands import command_tables
 from reference.events import event_tables
 from reference.fates import fate_table
@@ -28,6 +28,7 @@ from reference.senses import sense_tables
 TABLES: dict[str, Callable[..., str]] = {
     "behaviours": behaviour_table,
     "bodies": body_table,
+    "body-keys": body_keys,
     "body-sources": body_sources,
     "commands": command_tables,
     "drives": drive_tables,

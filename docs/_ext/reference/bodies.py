@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any, cast
 
 from reference.markdown import NOTHING, code, number, table
+from reference.parameters import HEAD, parameter_rows
 from swarmwire.comms.body import Body, body_names, load_body
 from swarmwire.comms.parameters import limits_of
 
@@ -28,6 +29,14 @@ def body_sources() -> str:
     return "".join(f"- {code(name)}: {load_body(name).source}\n" for name in body_names())
 
 
+def body_keys() -> str:
+    """The keys that stand in a sheet before its first table."""
+    tables = ("drive", "leds", "senses", "actuators")
+    rows = [row for row in parameter_rows(Body) if row[0].strip("`").partition(".")[0] not in tables]
+    like = (code("like"), "", "a body's name", NOTHING, "Body that this one starts from.")
+    return table(HEAD, [like, *rows])
+
+
 def _figures(body: Body) -> Iterator[Figure]:
     yield from _of(body, "", skipped=("name", "source", "senses"))
     yield "fastest ahead", "m/s", body.max_linear_mps
@@ -42,7 +51,7 @@ def _of(sheet: Any, prefix: str, skipped: tuple[str, ...] = ()) -> Iterator[Figu
         value = getattr(sheet, of.name)
         if is_dataclass(value):
             yield from _of(value, f"{prefix}{of.name}.")
-        elif of.name not in skipped and value != of.default and value != {}:
+        elif of.name not in skipped and value not in (of.default, {}):
             yield prefix + of.name, limits_of(of).unit, value
 
 

@@ -13,8 +13,7 @@ def about(static: Static, arena: int, selected: str, links_every_ticks: int) -> 
         "",
         f"{groups} in {size} m, {static.rate_hz} ticks per second",
         "",
-        f"The ring marks {selected}. Its rays: red meets a robot, white a wall or an obstacle, faint nothing; "
-        "yellow bars: light.",
+        " ".join([f"The ring marks {selected}.", *_drawn(static, selected)]),
     ]
     if static.range_m is not None:
         often = "" if links_every_ticks == 1 else f" (every {links_every_ticks} ticks)"
@@ -24,3 +23,11 @@ def about(static: Static, arena: int, selected: str, links_every_ticks: int) -> 
             f"coloured ones are packets that ended unheard{often}, in the colour of their fate in the plot of packets.",
         ]
     return "\n".join(shown(line) for line in lines)
+
+
+def _drawn(static: Static, selected: str) -> list[str]:
+    """What the selected robot's body lets the picture show of its senses."""
+    index = static.robot_names.index(selected)
+    body = next(group.body for group in static.groups if group.start <= index < group.stop)
+    rays = ["Its rays: red meets a robot, white a wall or an obstacle, faint nothing."] if body.proximity else []
+    return [*rays, "Yellow bars: light."] if body.light else rays

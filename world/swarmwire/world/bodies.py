@@ -47,6 +47,14 @@ def _body(name: str, where: str, key: str) -> Body:
             return load_body(name)
         except BadInput as error:
             raise BadInput(where, key, error.expected) from None
+    return read_body(path, where, key)
+
+
+def read_body(path: Path, where: str, key: str) -> Body:
+    """The body of a sheet of the user's own, its own senses and actuators fitted.
+
+    BadInput names the sheet, or `where` and `key`, which name it, if it cannot be read.
+    """
     try:
         sheet = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

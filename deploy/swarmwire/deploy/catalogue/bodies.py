@@ -1,33 +1,48 @@
 """Bodies: kinds of robot, from their data sheets."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
+from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.actuator_sheet import ActuatorSheet
 from swarmwire.comms.body import Body, body_names, load_body
 from swarmwire.comms.leds import Leds
-from swarmwire.comms.sheets import SHEETS
+from swarmwire.comms.parameters import limits_of
+from swarmwire.comms.sheets import OwnSheet
+from swarmwire.comms.sheets.sheet import RangedSheet
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
+from swarmwire.deploy.catalogue.units import unit_of
+from swarmwire.world.bodies import read_body
 
 GEOMETRY = ("radius_m", "height_m", "mass_kg", "altitude_m", "contacts")
 
 
 def bodies() -> list[Entry]:
     """The bodies that come with swarmwire."""
-    return [_body(load_body(name)) for name in body_names()]
+    return [_body(load_body(name), name) for name in body_names()]
 
 
-def _body(body: Body) -> Entry:
+def body_of(path: Path) -> Entry:
+    """The body of a sheet of the user's own; BadInput names it and what is wrong with it."""
+    return _body(read_body(path, str(path), ""), str(path))
+
+
+def _body(body: Body, named: str) -> Entry:
     sheet = asdict(body)
     geometry = [key for key in parameters_of_dataclass(Body) if key.name in GEOMETRY]
     leds = [] if body.leds is None else [_sheet("leds", Leds, sheet["leds"])]
-    senses = [_sheet(f"sense: {name}", SHEETS[name], sheet["senses"][name]) for name in body.senses]
+    senses = [
+        _own(f"sense: {name}", of) if isinstance(of, OwnSheet) else _sheet(f"sense: {name}", type(of), asdict(of))
+        for name, of in body.senses.items()
+    ]
+    actuators = [_own(f"actuator: {name}", of) for name, of in body.actuators.items()]
     return Entry(
         kind="body",
         name=body.name,
         help=f"radius {body.radius_m:.3g} m, at most {body.max_linear_mps:.3g} m/s; senses: {', '.join(body.senses)}",
         facts=(
-            ("in a scenario", f'body = "{body.name}" in [robots.GROUP]'),
+            ("in a scenario", f'body = "{named}" in [robots.GROUP]'),
             ("fastest ahead", f"{body.max_linear_mps:.4g} m/s"),
             ("fastest turn", f"{body.max_angular_radps:.4g} rad/s"),
             ("source", body.source),
@@ -37,12 +52,21 @@ def _body(body: Body) -> Entry:
             _sheet("drive", type(body.drive), sheet["drive"]),
             *leds,
             *senses,
+            *actuators,
         ),
     )
 
 
 def _sheet(title: str, kind: type[Any], values: dict[str, Any]) -> ParameterTable:
     return ParameterTable(title, tuple(_with_values(parameters_of_dataclass(kind), values)), "value")
+
+
+def _own(title: str, sheet: OwnSheet | ActuatorSheet) -> ParameterTable:
+    """Keys of a class of the user's own are known by name alone, those that every sense has in full."""
+    shared = _with_values(parameters_of_dataclass(RangedSheet), asdict(sheet)) if isinstance(sheet, OwnSheet) else []
+    keys = [Parameter(name, "", unit_of(name), value) for name, value in sheet.params.items()]
+    told = next(limits_of(of).help for of in fields(sheet) if of.name == "kind")
+    return ParameterTable(title, (Parameter("kind", told, value=sheet.kind), *shared, *keys), "value")
 
 
 def _with_values(parameters: "list[Parameter] | tuple[Parameter, ...]", values: dict[str, Any]) -> list[Parameter]:

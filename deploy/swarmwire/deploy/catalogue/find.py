@@ -2,11 +2,14 @@
 
 from collections.abc import Sequence
 from difflib import get_close_matches
+from pathlib import Path
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.catalogue.behaviours import behaviour
+from swarmwire.deploy.catalogue.bodies import body_of
 from swarmwire.deploy.catalogue.entry import Entry
 from swarmwire.deploy.catalogue.kinds import KINDS, Kind
+from swarmwire.world.bodies import SUFFIX
 
 
 def kind_named(name: str) -> Kind:
@@ -18,11 +21,13 @@ def kind_named(name: str) -> Kind:
 
 
 def find(name: str) -> Entry:
-    """What `name` names: alone, as "kind:name", or an agent class as "module:Class" or "file.py:Class".
+    """What `name` names: alone, as "kind:name", an agent as "module:Class" or "file.py:Class", a body as "sheet.toml".
 
     Keys of a scenario may leave out how they begin, as far as that is clear, and may hold a group's name for `*`.
     BadInput if nothing has the name, with the nearest that there are, or if several things have it.
     """
+    if name.endswith(SUFFIX):
+        return body_of(Path(name))
     before, colon, rest = name.partition(":")
     chosen = [kind for kind in KINDS if colon and before.lower() in (kind.name, kind.one)]
     if colon and not chosen:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 from swarmwire.deploy.catalogue.behaviours import behaviours
 from swarmwire.deploy.catalogue.bodies import bodies
+from swarmwire.deploy.catalogue.drives import drives
+from swarmwire.deploy.catalogue.engines import engines
 from swarmwire.deploy.catalogue.entry import Entry
 from swarmwire.deploy.catalogue.events import events
 from swarmwire.deploy.catalogue.fates import fates
@@ -13,6 +15,7 @@ from swarmwire.deploy.catalogue.presets import presets
 from swarmwire.deploy.catalogue.radio_stages import radio_stages
 from swarmwire.deploy.catalogue.scenario_keys import keys, radio_keys
 from swarmwire.deploy.catalogue.senses import senses
+from swarmwire.deploy.catalogue.sheet_keys import sheet_keys
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,8 @@ class Kind:
 
 KINDS = (
     Kind("bodies", "body", "kinds of robot: size, drive and senses", bodies),
+    Kind("drives", "drive", "what may move a body, with the keys of its sheet's table", drives),
+    Kind("sheets", "sheet", "keys of a body's data sheet; its drive and senses are kinds of their own", sheet_keys),
     Kind("senses", "sense", "what an agent may read of its robot and of packets, if its needs name it", senses),
     Kind("behaviours", "behaviour", "agents that come with swarmwire, with their parameters", behaviours),
     Kind("events", "event", "what may happen to robots and radios on the way", events),
@@ -35,5 +40,6 @@ KINDS = (
     Kind("presets", "preset", "kinds of radio that a scenario may name", presets),
     Kind("stages", "stage", "what a packet passes on its way to a receiver, in order", radio_stages),
     Kind("fates", "fate", "what may become of a packet for one receiver", fates),
+    Kind("engines", "engine", "what moves the bodies of a run", engines),
     Kind("keys", "key", "all other keys of a scenario", keys),
 )

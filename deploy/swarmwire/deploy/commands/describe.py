@@ -11,12 +11,15 @@ from swarmwire.deploy.commands.options import AsJson
 
 
 def describe_command(
-    name: Annotated[str, typer.Argument(help="A name that `swarmwire list` tells, or an agent class of your own.")],
+    name: Annotated[
+        str,
+        typer.Argument(help="A name that `swarmwire list` tells, an agent class or a body's sheet of your own."),
+    ],
     as_json: AsJson = False,
 ) -> None:
     """Describe one thing: what it is, its parameters with unit, default and bounds, and where its figures come from.
 
-    For example a body, a key of a scenario, one of two things of the same name, and an agent of your own:
+    For example a body, a key of a scenario, one of two things of the same name, an agent and a body of your own:
 
       swarmwire describe epuck
 
@@ -25,6 +28,8 @@ def describe_command(
       swarmwire describe event:blackout
 
       swarmwire describe my_agent.py:Mine
+
+      swarmwire describe mine.toml
     """
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
     from swarmwire.deploy.catalogue.find import find

@@ -32,12 +32,13 @@ def facts_of(body: Body) -> list[tuple[str, str]]:
         ("turns", f"{math.degrees(body.max_angular_radps):.0f} degrees/s"),
         ("drive", f"{drive.max_force_n:g} N, {drive.max_torque_nm:g} N m"),
     ]
+    if body.altitude_m:
+        facts.append(("flies", f"{_length(body.altitude_m)} up"))
     if body.leds:
         facts.append(("LEDs", f"{body.led_count}{', the last a beacon' if body.leds.beacon_height_m else ''}"))
     for name, sheet in body.senses.items():
         facts.extend(zip((name, *[""] * 9), _told(sheet, body.altitude_m), strict=False))
-    if body.leds is not None:
-        facts.append(("LEDs", f"{body.leds.count}"))
+    facts.extend((name, _own(sheet.kind)) for name, sheet in body.actuators.items())
     return facts
 
 
@@ -70,9 +71,14 @@ def _told(sheet: Sheet, altitude_m: float) -> list[str]:
         case Battery():
             return [f"{sheet.capacity_wh:g} Wh, {sheet.full_v:g} V"]
         case OwnSheet():
-            return [f"by {sheet.kind.rpartition('/')[2]}"]
+            return [_own(sheet.kind)]
         case _:
             return ["yes"]
+
+
+def _own(kind: str) -> str:
+    """A class of the user's own, without the folders of its file."""
+    return f"by {kind.rpartition('/')[2]}"
 
 
 def _apart(drive: Wheels | Twist) -> str:

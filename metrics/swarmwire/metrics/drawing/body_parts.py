@@ -12,6 +12,7 @@ from swarmwire.comms.sheets import Bumper, GroundColour, Infrared, Light, Proxim
 from swarmwire.metrics.drawing.looks import INK, LIGHT, LIGHT_EDGE, OBSTACLE_EDGE, PAPER, SMALL_PT, Look
 
 _RAY, _PASSIVE, _SCAN, _LED = "#d1495b", "#7b4fa3", "#3a86a8", "#43aa5b"
+_FADES_FROM, _FADING = 0.6, 10  # of the view, where rays that leave it begin to fade; and in so many steps
 _NUMBER_AT = 0.055  # beyond the rays' ends, as a share of the view
 
 
@@ -59,18 +60,22 @@ def _number_rays(axes: Any, radius_m: float, sheet: Rim) -> None:
 
 
 def _draw_scan(axes: Any, sheet: Scan) -> None:
-    """Rays that leave the view, or end in it."""
+    """Rays that end in the view, or fade where they would leave it."""
     from matplotlib.collections import LineCollection
 
     x, y = _turned(np.array([sheet.at_m]), np.zeros(1))
     half_m = axes.get_xlim()[1]
-    around_x, around_y = _around(sheet.angle_rad, min(sheet.range_m, half_m))
-    ends = np.stack([x + around_x, y + around_y], axis=1)
-    starts = np.broadcast_to(np.stack([x, y], axis=1), ends.shape)
+    whole = sheet.range_m <= half_m
+    parts_m = np.array([0.0, sheet.range_m]) if whole else half_m * np.linspace(_FADES_FROM, 1.0, _FADING + 1)
+    parts_m[0] = 0.0
+    points = np.stack([np.stack(_around(sheet.angle_rad, at_m), axis=1) for at_m in parts_m], axis=1)
+    points += np.stack([x, y], axis=1)[:, None]  # (rays, ends of parts, 2)
     width = max(0.15, min(0.9, 20.0 / sheet.rays))
-    look: Look = {"colors": _SCAN, "linewidths": width, "zorder": 1}
-    label = "scan" if sheet.rays > 1 else "range finder"
-    axes.add_collection(LineCollection(list(np.stack([starts, ends], axis=1)), label=label, **look))
+    label = f"{'scan' if sheet.rays > 1 else 'range finder'}, to {sheet.range_m:g} m"
+    for part, opacity in enumerate(np.linspace(1.0, 0.0, len(parts_m) - 1, endpoint=False)):
+        look: Look = {"colors": _SCAN, "linewidths": width, "zorder": 1, "alpha": opacity, "capstyle": "butt"}
+        named: Look = {} if part else {"label": label}
+        axes.add_collection(LineCollection(list(points[:, part : part + 2]), **look, **named))
 
 
 def _draw_photocells(axes: Any, radius_m: float, sheet: Light) -> None:

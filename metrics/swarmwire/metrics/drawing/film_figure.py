@@ -15,6 +15,7 @@ from swarmwire.metrics.drawing.legend import (
     dead_entry,
     group_entries,
     link_entry,
+    movable_entry,
     state_entries,
 )
 from swarmwire.metrics.drawing.looks import INK, LONG_SIDE_IN, STATE_COLORS, TITLE_PT
@@ -135,6 +136,8 @@ def _entries(film: Film) -> list[Any]:
         entries += state_entries(names, others=stateless)
     if not film.alive.all():
         entries.append(dead_entry())
+    if static.movable:
+        entries.append(movable_entry())
     if static.range_m is not None:
         entries.append(link_entry(static.range_m))
     return entries

@@ -10,6 +10,9 @@ from swarmwire.metrics.drawing.looks import (
     LIGHT,
     LIGHT_EDGE,
     LINK,
+    MOVABLE,
+    MOVABLE_DASHES,
+    MOVABLE_EDGE,
     OTHER_STATE,
     PAPER,
     STATE_COLORS,
@@ -57,6 +60,13 @@ def light_entry() -> Any:
     return Line2D([], [], linestyle="none", marker="o", label="light", **look)
 
 
+def movable_entry() -> Any:
+    """The entry of obstacles that robots can push."""
+    from matplotlib.patches import Patch
+
+    return Patch(facecolor=MOVABLE, edgecolor=MOVABLE_EDGE, linestyle=MOVABLE_DASHES, lw=0.8, label="movable")
+
+
 def columns_in(entries: list[Any], width_in: float) -> int:
     """How many columns of entries, which fill one column after the other, stand side by side in this width."""
     letters = [len(entry.get_label()) for entry in entries]
@@ -92,7 +102,8 @@ def add_legend(figure: Any, entries: list[Any], left: float, top: float, columns
 
 def _named(group: Group, body: bool) -> str:
     count = group.stop - group.start
-    return f"{group.name}: {count} {group.body.name}" if body else f"{group.name} ({count})"
+    up = f", {group.body.altitude_m:g} m up" if group.body.altitude_m else ""
+    return (f"{group.name}: {count} {group.body.name}" if body else f"{group.name} ({count})") + up
 
 
 def _disc(label: str, fill: Color | None, rim: Color) -> Any:

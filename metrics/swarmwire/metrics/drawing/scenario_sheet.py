@@ -1,15 +1,17 @@
 """A scenario on one sheet, before anything has moved: the arena with its axes, the radio's reach, and the facts."""
 
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.truth import Static
+from swarmwire.comms.truth import Obstacle, Static
 from swarmwire.metrics.drawing.canvas import new_figure, save
 from swarmwire.metrics.drawing.layout import Layout, add_arena_axes, lay_out
-from swarmwire.metrics.drawing.legend import add_legend, group_entries, light_entry
+from swarmwire.metrics.drawing.legend import add_legend, group_entries, light_entry, movable_entry
 from swarmwire.metrics.drawing.looks import FAINT, INK, LINK, PAPER, SMALL_PT, SOFT, TITLE_PT, Look
 from swarmwire.metrics.drawing.panel_text import add_facts
 from swarmwire.metrics.drawing.scenery import draw_scenery
@@ -33,6 +35,8 @@ def draw_scenario(static: Static, pose: FloatArray, duration_s: float, to: Path,
     swarm = Swarm(axes, static)
     swarm.show(pose, np.ones(static.robots, np.bool_))
     entries = group_entries(static, bodies=True)
+    if static.movable:
+        entries.append(movable_entry())
     if static.lights and static.lights[0]:
         entries.append(light_entry())
     if static.range_m is not None:
@@ -73,11 +77,7 @@ def _draw_reach(axes: Any, pose: FloatArray, range_m: float, size_m: tuple[float
 
 def _facts(static: Static, duration_s: float, enlarged: float) -> list[tuple[str, str]]:
     across, up = static.arena_size_m
-    kinds = [obstacle.shape for obstacle in static.obstacles[0]]
-    plural = {"cylinder": "cylinders", "box": "boxes", "polygon": "polygons"}
-    obstacles = [
-        f"{kinds.count(kind)} {kind if kinds.count(kind) == 1 else plural[kind]}" for kind in dict.fromkeys(kinds)
-    ]
+    obstacles = _counted(static.obstacles[0])
     facts = [
         ("arena", f"{across:g} x {up:g} m, " + static.boundary),
         ("obstacles", obstacles[0] if obstacles else "none"),
@@ -87,6 +87,16 @@ def _facts(static: Static, duration_s: float, enlarged: float) -> list[tuple[str
         ("seed", f"{static.seeds[0]}"),
     ]
     return [*facts, ("drawn", f"robots {enlarged:.1f} x as large")] if enlarged > 1.05 else facts
+
+
+def _counted(obstacles: Sequence[Obstacle]) -> list[str]:
+    """How many there are of each shape, those that can be pushed apart."""
+    kinds = Counter((obstacle.shape, obstacle.movable) for obstacle in obstacles)
+    plural = {"cylinder": "cylinders", "box": "boxes", "polygon": "polygons"}
+    return [
+        f"{count} {'movable ' if movable else ''}{shape if count == 1 else plural[shape]}"
+        for (shape, movable), count in kinds.items()
+    ]
 
 
 def _fill_panel(figure: Any, layout: Layout, entries: list[Any], facts: list[tuple[str, str]]) -> None:

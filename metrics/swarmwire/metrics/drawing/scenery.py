@@ -9,6 +9,9 @@ from swarmwire.metrics.drawing.looks import (
     INK,
     LIGHT,
     LIGHT_EDGE,
+    MOVABLE,
+    MOVABLE_DASHES,
+    MOVABLE_EDGE,
     OBSTACLE,
     OBSTACLE_EDGE,
     SMALL_PT,
@@ -23,7 +26,7 @@ _GLOW = ((0.045, 0.10), (0.03, 0.16), (0.018, 0.3))  # radius as a share of the 
 
 
 def draw_scenery(axes: Any, static: Static, arena: int) -> Any:
-    """Draw it once, below everything else. A boundary that is no wall is dashed.
+    """Draw it once, below everything else. A boundary that is no wall is dashed, and so are obstacles that move.
 
     Returns the collection of the movable obstacles, which `place_movable` moves.
     """
@@ -37,8 +40,9 @@ def draw_scenery(axes: Any, static: Static, arena: int) -> Any:
     axes.add_patch(floor)
     if static.floor is not None:
         draw_floor(axes, static.floor, static, floor)
-    _add_obstacles(axes, static.fixed(arena))
-    movable = _add_obstacles(axes, [obstacle for obstacle in static.obstacles[arena] if obstacle.movable])
+    _add_obstacles(axes, static.fixed(arena), {"facecolor": OBSTACLE, "edgecolor": OBSTACLE_EDGE})
+    pushed: Look = {"facecolor": MOVABLE, "edgecolor": MOVABLE_EDGE, "linestyle": MOVABLE_DASHES}
+    movable = _add_obstacles(axes, [obstacle for obstacle in static.obstacles[arena] if obstacle.movable], pushed)
     for light in static.lights[arena] if static.lights else ():
         _draw_light(axes, light.x_m, light.y_m, max(width, height))
     return movable
@@ -49,11 +53,11 @@ def place_movable(collection: Any, obstacles: Sequence[Obstacle]) -> None:
     collection.set_paths([_shape(obstacle) for obstacle in obstacles])
 
 
-def _add_obstacles(axes: Any, obstacles: Sequence[Obstacle]) -> Any:
+def _add_obstacles(axes: Any, obstacles: Sequence[Obstacle], look: Look) -> Any:
     from matplotlib.collections import PatchCollection
 
-    solid: Look = {"facecolor": OBSTACLE, "edgecolor": OBSTACLE_EDGE, "linewidth": 0.8, "zorder": 1}
-    collection: Any = PatchCollection([_shape(obstacle) for obstacle in obstacles], **solid)
+    shapes = [_shape(obstacle) for obstacle in obstacles]
+    collection: Any = PatchCollection(shapes, linewidth=0.8, zorder=1, **look)
     axes.add_collection(collection, autolim=False)
     return collection
 

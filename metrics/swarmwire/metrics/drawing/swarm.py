@@ -1,4 +1,4 @@
-"""The robots of one arena: discs, headings, trails and links as four collections whose arrays each frame replaces."""
+"""The robots of one arena: discs, headings, trails and links as a few collections whose arrays each frame replaces."""
 
 from itertools import pairwise
 from typing import Any
@@ -7,12 +7,12 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.drawing.looks import DEAD, LINK, OTHER_STATE, STATE_COLORS, Look, rgb, shade
+from swarmwire.metrics.drawing.discs import Discs
+from swarmwire.metrics.drawing.looks import DEAD, LINK, OTHER_STATE, STATE_COLORS, rgb, shade
 from swarmwire.metrics.palette import robot_color
 from swarmwire.metrics.shortest import link_lines
 
 _LEAST, _CROWDED = 0.0105, 0.2  # least radius of a disc by the arena's longer side; and that times sqrt(robots)
-_HEADING_RADII = 2.0  # length of a heading in radii of its disc, from the centre
 _FADING = (0.2, 0.4, 0.6, 0.8)  # opacity of a trail's parts, the oldest first
 _CROWD = 200  # robots; in greater swarms trails are of one part and few points
 _CROWD_POINTS = 7
@@ -22,37 +22,42 @@ _NOBODY = np.empty((0, 2, 2))
 class Swarm:
     """Robots as discs in the colour of their group, the dead grey; with states, the state's colour and the group's rim.
 
-    Robots too small to be seen are drawn larger, all of an arena by one factor, `enlarged`.
+    Robots too small to be seen are drawn larger, all of an arena by one factor, `enlarged`. Those that fly lie above
+    the others, the highest on top, and cast a shadow.
     """
 
     def __init__(self, axes: Any, static: Static) -> None:
         """Add the collections, empty, to axes in m."""
-        from matplotlib.collections import EllipseCollection, LineCollection
+        from matplotlib.collections import LineCollection
 
         self._static = static
         by_group = [(robot_color(i), group) for i, group in enumerate(static.groups)]
-        radius_m = np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for _, group in by_group])
+        count = [group.stop - group.start for group in static.groups]
+        radius_m = np.repeat([group.body.radius_m for group in static.groups], count)
+        altitude_m = np.repeat([group.body.altitude_m for group in static.groups], count)
         self._fill = np.array([rgb(color) for color, group in by_group for _ in range(group.start, group.stop)])
         self._rim = np.array([shade(color) for color, group in by_group for _ in range(group.start, group.stop)])
         self.enlarged = max(1.0, _least_radius_m(static) / float(radius_m.mean()))
-        self._radius_m, self._crowd = radius_m * self.enlarged, static.robots > _CROWD
+        self._crowd = static.robots > _CROWD
         fading = _FADING[-1:] if self._crowd else _FADING
         self._fading = np.array(fading)
         thin = 0.6 if self._crowd else 1.0
         self._links: Any = LineCollection([], colors=LINK, linewidths=0.6, zorder=2)
         self._trails: Any = LineCollection([], linewidths=1.3 * thin, zorder=3, capstyle="butt")
-        self._headings: Any = LineCollection([], linewidths=1.5 * thin, zorder=4, capstyle="round")
-        across = 2.0 * self._radius_m
-        on_axes: Look = {"units": "xy", "offset_transform": axes.transData, "zorder": 5}
-        self._discs: Any = EllipseCollection(across, across, np.zeros(len(across)), linewidths=0.9 * thin, **on_axes)
+        rows = np.argsort(altitude_m, kind="stable")
+        self._layers = [
+            Discs(axes, those, radius_m[those] * self.enlarged, flying, thin)
+            for flying, those in ((False, rows[altitude_m[rows] == 0.0]), (True, rows[altitude_m[rows] > 0.0]))
+            if len(those)
+        ]
         self._shown: tuple[bytes, bytes] | None = None
-        for artist in self.artists:
+        for artist in (self._links, self._trails):
             axes.add_collection(artist, autolim=False)
 
     @property
     def artists(self) -> tuple[Any, ...]:
         """Everything that moves, in the order in which it is drawn."""
-        return self._links, self._trails, self._headings, self._discs
+        return self._links, self._trails, *(artist for layer in self._layers for artist in layer.artists)
 
     @property
     def enlargement(self) -> str:
@@ -78,10 +83,8 @@ class Swarm:
         """
         position = pose[:, :2].astype(np.float64)
         self._color(alive, state)
-        self._discs.set_offsets(position)
-        ahead = np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])], axis=1)
-        ends = position + _HEADING_RADII * self._radius_m[:, None] * ahead
-        self._headings.set_segments(np.stack([position, ends], axis=1))
+        for layer in self._layers:
+            layer.show(position, pose[:, 2].astype(np.float64))
         self._links.set_segments(_NOBODY if edges is None else link_lines(position, edges, self._static))
         self._links.set_alpha(_link_opacity(0 if edges is None else len(edges)))
         self._show_trails(trail)
@@ -107,9 +110,8 @@ class Swarm:
         fill = self._fill if state is None else _state_fill(state)
         fill = np.where(alive[:, None], fill, rgb(DEAD))
         rim = np.where(alive[:, None], self._rim, shade(DEAD))
-        self._discs.set_facecolor(fill)
-        self._discs.set_edgecolor(rim)
-        self._headings.set_color(rim)
+        for layer in self._layers:
+            layer.color(fill, rim)
         parts = len(self._fading)
         trail = np.concatenate([np.tile(fill, (parts, 1)), np.repeat(self._fading, len(fill))[:, None]], axis=1)
         self._trails.set_color(trail)

@@ -21,6 +21,7 @@ from swarmwire.metrics.palette import robot_color
 _COLOR = robot_color(0)
 _ROOM = 1.16  # of what is seen by what is drawn, so that numbers at the rays' ends fit
 _BELOW = -0.035  # where legend and bar are, as a share of the view's height
+_LEAST_LINE_PT = 0.9  # of a legend
 _LEAST_RADII = 2.0  # seen in each direction at least, in radii of the body
 
 
@@ -48,9 +49,11 @@ def draw_from_above(axes: Any, body: Body) -> None:
             "borderaxespad": 0.0,
             "borderpad": 0.0,
         }
-        axes.legend(
+        legend = axes.legend(
             ncols=3, loc="center right", bbox_to_anchor=(1.0, _BELOW), handlelength=1.3, columnspacing=1.2, **plain
         )
+        for line in legend.get_lines():  # rays of a scan are too fine to be seen alone
+            line.set_linewidth(max(line.get_linewidth(), _LEAST_LINE_PT))
 
 
 def _draw_disc(axes: Any, body: Body) -> None:

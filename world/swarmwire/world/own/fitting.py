@@ -69,7 +69,6 @@ def _actuator(sheet: ActuatorSheet, where: str, key: str) -> ActuatorSheet:
     return replace(sheet, width=width)
 
 
-
 def _entry_point(kind: str, group: str) -> str:
     """The "package.module:Class" that an entry point of this name stands for; any other text as it is."""
     found = () if ":" in kind else tuple(entry_points(group=group, name=kind))
