@@ -52,7 +52,9 @@ def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells
     draw_from_above(axes, body_from({"like": "epuck", "name": "a", "senses": senses}, "a.toml"))
     drawn = [artist for artist in axes.collections if isinstance(artist, LineCollection)][1:]
     assert min(part.get_alpha() for part in drawn) == pytest.approx(faint)
-    assert f"range finder, to {range_m:g} m" in [text.get_text() for text in axes.get_legend().get_texts()]
+    legend = axes.get_legend()
+    assert legend
+    assert f"range finder, to {range_m:g} m" in [text.get_text() for text in legend.get_texts()]
 
 
 def test_the_facts_are_those_of_the_data_sheet():
