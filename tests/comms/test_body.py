@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.body import Body, body_from, body_names, load_body
+from swarmwire.comms.body import Body, body_from, body_from_mapping, body_names, load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sheets import Positioning, Proximity
 
@@ -187,11 +187,6 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("senses.ground.points_m", [[0, 0]] * 1001, "points_m: expected at most 1000 items, got 1001"),
         ("senses.scan", {"rays": 10_001, "range_m": 1}, "senses.scan.rays: expected at most 10000, got 10001"),
         ("senses.camera.most_blobs", 1001, "senses.camera.most_blobs: expected at most 1000, got 1001"),
-        (
-            "actuators.arm",
-            {"kind": "a:B", "params": {}, "width": 10_001},
-            "actuators.arm.width: expected a whole number from 0 to 10000, got 10001",
-        ),
         ("drive.wheel_base_m", 0.0701, "drive.wheel_base_m: expected at most the body's diameter, 0.07 m; got 0.0701"),
         ("leds.radius_m", 0.044, "leds.radius_m: expected at most 0.04375 m, 1.25 times the body's radius; got 0.044"),
         ("leds.height_m", 0.173, "leds.height_m: expected at most 0.172 m, twice the body's height; got 0.173"),
@@ -252,3 +247,12 @@ def test_a_body_like_another_does_not_take_over_senses_that_it_cannot_have() -> 
     assert set(load_body("epuck").senses) - set(drone.senses) == {"odometry", "ground"}
     with pytest.raises(BadInput, match=r"drone\.toml: senses\.ground: expected altitude_m = 0"):
         body_from({**sheet, "senses": {"ground": {"noise": 0.1}}}, "drone.toml")
+
+
+def test_a_told_sheet_whose_actuator_is_too_wide_is_refused() -> None:
+    told = load_body("epuck").as_mapping()
+    told["actuators"] = {"arm": {"kind": "a:B", "params": {}, "width": 10_001}}
+    with pytest.raises(
+        BadInput, match=r"told: actuators\.arm\.width: expected a whole number from 0 to 10000, got 10001"
+    ):
+        body_from_mapping(told, "told")
