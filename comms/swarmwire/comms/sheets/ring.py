@@ -10,6 +10,13 @@ from swarmwire.comms.parameters import parameter
 from swarmwire.comms.sheets.sheet import RangedSheet
 
 
+def within_a_turn(angle_rad: FloatArray) -> FloatArray:
+    """These angles in (-pi, pi], not to be written to."""
+    wrapped = np.arctan2(np.sin(angle_rad), np.cos(angle_rad))
+    wrapped.setflags(write=False)
+    return wrapped
+
+
 @dataclass(frozen=True)
 class Ring(RangedSheet):
     """Sensors around the body that look outwards."""
@@ -19,10 +26,7 @@ class Ring(RangedSheet):
     @cached_property
     def angle_rad(self) -> FloatArray:
         """Where the sensors look in the body's frame, in (-pi, pi], (sensors,)."""
-        angle = np.deg2rad(np.array(self.angles_deg, np.float64))
-        wrapped = np.arctan2(np.sin(angle), np.cos(angle))
-        wrapped.setflags(write=False)
-        return wrapped
+        return within_a_turn(np.deg2rad(np.array(self.angles_deg, np.float64)))
 
     @cached_property
     def direction(self) -> tuple[FloatArray, FloatArray]:

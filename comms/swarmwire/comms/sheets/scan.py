@@ -7,6 +7,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.parameters import parameter
+from swarmwire.comms.sheets.ring import within_a_turn
 from swarmwire.comms.sheets.sheet import RangedSheet
 
 FULL_DEG = 360.0
@@ -48,10 +49,7 @@ class Scan(RangedSheet):
     @cached_property
     def angle_rad(self) -> FloatArray:
         """Where the rays look in the body's frame, in (-pi, pi], (rays,)."""
-        angle = np.deg2rad(self.first_deg) + self.step_rad * np.arange(self.rays)
-        wrapped = np.arctan2(np.sin(angle), np.cos(angle))
-        wrapped.setflags(write=False)
-        return wrapped
+        return within_a_turn(np.deg2rad(self.first_deg) + self.step_rad * np.arange(self.rays))
 
     @cached_property
     def direction(self) -> tuple[FloatArray, FloatArray]:
