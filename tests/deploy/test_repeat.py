@@ -103,12 +103,10 @@ def test_every_shipped_scenario_survives_being_made_in_python_and_written(tmp_pa
     if changed.arena.map is not None:
         table = changed.arena.map.model_copy(update={"image": f"files/{changed.arena.map.image}"})
         changed = changed.model_copy(update={"arena": changed.arena.model_copy(update={"map": table})})
-    robots = {
-        name: table.model_copy(update={"body": f"files/{Path(table.body).name}"})
-        if table.body.endswith(".toml")
-        else table
-        for name, table in changed.robots.items()
-    }
+    robots = dict(changed.robots)
+    for name, table in robots.items():
+        if table.body.endswith(".toml"):
+            robots[name] = table.model_copy(update={"body": f"files/{Path(table.body).name}"})
     assert same_content(again, changed.model_copy(update={"robots": robots}))
     assert not same_content(again, as_read)
 
