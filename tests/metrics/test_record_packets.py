@@ -108,8 +108,8 @@ def test_an_event_has_a_row_in_each_arena_with_the_robots_it_changed(tmp_path):
     seen = [truth(of, 0), truth(of, 4, events=(kill,)), truth(of, 6, events=(over,))]
     assert record(tmp_path, of, seen)["events"] == {"rows": 4, "dropped": 0}
     assert pl.read_parquet(tmp_path / "events.parquet").rows() == [
-        (0.35, 4, 0.4, "kill", False, 0, ["flock-0"]),
-        (0.35, 4, 0.4, "kill", False, 1, ["flock-0", "flock-1"]),
-        (0.35, 6, 0.6, "kill", True, 0, []),
-        (0.35, 6, 0.6, "kill", True, 1, []),
+        (0.35, 4, 0.4, "kill", "", False, 0, ["flock-0"]),
+        (0.35, 4, 0.4, "kill", "", False, 1, ["flock-0", "flock-1"]),
+        (0.35, 6, 0.6, "kill", "", True, 0, []),
+        (0.35, 6, 0.6, "kill", "", True, 1, []),
     ]

@@ -61,7 +61,7 @@ def test_biases_are_drawn_once_for_each_wheel() -> None:
 
 
 def test_wheels_that_should_stand_still_do() -> None:
-    noise = noisy(bias_mps=0.5, factor_std=0.5)
+    noise = noisy(bias_mps=0.1, factor_std=0.5)
     assert not wheels_of(noise, 0, 0.0, 0.0).any()
     assert wheels_of(noise, 0, 0.0, 1e-6).all()
 
