@@ -13,6 +13,7 @@ from swarmwire.world.own import Field, Noise
 from swarmwire.world.own.fitting import fitted
 from tests.world import own_code
 
+UNKNOWN: Any = "gaussian"
 SHEET: dict[str, Any] = {"like": "epuck", "senses": {"x": {"kind": "tests.world.own_code:Alone"}}}
 
 
@@ -35,7 +36,7 @@ def fit(monkeypatch: pytest.MonkeyPatch, *fields: Field) -> dict[str, int]:
         ({"high": None}, "expected high as a number; got None"),
         ({"blank": None}, "expected blank as a number; got None"),
         ({"noise": 0.1}, "expected noise as a Noise; got 0.1"),
-        ({"noise": Noise(kind="gaussian")}, "expected noise of the kind uniform or normal; got 'gaussian'"),  # pyright: ignore[reportArgumentType]
+        ({"noise": Noise(kind=UNKNOWN)}, "expected noise of the kind uniform or normal; got 'gaussian'"),
         ({"noise": Noise(size=-1.0)}, "expected noise.size as a finite number from 0; got -1.0"),
         ({"noise": Noise(relative=inf)}, "expected noise.relative as a finite number from 0; got inf"),
         ({"width": -1}, "expected a width from 0 to 10000; got -1"),

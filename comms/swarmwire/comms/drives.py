@@ -75,3 +75,8 @@ class Holonomic:
 
 Drive = Wheels | Twist | Holonomic
 DRIVES: dict[str, type[Drive]] = {"wheels": Wheels, "twist": Twist, "holonomic": Holonomic}
+
+
+def wheel_base_of(drive: Drive) -> float:
+    """The distance between a drive's wheels in m; 0 if it has none."""
+    return 0.0 if isinstance(drive, Holonomic) else drive.wheel_base_m

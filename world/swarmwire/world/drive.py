@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.drives import Drive, Holonomic
+from swarmwire.comms.drives import wheel_base_of
 from swarmwire.comms.truth import Group
 
 
@@ -32,15 +32,11 @@ class Motors(NamedTuple):
 def motors_of(groups: Sequence[Group]) -> Motors:
     """The motors of each robot of the groups in order; a body's mass is spread evenly over its disc."""
     drives = [
-        (_wheel_base_m(d), d.max_force_n, d.max_torque_nm, b.mass_kg, 0.5 * b.mass_kg * b.radius_m**2)
+        (wheel_base_of(d), d.max_force_n, d.max_torque_nm, b.mass_kg, 0.5 * b.mass_kg * b.radius_m**2)
         for b, d in ((group.body, group.body.drive) for group in groups)
     ]
     columns = np.repeat(np.array(drives), [group.stop - group.start for group in groups], axis=0).T
     return Motors(*(np.ascontiguousarray(column) for column in columns))
-
-
-def _wheel_base_m(drive: Drive) -> float:
-    return 0.0 if isinstance(drive, Holonomic) else drive.wheel_base_m
 
 
 @njit(cache=True)

@@ -9,7 +9,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.body import MOTORS, WHEELS
-from swarmwire.comms.drives import Holonomic
+from swarmwire.comms.drives import wheel_base_of
 from swarmwire.comms.truth import Group
 
 
@@ -24,8 +24,7 @@ class FailedDrives:
     def __init__(self, groups: Sequence[Group], arenas: int) -> None:
         """All of them work."""
         sizes = [group.stop - group.start for group in groups]
-        bases = [0.0 if isinstance(group.body.drive, Holonomic) else group.body.drive.wheel_base_m for group in groups]
-        self._wheel_base_m = np.repeat(bases, sizes)
+        self._wheel_base_m = np.repeat([wheel_base_of(group.body.drive) for group in groups], sizes)
         self._shape = arenas, sum(sizes)
         self.fail({})
 

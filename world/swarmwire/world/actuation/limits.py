@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.drives import DRIVES, Holonomic
+from swarmwire.comms.drives import DRIVES, wheel_base_of
 from swarmwire.comms.truth import Group
 
 WHEELS, TWIST, HOLONOMIC = (list(DRIVES).index(kind) for kind in ("wheels", "twist", "holonomic"))
@@ -30,7 +30,7 @@ def limits_of(groups: Sequence[Group]) -> Limits:
     columns = [
         (
             list(DRIVES).index(drive.kind),
-            0.0 if isinstance(drive, Holonomic) else 0.5 * drive.wheel_base_m,
+            0.5 * wheel_base_of(drive),
             drive.max_linear_mps,
             drive.max_angular_radps,
         )
@@ -84,24 +84,29 @@ def take_commands(
         if not alive[row]:
             continue
         i = row % robots
-        kind, most, most_turn = limits.kind[i], limits.max_linear_mps[i], limits.max_angular_radps[i]
-        too_fast = lateral != 0.0 and kind != HOLONOMIC
-        if kind == WHEELS:
-            lateral = 0.0
-            fastest = abs(linear) + abs(angular) * limits.half_base_m[i]
-            if fastest > most * ROUNDED:
-                too_fast = True
-                linear, angular = linear * (most / fastest), angular * (most / fastest)
-        else:
-            if kind == TWIST:
-                lateral = 0.0
-            size = np.hypot(linear, lateral)
-            if size > most * ROUNDED:
-                too_fast = True
-                linear, lateral = linear * (most / size), lateral * (most / size)
-            if abs(angular) > most_turn * ROUNDED:
-                too_fast = True
-                angular = most_turn if angular > 0.0 else -most_turn
+        linear, angular, lateral, too_fast = _within(limits, i, linear, angular, lateral)
         clipped += too_fast
         command[row, 0], command[row, 1], command[row, 2] = linear, angular, lateral
     return clipped, not_finite
+
+
+@njit(cache=True)
+def _within(limits, i, linear, angular, lateral):
+    """What the drive of robot index i can follow of a command, and whether it asked for more."""
+    kind, most, most_turn = limits.kind[i], limits.max_linear_mps[i], limits.max_angular_radps[i]
+    too_fast = lateral != 0.0 and kind != HOLONOMIC
+    if kind != HOLONOMIC:
+        lateral = 0.0
+    if kind == WHEELS:
+        fastest = abs(linear) + abs(angular) * limits.half_base_m[i]
+        if fastest > most * ROUNDED:
+            return linear * (most / fastest), angular * (most / fastest), lateral, True
+        return linear, angular, lateral, too_fast
+    size = np.hypot(linear, lateral)
+    if size > most * ROUNDED:
+        too_fast = True
+        linear, lateral = linear * (most / size), lateral * (most / size)
+    if abs(angular) > most_turn * ROUNDED:
+        too_fast = True
+        angular = most_turn if angular > 0.0 else -most_turn
+    return linear, angular, lateral, too_fast

@@ -13,7 +13,7 @@ from numba import njit
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.draws_compiled import normal
-from swarmwire.comms.drives import NO_WHEEL_NOISE, Drive, Holonomic, WheelNoise
+from swarmwire.comms.drives import NO_WHEEL_NOISE, Drive, Holonomic, WheelNoise, wheel_base_of
 from swarmwire.comms.truth import Group
 
 BIAS, FACTOR = draws.purpose("wheel bias"), draws.purpose("wheel factor")
@@ -27,10 +27,9 @@ class NoisyWheels:
         """The biases are drawn now; `keys` (arenas,)."""
         sizes = [group.stop - group.start for group in groups]
         noise = [noise_of(group.body.drive) for group in groups]
-        bases = [0.0 if isinstance(group.body.drive, Holonomic) else group.body.drive.wheel_base_m for group in groups]
         self._keys = keys
         self._noisy = np.repeat([of != NO_WHEEL_NOISE for of in noise], sizes)
-        self._wheel_base_m = np.repeat(bases, sizes)
+        self._wheel_base_m = np.repeat([wheel_base_of(group.body.drive) for group in groups], sizes)
         self._factor = np.repeat([of.factor for of in noise], sizes)
         self._factor_std = np.repeat([of.factor_std for of in noise], sizes)
         mean, spread = np.repeat([(of.bias_mps, of.bias_std_mps) for of in noise], sizes, axis=0).T[:, :, None]
