@@ -127,7 +127,8 @@ class Robot(Handle):
     def drive(self, linear_mps: float, angular_radps: float, lateral_mps: float = 0.0) -> None:
         """Wanted forward speed and turn rate (positive to the left); they hold until the next call.
 
-        A body with a holonomic drive can also move sideways, positive to the left.
+        A body with a holonomic drive can also move sideways, positive to the left. What the body cannot do is clipped,
+        and nan is no command: the last one holds (`clipped_commands` and `nan_commands` in the summary).
         """
         self._turn.drive[self._row] = True
         self._turn.linear_mps[self._row] = linear_mps

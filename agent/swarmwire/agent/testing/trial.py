@@ -9,7 +9,12 @@ from swarmwire.comms.bodies.body import Body, load_body
 
 @dataclass(frozen=True)
 class Trial:
-    """What to try an agent with."""
+    """What to try an agent with: robots whose senses and packets are made up.
+
+    All that the body senses is drawn anew in each tick. What robots send is heard a tick later, by each of the others
+    with probability 0.4, and outcomes of all kinds are told to an agent that needs them. A tenth of the robots is
+    missing in each tick and starts afresh when it is back.
+    """
 
     robots: int = 7  # of one group
     ticks: int = 12  # of a tenth of a second
