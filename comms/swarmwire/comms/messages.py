@@ -8,7 +8,7 @@ checker a field is a `float`, in the constructor and when read: a decoded field 
 on air, so that both kinds of agent compute with the same numbers.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from hashlib import blake2b
 from typing import Annotated, Any, ClassVar, Self, cast, dataclass_transform, get_args, get_origin, get_type_hints
 
@@ -100,6 +100,13 @@ class Message:
             raise ValueError(f"{len(payload)} bytes that are no {cls.__name__}")
         fields = np.frombuffer(payload, cls.on_air)[0]
         return cls(**{name: float(fields[name]) for name in cls.ranges})
+
+
+def message_classes(of: type[Message] = Message) -> Iterator[type[Message]]:
+    """Every class of messages that this process knows."""
+    for kind in of.__subclasses__():
+        yield kind
+        yield from message_classes(kind)
 
 
 def message_class(kind: object) -> type[Message]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import chain
 
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.messages import DICT_TAG, Message, decode_dict
+from swarmwire.comms.messages import DICT_TAG, decode_dict, message_classes
 from swarmwire.comms.packets import BROADCAST, TAG_BYTES, UNTOLD, Sent
 from swarmwire.comms.senses import Actions
 
@@ -60,15 +60,9 @@ def _fields(payload: bytes) -> list[tuple[str, str]]:
     tag = int.from_bytes(payload[:TAG_BYTES], "little")
     if tag == DICT_TAG:
         return [("dict", repr(decode_dict(payload)))]
-    for kind in _message_classes(Message):
+    for kind in message_classes():
         if (kind.tag, kind.size_bytes) == (tag, len(payload)):
             message = kind.decode(payload)
             values = [(f"{kind.__name__}.{name}", repr(getattr(message, name))) for name in kind.ranges]
             return values or [(kind.__name__, "sent")]
     return [("bytes", payload.hex(" "))]
-
-
-def _message_classes(of: type[Message]) -> Iterator[type[Message]]:
-    for kind in of.__subclasses__():
-        yield kind
-        yield from _message_classes(kind)
