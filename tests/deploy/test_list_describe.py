@@ -11,7 +11,7 @@ from rich.console import Console
 from swarmwire.agent import behaviours
 from swarmwire.agent.declared import REQUIRED, parameters_of
 from swarmwire.comms.air.radio import Gives, Radio
-from swarmwire.comms.air.stages import ORDER
+from swarmwire.comms.air.stages.chain import ORDER
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES
 from swarmwire.comms.bodies.leds import Leds

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numba import njit
 
+from swarmwire.comms.air.parameters.reception import Bursts
 from swarmwire.comms.air.reception.bursts import FORGOTTEN, bad_after
-from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.arrays import BoolArray, IntArray, KeyArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import purpose

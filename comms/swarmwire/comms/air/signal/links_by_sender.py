@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.decibels import NEPERS, from_db
-from swarmwire.comms.air.signal.link_table import Pairs
+from swarmwire.comms.air.signal.pairs import Pairs
 from swarmwire.comms.air.signal.tables import LinkPlaces, LinkTable
 from swarmwire.comms.arrays import ByteArray, FloatArray
 from swarmwire.comms.fates import Fate

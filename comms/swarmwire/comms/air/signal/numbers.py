@@ -5,22 +5,22 @@
 import numpy as np
 
 from swarmwire.comms.air.decibels import from_db
-from swarmwire.comms.air.frames import acknowledgement_bytes, airtime_ns
+from swarmwire.comms.air.parameters.access import METHODS
+from swarmwire.comms.air.parameters.propagation import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.air.propagation.fading import fading_law
 from swarmwire.comms.air.propagation.loss_curve import SPEED_OF_LIGHT_MPS
-from swarmwire.comms.air.propagation.parameters import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.air.propagation.path_loss import reach_m
 from swarmwire.comms.air.propagation.scattering import scatter_waves
 from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.reception import Receiver, receiver_of
 from swarmwire.comms.air.reception.sensitivity import sensitivity_dbm, sinr_for_db
-from swarmwire.comms.air.signal.link_table import Surroundings
 from swarmwire.comms.air.signal.links_by_sender import Levels
 from swarmwire.comms.air.signal.log_success import log_success_table
-from swarmwire.comms.air.signal.parameters import METHODS
+from swarmwire.comms.air.signal.pairs import Surroundings
 from swarmwire.comms.air.signal.tables import Rules
-from swarmwire.comms.air.traffic.access_timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G, IEEE_802_15_4
+from swarmwire.comms.air.timing.access_timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G, IEEE_802_15_4
+from swarmwire.comms.air.timing.frames import acknowledgement_bytes, airtime_ns
 from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.clock import to_ns
 

@@ -9,11 +9,11 @@ disturb one another (access "none"), every receiver hears each of them on its ow
 
 import numpy as np
 
+from swarmwire.comms.air.parameters.access import METHODS
 from swarmwire.comms.air.signal import dcf
 from swarmwire.comms.air.signal.event_queue import OFF_AIR, schedule
+from swarmwire.comms.air.signal.frame_fate import alone_log_success, outcome
 from swarmwire.comms.air.signal.log_success import log_success
-from swarmwire.comms.air.signal.outcome import alone_log_success, outcome
-from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import DATA, NOBODY, RECEIVING, SILENT, TURNING
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.fates import Fate

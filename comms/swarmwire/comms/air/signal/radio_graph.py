@@ -7,15 +7,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from swarmwire.comms.air.channel import ROUNDING
+from swarmwire.comms.air.disk.channel import ROUNDING
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.signal.frame_fate import lone_deliveries, lone_delivery
 from swarmwire.comms.air.signal.jam_held import JamHeld
-from swarmwire.comms.air.signal.link_table import Pairs
 from swarmwire.comms.air.signal.links_held import LinksHeld
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
-from swarmwire.comms.air.signal.outcome import lone_deliveries, lone_delivery
+from swarmwire.comms.air.signal.pairs import Pairs
 from swarmwire.comms.air.signal.tables import Rules
-from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.air.stages.stage import Medium
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
 NEGLIGIBLE = 1e-3  # power of a jammer over that of the noise

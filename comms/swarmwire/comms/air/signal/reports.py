@@ -8,8 +8,8 @@ from swarmwire.comms.air.links import HEARD, Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.signal.links_held import LinksHeld
 from swarmwire.comms.air.signal.tables import NOBODY, Table, Told
-from swarmwire.comms.air.stage import Medium
-from swarmwire.comms.air.stages import chain_after_reception
+from swarmwire.comms.air.stages.chain import chain_after_reception
+from swarmwire.comms.air.stages.stage import Medium
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Decided
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray

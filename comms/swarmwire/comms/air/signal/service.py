@@ -2,9 +2,9 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+from swarmwire.comms.air.parameters.access import METHODS
 from swarmwire.comms.air.signal import csma, dcf, on_air, telling
 from swarmwire.comms.air.signal.event_queue import ANSWER, ENTER, LISTENED, SEND, TIMER, cancel, schedule
-from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import (
     ACKNOWLEDGEMENT,
     AWAITING,

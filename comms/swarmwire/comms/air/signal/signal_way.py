@@ -9,21 +9,20 @@ import numpy as np
 from swarmwire.comms.air.disruption import ALL, NEWEST, Disruption
 from swarmwire.comms.air.intake import Intake
 from swarmwire.comms.air.lives import Lives
+from swarmwire.comms.air.parameters.reception import Bursts
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.burst_states import BurstStates
-from swarmwire.comms.air.reception.parameters import Bursts
-from swarmwire.comms.air.send_times import SendTimes
-from swarmwire.comms.air.signal import events, jamming, kept_back
+from swarmwire.comms.air.signal import backlog, event_loop, jamming
 from swarmwire.comms.air.signal.event_queue import event_queue
 from swarmwire.comms.air.signal.jam_held import JamHeld
-from swarmwire.comms.air.signal.learning import learned, sent_in_vain
-from swarmwire.comms.air.signal.link_table import Surroundings
 from swarmwire.comms.air.signal.links_held import LinksHeld
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.air.signal.numbers import levels_of, rules_of, surroundings_of
 from swarmwire.comms.air.signal.packet_rows import packet_rows
+from swarmwire.comms.air.signal.pairs import Surroundings
 from swarmwire.comms.air.signal.radio_graph import RadioGraph
 from swarmwire.comms.air.signal.reports import Reports, taken_out
+from swarmwire.comms.air.signal.send_results import learned, sent_in_vain
 from swarmwire.comms.air.signal.tables import (
     KEPT_ALL,
     KEPT_NEWEST,
@@ -40,7 +39,8 @@ from swarmwire.comms.air.signal.tables import (
     Told,
     told,
 )
-from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.air.stages.stage import Medium
+from swarmwire.comms.air.timing.send_times import SendTimes
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Decided, Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
@@ -130,12 +130,12 @@ class SignalWay(Way):
         if len(self._packet) or self._events.size[0] or self._jam.anything:
             state, start = self._state(self._medium.disruption, until_ns)
             bursts = self._bursting()
-            events.line_up(state, self._events, start)
+            event_loop.line_up(state, self._events, start)
             most = int(max((state.places.stop - state.places.first).max(), _lengths(self._robot).max()))
-            room = told(max(LEAST_ROOM, 2 * (most + events.FEW + len(self._packet)), 2 * self._told))
+            room = told(max(LEAST_ROOM, 2 * (most + event_loop.FEW + len(self._packet)), 2 * self._told))
             done = False
             while not done:
-                done = events.run_until(self._rules, bursts, state, self._events, room, most, until_ns)
+                done = event_loop.run_until(self._rules, bursts, state, self._events, room, most, until_ns)
                 parts.append(taken_out(room))
             self._told = sum(len(part.packet) for part in parts)
             self._bursts.added(int(bursts.added[0]))
@@ -145,11 +145,11 @@ class SignalWay(Way):
     def disrupt(self, at_ns: int, coming: Disruption, lives: Lives) -> Decided:
         """The queues of the dead end, those of radios that are off may wait; they hear nothing of what is on air."""
         state, start = self._state(coming, at_ns)
-        events.line_up(state, self._events, start)
+        event_loop.line_up(state, self._events, start)
         room = told(len(self._packet) + 1)
-        events.stop_the_dead(state, self._events, room, coming.alive, at_ns)
-        events.cut_off(self._rules, state, self._events, coming.alive, coming.radio_on, at_ns)
-        kept_back.switch(self._rules, state, self._events, room, at_ns)
+        event_loop.stop_the_dead(state, self._events, room, coming.alive, at_ns)
+        event_loop.cut_off(self._rules, state, self._events, coming.alive, coming.radio_on, at_ns)
+        backlog.switch(self._rules, state, self._events, room, at_ns)
         return self._decided([taken_out(room)], lives)
 
     def outcomes(self, alive: BoolArray) -> Outcomes:
