@@ -4,7 +4,7 @@ import numpy as np
 
 from reference.markdown import NOTHING, code, number, table
 from swarmwire.comms.air.presets.registry import PRESETS
-from swarmwire.comms.air.signal.numbers import range_of
+from swarmwire.comms.air.signal.levels import range_of
 from swarmwire.comms.air.timing.frames import airtime_ns
 from swarmwire.deploy.radio.probe import radio_of
 

@@ -13,7 +13,7 @@ from swarmwire.comms.air.probe.contention import Contention, contention
 from swarmwire.comms.air.propagation.path_loss import loss_db
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.reception import chunk_success
-from swarmwire.comms.air.signal.numbers import range_of, receiver_for, sensitivity_of
+from swarmwire.comms.air.signal.levels import range_of, receiver_for, sensitivity_of
 from swarmwire.comms.air.timing.frames import airtime_ns
 from tests.comms.air.runs import at, make_air, packets, run
 from tests.world.scenario.test_radio_tables import radio_of

@@ -14,7 +14,7 @@ from swarmwire.comms.air.parameters.reception import Bursts
 from swarmwire.comms.air.probe.coverage import Coverage
 from swarmwire.comms.air.probe.survey import by_distance, coverage_map
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.signal.numbers import cut_off_dbm
+from swarmwire.comms.air.signal.levels import cut_off_dbm
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Obstacle

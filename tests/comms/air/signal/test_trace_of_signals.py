@@ -18,8 +18,8 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Obstacle
 from tests.comms.air.runs import TICK_NS, Run, at, everybody, make_air, packets, run, scattered
 from tests.comms.air.signal.radios import METHODS, with_access
+from tests.comms.air.stages.test_trace import ROBOTS, heard, of
 from tests.comms.air.test_accounts import random_traffic
-from tests.comms.air.traces.test_trace import ROBOTS, heard, of
 
 NEAR, FAR = at((0, 0), (1, 0), (0, 1)), at((0, 0), (9000, 0), (0, 9000))
 ALONE = with_access("none")

@@ -18,8 +18,9 @@ from swarmwire.comms.air.propagation.loss_between import loss_between_db
 from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.signal.frame_fate import lone_deliveries
-from swarmwire.comms.air.signal.numbers import cut_off_dbm, rules_of, sensitivity_of
-from swarmwire.comms.air.signal.radio_graph import passes_besides
+from swarmwire.comms.air.signal.levels import cut_off_dbm, sensitivity_of
+from swarmwire.comms.air.signal.losses import passing_share
+from swarmwire.comms.air.signal.rules import rules_of
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
 
@@ -38,7 +39,7 @@ class Coverage:
     def __init__(self, radio: Radio, key: np.uint64, obstacles: Obstacles, payload_bytes: int) -> None:
         """`key` is that of the arena, `obstacles` are those of this arena alone; packets have so many bytes."""
         self._radio, self._obstacles = radio, obstacles
-        self._passes = passes_besides(radio)
+        self._passes = passing_share(radio)
         self._range_m = math.inf if radio.range_m is None else radio.range_m
         self.sensitivity_dbm = sensitivity_of(radio) if radio.is_signal else None
         if radio.is_signal:

@@ -2,7 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from swarmwire.comms.air.signal import service
+from swarmwire.comms.air.signal import sender_queue
 from swarmwire.comms.air.signal.event_queue import LISTENED, SEND, TIMER, cancel
 from swarmwire.comms.air.signal.tables import BACKING_OFF, HELD, KEPT_ALL, SILENT, TURNING
 from swarmwire.comms.borrowing import borrowing
@@ -18,9 +18,9 @@ def switch(rules, state, queue, told, now_ns):
         me = state.robot[r]
         if state.off[r] <= KEPT_ALL:
             _hold_back(state, queue, r)
-            service.keep_newest(rules, state, queue, told, r, now_ns)
+            sender_queue.keep_newest(rules, state, queue, told, r, now_ns)
         elif me.stage == HELD:
-            service.begin(rules, state, queue, r, now_ns)
+            sender_queue.begin(rules, state, queue, r, now_ns)
 
 
 @borrowing()

@@ -2,7 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from swarmwire.comms.air.signal import dcf, jamming, on_air, service
+from swarmwire.comms.air.signal import attempts, dcf, jamming, on_air, sender_queue
 from swarmwire.comms.air.signal.event_queue import ENTER, LISTENED, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY, RECEIVING, SILENT
 from swarmwire.comms.borrowing import borrowing
@@ -33,7 +33,7 @@ def line_up(state, queue, start):
 
 
 @borrowing()
-def run_until(rules, bursts, state, queue, told, most_links, until_ns):
+def run_until(rules, losses, state, queue, told, most_links, until_ns):
     """Let happen what is due before `until_ns`; False if `told` has no more room: then take it out and call again.
 
     No robot has more than `most_links`.
@@ -54,17 +54,17 @@ def run_until(rules, bursts, state, queue, told, most_links, until_ns):
             return False
         cancel(queue, kind, r)
         if kind == OFF_AIR:
-            service.sent(rules, bursts, state, queue, told, r, now_ns)
+            attempts.sent(rules, losses, state, queue, told, r, now_ns)
         elif kind == LISTENED:
-            service.listened(rules, state, queue, told, r, now_ns)
+            attempts.listened(rules, state, queue, told, r, now_ns)
         elif kind == TIMER:
-            service.timer(rules, state, queue, told, r, now_ns)
+            attempts.timer(rules, state, queue, told, r, now_ns)
         elif kind == SEND:
-            service.send(rules, state, queue, told, r, now_ns)
+            attempts.send(rules, state, queue, told, r, now_ns)
         elif kind == ENTER:
-            service.enter(rules, state, queue, told, r, now_ns)
+            sender_queue.enter(rules, state, queue, told, r, now_ns)
         else:
-            service.answer(rules, state, queue, r, now_ns)
+            attempts.answer(rules, state, queue, r, now_ns)
     return True
 
 
@@ -73,7 +73,7 @@ def stop_the_dead(state, queue, told, alive, now_ns):
     """The queues of robots that are not alive (rows,) end; after `line_up`."""
     for r in range(len(state.robot)):
         if not alive[r]:
-            service.stop(state, queue, told, r, now_ns, SENDER_DEAD)
+            sender_queue.stop(state, queue, told, r, now_ns, SENDER_DEAD)
 
 
 @borrowing()

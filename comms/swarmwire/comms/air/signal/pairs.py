@@ -16,39 +16,14 @@ from numba import njit
 from swarmwire.comms.air.disk.reach import CELL_SLACK, strip
 from swarmwire.comms.air.propagation import scattering, shadowing
 from swarmwire.comms.air.propagation.bodies_between import bodies_between
-from swarmwire.comms.air.propagation.fading import FadingLaw, gain_of
-from swarmwire.comms.air.propagation.loss_curve import LossCurve
+from swarmwire.comms.air.propagation.fading import gain_of
 from swarmwire.comms.air.propagation.path_loss import loss_db
 from swarmwire.comms.air.propagation.walls import wall_loss_db
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
+from swarmwire.comms.air.signal.surroundings import Surroundings
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.geometry import grid
 from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
-
-
-class Surroundings(NamedTuple):
-    """Propagation in numbers."""
-
-    send_dbm: FloatArray  # (rows,) transmit power and antenna gain
-    receive_dbi: FloatArray  # (rows,) antenna gain
-    curve: LossCurve
-    reach_m: float  # no link is longer
-    least_dbm: float  # no link is weaker, fading apart
-    spread_db: float  # by how much shadowing may make up for path loss
-    shadows: bool
-    amplitude_db: float
-    field: FloatArray  # (arenas, 3, n), as `field_waves` has them
-    walls: bool
-    crossing_db: float
-    inside_db_per_m: float
-    line_of_sight: bool
-    bodies: bool
-    body_db: float
-    radius_m: FloatArray  # (rows,)
-    most_radius_m: float
-    fades: bool
-    law: FadingLaw
-    scatter: FloatArray  # (arenas, 5, n), as `scatter_waves` has them
 
 
 class Pairs(NamedTuple):
