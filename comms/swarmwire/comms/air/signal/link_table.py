@@ -23,6 +23,7 @@ from swarmwire.comms.air.propagation.walls import wall_loss_db
 from swarmwire.comms.air.reach import CELL_SLACK, strip
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry import Obstacles, is_blocked
 
 
@@ -145,14 +146,19 @@ def _ahead(x, y, robots, cells, at, j):
 
 @njit(cache=True)
 def _add_shadows(loss, x, y, robots, field, amplitude_db, a, b):
-    waves, single = field.shape[2], np.float32
-    height, parts, coarse = np.empty((len(x), waves), single), np.empty(waves, single), field.astype(single)
+    single = np.float32
+    height = np.empty((len(x), field.shape[2]), single)
     for r in range(len(x)):
         shadowing.heights(field[r // robots], x[r], y[r], height[r])
+    _add_between(loss, x, y, robots, field.astype(single), amplitude_db, a, b, height, np.empty(shadowing.SUMS, single))
+
+
+@borrowing()
+def _add_between(loss, x, y, robots, field, amplitude_db, a, b, height, parts):
     for i in range(len(a)):
         s, r = a[i], b[i]
-        dx, dy = single(x[r] - x[s]), single(y[r] - y[s])
-        loss[i] += shadowing.between_db(coarse, s // robots, amplitude_db, height, s, r, dx, dy, parts)
+        dx, dy = np.float32(x[r] - x[s]), np.float32(y[r] - y[s])
+        loss[i] += shadowing.between_db(field, s // robots, amplitude_db, height, s, r, dx, dy, parts)
 
 
 @njit(cache=True)
@@ -182,12 +188,16 @@ def _above(least_dbm, send_dbm, receive_dbi, a, b, loss):
 
 @njit(cache=True)
 def _fade(gain, x, y, robots, keys, scatter, law, a, b):
-    waves = scatter.shape[2]
-    at, parts = np.empty((len(x), 4, waves), np.float32), np.empty((2, waves), np.float32)
-    real, imaginary, number = parts[0], parts[1], np.empty(len(x), np.uint64)
+    at, number = np.empty((len(x), 4, scatter.shape[2]), np.float32), np.empty(len(x), np.uint64)
     for r in range(len(x)):
         scattering.arriving(scatter[r // robots], x[r], y[r], at[r])
         number[r] = scattering.own_number(keys[r // robots], r % robots)
+    parts = np.empty((2, scattering.SUMS), np.float32)
+    _gains(gain, x, y, at, number, law, a, b, parts[0], parts[1])
+
+
+@borrowing()
+def _gains(gain, x, y, at, number, law, a, b, real, imaginary):
     for i in range(len(a)):
         s, r = a[i], b[i]
         h = scattering.scattered(scattering.signs_of(number[s], number[r]), at, s, r, real, imaginary)
