@@ -9,6 +9,7 @@ from numba import njit
 
 from swarmwire.comms import grid
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.packets import BROADCAST
 
 # Two robots exactly `range_m` apart must not fall two cells apart by rounding.
@@ -108,7 +109,7 @@ def _strips(x, y, robots, cells):
     return first, stop
 
 
-@njit(cache=True)
+@borrowing()
 def strip(x, y, arena, cells, row):
     """First and stop in the grid's order of the three cells side by side that are `row` rows above (x, y) in m.
 
