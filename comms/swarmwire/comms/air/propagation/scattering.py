@@ -28,7 +28,11 @@ from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 
-WAVES, SUMS, GENERATOR = 32, 16, 19  # GENERATOR: v's index is GENERATOR x u's: near the golden section, and without common divisor
+WAVES, SUMS, GENERATOR = (
+    32,
+    16,
+    19,
+)  # GENERATOR: v's index is GENERATOR x u's: near the golden section, and without common divisor
 SCALE = 1.0 / math.sqrt(WAVES)
 FADING = purpose("fading")
 TURN_U, TURN_V, PHASE, OWN = range(4)  # what draws are for

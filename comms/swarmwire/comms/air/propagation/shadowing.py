@@ -58,9 +58,7 @@ def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
     height = np.empty((2, waves.shape[1]))
     heights(waves, ax, ay, height[0])
     heights(waves, bx, by, height[1])
-    return between_db(
-        waves.reshape((1, 3, -1)), 0, amplitude_db, height, 0, 1, bx - ax, by - ay, np.empty(SUMS)
-    )
+    return between_db(waves.reshape((1, 3, -1)), 0, amplitude_db, height, 0, 1, bx - ax, by - ay, np.empty(SUMS))
 
 
 @njit(cache=True, error_model="numpy")

@@ -187,7 +187,7 @@ def _add_bodies(loss, x, y, robots, cells, radius_m, most_radius_m, body_db, a, 
         loss[i] += body_db * bodies_between(x, y, radius_m, most_radius_m, cells, robots, a[i], b[i])
 
 
-@borrowing()
+@borrowing(from_python=True)
 def _above(least_dbm, send_dbm, receive_dbi, a, b, loss):
     """Put pairs in which either hears the other with so much power before the others, and say how many there are."""
     kept = np.uint64(0)

@@ -52,7 +52,7 @@ def links_by_sender(
     return LinkTable._make(column[:links] for column in table), LinkPlaces(first, weak, stop)
 
 
-@borrowing()
+@borrowing(from_python=True)
 def _find_kinds(kind, power_mw, counts, own, pairs, both_alike, send_dbm, receive_dbi, fate, levels):
     """What each link is, 4 more if it is listed, its power, and how many of each kind each robot has."""
     a, b, there_db, back_db, gain, _ = pairs
@@ -81,7 +81,7 @@ def _kind(mean_dbm, power_mw, is_open, levels):
     return STRONG * is_strong + WEAK * is_weak + 4 * is_listed
 
 
-@borrowing()
+@borrowing(from_python=True)
 def _fill(table, next_place, sender, receiver, fate, kind, power_mw):
     """Put in the links of one way; `next_place` (rows, 3), where each robot's next of a kind goes, moves on."""
     for i in range(len(kind)):

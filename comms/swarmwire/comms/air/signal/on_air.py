@@ -24,10 +24,10 @@ ALONE = METHODS.index("none")
 
 
 @borrowing()
-def put_on_air(rules, state, queue, s, kind, now_ns, airtime_ns, bits):
-    """The frame of robot s starts; its links are those from `first_link` to `stop_link`."""
+def put_on_air(rules, state, queue, s, now_ns, airtime_ns, bits):
+    """The frame of robot s, `on_air`, starts; its links are those from `first_link` to `stop_link`."""
     me = state.robot[s]
-    me.on_air, me.on_air_ns, me.airtime_ns, me.bits = kind, now_ns, airtime_ns, bits
+    me.on_air_ns, me.airtime_ns, me.bits = now_ns, airtime_ns, bits
     schedule(queue, OFF_AIR, s, now_ns + airtime_ns)
     robot, reception = state.robot, state.reception
     receiver, power_mw, fate, now = state.link.receiver, state.link.power_mw, state.link.fate, state.link.now
