@@ -2,17 +2,17 @@
 
 from dataclasses import dataclass, field
 
-from swarmwire.comms.air.presets import PRESETS
+from swarmwire.comms.air.parameters.access import Access
+from swarmwire.comms.air.parameters.delays import Delays
+from swarmwire.comms.air.parameters.propagation import Antenna, Bodies, Fading, Shadowing, Walls
+from swarmwire.comms.air.parameters.reception import Bursts, Reception
+from swarmwire.comms.air.parameters.trace import Trace
+from swarmwire.comms.air.presets.registry import PRESETS
 from swarmwire.comms.air.propagation.friis import Friis
 from swarmwire.comms.air.propagation.itu_indoor import ItuIndoor
 from swarmwire.comms.air.propagation.log_distance import LogDistance
-from swarmwire.comms.air.propagation.parameters import Antenna, Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.air.propagation.two_ray import TwoRay
 from swarmwire.comms.air.reception.noise import Noise
-from swarmwire.comms.air.reception.parameters import Bursts, Reception
-from swarmwire.comms.air.signal.parameters import Access
-from swarmwire.comms.air.traces.parameters import Trace
-from swarmwire.comms.air.traffic.parameters import Delays
 from swarmwire.comms.parameters import parameter
 
 MODELS = ("disk", "log-distance", "friis", "two-ray", "itu-indoor")

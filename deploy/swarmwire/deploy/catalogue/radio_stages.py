@@ -3,8 +3,8 @@
 import inspect
 from types import ModuleType
 
-from swarmwire.comms.air.stage import Stage
-from swarmwire.comms.air.stages import ORDER
+from swarmwire.comms.air.stages.chain import ORDER
+from swarmwire.comms.air.stages.stage import Stage
 from swarmwire.deploy.catalogue.docs import first_line, paragraphs
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
 from swarmwire.deploy.catalogue.scenario_keys import all_keys

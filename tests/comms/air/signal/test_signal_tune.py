@@ -9,13 +9,13 @@ import pytest
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.antennas import Antennas
 from swarmwire.comms.air.disruption import ALL, DROP, NEWEST, Disruption
-from swarmwire.comms.air.propagation.parameters import Antenna, Fading, OwnAntenna, Shadowing
+from swarmwire.comms.air.parameters.propagation import Antenna, Fading, OwnAntenna, Shadowing
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.noise import Noise
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import Sent
 from tests.comms.air.runs import RATE_HZ, SIZE_M, Run, at, everybody, make_air, packets, scattered
 from tests.comms.air.signal.radios import METHODS, with_access

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from numba import njit
 
+from swarmwire.comms.air.parameters.propagation import FADINGS, Fading
 from swarmwire.comms.air.propagation.loss_curve import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.air.propagation.nakagami import nakagami_gain
-from swarmwire.comms.air.propagation.parameters import FADINGS, Fading
 from swarmwire.comms.air.propagation.scattering import scattered_between
 from swarmwire.comms.air.propagation.waves import cosine, sine
 from swarmwire.comms.borrowing import borrowing

@@ -22,7 +22,7 @@ import math
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.air.propagation.parameters import Shadowing
+from swarmwire.comms.air.parameters.propagation import Shadowing
 from swarmwire.comms.air.propagation.waves import sine, total
 from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.borrowing import borrowing

@@ -15,11 +15,11 @@ from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.jammers import Jammers
 from swarmwire.comms.air.propagation.loss_between import loss_between_db
 from swarmwire.comms.air.signal import dcf
-from swarmwire.comms.air.signal.link_table import Surroundings
 from swarmwire.comms.air.signal.on_air import count_chunk
+from swarmwire.comms.air.signal.surroundings import Surroundings
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.geometry import Obstacles, is_blocked
+from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
 
 
 def powers_of(

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.air.decibels import from_db
-from swarmwire.comms.air.signal.link_table import Pairs
+from swarmwire.comms.air.signal.pairs import Pairs
 from swarmwire.comms.air.signal.tables import LinkPlaces, LinkTable
 from swarmwire.comms.arrays import ByteArray, FloatArray
 from swarmwire.comms.borrowing import borrowing

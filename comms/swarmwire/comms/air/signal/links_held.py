@@ -5,11 +5,12 @@
 import numpy as np
 
 from swarmwire.comms.air.disruption import Disruption
-from swarmwire.comms.air.signal.link_table import Pairs, Surroundings, pairs_of
 from swarmwire.comms.air.signal.links_by_sender import Levels, links_by_sender
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
+from swarmwire.comms.air.signal.pairs import Pairs, pairs_of
+from swarmwire.comms.air.signal.surroundings import Surroundings
 from swarmwire.comms.air.signal.tables import NO_LINKS, NOBODY, SILENT, LinkPlaces, LinkTable, Table
-from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.air.stages.stage import Medium
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.fates import Fate
 

@@ -9,11 +9,12 @@ disturb one another (access "none"), every receiver hears each of them on its ow
 
 import numpy as np
 
+from swarmwire.comms.air.parameters.access import METHODS
 from swarmwire.comms.air.signal import dcf
 from swarmwire.comms.air.signal.event_queue import OFF_AIR, schedule
+from swarmwire.comms.air.signal.frame_fate import alone_log_success, outcome
 from swarmwire.comms.air.signal.log_success import log_success
-from swarmwire.comms.air.signal.outcome import alone_log_success, outcome
-from swarmwire.comms.air.signal.parameters import METHODS
+from swarmwire.comms.air.signal.losses import takes_none
 from swarmwire.comms.air.signal.tables import DATA, NOBODY, RECEIVING, SILENT, TURNING
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.fates import Fate
@@ -54,7 +55,7 @@ def put_on_air(rules, state, queue, s, now_ns, airtime_ns, bits):
 
 
 @borrowing()
-def take_off_air(rules, bursts, state, queue, s, now_ns):
+def take_off_air(rules, losses, state, queue, s, now_ns):
     """The frame of robot s ends: each of its links that may be told of has a fate in `now`."""
     me = state.robot[s]
     robot, reception = state.robot, state.reception
@@ -62,11 +63,11 @@ def take_off_air(rules, bursts, state, queue, s, now_ns):
     if rules.method == ALONE:
         for i in range(me.first_link, me.weak_link):
             if now[i] == RECEIVING:
-                now[i] = outcome(rules, bursts, state, s, i, alone_log_success(rules, power_mw[i], me.bits))
+                now[i] = outcome(rules, losses, state, s, i, alone_log_success(rules, power_mw[i], me.bits))
         me.on_air = SILENT
         return
     # Nothing but noise could take a frame.
-    is_sure = rules.loss == 0.0 and not bursts.is_on and me.on_air == DATA and len(state.traced.link) == 0
+    is_sure = takes_none(losses) and me.on_air == DATA
     first, weak, stop = np.uint64(me.first_link), np.uint64(me.weak_link), np.uint64(me.stop_link)
     for i in range(first, weak):
         if fate[i] != HEARD:
@@ -79,7 +80,7 @@ def take_off_air(rules, bursts, state, queue, s, now_ns):
             if is_sure and it.log_success == 0.0:
                 now[i] = HEARD
             else:
-                now[i] = outcome(rules, bursts, state, s, np.int64(i), it.log_success)
+                now[i] = outcome(rules, losses, state, s, np.int64(i), it.log_success)
             robot[receiver[i]].trust_from_ns = 0 if now[i] == HEARD else now_ns + rules.distrust_ns
         dcf.sense(rules, state, queue, receiver[i], now_ns)
     for i in range(weak, stop):
