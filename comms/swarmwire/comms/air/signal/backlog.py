@@ -8,7 +8,7 @@ from swarmwire.comms.air.signal.tables import BACKING_OFF, HELD, KEPT_ALL, SILEN
 from swarmwire.comms.borrowing import borrowing
 
 
-@borrowing()
+@borrowing(from_python=True)
 def switch(rules, state, queue, told, now_ns):
     """Radios are off or on from now on, as `state.off` says; after `line_up`.
 
