@@ -5,9 +5,7 @@ import importlib
 
 import pytest
 
-from tests.docs.pages import ROOT
-
-PARTS = ("comms", "agent", "world", "metrics", "deploy")
+from tests.test_workspace import PARTS, ROOT
 
 
 def modules() -> list[str]:

@@ -3,9 +3,7 @@
 import re
 
 from swarmwire.comms import errors
-from tests.docs.pages import ROOT
-
-PARTS = ("comms", "agent", "world", "metrics", "deploy")
+from tests.test_workspace import PARTS, ROOT
 
 
 def test_the_tree_at_the_top_of_the_file_names_every_error_of_the_five_parts() -> None:
