@@ -84,7 +84,11 @@ def params_of(params: dict[str, Any], index: IntArray) -> dict[str, Any]:
 
 
 def robots_text(names: list[str]) -> str:
-    """Robot names in a few words."""
+    """Robot names in a few words.
+
+    >>> robots_text(["flock-0", "flock-1", "flock-2", "flock-3"])
+    'flock-0 … flock-3 (4 robots)'
+    """
     if len(names) <= 3:
         return ", ".join(names)
     return f"{names[0]} … {names[-1]} ({len(names)} robots)"
