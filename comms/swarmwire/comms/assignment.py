@@ -76,7 +76,7 @@ class Assignment:
 
 
 def params_of(params: dict[str, Any], index: IntArray) -> dict[str, Any]:
-    """The parameters of the robots `index` alone: of a list, which has a value for each robot, theirs."""
+    """The parameters of the robots `index` (k,) alone: of a list, which has a value for each robot, theirs."""
     return {
         name: [cast("list[Any]", value)[i] for i in index.tolist()] if isinstance(value, list) else value
         for name, value in params.items()
