@@ -2,6 +2,7 @@
 
 import re
 from collections import defaultdict
+from functools import cache
 from importlib import import_module
 from inspect import isclass, isfunction
 from types import ModuleType
@@ -14,6 +15,7 @@ DOCUMENTED = re.compile(DIRECTIVE + r":: (?P<path>[\w.]+)(?P<options>(?:\n   :.*
 USERS = "users"
 
 
+@cache
 def seams() -> dict[Name, list[str]]:
     """Who relies on each public name: "users", and the parts that take it from another, in the order of the parts."""
     found: dict[Name, set[str]] = defaultdict(set)

@@ -38,7 +38,7 @@ def tree_of(path: Path) -> ast.Module:
 
 def taken_by(tree: ast.Module) -> set[Name]:
     """The names that a file imports from modules of ours, and those that it reaches through a module."""
-    known = dict(_known(tree))
+    known = _known(tree)
     taken = {*known.values(), *_mentioned(tree, known)}
     return {name for name in taken if ".".join(name) not in modules() and not name[1].startswith("__")}
 
@@ -47,7 +47,7 @@ def taken_by(tree: ast.Module) -> set[Name]:
 def made_in(name: Name) -> Name:
     """Where a name that other modules hand on is made."""
     module, inner = name
-    source = dict(_known(tree_of(modules()[module]))).get(inner)
+    source = _known(tree_of(modules()[module])).get(inner)
     return made_in(source) if source and source[0] in modules() else name
 
 
@@ -58,7 +58,7 @@ def made_of() -> dict[Name, set[Name]]:
     for module, path in modules().items():
         tree = tree_of(path)
         own = {name: (module, name) for node in tree.body for name in names_of(node)}
-        known = {**own, **dict(_known(tree))}
+        known = {**own, **_known(tree)}
         for node in tree.body:
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 found[module, node.name] = {made_in(name) for name in _mentioned(node, known) if name[0] in modules()}
@@ -96,11 +96,15 @@ def names_of(node: ast.stmt) -> list[str]:
     return [inner.id for target in targets for inner in ast.walk(target) if isinstance(inner, ast.Name)]
 
 
-def _known(tree: ast.Module) -> Iterator[tuple[str, Name]]:
+@cache
+def _known(tree: ast.Module) -> dict[str, Name]:
     """Names as a file knows them by its imports, and the modules of ours and the names there that they stand for."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "swarmwire":
-            yield from ((alias.asname or alias.name, (node.module, alias.name)) for alias in node.names)
+    return {
+        alias.asname or alias.name: (node.module, alias.name)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "swarmwire"
+        for alias in node.names
+    }
 
 
 def _mentioned(tree: ast.AST, known: dict[str, Name]) -> Iterator[Name]:
