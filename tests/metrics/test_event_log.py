@@ -7,9 +7,9 @@ from swarmwire.comms.truth import Happened
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.event_recorder import EventRecorder
-from swarmwire.metrics.rerun_recording import RerunRecording
-from tests.metrics.test_rerun_recording import column
+from swarmwire.metrics.viewer.recording import RerunRecording
 from tests.metrics.truths import static, truth
+from tests.metrics.viewer.test_rerun_recording import column
 
 
 def kill(*changed: bool, ended: bool = False) -> Happened:

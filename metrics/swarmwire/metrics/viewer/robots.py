@@ -1,0 +1,67 @@
+"""The robots of a recording: where they are, where they head, where they were, what they are at, who hears whom."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.truth import Static, Truth
+from swarmwire.metrics.palette import robot_color
+from swarmwire.metrics.viewer.classes import RerunClasses
+from swarmwire.metrics.viewer.colors import shown
+
+_TRAIL_ALPHA = 170
+_TRAILS, _HEADINGS, _ROBOTS = 2.0, 3.0, 4.0  # drawn in this order, above the links
+_HEADING_RADII = 2.5  # length of a heading's arrow in body radii, from the centre
+_LEAST_HEADING = 0.025  # and at least this share of the arena's larger side, so that it can be seen,
+_CROWDED = 0.25  # or this share / sqrt(robots) if that is less, so that a thousand do not cover one another
+
+
+class RerunRobots:
+    """The robots of one arena: discs, headings and trails in each tick, their colours when one changes."""
+
+    def __init__(self, static: Static) -> None:
+        """Draw the robots of any arena of this run."""
+        self._static, self._classes = static, RerunClasses(static)
+        radii = [np.full(group.stop - group.start, group.body.radius_m) for group in static.groups]
+        self.radius_m = np.concatenate(radii)  # (robots,)
+        least = min(_LEAST_HEADING, _CROWDED / math.sqrt(static.robots))
+        self.heading_m = np.maximum(_HEADING_RADII * self.radius_m, least * max(static.arena_size_m))  # (robots,)
+        self._arrow_m = self.heading_m[:, None].astype(np.float32)
+        self._was: tuple[BoolArray, IntArray] | None = None  # who was alive and at what when the colours were logged
+
+    def begin(self, rec: Any) -> None:
+        """Log what does not change."""
+        import rerun as rr
+
+        names = [shown(name) for name in self._static.robot_names]
+        robots = rr.Points2D.from_fields(radii=self.radius_m, labels=names, show_labels=False, draw_order=_ROBOTS)
+        rec.log("world/robots", robots, static=True)
+        faint = np.zeros((self._static.robots, 4), np.uint8)
+        for i, group in enumerate(self._static.groups):
+            faint[group.start : group.stop] = (*robot_color(i), _TRAIL_ALPHA)
+        trails = rr.Points2D.from_fields(radii=rr.Radius.ui_points(0.7), colors=faint, draw_order=_TRAILS)
+        rec.log("world/trails", trails, static=True)
+        width = rr.Radius.ui_points(1.2)
+        headings = rr.Arrows2D.from_fields(radii=width, show_labels=False, draw_order=_HEADINGS)
+        rec.log("world/headings", headings, static=True)
+
+    def log(self, rec: Any, truth: Truth, rows: slice, *, trails: bool) -> None:
+        """Log a tick of the robots in these rows; without `trails` their places are not kept for those."""
+        import rerun as rr
+
+        pose, alive, state = truth.pose[rows], truth.alive[rows], truth.state[rows]
+        position_m, heading_rad = pose[:, :2].astype(np.float32), pose[:, 2].astype(np.float32)
+        points = rr.Points2D.from_fields(positions=position_m)
+        rec.log("world/robots", points)
+        if trails:
+            rec.log("world/trails", points)
+        ahead = np.stack([np.cos(heading_rad), np.sin(heading_rad)], axis=1) * self._arrow_m
+        rec.log("world/headings", rr.Arrows2D.from_fields(origins=position_m, vectors=ahead))
+        now = alive, state
+        if self._was is None or not all(map(np.array_equal, now, self._was)):
+            class_id = self._classes.of(rec, alive, state, truth.states)
+            rec.log("world/robots", rr.Points2D.from_fields(class_ids=class_id))
+            rec.log("world/headings", rr.Arrows2D.from_fields(class_ids=class_id))
+            self._was = alive.copy(), state.copy()
