@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.assignment import Assignment, GroupAssignment
-from swarmwire.comms.body import load_body
+from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.glimpse import Glimpse, Scene
 from swarmwire.comms.led_changes import LedChanges

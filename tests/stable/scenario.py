@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable
 
-from swarmwire.comms.actuator_sheet import ActuatorSheet
-from swarmwire.comms.body import Body
-from swarmwire.comms.drives import DRIVES
-from swarmwire.comms.leds import Leds
+from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.drives import DRIVES
+from swarmwire.comms.bodies.leds import Leds
 from swarmwire.comms.sheets import SHEETS
 from swarmwire.deploy.catalogue.entry import Parameter
 from swarmwire.deploy.catalogue.scenario_keys import all_keys

@@ -4,7 +4,7 @@ from dataclasses import asdict
 from typing import Any
 
 from swarmwire.comms.truth import Static
-from swarmwire.deploy.origin import Origin
+from swarmwire.deploy.record.origin import Origin
 from tests.stable.recorded_run import recorded
 from tests.stable.samples import LEFT_OUT, joined, lines_of, paths_of, sample
 

@@ -7,7 +7,7 @@ from swarmwire.agent.declared import parameters_of
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.loading import NotLoaded, load_named, resolve
 
-AgentClass = type[Agent] | type[VectorAgent[Any]]
+AgentClass = type[Agent] | type[VectorAgent[Any]]  # what a scenario's `agent` names
 
 __all__ = ["AgentClass", "NoAgent", "load_agent", "resolve"]
 

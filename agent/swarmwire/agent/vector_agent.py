@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from swarmwire.agent.robots import Robots
 from swarmwire.comms.arrays import IntArray
 
-FloatColumn = NDArray[np.float64]
-IntColumn = NDArray[np.int64]
-BoolColumn = NDArray[np.bool_]
+FloatColumn = NDArray[np.float64]  # float64, (n,)
+IntColumn = NDArray[np.int64]  # int64, (n,)
+BoolColumn = NDArray[np.bool_]  # bool, (n,)
 
 
 class _Default:

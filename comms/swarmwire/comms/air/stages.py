@@ -30,7 +30,7 @@ from swarmwire.comms.air import (
 from swarmwire.comms.air.stage import Medium, Stage
 
 AFTER_RECEPTION = (trace, given_range, given_bearing, given_rssi, delay, delays, propagation_delay)
-ORDER = (line_of_sight, bodies_block, disrupted, fixed_loss, bursts, *AFTER_RECEPTION)
+ORDER = (line_of_sight, bodies_block, disrupted, fixed_loss, bursts, *AFTER_RECEPTION)  # whose order is their meaning
 
 
 def chain(medium: Medium) -> tuple[Stage, ...]:
