@@ -255,7 +255,7 @@ def test_what_is_no_run_folder_is_refused(tmp_path):
 
 def test_a_recording_is_read_to_its_end(tmp_path):
     pytest.importorskip("rerun", reason="needs the extra [view]")
-    from tests.metrics import test_rerun_recording as recording
+    from tests.metrics.viewer import test_rerun_recording as recording
 
     fill(tmp_path)
     of = static(3)
