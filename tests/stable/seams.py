@@ -10,7 +10,7 @@ from types import ModuleType
 from tests.stable.sources import PARTS, ROOT, TEMPLATE, Name, modules, part_of, taken_by, tree_of
 
 FOR_USERS = ("agent", "agent.behaviours", "agent.readings", "agent.testing", "deploy", "world.own")
-DIRECTIVE = r"(?:auto|py:)(?P<kind>class|function|module|type)"
+DIRECTIVE = r"(?:auto|py:)(?P<kind>class|data|function|module|type)"
 DOCUMENTED = re.compile(DIRECTIVE + r":: (?P<path>[\w.]+)(?P<options>(?:\n   :.*)*)")
 USERS = "users"
 
