@@ -40,7 +40,7 @@ def taken_by(tree: ast.Module) -> set[Name]:
     """The names that a file imports from modules of ours, and those that it reaches through a module."""
     known = _known(tree)
     taken = {*known.values(), *_mentioned(tree, known)}
-    return {name for name in taken if ".".join(name) not in modules() and not name[1].startswith("__")}
+    return {name for name in taken if not _is_module(name) and not name[1].startswith("__")}
 
 
 @cache
@@ -53,15 +53,15 @@ def made_in(name: Name) -> Name:
 
 @cache
 def made_of() -> dict[Name, set[Name]]:
-    """What each function and class of ours mentions, types of its signature too, by where it is made."""
+    """What each function, class and value of ours mentions, its types too, by where it is made."""
     found: dict[Name, set[Name]] = {}
     for module, path in modules().items():
         tree = tree_of(path)
         own = {name: (module, name) for node in tree.body for name in names_of(node)}
         known = {**own, **_known(tree)}
         for node in tree.body:
-            if isinstance(node, ast.FunctionDef | ast.ClassDef):
-                found[module, node.name] = {made_in(name) for name in _mentioned(node, known) if name[0] in modules()}
+            mentioned = {made_in(name) for name in _mentioned(node, known) if name[0] in modules()}
+            found |= {(module, name): mentioned for name in names_of(node)}
     return found
 
 
@@ -85,7 +85,7 @@ def _said_above(lines: list[str], row: int) -> str:
     last = row
     while row > 0 and lines[row - 1].startswith("#"):
         row -= 1
-    return " ".join(line.lstrip("# ") for line in lines[row:last])
+    return " ".join(line.lstrip("#: ") for line in lines[row:last])
 
 
 def names_of(node: ast.stmt) -> list[str]:
@@ -94,6 +94,12 @@ def names_of(node: ast.stmt) -> list[str]:
         return [node.name]
     targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else ()
     return [inner.id for target in targets for inner in ast.walk(target) if isinstance(inner, ast.Name)]
+
+
+def _is_module(name: Name) -> bool:
+    """Whether this is a module, and nothing of the same name that its package hands on."""
+    package = modules().get(name[0])
+    return ".".join(name) in modules() and (package is None or name[1] not in _known(tree_of(package)))
 
 
 @cache

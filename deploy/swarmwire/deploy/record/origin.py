@@ -15,7 +15,7 @@ from swarmwire.deploy.record.modules import changed_modules, module_digests
 from swarmwire.deploy.record.scenario_copy import CopiedFile, changed_files, copy_scenario
 from swarmwire.metrics.record.formats import RUN_FORMAT, refuse_other_format
 from swarmwire.metrics.record.names import RUN_JSON
-from swarmwire.metrics.record.whole_text import write_whole
+from swarmwire.metrics.whole_file import write_whole
 from swarmwire.world.scenario.scenario import Scenario
 
 

@@ -12,7 +12,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
 from swarmwire.metrics.record.formats import TABLES_FORMAT, refuse_other_format
-from swarmwire.metrics.record.whole_text import write_whole
+from swarmwire.metrics.whole_file import write_whole
 
 
 def write_static(static: Static, path: Path) -> None:
