@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_arg
 import numpy as np
 from numpy.typing import NDArray
 
+from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.robots import Robots
 from swarmwire.comms.arrays import IntArray
 
-FloatColumn = NDArray[np.float64]
-IntColumn = NDArray[np.int64]
-BoolColumn = NDArray[np.bool_]
+FloatColumn = NDArray[np.float64]  # float64, (n,)
+IntColumn = NDArray[np.int64]  # int64, (n,)
+BoolColumn = NDArray[np.bool_]  # bool, (n,)
 
 
 class _Default:
@@ -85,9 +86,10 @@ class VectorAgent(ABC, Generic[S]):
 
     One instance serves all robots of a group in a process, over all arenas; so nothing may be kept on `self` but
     parameters (annotated class attributes, as for Agent, or `PerRobot`). `class Search(VectorAgent[Memory])` names its
-    State.
+    State. `api = 1` is as for Agent.
     """
 
+    api: ClassVar[int] = API_VERSION
     needs: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod

@@ -21,14 +21,14 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import TAG_BYTES, Payloads
 
-f4 = Annotated[float, np.dtype("<f4")]
-f8 = Annotated[float, np.dtype("<f8")]
-i1 = Annotated[float, np.dtype("<i1")]
-i2 = Annotated[float, np.dtype("<i2")]
-i4 = Annotated[float, np.dtype("<i4")]
-u1 = Annotated[float, np.dtype("<u1")]
-u2 = Annotated[float, np.dtype("<u2")]
-u4 = Annotated[float, np.dtype("<u4")]
+f4 = Annotated[float, np.dtype("<f4")]  # float32 on air
+f8 = Annotated[float, np.dtype("<f8")]  # float64 on air
+i1 = Annotated[float, np.dtype("<i1")]  # int8 on air
+i2 = Annotated[float, np.dtype("<i2")]  # int16 on air
+i4 = Annotated[float, np.dtype("<i4")]  # int32 on air
+u1 = Annotated[float, np.dtype("<u1")]  # uint8 on air
+u2 = Annotated[float, np.dtype("<u2")]  # uint16 on air
+u4 = Annotated[float, np.dtype("<u4")]  # uint32 on air
 
 DICT_TAG = 0  # a dict in msgpack, for prototypes; no class has this tag
 

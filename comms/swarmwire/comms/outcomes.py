@@ -50,4 +50,4 @@ class Outcomes:
 
 _NOTHING = np.empty(0, np.int64)
 _NOTHING.setflags(write=False)
-NO_OUTCOMES = Outcomes(_NOTHING, _NOTHING, _NOTHING)
+NO_OUTCOMES = Outcomes(_NOTHING, _NOTHING, _NOTHING)  # nothing to tell
