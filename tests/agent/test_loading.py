@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from swarmwire.agent.behaviours import Flocking
-from swarmwire.agent.loading import NoAgent, load_agent, resolve
+from swarmwire.agent.loading import NoAgent, load_agent
+from swarmwire.comms.loading import resolve
 from tests.agent.hosts import PLAYERS, spec
 
 HEAD = "from swarmwire.agent import Agent, Robot, VectorAgent\n"

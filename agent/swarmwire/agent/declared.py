@@ -10,8 +10,8 @@ from swarmwire.agent.per_robot import PerRobot, PerRobotDefault
 from swarmwire.agent.vector_agent import VectorAgent
 
 T = TypeVar("T")
-TYPES: dict[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
-REQUIRED = object()
+TYPES: dict[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}  # in words
+REQUIRED = object()  # in place of a default
 
 
 class BadParameter(ValueError):

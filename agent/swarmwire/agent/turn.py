@@ -18,7 +18,7 @@ from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
 
 M = TypeVar("M", bound=Message)
-OUTCOMES = "radio.outcomes"
+OUTCOMES = "radio.outcomes"  # what `needs` calls the outcomes of addressed packets
 NOT_SWITCHED = -1
 
 

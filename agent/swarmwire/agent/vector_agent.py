@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_arg
 import numpy as np
 from numpy.typing import NDArray
 
+from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.robots import Robots
 from swarmwire.comms.arrays import FloatArray, IntArray
 
-FloatColumn = NDArray[np.float64]
-IntColumn = NDArray[np.int64]
-BoolColumn = NDArray[np.bool_]
+FloatColumn = NDArray[np.float64]  # float64, (n,)
+IntColumn = NDArray[np.int64]  # int64, (n,)
+BoolColumn = NDArray[np.bool_]  # bool, (n,)
 
 
 FROZEN = "_frozen"  # attribute of a VectorAgent once it is made
@@ -96,8 +97,10 @@ class VectorAgent(ABC, Generic[S]):
     One instance serves all robots of a group in a process, over all arenas; so nothing can be set on `self` once it is
     made: it has parameters (annotated class attributes, as for Agent, or `PerRobot`) and what `__init__` makes of them.
     What it remembers of its robots is in its State, which `class Search(VectorAgent[Memory])` names.
+    `api = 1` is as for Agent.
     """
 
+    api: ClassVar[int] = API_VERSION
     needs: ClassVar[tuple[str, ...]] = ()
 
     def __setattr__(self, name: str, value: object) -> None:

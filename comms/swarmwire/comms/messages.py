@@ -1,7 +1,10 @@
 """Messages: what robots say to one another, with the exact bytes that go on air.
 
-    class Beacon(Message):
-        heading_rad: f4
+    >>> class Beacon(Message):
+    ...     heading_rad: f4
+    >>> on_air = Beacon(heading_rad=0.5).encode()
+    >>> len(on_air), Beacon.decode(on_air)
+    (6, Beacon(heading_rad=0.5))
 
 A message on air is a 2-byte tag made from its class name and fields, then its fields packed little-endian. To the type
 checker a field is a `float`, in the constructor and when read: a decoded field is widened to float64 whatever its width
@@ -18,14 +21,14 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import TAG_BYTES, Payloads
 
-f4 = Annotated[float, np.dtype("<f4")]
-f8 = Annotated[float, np.dtype("<f8")]
-i1 = Annotated[float, np.dtype("<i1")]
-i2 = Annotated[float, np.dtype("<i2")]
-i4 = Annotated[float, np.dtype("<i4")]
-u1 = Annotated[float, np.dtype("<u1")]
-u2 = Annotated[float, np.dtype("<u2")]
-u4 = Annotated[float, np.dtype("<u4")]
+f4 = Annotated[float, np.dtype("<f4")]  # float32 on air
+f8 = Annotated[float, np.dtype("<f8")]  # float64 on air
+i1 = Annotated[float, np.dtype("<i1")]  # int8 on air
+i2 = Annotated[float, np.dtype("<i2")]  # int16 on air
+i4 = Annotated[float, np.dtype("<i4")]  # int32 on air
+u1 = Annotated[float, np.dtype("<u1")]  # uint8 on air
+u2 = Annotated[float, np.dtype("<u2")]  # uint16 on air
+u4 = Annotated[float, np.dtype("<u4")]  # uint32 on air
 
 SEND_NAMES = ("rows", "to")  # arguments of a VectorAgent's `send`, beside which it takes the fields
 DICT_TAG = 0  # a dict in msgpack, for prototypes; no class has this tag
