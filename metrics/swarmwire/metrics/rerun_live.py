@@ -20,5 +20,5 @@ class RerunLive(RerunRecording):
     def _connect(self, layout: Any) -> None:
         layout.time_panel.play_state = "following"
         self._arena_view.links_every_ticks = 1  # whoever publishes the ticks has thinned the links already
-        self._plots.send_every_ticks = 1  # people wait for it
+        self._send_every_ticks = 1  # people wait for it
         self._rec.connect_grpc(self._url, default_blueprint=layout)

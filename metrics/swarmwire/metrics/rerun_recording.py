@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.metrics.event_log import names
@@ -13,8 +11,11 @@ from swarmwire.metrics.rerun_about import about
 from swarmwire.metrics.rerun_arena import RerunArena
 from swarmwire.metrics.rerun_layout import layout
 from swarmwire.metrics.rerun_plots import RerunPlots
+from swarmwire.metrics.rerun_rows import RerunRows
 from swarmwire.metrics.rerun_selected import selected_robot
 from swarmwire.metrics.view_extra import need_view_extra
+
+SEND_EVERY_S = 5.0  # of the run; each time costs half a kilobyte and more per entity, whatever it holds
 
 
 class RerunRecording:
@@ -49,6 +50,7 @@ class RerunRecording:
         self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
         self._rec.set_log_time_enabled(False)
         self._rec.set_log_tick_enabled(False)
+        self._send_every_ticks = round(SEND_EVERY_S * static.rate_hz)
         self._connect(layout(static, selected))
         self._rec.send_recording_name(f"{static.name}, seed {seed}")
         links_every = self._arena_view.links_every_ticks
@@ -58,24 +60,28 @@ class RerunRecording:
         self._rec.log("about", rr.TextDocument(text, media_type="text/markdown"), static=True)
         self._arena_view.begin(self._rec)
         self._plots.begin(self._rec)
+        self._rows = RerunRows(self._rec)
         self._ticks = 0
 
     def see(self, truth: Truth) -> None:
         """Record one tick."""
         import rerun as rr
 
-        self._rec.set_time("tick", sequence=truth.tick)
-        self._rec.set_time("sim_time", duration=np.timedelta64(truth.time_ns, "ns"))
-        self._arena_view.log(self._rec, truth)
-        if not self._ticks:
-            self._rec.log("events", rr.TextLog(f"the run begins: {self._static.robots} robots"))
-        self._ticks += 1
+        rows = self._rows
+        rows.begin_tick(truth.tick, truth.time_ns)
+        self._arena_view.add(rows, truth)
+        told = [] if self._ticks else [f"the run begins: {self._static.robots} robots"]
         for event in truth.events:
             robots = ", ".join(names(event, self._static)[self._arena])
             if event.singly and not robots:
                 continue
-            self._rec.log("events", rr.TextLog(f"{event.words}: {robots or 'no robot'}"))
-        self._plots.log(self._rec, self._metrics.latest, truth)
+            told.append(f"{event.words}: {robots or 'no robot'}")
+        for text in told:
+            rows.add("events", rr.TextLog, text=[text])
+        self._plots.add(rows, self._metrics.latest, truth)
+        self._ticks += 1
+        if rows.full or self._ticks % self._send_every_ticks == 0:
+            rows.send()
 
     def _connect(self, layout: Any) -> None:
         """Lead the stream to where it goes."""
@@ -83,7 +89,7 @@ class RerunRecording:
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """Close the file. Summary part: `record_rrd`, as of the tables; its rows are ticks."""
-        self._plots.flush(self._rec)
+        self._rows.send()
         self._rec.flush()
         self._rec.disconnect()
         return {"record_rrd": {"rows": self._ticks, "dropped": 0}}

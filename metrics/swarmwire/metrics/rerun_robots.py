@@ -10,6 +10,7 @@ from swarmwire.comms.truth import Static, Truth
 from swarmwire.metrics.palette import robot_color
 from swarmwire.metrics.rerun_classes import RerunClasses
 from swarmwire.metrics.rerun_colors import shown
+from swarmwire.metrics.rerun_rows import RerunRows
 
 _TRAIL_ALPHA = 170
 _TRAILS, _HEADINGS, _ROBOTS = 2.0, 3.0, 4.0  # drawn in this order, above the links
@@ -47,21 +48,20 @@ class RerunRobots:
         headings = rr.Arrows2D.from_fields(radii=width, show_labels=False, draw_order=_HEADINGS)
         rec.log("world/headings", headings, static=True)
 
-    def log(self, rec: Any, truth: Truth, rows: slice, *, trails: bool) -> None:
-        """Log a tick of the robots in these rows; without `trails` their places are not kept for those."""
+    def add(self, rows: RerunRows, truth: Truth, own: slice, *, trails: bool) -> None:
+        """Add a tick of the robots in these rows of the world; without `trails` their places are not kept for those."""
         import rerun as rr
 
-        pose, alive, state = truth.pose[rows], truth.alive[rows], truth.state[rows]
+        pose, alive, state = truth.pose[own], truth.alive[own], truth.state[own]
         position_m, heading_rad = pose[:, :2].astype(np.float32), pose[:, 2].astype(np.float32)
-        points = rr.Points2D.from_fields(positions=position_m)
-        rec.log("world/robots", points)
+        rows.add("world/robots", rr.Points2D, positions=position_m)
         if trails:
-            rec.log("world/trails", points)
+            rows.add("world/trails", rr.Points2D, positions=position_m)
         ahead = np.stack([np.cos(heading_rad), np.sin(heading_rad)], axis=1) * self._arrow_m
-        rec.log("world/headings", rr.Arrows2D.from_fields(origins=position_m, vectors=ahead))
+        rows.add("world/headings", rr.Arrows2D, origins=position_m, vectors=ahead)
         now = alive, state
         if self._was is None or not all(map(np.array_equal, now, self._was)):
-            class_id = self._classes.of(rec, alive, state, truth.states)
-            rec.log("world/robots", rr.Points2D.from_fields(class_ids=class_id))
-            rec.log("world/headings", rr.Arrows2D.from_fields(class_ids=class_id))
+            class_id = self._classes.of(rows.rec, alive, state, truth.states)
+            rows.add("world/robots", rr.Points2D, class_ids=class_id)
+            rows.add("world/headings", rr.Arrows2D, class_ids=class_id)
             self._was = alive.copy(), state.copy()
