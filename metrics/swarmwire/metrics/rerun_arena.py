@@ -55,7 +55,7 @@ class RerunArena:
         """Add one tick."""
         full = truth.tick % self.links_every_ticks == 0
         self._robots.add(rows, truth, self._own, trails=full)
-        self._leds.add(rows, truth.leds[self._own], truth.pose[self._own])
+        self._leds.add(rows, truth, self._own)
         self._selected.add(rows, truth, full=full)
         if truth.movable is not None:
             self._add_movable(rows, truth.movable[self._arena])
@@ -66,7 +66,7 @@ class RerunArena:
         import rerun as rr
 
         strips = [_outline(obstacle) for obstacle in self._static.movable_at(self._arena, pose)]
-        rows.add("world/movable", rr.LineStrips2D, strips=strips)
+        rows.add("world/movable", rr.LineStrips2D.columns, strips=strips)
 
     def _add_radio(self, rows: RerunRows, truth: Truth, position_m: FloatArray) -> None:
         import rerun as rr
@@ -74,7 +74,7 @@ class RerunArena:
         if truth.edges is not None:
             ends = self._edges(truth.edges)
             lines = link_lines(position_m, ends, self._static)
-            rows.add("world/links", rr.LineStrips2D, strips=lines.astype(np.float32))
+            rows.add("world/links", rr.LineStrips2D.columns, strips=lines.astype(np.float32))
         if truth.finished is not None:
             add_lost(rows, truth.finished, self._arena, position_m)
 

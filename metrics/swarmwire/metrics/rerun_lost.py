@@ -38,4 +38,4 @@ def add_lost(rows: RerunRows, finished: Finished, arena: int, position_m: FloatA
     own = (finished.arena == arena) & (finished.receiver >= 0) & (finished.fate != Fate.HEARD)
     ends = np.column_stack([finished.sender[own], finished.receiver[own]])
     strips, colors = position_m[ends].astype(np.float32), _COLORS[finished.fate[own]]
-    rows.add("world/lost_packets", rr.LineStrips2D, strips=strips, colors=colors)
+    rows.add("world/lost_packets", rr.LineStrips2D.columns, strips=strips, colors=colors)

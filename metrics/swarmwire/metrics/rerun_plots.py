@@ -59,7 +59,7 @@ class RerunPlots:
         for plot, value in numbers.items():
             self._series[plot].add(rows, value)
         if any(self._concerns(event) for event in truth.events):
-            rows.add("plots/shares/event", rr.Scalars, scalars=[_EVENT_MARK])
+            rows.add("plots/shares/event", rr.Scalars.columns, scalars=[_EVENT_MARK])
 
     def _concerns(self, event: Happened) -> bool:
         own = slice(self._arena * self._robots, (self._arena + 1) * self._robots)

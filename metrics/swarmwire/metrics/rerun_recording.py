@@ -3,10 +3,12 @@
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.metrics.event_log import names
 from swarmwire.metrics.plotted import Measured
+from swarmwire.metrics.record.chunk_limit import ChunkLimit
 from swarmwire.metrics.rerun_about import about
 from swarmwire.metrics.rerun_arena import RerunArena
 from swarmwire.metrics.rerun_layout import layout
@@ -15,7 +17,7 @@ from swarmwire.metrics.rerun_rows import RerunRows
 from swarmwire.metrics.rerun_selected import selected_robot
 from swarmwire.metrics.view_extra import need_view_extra
 
-SEND_EVERY_S = 5.0  # of the run; each time costs half a kilobyte and more per entity, whatever it holds
+SEND_BYTES = 4_000_000  # each time costs half a kilobyte and more per entity, whatever it holds
 
 
 class RerunRecording:
@@ -27,15 +29,20 @@ class RerunRecording:
     time in it), but not equal bytes: rerun numbers its chunks at random and cuts them as they come.
     """
 
-    def __init__(self, path: Path | None, metrics: Measured, arena: int = 0, selected: str | None = None) -> None:
-        """Record to this file, which is replaced; BadInput without the extra [view].
+    _send_bytes = SEND_BYTES
+
+    def __init__(
+        self, path: Path | None, metrics: Measured, clock: Clock, arena: int = 0, selected: str | None = None
+    ) -> None:
+        """Record to this file, which is replaced, at least every 2 s of `clock`; BadInput without the extra [view].
 
         `selected` names the robot that is shown in detail: its rays, its ring, its radio's range. None: the first robot
         of the first group that has rays or photocells. A subclass that leads elsewhere has no path.
         """
         self._what = f"recording {path.name}" if path else "live view"
         need_view_extra(self._what)
-        self._path, self._metrics, self._arena, self._selected = path, metrics, arena, selected
+        self._path, self._metrics, self._clock = path, metrics, clock
+        self._arena, self._selected = arena, selected
 
     def begin(self, static: Static) -> None:
         """Open the file and log what does not change; BadInput if there is no such arena or selected robot."""
@@ -50,7 +57,6 @@ class RerunRecording:
         self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
         self._rec.set_log_time_enabled(False)
         self._rec.set_log_tick_enabled(False)
-        self._send_every_ticks = round(SEND_EVERY_S * static.rate_hz)
         self._connect(layout(static, selected))
         self._rec.send_recording_name(f"{static.name}, seed {seed}")
         links_every = self._arena_view.links_every_ticks
@@ -60,7 +66,7 @@ class RerunRecording:
         self._rec.log("about", rr.TextDocument(text, media_type="text/markdown"), static=True)
         self._arena_view.begin(self._rec)
         self._plots.begin(self._rec)
-        self._rows = RerunRows(self._rec)
+        self._rows, self._limit = RerunRows(self._rec), ChunkLimit(self._send_bytes, self._clock)
         self._ticks = 0
 
     def see(self, truth: Truth) -> None:
@@ -77,11 +83,12 @@ class RerunRecording:
                 continue
             told.append(f"{event.words}: {robots or 'no robot'}")
         for text in told:
-            rows.add("events", rr.TextLog, text=[text])
+            rows.add("events", rr.TextLog.columns, text=[text])
         self._plots.add(rows, self._metrics.latest, truth)
         self._ticks += 1
-        if rows.full or self._ticks % self._send_every_ticks == 0:
+        if self._limit.reached(rows.kept_bytes):
             rows.send()
+            self._limit.restart()
 
     def _connect(self, layout: Any) -> None:
         """Lead the stream to where it goes."""

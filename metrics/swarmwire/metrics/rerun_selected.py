@@ -88,7 +88,7 @@ class RerunSelected:
         import rerun as rr
 
         x_m, y_m, heading_rad = truth.pose[self._row].tolist()
-        rows.add(_FRAME, rr.Transform3D, translation=[[x_m, y_m, 0.0]])
+        rows.add(_FRAME, rr.Transform3D.columns, translation=[[x_m, y_m, 0.0]])
         self._remember(truth)
         saw, self._sees = self._sees, any(bool(value.any()) for value in self._sensed.values())
         if not (full or saw or self._sees or not truth.alive[self._row]):
@@ -106,7 +106,7 @@ class RerunSelected:
             colors.append(np.full(len(length_m), _LIGHT_BAR, np.uint32))
         lines = np.concatenate(strips).astype(np.float32)
         if len(lines) or self._drawn:
-            rows.add(f"{_FRAME}/rays", rr.LineStrips2D, strips=lines, colors=np.concatenate(colors))
+            rows.add(f"{_FRAME}/rays", rr.LineStrips2D.columns, strips=lines, colors=np.concatenate(colors))
         self._drawn = len(lines) > 0
 
     def _remember(self, truth: Truth) -> None:

@@ -33,7 +33,7 @@ class RerunSeries:
         if new:
             self._appear(rows.rec, new)
         for entity, names in self._names.items():
-            rows.add(entity, rr.Scalars, scalars=[value[name] for name in names])
+            rows.add(entity, rr.Scalars.columns, scalars=[value[name] for name in names])
 
     def _appear(self, rec: Any, names: list[str]) -> None:
         import rerun as rr
