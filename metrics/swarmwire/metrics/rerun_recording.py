@@ -17,7 +17,7 @@ from swarmwire.metrics.rerun_rows import RerunRows
 from swarmwire.metrics.rerun_selected import selected_robot
 from swarmwire.metrics.view_extra import need_view_extra
 
-SEND_BYTES = 4_000_000  # each time costs half a kilobyte and more per entity, whatever it holds
+SEND_BYTES = 3_000_000  # each time costs half a kilobyte and more per entity, whatever it holds
 
 
 class RerunRecording:
