@@ -24,8 +24,8 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy import run
 from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.rerun_recording import RerunRecording
-from swarmwire.world.scenario_file import scenario_from
+from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.world.scenario.scenario_file import scenario_from
 
 REPEATS = 3
 PACKETS = 10  # that a robot reads in a step

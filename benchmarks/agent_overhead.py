@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.agents import Ping
 from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.assignment import Assignment, GroupAssignment
-from swarmwire.comms.body import load_body
+from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.messages import encode_rows
 from swarmwire.comms.packets import Heard

@@ -16,9 +16,9 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import WallClock, tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
-from swarmwire.deploy.probe import radio_of
+from swarmwire.deploy.radio.probe import radio_of
 
 RATE_HZ, TICKS, WARM_UP = 10, 60, 10
 STEP_M = 0.05  # deviation of each robot's move in a tick, along each axis

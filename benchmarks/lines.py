@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 from swarmwire.deploy import Result
-from swarmwire.deploy.machine import cpu
+from swarmwire.deploy.record.machine import cpu
 
 
 def report(name: str, value: float, unit: str, result: Result, config: dict[str, Any]) -> None:

@@ -15,7 +15,7 @@ from swarmwire.comms.air.reception.oqpsk import oqpsk_success
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
 
 FILE = "ns3_802154_distance.json"

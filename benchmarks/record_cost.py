@@ -8,7 +8,7 @@ from swarmwire.comms.protocols import Observer
 from swarmwire.deploy import Result, run
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.recorders import recorders
-from swarmwire.world.scenario import Scenario
+from swarmwire.world.scenario.scenario import Scenario
 
 
 def one_run(scenario: Scenario, folder: Path | None) -> tuple[float, Result]:

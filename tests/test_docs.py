@@ -5,7 +5,7 @@ import re
 import pytest
 
 from swarmwire.deploy import run
-from swarmwire.world.scenario_file import load_scenario
+from swarmwire.world.scenario.scenario_file import load_scenario
 from tests.docs.pages import PAGES, ROOT
 
 README = (ROOT / "README.md").read_text()

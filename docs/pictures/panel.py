@@ -12,11 +12,11 @@ from rich.console import Console
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.deploy.figures import Figures
-from swarmwire.deploy.panel_view import panel_view
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.world.scenario_file import load_scenario
+from swarmwire.deploy.terminal.figures import Figures
+from swarmwire.deploy.terminal.panel_view import panel_view
+from swarmwire.world.scenario.scenario_file import load_scenario
 
 DOCS = Path(__file__).parents[1]
 SCENARIO = "scenarios/flocking-disrupted.toml"

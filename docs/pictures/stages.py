@@ -8,7 +8,7 @@ import numpy as np
 
 from docs.pictures.radio.sheet import line_color, panels, say
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.body import load_body
+from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.sheets import RangedSheet
 from swarmwire.comms.truth import Group

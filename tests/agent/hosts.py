@@ -7,7 +7,7 @@ import numpy as np
 
 from swarmwire.comms import draws
 from swarmwire.comms.assignment import Assignment, GroupAssignment
-from swarmwire.comms.body import load_body
+from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 

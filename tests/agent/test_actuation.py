@@ -10,7 +10,7 @@ import pytest
 from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
 from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
-from swarmwire.comms.body import body_from
+from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions

@@ -11,7 +11,7 @@ from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.body import load_body
+from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import Heard, Payloads
 from swarmwire.comms.senses import GroupSenses
 from tests.agent.hosts import group

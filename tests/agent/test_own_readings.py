@@ -9,8 +9,8 @@ import pytest
 from swarmwire.agent import Agent, VectorAgent
 from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
-from swarmwire.comms.actuator_sheet import ActuatorSheet
-from swarmwire.comms.body import load_body
+from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
+from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.sheets import Battery, Imu, OwnSheet

@@ -8,13 +8,13 @@ import pytest
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy import Result, run
-from swarmwire.deploy.bindings import BINDINGS, press
 from swarmwire.deploy.controls import LOOK_NS, Controls
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.world.pace import Pace
+from swarmwire.deploy.terminal.bindings import BINDINGS, press
+from swarmwire.world.crews.pace import Pace
 from tests.deploy.commands import LOSSY
-from tests.world.test_pace import MS, FakeClock
+from tests.world.crews.test_pace import MS, FakeClock
 
 RATE_HZ = 10
 TICK_NS = NS_PER_S // RATE_HZ

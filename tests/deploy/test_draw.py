@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from swarmwire.comms.body import body_names
+from swarmwire.comms.bodies.body import body_names
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli import app
 from tests.deploy.commands import LOSSY, ROOT, swarmwire

@@ -12,7 +12,7 @@ import typer
 from swarmwire.comms.errors import Interrupted
 from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
 from swarmwire.deploy.interrupt import Interrupt
-from swarmwire.metrics.verify import verify
+from swarmwire.metrics.verify.verify import verify
 from tests.deploy.commands import LOSSY, family, runners_of, started, swarmwire
 
 LONG = ["--set", "duration_s=3600", "--runners", "4", "--set", "robots.flock.count=8"]

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, run
 from swarmwire.deploy.cli import app
-from swarmwire.deploy.recording import Recording
-from swarmwire.metrics.finding import State
-from swarmwire.metrics.verify import verify
+from swarmwire.deploy.record.recording import Recording
+from swarmwire.metrics.verify.finding import State
+from swarmwire.metrics.verify.verify import verify
 from tests.deploy.commands import ROOT
 from tests.metrics.capture.reading import Capture, read
 

@@ -4,10 +4,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.metrics.finding import State
 from swarmwire.metrics.record.part_files import part_file, parts_of
 from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.verify import verify
+from swarmwire.metrics.verify.finding import State
+from swarmwire.metrics.verify.verify import verify
 from tests.deploy.commands import swarmwire
 from tests.deploy.recorded import record_run, started
 

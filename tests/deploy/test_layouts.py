@@ -8,9 +8,9 @@ from swarmwire.deploy.agents import agent_specs
 from swarmwire.deploy.endpoint import local_endpoint, new_run_id
 from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.world import assignments
+from swarmwire.world.crews import assignments
+from swarmwire.world.crews.remote_crew import RemoteCrew
 from swarmwire.world.loop import Loop
-from swarmwire.world.remote_crew import RemoteCrew
 from tests.deploy.commands import LOSSY, ROOT
 
 SHORT = ["duration_s=3"]

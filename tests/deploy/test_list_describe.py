@@ -12,24 +12,24 @@ from swarmwire.agent import behaviours
 from swarmwire.agent.declared import REQUIRED, parameters_of
 from swarmwire.comms.air.radio import Gives, Radio
 from swarmwire.comms.air.stages import ORDER
-from swarmwire.comms.body import body_names, load_body
-from swarmwire.comms.drives import DRIVES
+from swarmwire.comms.bodies.body import body_names, load_body
+from swarmwire.comms.bodies.drives import DRIVES
+from swarmwire.comms.bodies.leds import Leds
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.fates import FATE_NAMES
-from swarmwire.comms.leds import Leds
 from swarmwire.comms.parameters import limits_of
 from swarmwire.comms.sheets import SHEETS
 from swarmwire.deploy.catalogue.entry import Entry
 from swarmwire.deploy.catalogue.find import find
 from swarmwire.deploy.catalogue.kinds import KINDS
+from swarmwire.deploy.catalogue.text import print_entry, print_list
 from swarmwire.deploy.catalogue.units import unit_of
-from swarmwire.deploy.catalogue_text import print_entry, print_list
-from swarmwire.metrics.order import Order
 from swarmwire.metrics.registry import METRICS
-from swarmwire.world.scenario import PhysicsTable
-from swarmwire.world.scenario_file import scenario_schema
-from swarmwire.world.schema import written_form
+from swarmwire.metrics.swarm.order import Order
+from swarmwire.world.scenario.scenario import PhysicsTable
+from swarmwire.world.scenario.scenario_file import scenario_schema
+from swarmwire.world.scenario.schema import written_form
 from tests.deploy.commands import called
 from tests.docs.pages import ROOT
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.deploy import Recording, Simulation, run
-from swarmwire.metrics.film import film_of
+from swarmwire.metrics.drawing.film import film_of
 from swarmwire.metrics.run_folder import RunFolder
 
 PUSHER = """
@@ -83,7 +83,7 @@ def test_the_record_and_its_pictures_show_it_where_it_is(scenario: Path, tmp_pat
     assert "movable_x_m" not in folder.metrics().columns
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
     from swarmwire.metrics.drawing.film_figure import FilmFigure
-    from tests.metrics.test_film_figure import FLOOR, MOVABLE, color_at
+    from tests.metrics.drawing.test_film_figure import FLOOR, MOVABLE, color_at
 
     figure = FilmFigure(film, 640)
     side_m = 0.15  # along the box from its middle: there the pusher does not hide it

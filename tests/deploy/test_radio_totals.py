@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.deploy.cli import app
-from swarmwire.metrics.verify import verify
+from swarmwire.metrics.verify.verify import verify
 from tests.deploy.commands import LOSSY, ROOT
 
 SIGNALS = ROOT / "scenarios" / "flocking-802154.toml"

@@ -12,7 +12,7 @@ from swarmwire.metrics.record import table_writer
 from swarmwire.metrics.record.part_files import write_file
 from swarmwire.metrics.record.tick_recorder import TickRecorder
 from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.verify import verify
+from swarmwire.metrics.verify.verify import verify
 from tests.deploy.commands import LOSSY
 from tests.deploy.recorded import hastily, record_run
 

@@ -11,11 +11,11 @@ from typer.testing import CliRunner, Result
 from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.cli import app
-from swarmwire.deploy.modules import PARTS, module_digests
+from swarmwire.deploy.record.modules import PARTS, module_digests
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.metrics.record.names import DIGESTS
-from swarmwire.world.scenario_file import load_scenario
-from swarmwire.world.scenario_mapping import same_content
+from swarmwire.world.scenario.scenario_file import load_scenario
+from swarmwire.world.scenario.scenario_mapping import same_content
 from tests.deploy.commands import LOSSY, ROOT, started
 
 SHORT = ["duration_s=2"]

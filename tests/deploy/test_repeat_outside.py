@@ -15,8 +15,8 @@ from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.deploy import repeat, run
-from swarmwire.deploy.inputs import RecordedCrew
-from swarmwire.deploy.run_record import RunRecord
+from swarmwire.deploy.record.inputs import RecordedCrew
+from swarmwire.deploy.record.run_record import RunRecord
 from swarmwire.metrics.record.names import INPUTS
 from tests.deploy.commands import LOSSY
 from tests.deploy.test_realtime import Watcher, runners_here, still

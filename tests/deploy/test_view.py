@@ -23,7 +23,7 @@ from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.live.recording import whole
 from swarmwire.deploy.live.showing import Drawer, Way
 from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.rerun_program import end, free_port, is_open, program
+from swarmwire.metrics.viewer.program import end, free_port, is_open, program
 from tests.deploy.commands import LOSSY
 from tests.deploy.watching import At, until
 from tests.metrics.truths import tally
@@ -139,7 +139,7 @@ def test_nothing_to_see_is_refused(tmp_path, content):
 
 
 def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("swarmwire.metrics.view_extra.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.metrics.viewer.extra.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r"view: needs rerun-sdk: install swarmwire-metrics\[view\]"):
         view_command(tmp_path)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.comms.body import body_from
+from swarmwire.comms.bodies.body import body_from
 from tests.docs.pages import PAGES, ROOT, Command, blocks_of, commands_of, files_of, first_not_printed
 
 WITH_COMMANDS = [page for page in PAGES if commands_of(page)]

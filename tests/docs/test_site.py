@@ -18,17 +18,17 @@ from swarmwire.agent.declared import parameters_of
 from swarmwire.comms import errors
 from swarmwire.comms.air.presets import PRESETS
 from swarmwire.comms.air.radio import Gives
-from swarmwire.comms.body import Body, body_names, load_body
-from swarmwire.comms.drives import DRIVES, Holonomic, Twist, Wheels
+from swarmwire.comms.bodies.body import Body, body_names, load_body
+from swarmwire.comms.bodies.drives import DRIVES, Holonomic, Twist, Wheels
+from swarmwire.comms.bodies.leds import Leds
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.leds import Leds
 from swarmwire.comms.sheets import SHEETS
 from swarmwire.deploy import run
 from swarmwire.deploy.cli import app
 from swarmwire.metrics.registry import METRICS
-from swarmwire.world.realtime_crew import RealTimeReport
-from swarmwire.world.scenario_file import scenario_schema
+from swarmwire.world.crews.realtime_crew import RealTimeReport
+from swarmwire.world.scenario.scenario_file import scenario_schema
 from tests.docs.pages import ROOT
 
 

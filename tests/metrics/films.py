@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.body import load_body
+from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
-from swarmwire.metrics.film import Film
+from swarmwire.metrics.drawing.film import Film
 
 OBSTACLES = (
     Obstacle("cylinder", 2.0, 2.0, radius_m=0.4),

@@ -7,10 +7,10 @@ from swarmwire.comms.truth import Happened
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.event_recorder import EventRecorder
-from swarmwire.metrics.rerun_recording import RerunRecording
+from swarmwire.metrics.viewer.recording import RerunRecording
 from tests.metrics.recorded import SetClock
-from tests.metrics.test_rerun_recording import column
 from tests.metrics.truths import static, truth
+from tests.metrics.viewer.test_rerun_recording import column
 
 
 def kill(*changed: bool, ended: bool = False) -> Happened:

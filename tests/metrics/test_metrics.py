@@ -9,8 +9,8 @@ from swarmwire.comms.parameters import parameter
 from swarmwire.comms.protocols import Observer
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.order import Order
 from swarmwire.metrics.registry import METRICS, register
+from swarmwire.metrics.swarm.order import Order
 from tests.metrics.truths import edges, poses, static, truth
 
 

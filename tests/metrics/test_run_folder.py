@@ -4,13 +4,13 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.comms.body import body_from
+from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Happened
 from swarmwire.metrics.record import recorders, table_writer, tick_recorder
 from swarmwire.metrics.registry import METRICS
 from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.table_faults import table_fault
+from swarmwire.metrics.verify.table_faults import table_fault
 from tests.metrics.recorded import links, record, wandering
 from tests.metrics.truths import static
 

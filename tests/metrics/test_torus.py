@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.geometry import is_blocked_on, obstacle_arrays
+from swarmwire.comms.geometry.obstacles import is_blocked_on, obstacle_arrays
 from swarmwire.comms.truth import Light
-from swarmwire.metrics.distance_counts import Places
 from swarmwire.metrics.drawing.radio_range import in_range
-from swarmwire.metrics.min_gap import smallest_gap_m
+from swarmwire.metrics.network.distance_counts import Places
 from swarmwire.metrics.shortest import link_lines, shortest, whole_path
+from swarmwire.metrics.swarm.min_gap import smallest_gap_m
 from tests.metrics.films import OBSTACLES
 from tests.metrics.truths import measured, static, truth
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.body import Body, load_body
+from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.truth import Departed, Finished, Group, Light, Obstacle, Static, Tally, Truth

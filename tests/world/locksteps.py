@@ -10,7 +10,7 @@ from swarmwire.comms.packets import BROADCAST, Payloads, Sent
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
-from swarmwire.world.lockstep import Lockstep
+from swarmwire.world.crews.lockstep import Lockstep
 from tests.agent.hosts import GIVES, assignment, group, senses
 
 GROUPS = {"flock", "scouts", "lone"}

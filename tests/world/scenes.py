@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.body import Body
-from swarmwire.comms.geometry import obstacle_arrays
-from swarmwire.comms.ground import ground_of
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.geometry.ground import ground_of
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.sheets import Sheet
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.sensors import SENSORS, Scene

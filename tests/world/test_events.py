@@ -9,12 +9,12 @@ from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.events.selection import Selection
 from swarmwire.comms.events.swarm import Swarm
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.world import assignments
+from swarmwire.world.crews import assignments
 from swarmwire.world.loop import Loop
 from swarmwire.world.world import World
 from tests.world.samples import commanded, posed

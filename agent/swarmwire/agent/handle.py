@@ -1,7 +1,7 @@
 """What both kinds of handle tell of the tick and the body."""
 
 from swarmwire.agent.turn import Turn
-from swarmwire.comms.body import Body
+from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import to_s
 
 

@@ -28,7 +28,7 @@ from swarmwire.agent.readings import (
 from swarmwire.agent.robots import forward_and_turn, had
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.leds import rgb_of
+from swarmwire.comms.bodies.leds import rgb_of
 from swarmwire.comms.messages import DICT_TAG, Message, decode_dict, encode_dict
 from swarmwire.comms.outcomes import SendResult
 from swarmwire.comms.packets import Payloads

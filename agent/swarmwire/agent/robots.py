@@ -25,7 +25,7 @@ from swarmwire.agent.readings import (
 )
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.leds import rgb_of
+from swarmwire.comms.bodies.leds import rgb_of
 from swarmwire.comms.messages import Message, encode_rows
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.sheets import Sheet

@@ -18,9 +18,9 @@ from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import GroupAssignment, params_of
-from swarmwire.comms.body import Body, load_body
+from swarmwire.comms.bodies.body import Body, load_body
+from swarmwire.comms.bodies.leds import BRIGHTEST
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.leds import BRIGHTEST
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses

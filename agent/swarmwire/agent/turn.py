@@ -9,7 +9,7 @@ from swarmwire.agent.packet import NotDeclared, Packets
 from swarmwire.comms.actuations import NO_ACTUATIONS, Actuations
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
-from swarmwire.comms.body import NotFitted
+from swarmwire.comms.bodies.body import NotFitted
 from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
 from swarmwire.comms.messages import Message, decode_alike, decode_rows
 from swarmwire.comms.notes import Notes, checked_state

@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray, KeyArray
-from swarmwire.comms.body import Body, body_from_mapping
+from swarmwire.comms.bodies.body import Body, body_from_mapping
 
 
 @dataclass(frozen=True)

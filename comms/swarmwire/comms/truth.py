@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.body import Body
-from swarmwire.comms.floor import Floor
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.geometry.floor import Floor
 from swarmwire.comms.packets import Payloads
 from swarmwire.comms.senses import Senses
 

@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.recording import Recording
+    from swarmwire.deploy.record.recording import Recording
     from swarmwire.deploy.repetition import Repetition, repeat
     from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
     from swarmwire.deploy.running import run
@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 _PLACES = {
-    "Recording": "swarmwire.deploy.recording",
+    "Recording": "swarmwire.deploy.record.recording",
     "Repetition": "swarmwire.deploy.repetition",
     "RunFolder": "swarmwire.metrics.run_folder",
     "Simulation": "swarmwire.deploy.simulation",

@@ -6,8 +6,8 @@ from pathlib import Path
 from swarmwire.agent.declared import BadParameter, checked
 from swarmwire.agent.loading import AgentClass, NoAgent, load_agent, resolve
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.bodies import bodies_of
-from swarmwire.world.scenario import Scenario
+from swarmwire.world.scenario.bodies import bodies_of
+from swarmwire.world.scenario.scenario import Scenario
 
 
 def agent_specs(scenario: Scenario) -> dict[str, str]:

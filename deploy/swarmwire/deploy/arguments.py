@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.scenario import Scenario
+from swarmwire.world.scenario.scenario import Scenario
 
 FASTEST = 1e6  # factor in real time
 Runners = int | str | None  # how many, "per-robot", or None for a local crew

@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
-from swarmwire.world.pace import Pace
+from swarmwire.world.crews.pace import Pace
 
 SPEEDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # simulated s per s of wall time
 LOOK_NS = to_ns(0.02)  # how often a loop that is held looks up what people ask

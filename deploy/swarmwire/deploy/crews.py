@@ -12,13 +12,13 @@ from swarmwire.comms.protocols import Crew
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.endpoint import local_endpoint
 from swarmwire.deploy.runner_processes import RunnerProcesses
-from swarmwire.world import assignments
-from swarmwire.world.pace import Pace
-from swarmwire.world.realtime_crew import PacedCrew, RealTimeCrew
-from swarmwire.world.remote_crew import RemoteCrew
-from swarmwire.world.roster import Loss
-from swarmwire.world.runner_crew import Surroundings
-from swarmwire.world.scenario import Scenario
+from swarmwire.world.crews import assignments
+from swarmwire.world.crews.pace import Pace
+from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
+from swarmwire.world.crews.remote_crew import RemoteCrew
+from swarmwire.world.crews.roster import Loss
+from swarmwire.world.crews.runner_crew import Surroundings
+from swarmwire.world.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True)

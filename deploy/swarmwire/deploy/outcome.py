@@ -6,12 +6,12 @@ from typing import Any
 
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.truth import Static
-from swarmwire.deploy.inputs import InputsRecord
-from swarmwire.deploy.origin import Origin
+from swarmwire.deploy.record.inputs import InputsRecord
+from swarmwire.deploy.record.origin import Origin
 from swarmwire.deploy.result import EventResult, Result, arena_result
 from swarmwire.metrics.record.recorders import record_summary
-from swarmwire.world.realtime_crew import RealTimeReport
-from swarmwire.world.roster import Loss
+from swarmwire.world.crews.realtime_crew import RealTimeReport
+from swarmwire.world.crews.roster import Loss
 
 GLOBAL_SENSES = ("compass", "positioning")
 

@@ -8,14 +8,14 @@ from typing import Any
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.protocols import Observer
 from swarmwire.deploy.arguments import Runners
-from swarmwire.deploy.inputs import RecordedInputs, recorded_inputs
-from swarmwire.deploy.origin import Origin, read_origin
-from swarmwire.deploy.recording import Recording
+from swarmwire.deploy.record.inputs import RecordedInputs, recorded_inputs
+from swarmwire.deploy.record.origin import Origin, read_origin
+from swarmwire.deploy.record.recording import Recording
+from swarmwire.deploy.record.trajectory_log import TrajectoryCheck, ticks_logged
 from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.deploy.trajectory_log import TrajectoryCheck, ticks_logged
 from swarmwire.metrics.record.names import INPUTS, SCENARIO, SUMMARY
 from swarmwire.metrics.run_folder import RunFolder
 

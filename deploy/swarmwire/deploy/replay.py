@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from swarmwire.deploy.inputs import RecordedInputs
+from swarmwire.deploy.record.inputs import RecordedInputs
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from swarmwire.deploy.inputs import InputsRecord
-from swarmwire.deploy.scenario_copy import CopiedFile
+from swarmwire.deploy.record.inputs import InputsRecord
+from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.record.whole_text import write_whole
-from swarmwire.world.realtime_crew import RealTimeReport
+from swarmwire.world.crews.realtime_crew import RealTimeReport
 
 SUMMARY_FORMAT = 1
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 from swarmwire.comms.protocols import Observer
 from swarmwire.deploy.arguments import Runners
-from swarmwire.deploy.recording import Recording
+from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.world.scenario import Scenario
+from swarmwire.world.scenario.scenario import Scenario
 
 
 def run(

@@ -20,27 +20,27 @@ from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.crews import Crews
 from swarmwire.deploy.endpoint import check_socket, new_run_id
 from swarmwire.deploy.guarded import Guarded
-from swarmwire.deploy.inputs import ReplayedCrew
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.kept_memory import keep_memory
-from swarmwire.deploy.link_trace_file import scenario_traces
 from swarmwire.deploy.outcome import outcome
-from swarmwire.deploy.recording import Recording
+from swarmwire.deploy.radio.link_trace_file import scenario_traces
+from swarmwire.deploy.record.inputs import ReplayedCrew
+from swarmwire.deploy.record.recording import Recording
+from swarmwire.deploy.record.run_record import RunRecord
 from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
-from swarmwire.deploy.run_record import RunRecord
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.radio_tally import RadioTally
-from swarmwire.world.bodies import own_code
+from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.world.crews.pace import Pace
+from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
+from swarmwire.world.crews.remote_crew import RemoteCrew
+from swarmwire.world.crews.roster import Loss
+from swarmwire.world.crews.runner_health import RunnerHealth
 from swarmwire.world.loop import Loop
-from swarmwire.world.pace import Pace
-from swarmwire.world.realtime_crew import PacedCrew, RealTimeCrew
-from swarmwire.world.remote_crew import RemoteCrew
-from swarmwire.world.roster import Loss
-from swarmwire.world.runner_health import RunnerHealth
-from swarmwire.world.scenario import Scenario
-from swarmwire.world.scenario_file import load_scenario
+from swarmwire.world.scenario.bodies import own_code
+from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario.scenario_file import load_scenario
 from swarmwire.world.world import World
 
 

@@ -6,7 +6,7 @@ from reference.markdown import NOTHING, code, number, table
 from swarmwire.comms.air.frames import airtime_ns
 from swarmwire.comms.air.presets import PRESETS
 from swarmwire.comms.air.signal.numbers import range_of
-from swarmwire.deploy.probe import radio_of
+from swarmwire.deploy.radio.probe import radio_of
 
 HEADS = ["preset", "what it is", "reach, m", "longest frame, ms", "but"]
 

@@ -13,9 +13,9 @@ from swarmwire.comms.air.contention import contention
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import Payloads, Sent
-from swarmwire.deploy.probe import radio_of
+from swarmwire.deploy.radio.probe import radio_of
 from swarmwire.metrics.drawing.looks import INK
 
 LOADS = (0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)

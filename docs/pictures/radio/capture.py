@@ -14,7 +14,7 @@ from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.signal.parameters import Access
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import Payloads, Sent
 
 WANTED_LOSS_DB = 70.0

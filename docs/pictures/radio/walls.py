@@ -12,7 +12,7 @@ from swarmwire.comms.air.propagation.log_distance import LogDistance
 from swarmwire.comms.air.propagation.parameters import Walls
 from swarmwire.comms.air.propagation.path_loss import loss_db
 from swarmwire.comms.air.propagation.walls import wall_loss_db
-from swarmwire.comms.geometry import Obstacles, obstacle_arrays
+from swarmwire.comms.geometry.obstacles import Obstacles, obstacle_arrays
 from swarmwire.comms.truth import Obstacle
 from swarmwire.metrics.drawing.looks import INK
 

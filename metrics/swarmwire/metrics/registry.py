@@ -3,21 +3,21 @@
 from collections.abc import Sequence
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.age_of_information import AgeOfInformation
-from swarmwire.metrics.airtime import Airtime
-from swarmwire.metrics.components import ComponentCount
-from swarmwire.metrics.contacts import Collisions, WallContacts
-from swarmwire.metrics.fragmentations import Fragmentations
-from swarmwire.metrics.largest_component import LargestComponent
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.min_gap import MinGap
-from swarmwire.metrics.order import Order
-from swarmwire.metrics.order_velocity import OrderVelocity
-from swarmwire.metrics.rejoin import RejoinMedian, RejoinWorst
-from swarmwire.metrics.target_best import TargetBest
-from swarmwire.metrics.target_mean import TargetMean
-from swarmwire.metrics.throughput import Throughput
-from swarmwire.metrics.unrejoined import Unrejoined
+from swarmwire.metrics.network.age_of_information import AgeOfInformation
+from swarmwire.metrics.network.airtime import Airtime
+from swarmwire.metrics.network.components import ComponentCount
+from swarmwire.metrics.network.fragmentations import Fragmentations
+from swarmwire.metrics.network.largest_component import LargestComponent
+from swarmwire.metrics.network.rejoin import RejoinMedian, RejoinWorst
+from swarmwire.metrics.network.throughput import Throughput
+from swarmwire.metrics.network.unrejoined import Unrejoined
+from swarmwire.metrics.swarm.contacts import Collisions, WallContacts
+from swarmwire.metrics.swarm.min_gap import MinGap
+from swarmwire.metrics.swarm.order import Order
+from swarmwire.metrics.swarm.order_velocity import OrderVelocity
+from swarmwire.metrics.task.target_best import TargetBest
+from swarmwire.metrics.task.target_mean import TargetMean
 
 METRICS: dict[str, type[Metric]] = {
     kind.name: kind

@@ -12,7 +12,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
 from swarmwire.comms.truth import Obstacle, Tally
 

@@ -7,7 +7,7 @@ from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.presets import PRESETS, with_preset
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from tests.comms.air.runs import RATE_HZ, SIZE_M, at, everybody, run, scattered
 
 RADIUS_M = 0.1

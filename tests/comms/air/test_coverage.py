@@ -16,7 +16,7 @@ from swarmwire.comms.air.signal.numbers import cut_off_dbm
 from swarmwire.comms.air.signal.parameters import Access
 from swarmwire.comms.air.survey import by_distance, coverage_map
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Obstacle
 from tests.comms.air.runs import SIZE_M, at, everybody, make_air, packets, run, scattered
 from tests.comms.air.signal.radios import IEEE_802_15_4

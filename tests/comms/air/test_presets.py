@@ -16,7 +16,7 @@ from swarmwire.comms.air.reception.reception import chunk_success
 from swarmwire.comms.air.signal.numbers import range_of, receiver_for, sensitivity_of
 from swarmwire.comms.air.signal.parameters import Access
 from tests.comms.air.runs import at, make_air, packets, run
-from tests.world.test_radio_tables import radio_of
+from tests.world.scenario.test_radio_tables import radio_of
 
 NEW = ("ble-1M", "kilobot", "gz-rfcomms", "subt", "acoustic")
 GAZEBO = ("gz-rfcomms", "subt")

@@ -7,7 +7,7 @@ from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.radio import BearingGiven, Gives, Radio, RangeGiven
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry import is_blocked_on, obstacle_arrays, to_nearest
+from swarmwire.comms.geometry.obstacles import is_blocked_on, obstacle_arrays, to_nearest
 from swarmwire.comms.truth import Obstacle
 from tests.comms.air.runs import RATE_HZ, everybody, packets, run
 

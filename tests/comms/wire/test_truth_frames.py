@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from swarmwire.comms.body import load_body
+from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.floor import Floor, FloorImage, Patch, packed_image
+from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch, packed_image
 from swarmwire.comms.glimpse import Glimpse, Scene, Series
 from swarmwire.comms.one_arena import static_of, truth_of
 from swarmwire.comms.senses import GroupSenses

@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.air.radio import Radio
 from swarmwire.metrics.capture.frame import Frame
 from swarmwire.metrics.capture.link_headers import link_of
-from tests.world.test_radio_tables import radio_of
+from tests.world.scenario.test_radio_tables import radio_of
 
 
 def header(radio: Radio, **fields: Any) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.body import body_from
+from swarmwire.comms.bodies.body import body_from
 from swarmwire.world import world as world_module
 from swarmwire.world.world import World
 from tests.world.samples import commanded, posed

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.body import body_from
+from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.limits import limits_of, take_commands
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.body import body_from
+from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.noise import NoisyWheels

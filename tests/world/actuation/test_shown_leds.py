@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from swarmwire.comms.body import load_body
+from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.led_changes import LedChanges
 from swarmwire.comms.senses import Actions
 from swarmwire.comms.truth import Group

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.body import load_body
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Boundary, Obstacle
-from swarmwire.world.drive import Motors
 from swarmwire.world.engines.discs import DiscsEngine
+from swarmwire.world.engines.drive import Motors
 from swarmwire.world.engines.engine import Engine, Setting
 from swarmwire.world.engines.kinematic import KinematicEngine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine

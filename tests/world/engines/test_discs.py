@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.engines import discs
 from swarmwire.world.engines.discs import DiscsEngine

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry import Obstacles, obstacle_arrays
+from swarmwire.comms.geometry.obstacles import Obstacles, obstacle_arrays
 from swarmwire.comms.truth import Obstacle
-from swarmwire.world.drive import Motors
+from swarmwire.world.engines.drive import Motors
 from swarmwire.world.engines.engine import Setting
 from swarmwire.world.engines.kinematic import KinematicEngine
 

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Obstacle
-from swarmwire.world.drive import Motors
+from swarmwire.world.engines.drive import Motors
 from swarmwire.world.engines.engine import Setting
 from swarmwire.world.engines.kinematic import KinematicEngine
 

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.body import load_body
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, load_of
 from swarmwire.world.world import World
 from tests.world.samples import commanded, posed, wandering

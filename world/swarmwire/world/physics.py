@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.geometry import Obstacles
+from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.truth import Static
 from swarmwire.world.engines.choice import EngineName
 from swarmwire.world.engines.discs import DiscsEngine

@@ -9,25 +9,25 @@ import numpy as np
 
 from swarmwire.comms.air.signal.numbers import range_of
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.body import Body
+from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.geometry import obstacle_arrays
-from swarmwire.comms.ground import ground_of
+from swarmwire.comms.geometry.ground import ground_of
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.sheets import OwnSheet, Sheet
 from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.actuation.own_actuators import OwnActuators
-from swarmwire.world.bodies import bodies_of
 from swarmwire.world.engines.choice import engines_of
-from swarmwire.world.layout import read_layout
 from swarmwire.world.own.fitting import made_sensor
 from swarmwire.world.own.sensor import AskedSensor
 from swarmwire.world.physics import Physics
-from swarmwire.world.placement import place
-from swarmwire.world.scenario import Scenario
+from swarmwire.world.placement.layout import read_layout
+from swarmwire.world.placement.placement import place
+from swarmwire.world.scenario.bodies import bodies_of
+from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.sensors import SENSORS, Scene
 from swarmwire.world.sensors.scene import led_places_m
 from swarmwire.world.sensors.sensor import TrueSense

@@ -22,7 +22,7 @@ from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.geometry import Obstacles
+from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import BROADCAST, NOWHERE, Heard, Sent
 from swarmwire.comms.truth import Boundary, Departed, Finished, Tally

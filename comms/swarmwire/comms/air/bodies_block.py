@@ -5,12 +5,12 @@
 import numpy as np
 from numba import njit
 
-from swarmwire.comms import grid
 from swarmwire.comms.air.links import HEARD, Links
 from swarmwire.comms.air.propagation.bodies_between import bodies_between
 from swarmwire.comms.air.stage import Medium, Stage
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.geometry import grid
 
 
 def stage(medium: Medium) -> Stage | None:

@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
 from swarmwire.comms.truth import Finished
 

@@ -21,7 +21,7 @@ from swarmwire.comms.air.signal.numbers import cut_off_dbm, rules_of, sensitivit
 from swarmwire.comms.air.signal.outcome import lone_deliveries
 from swarmwire.comms.air.signal.radio_graph import passes_besides
 from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.geometry import Obstacles, is_blocked
+from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
 
 GAINS = 2000  # of fading, over which delivery is averaged
 STEP_DB, DEEP_DB = 0.1, 40.0  # of the table of delivery by power; how far fading reaches below and above the mean

@@ -10,7 +10,7 @@ from swarmwire.comms.air.stage import Medium, Stage
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
-from swarmwire.comms.geometry import to_nearest
+from swarmwire.comms.geometry.obstacles import to_nearest
 
 NOISE = purpose("range noise")
 

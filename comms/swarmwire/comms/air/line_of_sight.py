@@ -9,7 +9,7 @@ from swarmwire.comms.air.links import HEARD, Links
 from swarmwire.comms.air.stage import Medium, Stage
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.geometry import is_blocked, is_blocked_on
+from swarmwire.comms.geometry.obstacles import is_blocked, is_blocked_on
 
 
 def stage(medium: Medium) -> Stage | None:

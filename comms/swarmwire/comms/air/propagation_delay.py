@@ -9,7 +9,7 @@ from swarmwire.comms.air.links import HEARD, Links
 from swarmwire.comms.air.stage import Medium, Stage
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.geometry import to_nearest
+from swarmwire.comms.geometry.obstacles import to_nearest
 
 
 def stage(medium: Medium) -> Stage | None:

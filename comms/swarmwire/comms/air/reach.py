@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from swarmwire.comms import grid
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.geometry import grid
 from swarmwire.comms.packets import BROADCAST
 
 # Two robots exactly `range_m` apart must not fall two cells apart by rounding.

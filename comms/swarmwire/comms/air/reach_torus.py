@@ -5,10 +5,10 @@
 import numpy as np
 from numba import njit
 
-from swarmwire.comms import grid
 from swarmwire.comms.air.reach import CELL_SLACK, Reach
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry import to_nearest
+from swarmwire.comms.geometry import grid
+from swarmwire.comms.geometry.obstacles import to_nearest
 
 CELLS = 5  # in a row that hold all within reach: the last cell at a seam may be cut, and then two do what one would
 

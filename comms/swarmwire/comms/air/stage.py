@@ -9,7 +9,7 @@ from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.traces.link_traces import LinkTraces
 from swarmwire.comms.arrays import FloatArray, KeyArray
-from swarmwire.comms.geometry import Obstacles
+from swarmwire.comms.geometry.obstacles import Obstacles
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.body import Body
+from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.swarm import Groups, Swarm

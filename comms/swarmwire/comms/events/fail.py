@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.body import MOTORS, WHEELS, Body
+from swarmwire.comms.bodies.body import MOTORS, WHEELS, Body
+from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.clock import to_ns
-from swarmwire.comms.drives import Holonomic
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.event import LastingEvent

@@ -5,12 +5,12 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, cast
 
+from swarmwire.comms.bodies.tables import built, mapping_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.loading import resolve
 from swarmwire.comms.parameters import parameter
 from swarmwire.comms.plain_values import check_plain
 from swarmwire.comms.sheets.sheet import RangedSheet
-from swarmwire.comms.tables import built, mapping_of
 
 MOST_WIDE = 10_000  # numbers of a field, or of an actuator, of one robot
 

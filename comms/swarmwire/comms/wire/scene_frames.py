@@ -6,9 +6,9 @@ from math import inf, isfinite
 from types import NoneType, UnionType
 from typing import Any, Literal, cast, get_args, get_origin, get_type_hints
 
-from swarmwire.comms.body import Body, body_from_mapping
+from swarmwire.comms.bodies.body import Body, body_from_mapping
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.floor import FloorImage
+from swarmwire.comms.geometry.floor import FloorImage
 from swarmwire.comms.glimpse import Scene
 from swarmwire.comms.truth import Obstacle, Static
 from swarmwire.comms.wire import frames

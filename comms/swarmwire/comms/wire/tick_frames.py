@@ -7,9 +7,9 @@ import numpy as np
 
 from swarmwire.comms.actuations import NO_ACTUATIONS, Actuations
 from swarmwire.comms.arrays import AnyArray, IntArray
+from swarmwire.comms.bodies.leds import BRIGHTEST
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
-from swarmwire.comms.leds import BRIGHTEST
 from swarmwire.comms.notes import MOST_STATES, Notes, checked_state
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent

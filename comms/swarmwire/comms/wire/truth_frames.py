@@ -6,10 +6,10 @@ from typing import Any, cast
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray
+from swarmwire.comms.bodies.leds import BRIGHTEST
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.glimpse import Glimpse, Scene
-from swarmwire.comms.leds import BRIGHTEST
 from swarmwire.comms.notes import LONGEST_STATE
 from swarmwire.comms.senses import GroupSenses, Senses
 from swarmwire.comms.truth import Finished, Happened, Static, Tally, Truth

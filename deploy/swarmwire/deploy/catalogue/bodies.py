@@ -4,16 +4,16 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.actuator_sheet import ActuatorSheet
-from swarmwire.comms.body import Body, body_names, load_body
-from swarmwire.comms.leds import Leds
+from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
+from swarmwire.comms.bodies.body import Body, body_names, load_body
+from swarmwire.comms.bodies.leds import Leds
 from swarmwire.comms.parameters import limits_of
 from swarmwire.comms.sheets import OwnSheet
 from swarmwire.comms.sheets.sheet import RangedSheet
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 from swarmwire.deploy.catalogue.units import unit_of
-from swarmwire.world.bodies import read_body
+from swarmwire.world.scenario.bodies import read_body
 
 GEOMETRY = ("radius_m", "height_m", "mass_kg", "altitude_m", "contacts")
 

@@ -1,6 +1,6 @@
 """Drives: what may move a body, by the `kind` in the table [drive] of its sheet."""
 
-from swarmwire.comms.drives import DRIVES
+from swarmwire.comms.bodies.drives import DRIVES
 from swarmwire.deploy.catalogue.docs import first_line, paragraphs
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass

@@ -9,7 +9,7 @@ from swarmwire.deploy.catalogue.behaviours import behaviour
 from swarmwire.deploy.catalogue.bodies import body_of
 from swarmwire.deploy.catalogue.entry import Entry
 from swarmwire.deploy.catalogue.kinds import KINDS, Kind
-from swarmwire.world.bodies import SUFFIX
+from swarmwire.world.scenario.bodies import SUFFIX
 
 
 def kind_named(name: str) -> Kind:

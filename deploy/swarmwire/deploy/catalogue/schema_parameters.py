@@ -7,8 +7,8 @@ from typing import Any
 from swarmwire.deploy.catalogue.docs import first_line
 from swarmwire.deploy.catalogue.entry import Parameter
 from swarmwire.deploy.catalogue.units import unit_of
-from swarmwire.world.schema import table_of
-from swarmwire.world.schema_words import Node, plain, words
+from swarmwire.world.scenario.schema import table_of
+from swarmwire.world.scenario.schema_words import Node, plain, words
 
 
 def parameters_of_dataclass(kind: type[Any]) -> tuple[Parameter, ...]:

@@ -8,7 +8,7 @@ from swarmwire.agent.packet import Packet
 from swarmwire.agent.robot import RadioPort, Robot
 from swarmwire.agent.turn import OUTCOMES
 from swarmwire.comms.air.radio import Gives
-from swarmwire.comms.body import body_names, load_body
+from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.outcomes import SendResult
 from swarmwire.comms.sheets import SHEETS
 from swarmwire.deploy.catalogue.docs import first_line, paragraphs

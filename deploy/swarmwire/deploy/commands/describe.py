@@ -33,7 +33,7 @@ def describe_command(
     """
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
     from swarmwire.deploy.catalogue.find import find
-    from swarmwire.deploy.catalogue_text import print_entry
+    from swarmwire.deploy.catalogue.text import print_entry
 
     entry = find(name)
     if as_json:

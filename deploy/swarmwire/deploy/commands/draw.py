@@ -55,7 +55,7 @@ def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path,
 
 
 def _draw_named_body(name: str, to: Path, size_px: int) -> None:
-    from swarmwire.comms.body import body_names, load_body
+    from swarmwire.comms.bodies.body import body_names, load_body
     from swarmwire.metrics.drawing.body_sheet import draw_body
 
     if name not in body_names():
@@ -64,7 +64,7 @@ def _draw_named_body(name: str, to: Path, size_px: int) -> None:
 
 
 def _draw_sheet(sheet: dict[str, Any], path: Path, to: Path, size_px: int) -> None:
-    from swarmwire.comms.body import body_from
+    from swarmwire.comms.bodies.body import body_from
     from swarmwire.metrics.drawing.body_sheet import draw_body
 
     draw_body(body_from(sheet, str(path)), to, size_px)

@@ -9,7 +9,7 @@ from rich.progress import track
 
 if TYPE_CHECKING:
     from swarmwire.metrics.drawing.film_figure import FilmFigure
-    from swarmwire.metrics.footage import Footage
+    from swarmwire.metrics.drawing.footage import Footage
 
 FilmKind = Literal["gif", "mp4"]
 USUAL_FRAMES_PER_S = {"gif": 10.0, "mp4": 25.0}
@@ -37,10 +37,10 @@ def export_film(
     console: Console,
 ) -> None:
     """Draw the arena, and metrics beside it, as a film; the console is told how it goes."""
+    from swarmwire.metrics.drawing.film import film_of
     from swarmwire.metrics.drawing.film_figure import FilmFigure
+    from swarmwire.metrics.drawing.footage import footage
     from swarmwire.metrics.drawing.whole_file import check_path
-    from swarmwire.metrics.film import film_of
-    from swarmwire.metrics.footage import footage
     from swarmwire.metrics.run_folder import RunFolder
 
     film = film_of(RunFolder(run), arena, str(run))

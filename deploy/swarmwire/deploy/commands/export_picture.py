@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
-    from swarmwire.metrics.film import Film
+    from swarmwire.metrics.drawing.film import Film
 
 END = "end"
 SUFFIXES = (".png", ".svg", ".pdf")
@@ -14,9 +14,9 @@ SUFFIXES = (".png", ".svg", ".pdf")
 
 def export_picture(run: Path, to: Path, arena: int, at: str, size_px: int, metrics: list[str] | None) -> None:
     """Draw the arena, and metrics beside it, `at` a time in s or END; BadInput if it was not recorded."""
+    from swarmwire.metrics.drawing.film import film_of
     from swarmwire.metrics.drawing.film_figure import FilmFigure
     from swarmwire.metrics.drawing.whole_file import check_path
-    from swarmwire.metrics.film import film_of
     from swarmwire.metrics.run_folder import RunFolder
 
     film = film_of(RunFolder(run), arena, str(run))

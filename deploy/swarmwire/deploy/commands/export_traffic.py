@@ -20,8 +20,8 @@ def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_
     from swarmwire.metrics.drawing.whole_file import check_path
     from swarmwire.metrics.record.names import SCENARIO
     from swarmwire.metrics.run_folder import RunFolder
-    from swarmwire.metrics.sound_table import sound_table
-    from swarmwire.world.scenario_file import load_scenario
+    from swarmwire.metrics.verify.sound_table import sound_table
+    from swarmwire.world.scenario.scenario_file import load_scenario
 
     check_path(to, (SUFFIX,))
     for option, value_s in (("--from", from_s), ("--until", until_s)):

@@ -27,7 +27,7 @@ def list_command(
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
     from swarmwire.deploy.catalogue.find import kind_named
     from swarmwire.deploy.catalogue.kinds import KINDS
-    from swarmwire.deploy.catalogue_text import print_kinds, print_list
+    from swarmwire.deploy.catalogue.text import print_kinds, print_list
 
     console = Console(highlight=False)
     found = None if kind is None else kind_named(kind)

@@ -32,9 +32,9 @@ def repeat_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.compiling import compiling_told
-    from swarmwire.deploy.recording import Recording, packet_share
+    from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.repetition import RepeatedRun
-    from swarmwire.deploy.shown import progress
+    from swarmwire.deploy.terminal.shown import progress
 
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     record = Recording(packets=packet_share(packets), links=links)

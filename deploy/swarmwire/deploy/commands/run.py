@@ -11,9 +11,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
 from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
 from swarmwire.deploy.commands.options import Links, Overrides, Packets, Quiet, Runners, ScenarioFile, Seed
-from swarmwire.deploy.folder import default_folder
-from swarmwire.deploy.report import print_result
+from swarmwire.deploy.record.folder import default_folder
 from swarmwire.deploy.result import Result
+from swarmwire.deploy.terminal.report import print_result
 
 if TYPE_CHECKING:
     from swarmwire.deploy.simulation import Simulation
@@ -64,9 +64,9 @@ def run_command(
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.arguments import choose_seeds
     from swarmwire.deploy.compiling import compiling_told
-    from swarmwire.deploy.recording import Recording, packet_share
+    from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.simulation import Simulation
-    from swarmwire.world.scenario_file import load_scenario
+    from swarmwire.world.scenario.scenario_file import load_scenario
 
     checked = load_scenario(scenario, overrides or [])
     chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
@@ -91,7 +91,7 @@ def _shown(simulation: "Simulation", folder: Path, view: bool, console: Console)
     """The result of the run, told and shown while it goes on and afterwards."""
     from swarmwire.deploy.live.live_view import LiveView
     from swarmwire.deploy.running import finished
-    from swarmwire.deploy.shown import progress
+    from swarmwire.deploy.terminal.shown import progress
 
     simulation.watch(progress(simulation, console))
     with LiveView(folder) as live:

@@ -33,7 +33,7 @@ def view_command(
     from swarmwire.deploy.live.live_file import read_live
     from swarmwire.deploy.live.showing import Way, show_live, show_recording
     from swarmwire.deploy.live.viewer_program import has_screen
-    from swarmwire.metrics.view_extra import need_view_extra
+    from swarmwire.metrics.viewer.extra import need_view_extra
 
     need_view_extra("view")
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error

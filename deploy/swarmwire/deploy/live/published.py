@@ -26,8 +26,8 @@ from swarmwire.comms.wire.truth_frames import encode_truth
 from swarmwire.deploy.endpoint import local_endpoint
 from swarmwire.deploy.live.live_file import Live, forget_live
 from swarmwire.deploy.live.sampling import FRAMES_PER_S, Rate, Sampling, Since
-from swarmwire.metrics.plotted import Measured
-from swarmwire.metrics.rerun_selected import selected_robot
+from swarmwire.metrics.viewer.plotted import Measured
+from swarmwire.metrics.viewer.selected import selected_robot
 
 LEAVE_S = 2.0  # how long the last frame may take
 

@@ -2,8 +2,8 @@
 
 import math
 
-from swarmwire.comms.body import Body
-from swarmwire.comms.drives import Holonomic, Twist, Wheels
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.drives import Holonomic, Twist, Wheels
 from swarmwire.comms.sheets import (
     Battery,
     Bumper,

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.body import Body
+from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.sheets import Bumper, GroundColour, Infrared, Light, Proximity, Rim, Scan
 from swarmwire.metrics.drawing.looks import INK, LIGHT, LIGHT_EDGE, OBSTACLE_EDGE, PAPER, SMALL_PT, Look
 

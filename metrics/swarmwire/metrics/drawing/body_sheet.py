@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.body import Body
+from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.sheets import Proximity
 from swarmwire.metrics.drawing.body_facts import facts_of
 from swarmwire.metrics.drawing.canvas import new_figure, save

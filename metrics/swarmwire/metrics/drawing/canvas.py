@@ -5,9 +5,9 @@ from typing import Any, cast
 
 from swarmwire.comms.arrays import ByteArray
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.drawing.extra import need_report_extra
 from swarmwire.metrics.drawing.looks import LONG_SIDE_IN, PAPER
 from swarmwire.metrics.drawing.whole_file import check_path, whole_file
-from swarmwire.metrics.report_extra import need_report_extra
 
 SUFFIXES = (".png", ".svg", ".pdf")
 LEAST_SIZE_PX, GREATEST_SIZE_PX = 100, 8000

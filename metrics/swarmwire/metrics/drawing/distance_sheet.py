@@ -21,7 +21,7 @@ from swarmwire.metrics.drawing.looks import (
 )
 from swarmwire.metrics.drawing.plain_axes import plain_axes
 from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.sound_table import sound_table
+from swarmwire.metrics.verify.sound_table import sound_table
 
 if TYPE_CHECKING:
     import polars as pl

@@ -8,6 +8,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, ByteArray, IntArray
 from swarmwire.metrics.drawing.canvas import new_figure, pixels, save
+from swarmwire.metrics.drawing.film import NO_STATE, Film
 from swarmwire.metrics.drawing.layout import add_arena_axes, lay_out
 from swarmwire.metrics.drawing.legend import (
     add_legend,
@@ -23,7 +24,6 @@ from swarmwire.metrics.drawing.metric_strip import MetricStrip, choose
 from swarmwire.metrics.drawing.radio_range import in_range
 from swarmwire.metrics.drawing.scenery import draw_scale_bar, draw_scenery, place_movable
 from swarmwire.metrics.drawing.swarm import Swarm
-from swarmwire.metrics.film import NO_STATE, Film
 from swarmwire.metrics.shortest import whole_path
 
 TRAIL_S = 5.0

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import ByteArray, IntArray
-from swarmwire.metrics.report_extra import need_report_extra
+from swarmwire.metrics.drawing.extra import need_report_extra
 
 COLORS = 64
 EVEN_COLORS = 24  # of these, of areas

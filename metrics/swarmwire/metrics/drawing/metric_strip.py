@@ -7,9 +7,9 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.drawing.film import DELIVERY
 from swarmwire.metrics.drawing.layout import Layout
 from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Look
-from swarmwire.metrics.film import DELIVERY
 from swarmwire.metrics.registry import METRICS
 
 MOST_PLOTS = 4

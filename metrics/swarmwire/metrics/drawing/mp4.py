@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 
 from swarmwire.comms.arrays import ByteArray
-from swarmwire.metrics.report_extra import need_report_extra
+from swarmwire.metrics.drawing.extra import need_report_extra
 
 _QUALITY = "20"  # x264's constant rate factor: lower is better, 18 is taken for visually lossless
 

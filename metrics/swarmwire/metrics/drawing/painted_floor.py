@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.floor import Floor
+from swarmwire.comms.geometry.floor import Floor
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.looks import Look
 

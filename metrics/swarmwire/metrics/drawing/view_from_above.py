@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from swarmwire.comms.body import Body
-from swarmwire.comms.drives import Holonomic
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.sheets import Rim
 from swarmwire.metrics.drawing.body_parts import draw_parts
 from swarmwire.metrics.drawing.looks import (

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swarmwire.comms.truth import Static, Truth
-from swarmwire.metrics.distance_counts import DistanceCounts
+from swarmwire.metrics.network.distance_counts import DistanceCounts
 from swarmwire.metrics.record.totals_recorder import TotalsRecorder
 
 if TYPE_CHECKING:

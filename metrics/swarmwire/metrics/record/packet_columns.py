@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray, Ke
 from swarmwire.comms.draws import LOW32, derive_key, purpose, uniform
 from swarmwire.comms.fates import FATE_NAMES
 from swarmwire.comms.truth import Finished, Static
-from swarmwire.metrics.geometry_tick import geometry_tick
+from swarmwire.metrics.network.geometry_tick import geometry_tick
 from swarmwire.metrics.shortest import shortest
 
 if TYPE_CHECKING:

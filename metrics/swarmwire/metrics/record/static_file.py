@@ -7,9 +7,9 @@ from math import inf
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.body import body_from_mapping
+from swarmwire.comms.bodies.body import body_from_mapping
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.floor import Floor, FloorImage, Patch
+from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
 from swarmwire.metrics.record.whole_text import write_whole
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, FloatArray
+from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.clock import to_s
-from swarmwire.comms.drives import Holonomic
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.truth import Static, Tally, Truth
 

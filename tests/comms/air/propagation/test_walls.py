@@ -7,10 +7,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from swarmwire.comms import grid
 from swarmwire.comms.air.propagation.bodies_between import bodies_between, is_on_line
 from swarmwire.comms.air.propagation.walls import crossed_and_inside_m, wall_loss_db
-from swarmwire.comms.geometry import Obstacles, is_blocked, obstacle_arrays
+from swarmwire.comms.geometry import grid
+from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked, obstacle_arrays
 from swarmwire.comms.truth import Obstacle
 
 CYLINDER = Obstacle("cylinder", 0.0, 0.0, radius_m=1.0)

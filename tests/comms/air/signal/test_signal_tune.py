@@ -15,7 +15,7 @@ from swarmwire.comms.air.reception.noise import Noise
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry import obstacle_arrays
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import Sent
 from tests.comms.air.runs import RATE_HZ, SIZE_M, Run, at, everybody, make_air, packets, scattered
 from tests.comms.air.signal.radios import METHODS, with_access

@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.body import MOTORS, WHEELS
-from swarmwire.comms.drives import wheel_base_of
+from swarmwire.comms.bodies.body import MOTORS, WHEELS
+from swarmwire.comms.bodies.drives import wheel_base_of
 from swarmwire.comms.truth import Group
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.drives import DRIVES, wheel_base_of
+from swarmwire.comms.bodies.drives import DRIVES, wheel_base_of
 from swarmwire.comms.truth import Group
 
 WHEELS, TWIST, HOLONOMIC = (list(DRIVES).index(kind) for kind in ("wheels", "twist", "holonomic"))

@@ -12,8 +12,8 @@ from numba import njit
 
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import FloatArray, KeyArray
+from swarmwire.comms.bodies.drives import NO_WHEEL_NOISE, Drive, Holonomic, WheelNoise, wheel_base_of
 from swarmwire.comms.draws_compiled import normal
-from swarmwire.comms.drives import NO_WHEEL_NOISE, Drive, Holonomic, WheelNoise, wheel_base_of
 from swarmwire.comms.truth import Group
 
 BIAS, FACTOR = draws.purpose("wheel bias"), draws.purpose("wheel factor")

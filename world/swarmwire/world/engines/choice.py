@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Literal
 
-from swarmwire.comms.body import Body
+from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.scenario import Scenario
+from swarmwire.world.scenario.scenario import Scenario
 
 EngineName = Literal["discs", "pymunk", "kinematic"]
 

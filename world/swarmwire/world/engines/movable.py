@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.geometry import Obstacles, sides_of
+from swarmwire.comms.geometry.obstacles import Obstacles, sides_of
 from swarmwire.comms.truth import Obstacle
 
 GRAVITY_MPS2 = 9.81

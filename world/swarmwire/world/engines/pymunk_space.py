@@ -20,7 +20,7 @@ from pymunk.constraints import PivotJoint
 
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.truth import Obstacle
-from swarmwire.world.contacts import count_began, mark, pairs_of
+from swarmwire.world.engines.contacts import count_began, mark, pairs_of
 from swarmwire.world.engines.engine import Setting
 from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, Load
 

@@ -5,13 +5,13 @@ from dataclasses import is_dataclass, replace
 from importlib.metadata import entry_points
 from typing import Any, TypeVar, cast
 
-from swarmwire.comms.actuator_sheet import ActuatorSheet
-from swarmwire.comms.body import Body
+from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.loading import NotLoaded, load_named
 from swarmwire.comms.sheets import OwnSheet, Sheet
 from swarmwire.comms.sheets.own import MOST_WIDE
-from swarmwire.comms.tables import built
 from swarmwire.world.own.actuator import OwnActuator
 from swarmwire.world.own.field_faults import field_fault
 from swarmwire.world.own.sensor import OwnSensor

@@ -13,8 +13,8 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.cells import sort
-from swarmwire.comms.obstacle_cells import near_things
+from swarmwire.comms.geometry.cells import sort
+from swarmwire.comms.geometry.obstacle_cells import near_things
 from swarmwire.comms.sheets import Camera
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest

@@ -8,9 +8,9 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.cells import sort
-from swarmwire.comms.geometry import ray_to_circle
-from swarmwire.comms.obstacle_cells import near_things, ray_to_thing
+from swarmwire.comms.geometry.cells import sort
+from swarmwire.comms.geometry.obstacle_cells import near_things, ray_to_thing
+from swarmwire.comms.geometry.obstacles import ray_to_circle
 from swarmwire.comms.sheets import Rim
 from swarmwire.comms.sheets.rim import FORMS
 from swarmwire.comms.truth import Group

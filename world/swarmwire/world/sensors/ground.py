@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.ground import shade_at
+from swarmwire.comms.geometry.ground import shade_at
 from swarmwire.comms.sheets import GroundColour
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene

@@ -15,7 +15,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.cells import sort
+from swarmwire.comms.geometry.cells import sort
 from swarmwire.comms.sheets import Light
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, nearest

@@ -8,9 +8,9 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.cells import sort
-from swarmwire.comms.geometry import ray_to_circle, ray_to_polygon
-from swarmwire.comms.obstacle_cells import near_things
+from swarmwire.comms.geometry.cells import sort
+from swarmwire.comms.geometry.obstacle_cells import near_things
+from swarmwire.comms.geometry.obstacles import ray_to_circle, ray_to_polygon
 from swarmwire.comms.sheets import Scan
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest

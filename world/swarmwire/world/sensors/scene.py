@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.geometry import Obstacles
-from swarmwire.comms.ground import Ground
+from swarmwire.comms.geometry.ground import Ground
+from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.truth import Boundary, Group, Light
 
 

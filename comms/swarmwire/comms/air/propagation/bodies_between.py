@@ -4,7 +4,7 @@
 
 from numba import njit
 
-from swarmwire.comms import grid
+from swarmwire.comms.geometry import grid
 
 
 @njit(cache=True)

@@ -19,7 +19,7 @@ from swarmwire.comms.air.signal.link_table import Surroundings
 from swarmwire.comms.air.signal.on_air import count_chunk
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.geometry import Obstacles, is_blocked
+from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
 
 
 def powers_of(

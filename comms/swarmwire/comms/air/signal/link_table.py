@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from swarmwire.comms import grid
 from swarmwire.comms.air.propagation import scattering, shadowing
 from swarmwire.comms.air.propagation.bodies_between import bodies_between
 from swarmwire.comms.air.propagation.fading import FadingLaw, gain_of
@@ -23,7 +22,8 @@ from swarmwire.comms.air.propagation.walls import wall_loss_db
 from swarmwire.comms.air.reach import CELL_SLACK, strip
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.geometry import Obstacles, is_blocked
+from swarmwire.comms.geometry import grid
+from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
 
 
 class Surroundings(NamedTuple):

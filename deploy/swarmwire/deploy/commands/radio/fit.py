@@ -41,8 +41,8 @@ def fit_command(
     """
     from rich.console import Console
 
-    from swarmwire.deploy.radio_fit_report import print_fit
-    from swarmwire.deploy.radio_fit_toml import radio_fit_toml
+    from swarmwire.deploy.radio.fit_report import print_fit
+    from swarmwire.deploy.radio.fit_toml import radio_fit_toml
     from swarmwire.metrics.drawing.whole_file import check_path
 
     if write is not None:

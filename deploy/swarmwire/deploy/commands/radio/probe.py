@@ -11,7 +11,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.options import AsJson
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.coverage_probe import CoverageProbe
+    from swarmwire.deploy.radio.coverage_probe import CoverageProbe
 
 USUAL_SIZE_PX = 1280
 POINTS, JSON_POINTS = 200, 50  # of the map, along the longer side of the arena
@@ -89,8 +89,8 @@ def _probe_scenario(
     from rich.console import Console
 
     from swarmwire.deploy.compiling import compiling_told
-    from swarmwire.deploy.coverage_probe import probe_coverage
-    from swarmwire.deploy.coverage_report import coverage_json, print_coverage
+    from swarmwire.deploy.radio.coverage_probe import probe_coverage
+    from swarmwire.deploy.radio.coverage_report import coverage_json, print_coverage
     from swarmwire.metrics.drawing.canvas import SUFFIXES
     from swarmwire.metrics.drawing.whole_file import check_path
 
@@ -127,7 +127,7 @@ def _probe_contention(preset: str, contention: str | None, settings: list[str], 
 
     from swarmwire.comms.air.contention import contention as contend
     from swarmwire.deploy.compiling import compiling_told
-    from swarmwire.deploy.probe import radio_of
+    from swarmwire.deploy.radio.probe import radio_of
 
     radio = radio_of(preset, settings)
     nodes, payload_bytes, interval_s = _parts(contention or "")

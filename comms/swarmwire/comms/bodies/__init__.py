@@ -1,0 +1,1 @@
+"""Kinds of robot: their data sheets, and those that come with swarmwire."""

@@ -1,0 +1,239 @@
+"""Bodies: kinds of robot, each a TOML data sheet. Those that come with swarmwire lie in `bodies/`.
+
+A sheet with `like = "epuck"` starts from that body's sheet, table by table, and says only what differs.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet, actuator_sheet, told_actuator_sheet
+from swarmwire.comms.bodies.body_faults import fault_of_body, unfit_senses
+from swarmwire.comms.bodies.drives import DRIVES, Drive, Holonomic, Twist, Wheels
+from swarmwire.comms.bodies.leds import Leds
+from swarmwire.comms.bodies.tables import built, mapping_of
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parameters import parameter
+from swarmwire.comms.sheets import SHEETS, Compass, Infrared, Light, Odometry, OwnSheet, Proximity, Scan, Sheet
+from swarmwire.comms.sheets.own import own_sheet, told_own_sheet
+
+S = TypeVar("S", bound=Sheet)
+HERE = Path()
+MOTORS, WHEELS = "motors", ("left_wheel", "right_wheel")  # parts that can fail as senses can: no sense is named so
+
+
+class NotFitted(AttributeError):
+    """The body does not have what an agent asks it for: wheels, LEDs."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A disc-shaped robot: its size, drive and senses (a sense that is None it does not have)."""
+
+    name: str = parameter(help="name in scenarios")
+    source: str = parameter(help="where the figures come from")
+    radius_m: float = parameter(help="radius of the body", unit="m", above=0)
+    height_m: float = parameter(help="height of the body", unit="m", above=0)
+    mass_kg: float = parameter(help="mass", unit="kg", above=0)
+    drive: Drive = parameter(help="how it moves")
+    altitude_m: float = parameter(0.0, help="height of its lower side above the floor", unit="m", at_least=0)
+    contacts: bool = parameter(True, help="whether others and obstacles stop it; false: it passes through them")
+    leds: Leds | None = None
+    senses: dict[str, Sheet] = field(default_factory=dict[str, Sheet])
+    actuators: dict[str, ActuatorSheet] = field(default_factory=dict[str, ActuatorSheet])  # of the user's own
+
+    @cached_property
+    def proximity(self) -> Proximity | None:
+        """The proximity sensor's sheet."""
+        return self._sheet(Proximity)
+
+    @cached_property
+    def compass(self) -> Compass | None:
+        """The compass's sheet."""
+        return self._sheet(Compass)
+
+    @cached_property
+    def odometry(self) -> Odometry | None:
+        """The wheel encoders' sheet."""
+        return self._sheet(Odometry)
+
+    @cached_property
+    def light(self) -> Light | None:
+        """The photocells' sheet."""
+        return self._sheet(Light)
+
+    @cached_property
+    def infrared(self) -> Infrared | None:
+        """The passive infrared sensor's sheet."""
+        return self._sheet(Infrared)
+
+    @cached_property
+    def scan(self) -> Scan | None:
+        """The laser scanner's sheet."""
+        return self._sheet(Scan)
+
+    @cached_property
+    def actuator_places(self) -> dict[str, slice]:
+        """Where the numbers of each own actuator stand among those of all of them, by its name."""
+        places: dict[str, slice] = {}
+        start = 0
+        for name, sheet in self.actuators.items():
+            places[name] = slice(start, start + sheet.width)
+            start += sheet.width
+        return places
+
+    def _sheet(self, kind: type[S]) -> S | None:
+        return next((sheet for sheet in self.senses.values() if isinstance(sheet, kind)), None)
+
+    @property
+    def wheels(self) -> Wheels | Twist:
+        """The drive of a body with two wheels; NotFitted if it moves in another way."""
+        if isinstance(self.drive, Holonomic):
+            raise NotFitted(f"the body {self.name} has no wheels: its drive is {self.drive.kind}")
+        return self.drive
+
+    @property
+    def led_count(self) -> int:
+        """How many LEDs it has."""
+        return 0 if self.leds is None else self.leds.count
+
+    @cached_property
+    def led_places_m(self) -> FloatArray:
+        """Where its LEDs sit: x ahead, y to the left, z above its lower side, (leds, 3)."""
+        return np.empty((0, 3)) if self.leds is None else self.leds.places_m(self.radius_m)
+
+    @property
+    def max_linear_mps(self) -> float:
+        """The fastest it can drive straight ahead."""
+        return self.drive.max_linear_mps
+
+    @property
+    def max_angular_radps(self) -> float:
+        """The fastest it can turn on the spot."""
+        return self.drive.max_angular_radps
+
+    @property
+    def told(self) -> "Body":
+        """The body as agents know it: without the classes of own senses and actuators, and without their keys.
+
+        Keys may tell of the arena, and where a file lies tells of the machine that it lies on.
+        """
+        hidden: dict[str, Any] = {"kind": "", "params": {}}
+        senses = {n: replace(s, **hidden) if isinstance(s, OwnSheet) else s for n, s in self.senses.items()}
+        actuators = {name: replace(sheet, **hidden) for name, sheet in self.actuators.items()}
+        return replace(self, senses=senses, actuators=actuators)
+
+    def as_mapping(self) -> dict[str, Any]:
+        """The sheet as `body_from_mapping` reads it back."""
+        return asdict(self)
+
+
+def body_names() -> list[str]:
+    """The bodies that come with swarmwire."""
+    entries = (entry.name for entry in files("swarmwire.comms.bodies").iterdir())
+    return sorted(name.removesuffix(".toml") for name in entries if name.endswith(".toml"))
+
+
+def load_body(name: str) -> Body:
+    """A body that comes with swarmwire, by name; BadInput if there is none."""
+    return body_from(_shipped(name, "", "body"), where=f"{name}.toml")
+
+
+def body_from(sheet: Mapping[str, Any], where: str, beside: Path = HERE) -> Body:
+    """The body of a data sheet; BadInput names `where` and the key of what is wrong.
+
+    Files of the user's own senses and actuators lie in the folder `beside`.
+    """
+    like, rest = sheet.get("like"), {key: value for key, value in sheet.items() if key != "like"}
+    if like is not None:
+        base = _shipped(like, where, "like")
+        if _kind_of(rest, _kind_of(base)) != _kind_of(base):
+            base.pop("drive", None)  # of another kind: its limits have other names
+        return body_from(_like(base, rest), where, beside)
+    return _body(rest, where, beside)
+
+
+def body_from_mapping(mapping: Mapping[str, Any], where: str) -> Body:
+    """The body that `as_mapping` wrote down; BadInput names `where` and the key of what is wrong."""
+    return _body(dict(mapping), where, None)
+
+
+def _body(rest: dict[str, Any], where: str, beside: Path | None) -> Body:
+    """The body of a whole sheet, or, with nothing `beside`, of one that `as_mapping` wrote down."""
+    senses = mapping_of(where, "senses", rest.pop("senses", {}))
+    rest["senses"] = {name: _sense(name, table, where, beside) for name, table in senses.items()}
+    actuators = mapping_of(where, "actuators", rest.pop("actuators", {}))
+    rest["actuators"] = {name: _actuator(name, table, where, beside) for name, table in actuators.items()}
+    if "drive" in rest:
+        rest["drive"] = _drive(rest["drive"], where)
+    if rest.get("leds") is not None:  # None: a sheet written down as a mapping
+        rest["leds"] = built(Leds, rest["leds"], where, "leds")
+    body: Body = built(Body, rest, where, "")
+    fault = fault_of_body(body)
+    if fault:
+        raise BadInput(where, *fault)
+    return body
+
+
+def _like(base: dict[str, Any], rest: Mapping[str, Any]) -> dict[str, Any]:
+    """`base` with what `rest` says; senses that do not go with it any more are not taken over."""
+    both = _merged(base, rest)
+    own = rest.get("senses", {})
+    if isinstance(both.get("senses"), dict):
+        for name in unfit_senses(_kind_of(both), both.get("altitude_m", 0.0)):
+            if name not in own:
+                both["senses"].pop(name, None)
+    return both
+
+
+def _sense(name: str, table: object, where: str, beside: Path | None) -> Sheet:
+    key = f"senses.{name}"
+    if name in (MOTORS, *WHEELS):
+        raise BadInput(where, key, f"expected another name: {name} is a part of the drive, which the event fail names")
+    if name in SHEETS:
+        return built(SHEETS[name], table, where, key)
+    if "kind" not in mapping_of(where, key, table) or not name.isidentifier():
+        expected = f'expected one of {", ".join(SHEETS)}, or a kind = "file.py:Class" of your own'
+        raise BadInput(where, key, f"unknown sense; {expected}")
+    return told_own_sheet(table, where, key) if beside is None else own_sheet(table, where, key, beside)
+
+
+def _actuator(name: str, table: object, where: str, beside: Path | None) -> ActuatorSheet:
+    key = f"actuators.{name}"
+    if not name.isidentifier():
+        raise BadInput(where, key, "expected a name of letters, digits and _, which does not start with a digit")
+    return told_actuator_sheet(table, where, key) if beside is None else actuator_sheet(table, where, key, beside)
+
+
+def _kind_of(sheet: Mapping[str, Any], otherwise: object = "wheels") -> object:
+    """The kind of drive that a sheet names."""
+    drive: object = sheet.get("drive")
+    return cast("Mapping[str, object]", drive).get("kind", otherwise) if isinstance(drive, Mapping) else otherwise
+
+
+def _drive(value: object, where: str) -> Drive:
+    table = mapping_of(where, "drive", value)
+    kind = table.get("kind", "wheels")
+    if not isinstance(kind, str) or kind not in DRIVES:
+        raise BadInput(where, "drive.kind", f"expected one of {', '.join(DRIVES)}; got {kind!r}")
+    return built(DRIVES[kind], table, where, "drive")
+
+
+def _shipped(name: object, where: str, key: str) -> dict[str, Any]:
+    """The sheet of a body that comes with swarmwire; BadInput names `where` and `key` if there is none."""
+    if name not in body_names():
+        raise BadInput(where, key, f"expected one of {', '.join(body_names())}; got {name!r}")
+    return tomllib.loads(files("swarmwire.comms.bodies").joinpath(f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """`base` with what `over` says in its place; tables that both have are merged."""
+    both = {key for key in over if isinstance(over[key], Mapping) and isinstance(base.get(key), Mapping)}
+    return {**base, **over, **{key: _merged(base[key], over[key]) for key in both}}

@@ -1,0 +1,1 @@
+"""Where obstacles, floors and robots are, in arrays that compiled kernels search."""

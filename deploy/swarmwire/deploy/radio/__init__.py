@@ -1,0 +1,1 @@
+"""Radios without a run: probed, fitted to logs, replayed from measurements."""

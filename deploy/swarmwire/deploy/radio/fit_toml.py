@@ -1,0 +1,51 @@
+"""A radio's fit as TOML that a scenario takes."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from swarmwire.comms.errors import BadInput
+
+if TYPE_CHECKING:
+    from swarmwire.comms.air.propagation.parameters import Antenna
+    from swarmwire.metrics.radio_fit.radio_fit import RadioFit
+
+# A scenario around the table, to hold it against every bound and check.
+AROUND: dict[str, Any] = {
+    "format": 1,
+    "name": "fit",
+    "duration_s": 1.0,
+    "arena": {"size_m": [1.0, 1.0]},
+    "robots": {"one": {"body": "epuck", "count": 1, "agent": "fit:Agent"}},
+}
+DISK = {"range_m": 1.0}  # what a table without path loss is put into
+
+
+def radio_fit_toml(fit: "RadioFit", antenna: "Antenna", file: Path) -> str:
+    """The table `[radio]`, with what was left out as comments.
+
+    BadInput where nothing could be fitted, or where a scenario would refuse what was.
+    """
+    import tomli_w
+
+    from swarmwire.metrics.radio_fit.fit_rows import parameter_rows
+    from swarmwire.metrics.radio_fit.radio_table import radio_table
+
+    table = radio_table(fit, antenna)
+    left_out = [f"{row.parameter}: {row.left_out}" for row in parameter_rows(fit) if row.estimate is None]
+    if not table["radio"]:
+        raise BadInput(str(file), "", f"nothing could be fitted: {'; '.join(left_out)}")
+    comments = [f"Fitted to {file.name} by swarmwire radio fit.", *(f"Left out: {one}." for one in left_out)]
+    if "model" not in table["radio"]:
+        comments.append("Without path loss this is no radio yet: put it into one that has a model or a range_m.")
+    _refuse_unfit(table, file)
+    return "".join(f"# {comment}\n" for comment in comments) + tomli_w.dumps(table)
+
+
+def _refuse_unfit(table: dict[str, Any], file: Path) -> None:
+    from swarmwire.world.scenario.scenario_file import scenario_from
+
+    whole = table["radio"] if "model" in table["radio"] else {**DISK, **table["radio"]}
+    try:
+        scenario_from({**AROUND, "radio": whole}, str(file))
+    except BadInput as error:
+        raise BadInput(str(file), f"fitted {error.key}", f"{error.expected}, which no scenario takes") from None

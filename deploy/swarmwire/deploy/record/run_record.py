@@ -1,0 +1,127 @@
+"""What a run leaves behind: its folder, from the scenario and the first line of the log to the summary."""
+
+import sys
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.messages import DICT_TAG, Message
+from swarmwire.comms.protocols import Crew, Observer
+from swarmwire.deploy.live.published import Published
+from swarmwire.deploy.record.folder import make_folder
+from swarmwire.deploy.record.inputs import InputsRecord, RecordedCrew
+from swarmwire.deploy.record.origin import Origin, origin_of
+from swarmwire.deploy.record.recording import Recording
+from swarmwire.deploy.record.trajectory_log import TrajectoryLog
+from swarmwire.deploy.result import Result
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.record.names import RECORDING, SUMMARY
+from swarmwire.metrics.record.recorders import recorders
+from swarmwire.metrics.record.run_log import RunLog
+from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.world.scenario.scenario import Scenario
+
+
+class RunRecord:
+    """The folder of one run, or, with `out` None, nothing but what people are told.
+
+    Attributes:
+        folder: the run folder, if any.
+    """
+
+    def __init__(self, out: Path | None, clock: WallClock) -> None:
+        """Make the folder; BadInput unless it is new or empty, or can be made."""
+        self.folder = None if out is None else make_folder(out)
+        self._clock = clock
+        self._log = RunLog(self.folder, clock) if self.folder else None
+        self._recorded: RecordedCrew | None = None
+
+    def observers(
+        self, what: Recording, run_id: str, metrics: Metrics, hashes: Callable[[], list[str]], *, may_drop: bool
+    ) -> Sequence[Observer]:
+        """Those that fill the folder, and let others look on; `metrics` must see each tick before them."""
+        folder, clock = self.folder, self._clock
+        if folder is None:
+            return ()
+        found: list[Observer] = [TrajectoryLog(folder, hashes)]
+        if what.tables:
+            topics = _topics(Message)
+            found += recorders(
+                folder,
+                metrics,
+                clock,
+                packets=what.packets,
+                topics=topics,
+                links=what.links,
+                may_drop=may_drop,
+            )
+        if what.rrd:
+            found.append(RerunRecording(folder / RECORDING, metrics, clock, selected=what.select))
+        return (*found, Published(folder, run_id, metrics, clock, selected=what.select))
+
+    def begin(
+        self,
+        scenario: Scenario,
+        code: Sequence[str],
+        seeds: tuple[int, ...],
+        *,
+        ticks: int,
+        runners: int,
+        realtime: float | None,
+    ) -> Origin:
+        """Put into the folder all that the run is made from; what that is."""
+        origin = origin_of(
+            scenario, code, seeds=seeds, ticks=ticks, runners=runners, realtime=realtime, folder=self.folder
+        )
+        what = f"{scenario.name}, seeds {list(seeds)}, {ticks} ticks, {runners} runners"
+        self.note(f"swarmwire {version('swarmwire-deploy')}: {what}")
+        return origin
+
+    def failed_to_start(
+        self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
+    ) -> None:
+        """Say in the log why there was no first tick; there is nothing to sum up."""
+        if error is not None:
+            self.note(f"failed to start: {error}")
+
+    def recorded(self, crew: Crew, outside: Callable[[int], bool]) -> Crew:
+        """The crew, with its actions kept in the folder from the first tick on at which `outside(tick)` holds."""
+        if self.folder is None:
+            return crew
+        self._recorded = RecordedCrew(crew, self.folder, outside)
+        return self._recorded
+
+    def inputs(self) -> InputsRecord | None:
+        """What was recorded of the crew; None if nothing."""
+        return self._recorded.record() if self._recorded else None
+
+    def say(self, text: str) -> None:
+        """Keep it in the log, and tell people at once; a terminal that is gone must not end a run."""
+        self.note(text)
+        try:
+            print(text, file=sys.stderr, flush=True)
+        except (OSError, ValueError) as error:
+            self.note(f"(nobody could be told: {error})")
+
+    def note(self, text: str) -> None:
+        """Keep it in the log."""
+        if self._log:
+            self._log.say(text)
+
+    def close(self, result: Result) -> None:
+        """Write the summary, the last of all: where it is, the run is over."""
+        self.note(f"ended: {result.ended}, {result.ticks} ticks" + (f": {result.error}" if result.error else ""))
+        if self._log:
+            self._log.close()
+        if self.folder:
+            result.write(self.folder / SUMMARY)
+
+
+def _topics(kind: type[Message]) -> dict[int, str]:
+    """The names of all messages that agents known to this process have defined, by tag."""
+    names = {DICT_TAG: "dict"}
+    for below in kind.__subclasses__():
+        names |= {below.tag: below.__name__, **_topics(below)}
+    return names

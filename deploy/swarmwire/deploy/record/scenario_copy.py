@@ -1,0 +1,121 @@
+"""The scenario as run, in the run folder, with the files that it names: the folder needs the original no more.
+
+    scenario.toml      overrides applied, the seed as run; what was left out stays left out
+    files/<name>       agent files, measured links, pictures of the arena, byte for byte; bodies of the user's own with
+                       the files of their senses and actuators, which lie beside them
+
+Other bodies come with swarmwire and are covered by the digests of its parts. An agent file is loaded without its folder
+on `sys.path`, so there is nothing beside it that it could have imported; installed modules are not copied but named by
+their digests (`modules`).
+"""
+
+import hashlib
+import tomllib
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from swarmwire.agent.loading import resolve
+from swarmwire.deploy.radio.link_trace_file import trace_path
+from swarmwire.metrics.record.names import SCENARIO
+from swarmwire.world.placement.grey_image import beside
+from swarmwire.world.scenario.bodies import sheet_path
+from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario.scenario_mapping import mapping_of
+
+FILES = "files"
+
+
+@dataclass(frozen=True)
+class CopiedFile:
+    """A file that a run needs to be repeated, as it was when the run began."""
+
+    path: str  # within the run folder
+    sha256: str
+    what: str  # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "own sense" | "own actuator"
+
+
+def copy_scenario(scenario: Scenario, seeds: tuple[int, ...], folder: Path) -> tuple[CopiedFile, ...]:
+    """Write `scenario.toml` and `files/` into the run folder; with several seeds the scenario says the first."""
+    mapping = mapping_of(scenario)
+    mapping["seed"] = seeds[0]
+    copies = _Copies(folder)
+    for group in mapping["robots"].values():
+        path, _, name = resolve(group["agent"], Path(scenario.source).parent).rpartition(":")
+        if path.endswith(".py"):
+            group["agent"] = f"{copies.add(Path(path), 'agent')}:{name}"
+        body = sheet_path(group["body"], scenario.source)
+        if body is not None:
+            group["body"] = _copied_body(body, copies)
+    trace = trace_path(scenario)
+    if trace is not None:
+        mapping["radio"]["trace"]["file"] = copies.add(trace, "trace")
+    for what in ("map", "ground"):
+        table = mapping["arena"].get(what, {})
+        if "image" in table:
+            table["image"] = copies.add(beside(scenario.source, table["image"]).resolve(), what)
+    text = f"{_header(scenario)}\n{tomli_w.dumps(mapping)}".encode()
+    (folder / SCENARIO).write_bytes(text)
+    return (CopiedFile(SCENARIO, _sha256(text), "scenario"), *copies.made)
+
+
+def _copied_body(sheet: Path, copies: "_Copies") -> str:
+    """The path within the run folder of a body's sheet, which names the copies of its files."""
+    body: dict[str, Any] = tomllib.loads(sheet.read_text(encoding="utf-8"))
+    for what, tables in (("own sense", body.get("senses", {})), ("own actuator", body.get("actuators", {}))):
+        for table in tables.values():
+            path, _, name = resolve(table.get("kind", ""), sheet.parent).rpartition(":")
+            if path.endswith(".py"):
+                table["kind"] = f"{Path(copies.add(Path(path), what)).name}:{name}"
+    return copies.add(sheet, "body", tomli_w.dumps(body).encode())
+
+
+def changed_files(files: tuple[CopiedFile, ...], folder: Path) -> list[str]:
+    """The copied files that are not as they were any more, a line each."""
+    lines: list[str] = []
+    for file in files:
+        try:
+            if _sha256((folder / file.path).read_bytes()) != file.sha256:
+                lines.append(f"{file.path} is not as the run left it: its sha256 differs")
+        except OSError as error:
+            lines.append(f"{file.path} cannot be read: {error.strerror}")
+    return lines
+
+
+class _Copies:
+    """The files of one run folder: each original once, two of one name under different names."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._places: dict[Path, str] = {}
+        self.made: list[CopiedFile] = []
+
+    def add(self, original: Path, what: str, content: bytes | None = None) -> str:
+        """Copy a file unless it has been, or keep `content` in its place; its path within the run folder."""
+        if original not in self._places:
+            place = self._free(original)
+            data = original.read_bytes() if content is None else content
+            (self._folder / FILES).mkdir(exist_ok=True)
+            (self._folder / place).write_bytes(data)
+            self._places[original] = place
+            self.made.append(CopiedFile(place, _sha256(data), what))
+        return self._places[original]
+
+    def _free(self, original: Path) -> str:
+        taken, place, number = set(self._places.values()), f"{FILES}/{original.name}", 1
+        while place in taken:
+            number += 1
+            place = f"{FILES}/{original.stem}-{number}{original.suffix}"
+        return place
+
+
+def _header(scenario: Scenario) -> str:
+    source = Path(scenario.source).name or "a Scenario made in Python"
+    return f"# As run by swarmwire {version('swarmwire-deploy')}, from {source}, with overrides and seed as run.\n"
+
+
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

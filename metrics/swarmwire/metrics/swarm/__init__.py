@@ -1,0 +1,1 @@
+"""Metrics of the swarm: how it is spread, how it moves, whom it touches."""

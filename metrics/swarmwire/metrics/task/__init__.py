@@ -1,0 +1,1 @@
+"""Metrics of a task: how far the swarm has come with what it is there for."""

@@ -1,0 +1,1 @@
+"""Whether a run folder is whole, and holds what its summary says."""

@@ -1,0 +1,135 @@
+"""How a recording looks when it is opened: the arena in the middle, explained on the left, measured on the right."""
+
+from typing import Any, Literal
+
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.viewer.classes import LEGEND_LINES
+from swarmwire.metrics.viewer.selected import EYE, close_up_m
+
+TRAIL_S = 5.0
+_MARGIN = 1.03  # of the arena's half width, so that its walls are seen
+_TICK, _TIME = "tick", "sim_time"
+_GROUND = [16, 18, 24]
+_ARENA_SHARE = 0.44  # of the window's width, for an arena as wide as it is high; a narrow one leaves more to the plots
+_LEAST_ARENA_SHARE, _SIDE_SHARE = 0.24, 0.19
+_NARROW = 0.6  # width over height below which an arena gets the window's whole height
+_ROWS = [4.2, 1.0]  # of what is looked at, and of the events below it
+
+
+def layout(static: Static, selected: str, play_state: Literal["playing", "following", "paused"] = "playing") -> Any:
+    """The blueprint for recordings of this run, with a close look at the selected robot.
+
+    `play_state` is "following" for what is still being recorded. Without a radio there is no plot of packets.
+    """
+    import rerun.blueprint as rrb
+
+    wide = static.arena_size_m[0] / static.arena_size_m[1]
+    arena_share = _ARENA_SHARE * min(max(wide, _LEAST_ARENA_SHARE / _ARENA_SHARE), 1.0)
+    side = rrb.Vertical(_legend(), _close_up(static, selected), _about(), row_shares=[0.65, 1.1, 1.25])
+    plots = rrb.Vertical(*_plots(static))
+    if wide < _NARROW:
+        middle, right = _arena(static), rrb.Vertical(plots, _events(), row_shares=_ROWS)
+    else:
+        middle, right = rrb.Vertical(_arena(static), _events(), row_shares=_ROWS), plots
+    shares = [_SIDE_SHARE, arena_share, 1.0 - _SIDE_SHARE - arena_share]
+    return rrb.Blueprint(
+        rrb.Horizontal(side, middle, right, column_shares=shares),
+        rrb.TopPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=_TIME, play_state=play_state),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _arena(static: Static) -> Any:
+    import rerun.blueprint as rrb
+
+    half_x, half_y = (_MARGIN * size / 2 for size in static.arena_size_m)
+    return rrb.Spatial2DView(
+        origin="/",
+        contents=["/world/**"],
+        name="Arena",
+        background=_GROUND,
+        visual_bounds=rrb.VisualBounds2D(x_range=[-half_x, half_x], y_range=[-half_y, half_y]),
+        overrides={"/world/trails": [_last(TRAIL_S, static.rate_hz)]},
+    )
+
+
+def _close_up(static: Static, selected: str) -> Any:
+    import rerun.blueprint as rrb
+
+    half_m = close_up_m(static, selected)
+    return rrb.Spatial2DView(
+        origin=f"/{EYE}",
+        contents=["/world/**", "- /world/trails", "- /world/links", "- /world/lost_packets"],
+        name=f"Robot {selected}",
+        background=_GROUND,
+        visual_bounds=rrb.VisualBounds2D(x_range=[-half_m, half_m], y_range=[-half_m, half_m]),
+    )
+
+
+def _legend() -> Any:
+    import rerun.blueprint as rrb
+
+    half = LEGEND_LINES / 2
+    return rrb.Spatial2DView(
+        origin="/legend",
+        name="Robots",
+        background=_GROUND,
+        visual_bounds=rrb.VisualBounds2D(x_range=[-half, half], y_range=[-0.5, LEGEND_LINES]),
+    )
+
+
+def _about() -> Any:
+    import rerun.blueprint as rrb
+
+    return rrb.TextDocumentView(origin="/about", name="About")
+
+
+def _events() -> Any:
+    import rerun.blueprint as rrb
+
+    columns = rrb.TextLogColumns(timeline_columns=[_TIME], text_log_columns=["Body"])
+    return rrb.TextLogView(origin="/events", name="Events", columns=columns)
+
+
+def _plots(static: Static) -> list[Any]:
+    import rerun.blueprint as rrb
+
+    shares = _plot("shares", "Order and connectivity, as shares", (-0.03, 1.08))
+    distances, numbers = _plot("distances", "Distances in m"), _plot("numbers", "Counts")
+    if static.range_m is None:
+        return [shares, distances, numbers]
+    packets = _plot("packets", "Receivers per second, by a packet's fate")
+    times, rates = _plot("times", "Times in s"), _plot("rates", "Rates in bit/s")
+    first, second = (distances, numbers) if any(static.lights) else (numbers, distances)
+    return [shares, packets, rrb.Tabs(first, second, times, rates, active_tab=0)]
+
+
+def _last(duration_s: float, rate_hz: int) -> Any:
+    """What was logged in the last seconds before the cursor, whichever timeline is shown."""
+    import rerun.blueprint as rrb
+
+    since, now = -round(duration_s * NS_PER_S), rrb.TimeRangeBoundary.cursor_relative
+    return rrb.VisibleTimeRanges(
+        [
+            rrb.VisibleTimeRange(_TICK, start=now(seq=-round(duration_s * rate_hz)), end=now(seq=0)),
+            rrb.VisibleTimeRange(_TIME, start=now(nanos=since), end=now(nanos=0)),
+        ]
+    )
+
+
+def _plot(entity: str, name: str, bounds: tuple[float, float] | None = None) -> Any:
+    import rerun.blueprint as rrb
+
+    always = rrb.TimeRangeBoundary.infinite()  # else the viewer shows no more than a minute around the cursor
+    return rrb.TimeSeriesView(
+        origin=f"/plots/{entity}",
+        name=name,
+        axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(start=always, end=always)),
+        axis_y=rrb.ScalarAxis(range=bounds) if bounds else None,
+        plot_legend=rrb.Corner2D.LeftTop if entity == "numbers" else rrb.Corner2D.RightBottom,
+    )

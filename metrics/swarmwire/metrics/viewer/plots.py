@@ -1,0 +1,85 @@
+"""The plots of a recording: which numbers are drawn together, and what became of packets in the last second."""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.truth import Happened, Static, Truth
+from swarmwire.metrics.palette import Color
+from swarmwire.metrics.viewer.colors import FATES, MARK
+from swarmwire.metrics.viewer.plotted import Plotted
+from swarmwire.metrics.viewer.rows import RerunRows
+from swarmwire.metrics.viewer.series import RerunSeries
+
+_EVENT_MARK = 1.04  # where the mark of an event stands among the shares: above them all
+_FATES = {fate: FATE_NAMES[fate].replace("_", " ") for fate in FATES}
+_PLOTS = {"m": "distances", "s": "times", "bit/s": "rates"}  # by a metric's unit; the others are shares or numbers
+
+
+class RerunPlots:
+    """Plots of one arena, each with the series that have had a value.
+
+    shares: the metrics within 0 and 1, and `delivery` (heard / in range, over the last second), with a mark where an
+    event took effect; distances, times and rates: those in m, in s and in bit/s; numbers: the other metrics; packets:
+    receivers per second by fate, once one has had it. Those out of range are left out: they would dwarf the others.
+    """
+
+    def __init__(self, static: Static, metrics: Sequence[Plotted], arena: int) -> None:
+        """Plots of one arena."""
+        self._arena, self._rate_hz, self._radio = arena, static.rate_hz, static.range_m is not None
+        self._robots = static.robots
+        self._names = {"shares": [m.name for m in metrics if _plot(m) == "shares"]}
+        self._names |= {plot: [m.name for m in metrics if _plot(m) == plot] for plot in (*_PLOTS.values(), "numbers")}
+        fates: dict[str, Color] = {_FATES[fate]: color for fate, color in FATES.items()}
+        self._series = {plot: RerunSeries(f"plots/{plot}") for plot in self._names}
+        self._series["packets"] = RerunSeries("plots/packets", fates)
+        self._occurred: set[str] = set()  # fates
+        self._second: deque[IntArray] = deque(maxlen=static.rate_hz)  # per tick: (fates,), in range
+
+    def begin(self, rec: Any) -> None:
+        """Log the look of the marks of events; that of a series comes with its first value."""
+        import rerun as rr
+
+        look = rr.SeriesPoints(names="event", colors=MARK, markers="Diamond", marker_sizes=4.0)
+        rec.log("plots/shares/event", look, static=True)
+
+    def add(self, rows: RerunRows, latest: Mapping[str, FloatArray], truth: Truth) -> None:
+        """Add the numbers of a tick."""
+        import rerun as rr
+
+        numbers = {plot: {name: latest[name][self._arena] for name in names} for plot, names in self._names.items()}
+        if self._radio:
+            per_second, in_range = self._per_second(truth)
+            numbers["shares"]["delivery"] = per_second[Fate.HEARD] / in_range if in_range > 0 else np.nan
+            numbers["packets"] = self._by_name(per_second)
+        for plot, value in numbers.items():
+            self._series[plot].add(rows, value)
+        if any(self._concerns(event) for event in truth.events):
+            rows.add("plots/shares/event", rr.Scalars.columns, scalars=[_EVENT_MARK])
+
+    def _concerns(self, event: Happened) -> bool:
+        own = slice(self._arena * self._robots, (self._arena + 1) * self._robots)
+        return not event.singly or bool(event.changed[own].any())
+
+    def _per_second(self, truth: Truth) -> tuple[FloatArray, float]:
+        """Receivers per second over the last one: by fate, (fates,), and in range."""
+        if truth.tally is not None:
+            self._second.append(np.append(truth.tally.fates[self._arena], truth.tally.in_range[self._arena]))
+        if not self._second:
+            return np.zeros(len(Fate)), 0.0
+        rates = np.sum(self._second, axis=0) * (self._rate_hz / len(self._second))
+        return rates[:-1], float(rates[-1])
+
+    def _by_name(self, per_second: FloatArray) -> dict[str, float]:
+        """Receivers per second of each fate, NaN until it first occurs."""
+        rates = {name: float(per_second[fate]) for fate, name in _FATES.items()}
+        self._occurred |= {name for name, rate in rates.items() if rate > 0}
+        return {name: rate if name in self._occurred else np.nan for name, rate in rates.items()}
+
+
+def _plot(metric: Plotted) -> str:
+    return "shares" if metric.bounds == (0.0, 1.0) else _PLOTS.get(metric.unit, "numbers")

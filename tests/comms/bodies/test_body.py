@@ -1,0 +1,258 @@
+"""Bodies: the data sheets that come along are ARGoS's robots, and a bad sheet is refused with its place in it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.bodies.body import Body, body_from, body_from_mapping, body_names, load_body
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.sheets import Positioning, Proximity
+
+WITH_PROXIMITY = [name for name in body_names() if load_body(name).proximity]
+
+
+def proximity_of(name: str) -> Proximity:
+    sheet = load_body(name).proximity
+    assert sheet is not None
+    return sheet
+
+
+@pytest.mark.parametrize("name", body_names())
+def test_every_body_that_comes_along_loads_under_its_name(name: str) -> None:
+    assert load_body(name).name == name
+
+
+@pytest.mark.parametrize("name", body_names())
+def test_a_body_written_down_reads_back_the_same(name: str) -> None:
+    body = load_body(name)
+    assert body_from(body.as_mapping(), "copy.toml") == body
+
+
+def test_an_unknown_body_is_refused_with_those_that_there_are() -> None:
+    with pytest.raises(BadInput, match=r"body: expected one of epuck, .*; got 'roomba'"):
+        load_body("roomba")
+
+
+@pytest.mark.parametrize(
+    ("name", "distance_m", "value"),
+    [
+        ("epuck", 0.005, 0.905),
+        ("epuck", 0.01, 0.743),
+        ("epuck", 0.02, 0.464),
+        ("epuck", 0.03, 0.244),
+        ("epuck", 0.04, 0.084),
+        ("footbot", 0.02, 0.4986),
+        ("footbot", 0.05, 0.2004),
+        ("footbot", 0.10, 0.1004),
+    ],
+)
+def test_proximity_answers_as_in_argos(name: str, distance_m: float, value: float) -> None:
+    digits = 3 if name == "epuck" else 4
+    assert round(float(proximity_of(name).response.value(np.float64(distance_m))), digits) == value
+
+
+@pytest.mark.parametrize("distance_m", [0.01, 0.02, 0.05])
+def test_the_epuck2_answers_as_its_driver_reads_it(distance_m: float) -> None:
+    # epuck_driver_cpp: the distance in m is 0.5 / sqrt(value), of 4095.
+    value = proximity_of("epuck2").response.value(np.float64(distance_m))
+    assert 0.5 / np.sqrt(4095.0 * value) == pytest.approx(distance_m, rel=1e-3)
+
+
+def test_the_flockbot_sees_five_diameters_far_with_three_rays_in_each_sector() -> None:
+    # Sectors of minimalist flocking: front (-45, 45], left (45, 135], rear (135, 225], right (225, 315].
+    body, sheet = load_body("flockbot"), proximity_of("flockbot")
+    infrared = body.infrared
+    assert infrared is not None
+    assert sheet.range_m == infrared.range_m == pytest.approx(5.0 * 2.0 * body.radius_m)
+    for each in (sheet, infrared):
+        sector = np.floor((np.rad2deg(each.angle_rad) + 45.0 - 1e-9) / 90.0) % 4
+        assert np.bincount(sector.astype(int)).tolist() == [3, 3, 3, 3]
+
+
+def test_the_epuck_sees_nothing_from_48_mm_on() -> None:
+    assert not proximity_of("epuck").response.value(np.linspace(0.048, 0.2, 100)).any()
+
+
+def test_the_footbot_answers_fully_at_the_rim_and_not_beyond_10_cm() -> None:
+    response = proximity_of("footbot").response
+    assert response.value(np.array([0.0, 0.009])).tolist() == [1.0, 1.0]
+    assert response.value(np.array([0.1001, 1.0])).tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("name", WITH_PROXIMITY)
+@given(st.floats(0.0, 0.2))
+def test_a_response_names_the_distance_it_came_from(name: str, distance_m: float) -> None:
+    response = proximity_of(name).response
+    value = response.value(np.array([distance_m]))
+    if 1e-9 < value[0] < 1.0:
+        assert response.distance_m(value)[0] == pytest.approx(distance_m, abs=1e-9)
+    elif value[0] == 0.0:
+        assert response.distance_m(value)[0] == response.reach_m
+
+
+@pytest.mark.parametrize("name", WITH_PROXIMITY)
+def test_a_stronger_response_never_means_farther_away(name: str) -> None:
+    response = proximity_of(name).response
+    distance_m = response.distance_m(np.linspace(0.0, 1.0, 1001))
+    assert np.all(np.diff(distance_m) <= 0.0)
+    assert 0.0 <= distance_m.min() <= distance_m.max() == response.reach_m
+
+
+@pytest.mark.parametrize("name", WITH_PROXIMITY)
+def test_rays_are_mirrored_left_and_right_and_lie_within_half_a_turn(name: str) -> None:
+    angle = proximity_of(name).angle_rad
+    assert np.all((angle > -np.pi) & (angle <= np.pi))
+    ahead, left = np.round(np.cos(angle), 9), np.round(np.sin(angle), 9)
+    assert set(zip(ahead, left, strict=True)) == set(zip(ahead, -left, strict=True))
+
+
+def test_the_turning_limit_follows_from_wheels_and_axle() -> None:
+    body = load_body("epuck")
+    assert body.max_angular_radps == pytest.approx(2.0 * body.drive.max_wheel_mps / body.wheels.wheel_base_m)
+    assert body.max_linear_mps == body.drive.max_wheel_mps
+
+
+def test_a_body_without_a_sense_has_no_sheet_for_it() -> None:
+    body = body_from({**sheet_of("epuck"), "senses": {}}, "blind.toml")
+    assert (body.proximity, body.compass, body.odometry) == (None, None, None)
+
+
+def sheet_of(name: str) -> dict[str, Any]:
+    return load_body(name).as_mapping()
+
+
+def changed(path: str, value: object) -> dict[str, Any]:
+    """The e-puck's sheet with one value put in place, or taken away where it is None."""
+    sheet = sheet_of("epuck")
+    *tables, key = path.split(".")
+    table = sheet
+    for name in tables:
+        table = table[name]
+    table[key] = value
+    if value is None:
+        del table[key]
+    return sheet
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "expected"),
+    [
+        ("radius_m", None, "radius_m: is missing"),
+        ("drive", None, "drive: is missing"),
+        ("drive.wheel_base_m", None, "drive.wheel_base_m: is missing"),
+        (
+            "like",
+            "roomba",
+            f"like: expected one of {', '.join(body_names())}; got 'roomba'",
+        ),
+        (
+            "like",
+            3,
+            f"like: expected one of {', '.join(body_names())}; got 3",
+        ),
+        ("senses.light.noise", 2, "senses.light.noise: expected at most 1, got 2.0"),
+        ("senses.bumper.noise", 1, "senses.bumper.noise: unknown key; expected one of"),
+        ("senses.positioning", {"noise_m": -1}, "senses.positioning.noise_m: expected at least 0 m, got -1.0"),
+        ("colour", "red", "colour: unknown key; expected one of name, source, radius_m"),
+        ("drive.gears", 3, "drive.gears: unknown key; expected one of wheel_base_m"),
+        ("senses.lidar", {}, "senses.lidar: unknown sense; expected one of proximity, compass, odometry, light"),
+        ("senses", 3, "senses: expected a table, got 3"),
+        ("senses.compass", True, "senses.compass: expected a table, got True"),
+        ("drive", [], "drive: expected a table, got []"),
+        ("name", 3, "name: expected a text, got 3"),
+        ("radius_m", "big", "radius_m: expected a number, got 'big'"),
+        ("radius_m", True, "radius_m: expected a number, got True"),
+        ("radius_m", 0.0, "radius_m: expected more than 0 m, got 0.0"),
+        ("radius_m", float("nan"), "radius_m: expected a finite number, got nan"),
+        ("mass_kg", 10**400, "mass_kg: expected a number of at most 1e+09 in size, got 1000"),
+        ("senses.compass.delay_s", 1e308, "senses.compass.delay_s: expected a number of at most 1e+09 in size"),
+        ("drive.noise", {"factor": 1000.0}, "drive.noise.factor: expected at most 2, got 1000.0"),
+        ("drive.noise", {"bias_mps": -1}, "drive.noise.bias_mps: expected at least -0.1 m/s, got -1.0"),
+        ("radius_m", float("inf"), "radius_m: expected a finite number, got inf"),
+        ("senses.compass.noise_rad", -1, "senses.compass.noise_rad: expected at least 0 rad, got -1.0"),
+        ("senses.odometry.slip", 2, "senses.odometry.slip: expected at most 1, got 2.0"),
+        ("senses.proximity.response.b", 36.8961, "response: expected a curve that falls from the rim to reach_m"),
+        (
+            "senses.proximity.response.kind",
+            "cubic",
+            "response.kind: expected one of rational, inverse_square, quadratic; got 'cubic'",
+        ),
+        ("senses.proximity.angles_deg", 17, "senses.proximity.angles_deg: expected a list, got 17"),
+        ("senses.proximity.angles_deg", [], "senses.proximity.angles_deg: expected at least one item"),
+        ("senses.proximity.angles_deg", [1] * 1001, "angles_deg: expected at most 1000 items, got 1001"),
+        ("leds.angles_deg", [1] * 1001, "leds.angles_deg: expected at most 1000 items, got 1001"),
+        ("senses.ground.points_m", [[0, 0]] * 1001, "points_m: expected at most 1000 items, got 1001"),
+        ("senses.scan", {"rays": 10_001, "range_m": 1}, "senses.scan.rays: expected at most 10000, got 10001"),
+        ("senses.camera.most_blobs", 1001, "senses.camera.most_blobs: expected at most 1000, got 1001"),
+        ("drive.wheel_base_m", 0.0701, "drive.wheel_base_m: expected at most the body's diameter, 0.07 m; got 0.0701"),
+        ("leds.radius_m", 0.044, "leds.radius_m: expected at most 0.04375 m, 1.25 times the body's radius; got 0.044"),
+        ("leds.height_m", 0.173, "leds.height_m: expected at most 0.172 m, twice the body's height; got 0.173"),
+        ("leds.beacon_height_m", 1, "leds.beacon_height_m: expected at most 0.172 m, twice the body's height; got 1.0"),
+        ("altitude_m", 0.5, "senses.ground: expected altitude_m = 0: it looks at the floor right below, not from 0.5"),
+        (
+            "drive",
+            {"kind": "holonomic", "max_speed_mps": 1, "max_angular_radps": 1, "max_force_n": 1, "max_torque_nm": 1},
+            "senses.odometry: expected a drive with wheels: holonomic has no wheels",
+        ),
+        ("senses.proximity.angles_deg", [1, "x"], "senses.proximity.angles_deg[1]: expected a number, got 'x'"),
+    ],
+)
+def test_a_bad_sheet_is_refused_with_file_key_and_what_was_expected(path: str, value: object, expected: str) -> None:
+    with pytest.raises(BadInput) as refused:
+        body_from(changed(path, value), "mine.toml")
+    assert str(refused.value).startswith("mine.toml: ")
+    assert expected in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_whole_numbers_serve_as_numbers() -> None:
+    body = body_from(changed("mass_kg", 2), "mine.toml")
+    assert isinstance(body, Body)
+    assert (body.mass_kg, type(body.mass_kg)) == (2.0, float)
+
+
+def test_a_body_like_another_differs_only_in_what_it_says() -> None:
+    gps, epuck = load_body("epuck-gps"), load_body("epuck")
+    assert {**gps.as_mapping(), "name": "epuck", "source": epuck.source, "senses": None} == {
+        **epuck.as_mapping(),
+        "senses": None,
+    }
+    assert gps.senses == {**epuck.senses, "positioning": Positioning(0.01)}
+    mine = body_from({"like": "epuck-gps", "name": "mine", "drive": {"wheel_base_m": 0.06}}, "mine.toml")
+    assert (mine.wheels.wheel_base_m, mine.drive.max_force_n) == (0.06, epuck.drive.max_force_n)
+    assert (mine.name, mine.senses) == ("mine", gps.senses)
+
+
+def test_bodies_know_no_global_position_unless_they_say_so() -> None:
+    assert [name for name in body_names() if "positioning" in load_body(name).senses] == ["epuck-gps", "point"]
+
+
+def test_photocells_are_argos_s() -> None:
+    epuck, footbot = load_body("epuck").light, load_body("footbot").light
+    assert epuck
+    assert footbot
+    assert epuck.angles_deg == tuple(22.5 + 45.0 * k for k in range(8))
+    assert footbot.angles_deg == proximity_of("footbot").angles_deg
+    assert (epuck.noise, footbot.noise) == (0.05, 0.0)
+
+
+def test_a_body_like_another_does_not_take_over_senses_that_it_cannot_have() -> None:
+    forces = {"max_force_n": 1.0, "max_torque_nm": 1.0}
+    drive = {"kind": "holonomic", "max_speed_mps": 1.0, "max_angular_radps": 1.0, **forces}
+    sheet = {"like": "epuck", "name": "drone", "altitude_m": 1.0, "drive": drive}
+    drone = body_from(sheet, "drone.toml")
+    assert set(load_body("epuck").senses) - set(drone.senses) == {"odometry", "ground"}
+    with pytest.raises(BadInput, match=r"drone\.toml: senses\.ground: expected altitude_m = 0"):
+        body_from({**sheet, "senses": {"ground": {"noise": 0.1}}}, "drone.toml")
+
+
+def test_a_told_sheet_whose_actuator_is_too_wide_is_refused() -> None:
+    told = load_body("epuck").as_mapping()
+    told["actuators"] = {"arm": {"kind": "a:B", "params": {}, "width": 10_001}}
+    with pytest.raises(
+        BadInput, match=r"told: actuators\.arm\.width: expected a whole number from 0 to 10000, got 10001"
+    ):
+        body_from_mapping(told, "told")

@@ -1,0 +1,103 @@
+"""The hand-shake with runners: who joins gets robots, and what does not fit is counted and changes nothing."""
+
+import msgpack
+import numpy as np
+import pytest
+
+from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.wire import frames
+from swarmwire.world.crews.lockstep import Refused
+from tests.agent.hosts import GIVES, assignment, group
+from tests.world.locksteps import FLOCK, joined, ready, request, state, two
+
+
+def test_runners_get_robots_in_the_order_in_which_they_join() -> None:
+    lockstep = two()
+    name, reply = lockstep.join(request("second-named-first"))
+    assert name == "second-named-first"
+    got = Assignment.from_mapping(msgpack.unpackb(reply))
+    assert got.robots_text == "flock-0 … lone-3 (4 robots)"
+    assert got.groups[0].keys.tolist() == group("", FLOCK).keys[:2].tolist()
+    assert Assignment.from_mapping(msgpack.unpackb(lockstep.join(request("a"))[1])).groups[0].rows.tolist() == [4, 5]
+    assert not lockstep.counts()
+
+
+def test_an_assignment_comes_over_whole() -> None:
+    sent = assignment(
+        group("a.b:C", [1, 4], params={"x": 1.5, "n": 2, "on": True, "w": "ä"}), group("d:E", [2], "s", "footbot")
+    )
+    got = Assignment.from_mapping(msgpack.unpackb(msgpack.packb(sent.as_mapping())))
+    assert got.as_mapping() == sent.as_mapping()
+    assert got.gives == GIVES
+    assert got.groups[1].body == sent.groups[1].body
+    assert got.groups[0].keys.dtype == np.uint64
+    assert Assignment.from_mapping(Assignment((), 10, None).as_mapping()).gives is None
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        b"",
+        b"\xc1",
+        b"\x91" * 5000,
+        msgpack.packb(None),
+        msgpack.packb({"runner": "a"}),
+        msgpack.packb({"v": frames.VERSION}),
+        request("a", version=frames.VERSION + 1),
+        request("a", version="1"),
+        request(3),
+        request(b"a"),
+        *(request(name) for name in ("", "a/b", "*", "**", "a*", "$*", "a?b", "a#b", "ä", "a b", "a\n", "x" * 65)),
+    ],
+    ids=repr,
+)
+def test_a_bad_request_is_refused_counted_and_changes_nothing(bad: bytes) -> None:
+    lockstep = joined(two(), "a")
+    before = state(lockstep)
+    with pytest.raises(Refused, match="expected a request of version 1"):
+        lockstep.join(bad)
+    assert state(lockstep) == before
+    assert lockstep.counts() == {"bad_join": 1}
+
+
+def test_a_name_in_use_is_refused() -> None:
+    lockstep = joined(two(), "a")
+    before = state(lockstep)
+    with pytest.raises(Refused, match="in use"):
+        lockstep.join(request("a"))
+    assert state(lockstep) == before
+    assert lockstep.counts() == {"refused_join": 1}
+
+
+def test_who_comes_too_late_gets_no_robots() -> None:
+    lockstep = joined(two(), "a", "b")
+    before = state(lockstep)
+    with pytest.raises(Refused, match="all robots are taken"):
+        lockstep.join(request("c"))
+    assert state(lockstep) == before
+    assert lockstep.counts() == {"refused_join": 1}
+
+
+def test_the_first_tick_may_begin_once_all_are_ready() -> None:
+    lockstep = two()
+    assert lockstep.waiting
+    assert lockstep.missing == ("that did not join", "flock-0 … lone-3 (4 robots)")
+    joined(lockstep, "a", "b")
+    assert lockstep.missing[0] == "a"
+    ready(lockstep, "a")
+    assert lockstep.waiting
+    assert lockstep.missing == ("b", "flock-4 … lone-7 (4 robots)")
+    ready(lockstep, "b")
+    assert not lockstep.waiting
+    assert not lockstep.counts()
+
+
+@pytest.mark.parametrize("kind", ["actions", "ready"])
+def test_before_the_first_tick_only_a_first_ready_counts(kind: str) -> None:
+    lockstep = joined(two(), "a", "b")
+    if kind == "ready":
+        ready(lockstep, "a")
+    before = state(lockstep)
+    lockstep.answer("a", frames.encode(kind, -1, {}))
+    assert state(lockstep) == before
+    assert lockstep.counts() == {{"ready": "unexpected_kind_frames", "actions": "wrong_tick_frames"}[kind]: 1}

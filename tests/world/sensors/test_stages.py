@@ -1,0 +1,84 @@
+"""What goes wrong between the truth and a reading goes wrong in the order told, by keyed draws, at its share."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.draws import normal, purpose, uniform
+from swarmwire.world.placement.angles import wrapped
+from swarmwire.world.sensors.sensor import Field, Noise
+from swarmwire.world.sensors.stages import Stages
+
+KEYS = np.array([7, 8], np.uint64)
+ROBOTS = np.arange(3, 8)
+KEY, ROBOT, PLACE = KEYS[:, None, None], ROBOTS[None, :, None], np.arange(4)
+
+
+def through(field: Field, truth, outlier: float = 0.0, drop_out: float = 0.0, tick: int = 9):
+    """What becomes of a truth, of the robots 3 to 7 of two arenas."""
+    value = np.array(np.broadcast_to(truth, (2, 5, 4) if field.width else (2, 5)), np.float64)
+    Stages("sense", field, outlier, drop_out).apply(value, KEYS, 3, tick)
+    return value
+
+
+def draw(of, what_for: str, tick: int = 9):
+    return of(KEY, ROBOT, tick, PLACE, purpose(what_for))
+
+
+def test_noise_is_of_the_kind_and_size_told_and_keyed() -> None:
+    even = through(Field("value", 4, Noise("uniform", 0.2, 0.1)), -3.0)
+    assert even == pytest.approx(-3.0 + 0.5 * (2.0 * draw(uniform, "sense.value noise") - 1.0))
+    bell = through(Field("value", 4, Noise("normal", 0.2, 0.1)), 3.0)
+    assert bell == pytest.approx(3.0 + 0.5 * draw(normal, "sense.value noise"))
+    one = through(Field("value", 0, Noise("normal", 0.2, 0.1)), 3.0)
+    assert np.array_equal(one, bell[:, :, 0])
+    other = through(Field("other", 0, Noise("normal", 0.2, 0.1)), 3.0)
+    assert not (one == other).any()
+
+
+def test_lost_readings_are_blank_and_lost_together_in_all_fields_of_a_sense() -> None:
+    lost = draw(uniform, "sense drop-out") < 0.3
+    assert 0 < np.count_nonzero(lost) < lost.size
+    for name, blank in (("value", 0.0), ("other", np.inf), ("third", np.nan)):
+        noise = Noise("uniform", 0.1)
+        told = through(Field(name, 4, noise, step=0.25, low=1.0, high=2.0, blank=blank), 1.6, drop_out=0.3)
+        assert np.array_equal(told[lost], np.full(told[lost].shape, blank), equal_nan=True)
+        assert np.all((told[~lost] >= 1.0) & (told[~lost] <= 2.0))
+    assert np.isnan(through(Field("value", 4), 1.0, drop_out=1.0)).all()
+
+
+def test_outliers_lie_anywhere_in_the_range_and_at_the_same_places_in_all_fields() -> None:
+    out, where = draw(uniform, "sense outlier") < 0.3, draw(uniform, "sense.value outlier")
+    told = through(Field("value", 4, low=-1.0, high=3.0), 0.5, outlier=0.3)
+    assert told == pytest.approx(np.where(out, -1.0 + 4.0 * where, 0.5))
+    assert through(Field("value", 4, span=(-1.0, 3.0)), np.inf, outlier=0.3)[out] == pytest.approx(told[out])
+
+
+def test_steps_come_after_noise_and_the_range_after_steps() -> None:
+    noisy = through(Field("value", 4, Noise("uniform", 1.0)), 0.0)
+    stepped = through(Field("value", 4, Noise("uniform", 1.0), step=0.4), 0.0)
+    assert np.array_equal(stepped, np.rint(noisy / 0.4) * 0.4)
+    clipped = through(Field("value", 4, Noise("uniform", 1.0), step=0.4, low=-0.5, high=0.5), 0.0)
+    assert np.array_equal(clipped, np.clip(stepped, -0.5, 0.5))
+    assert {-0.5, 0.5} <= set(clipped.ravel().tolist())
+
+
+@given(st.floats(-50, 50))
+def test_angles_are_wrapped_last_bit_for_bit_as_everywhere(angle: float) -> None:
+    told = through(Field("value", angle=True), angle)
+    assert np.array_equal(told, np.broadcast_to(wrapped(np.array(angle)), (2, 5)))
+
+
+@pytest.mark.parametrize("nothing", [np.inf, -np.inf, np.nan])
+def test_what_is_not_finite_stays_as_it_is(nothing: float) -> None:
+    field = Field("value", 4, Noise("normal", 0.1, 0.1), step=0.1, low=0.0, high=1.0)
+    assert np.array_equal(through(field, nothing), np.full((2, 5, 4), nothing), equal_nan=True)
+
+
+def test_an_arena_alone_errs_as_among_others() -> None:
+    field = Field("value", 4, Noise("normal", 0.1))
+    both, alone = through(field, 1.0), np.ones((1, 5, 4))
+    Stages("sense", field, 0.0, 0.0).apply(alone, KEYS[1:], 3, 9)
+    assert np.array_equal(alone[0], both[1])
+    assert not (both[0] == both[1]).any()

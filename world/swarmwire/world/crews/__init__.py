@@ -1,0 +1,1 @@
+"""Crews behind the network: who plays which robots, in lockstep or in real time."""

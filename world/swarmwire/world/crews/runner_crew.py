@@ -1,0 +1,202 @@
+"""Runners behind zenoh: a thin adapter that carries bytes between them and a roster, which decides."""
+
+# zenoh's stubs leave out the return types of put, reply and close.
+# pyright: reportUnknownMemberType=false
+
+import queue
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import zenoh
+
+from swarmwire.comms.clock import Clock, to_ns
+from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.keys import Keys, runner_of
+from swarmwire.comms.wire.sessions import open_world
+from swarmwire.world.crews.roster import Loss, Refused, Roster
+from swarmwire.world.crews.runner_health import RunnerHealth
+
+POLL_S = 0.2  # how often a wait looks up whether to go on waiting
+START_S = 60.0  # how long runners may take to join and build their agents
+FAREWELL_S = 3.0  # how long runners may take to leave after the end
+
+Item = zenoh.Sample | zenoh.Query
+R = TypeVar("R", bound=Roster[Any])
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a crew asks and tells whoever runs it.
+
+    `trouble` says why there is no more point in waiting for runners (a process that exited), or None; it is asked while
+    any loss ends the run. `stopped` says whether the run is to end; `lost` is told of a loss that the run survives.
+    """
+
+    trouble: Callable[[], str | None] = lambda: None
+    stopped: Callable[[], bool] = lambda: False
+    lost: Callable[[Loss], None] = lambda _: None
+
+
+class RunnerCrew(ABC, Generic[R]):
+    """All agents of a run in runners that join at `endpoint`; how the loop waits for them is the subclass's affair."""
+
+    congestion = zenoh.CongestionControl.BLOCK  # of frames to runners
+
+    def __init__(
+        self,
+        endpoint: str,
+        run_id: str,
+        roster: R,
+        timeout_s: float,
+        clock: Clock,
+        around: Surroundings,
+        start_s: float = START_S,
+    ) -> None:
+        self._endpoint, self._keys = endpoint, Keys(run_id)
+        self._roster, self._timeout_s, self._clock, self._around = roster, timeout_s, clock, around
+        self._inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
+        self._session: zenoh.Session | None = None
+        self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to
+        self._frames: dict[str, zenoh.Publisher] = {}
+        self._present: set[str] = set()
+        self._losses_told = 0
+        self._patience_s = start_s  # how long a wait may last; in ticks the time-out
+        self._deadline_ns = 0
+
+    def open(self) -> None:
+        """Listen at the endpoint, so that runners may join; BadInput if it is taken."""
+        try:
+            session = self._session = open_world(self._endpoint, self._timeout_s)
+        except zenoh.ZError as error:
+            reason = str(error).split(" at ")[0]
+            raise BadInput(
+                "", self._endpoint, f"expected an endpoint that is free and can be listened on: {reason}"
+            ) from error
+        arrived = (self._inbox.put, self._inbox)
+        self._declared = (
+            session.declare_queryable(self._keys.join, arrived),
+            session.declare_subscriber(self._keys.any_answer, arrived),
+            session.liveliness().declare_subscriber(self._keys.any_alive, arrived, history=True),
+            session.liveliness().declare_token(self._keys.world),  # last: it says that runners may join
+        )
+
+    def start(self) -> None:
+        """Wait until runners have taken all robots and built their agents."""
+        if self._session is None:
+            self.open()
+        self._wait()
+        self._patience_s = self._timeout_s
+
+    @abstractmethod
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+        """What every robot does in this tick."""
+
+    def counts(self) -> dict[str, int]:
+        """Frames that were dropped and runners that were lost, by name."""
+        return self._roster.counts()
+
+    def health(self) -> RunnerHealth:
+        """How the runners are doing."""
+        return self._roster.health()
+
+    def close(self) -> None:
+        """Tell the runners that the run is over, give them a moment to leave, and close the session."""
+        session, self._session = self._session, None
+        if session is None:
+            return
+        for publisher in self._frames.values():
+            publisher.put(frames.encode("end", -1, {}))
+        deadline_ns = self._clock.now_ns() + to_ns(FAREWELL_S)
+        while self._present and self._clock.now_ns() < deadline_ns and self._trouble() is None:
+            item = self._next()
+            if isinstance(item, zenoh.Sample) and item.kind == zenoh.SampleKind.DELETE:
+                self._present.discard(runner_of(str(item.key_expr)))
+        session.close()
+
+    def _send(self, out: list[tuple[str, bytes]]) -> None:
+        for runner, data in out:
+            self._frames[runner].put(data)
+
+    def _wait(self) -> None:
+        """Take in what arrives until every runner is ready; one that takes too long is lost.
+
+        Samples are handled together once there may be one from each runner: one by one, the caches of this process
+        would be cold for each, since the runners use the cores in between.
+        """
+        self._allow_time()
+        arrived: list[Item] = []
+        while waiting := self._roster.waiting:
+            while len(arrived) < waiting:
+                item = self._next()
+                if item is None:
+                    break
+                arrived.append(item)
+            if not arrived and self._around.stopped():
+                raise Interrupted("interrupted while it waited for its runners")
+            trouble = None if arrived else self._trouble()
+            for item in arrived:
+                self._handle(item)
+            arrived.clear()
+            if trouble is not None and self._roster.waiting:
+                raise RunnerLost(*self._roster.missing, trouble)
+            if self._clock.now_ns() > self._deadline_ns:
+                self._roster.lose_silent(f"no answer for {self._patience_s:g} s")
+                self._allow_time()
+            self._tell_losses()
+
+    def _allow_time(self) -> None:
+        self._deadline_ns = self._clock.now_ns() + to_ns(self._patience_s)
+
+    def _trouble(self) -> str | None:
+        return None if self._roster.bears_losses else self._around.trouble()
+
+    def _next(self) -> Item | None:
+        try:
+            return self._inbox.get(timeout=POLL_S)
+        except queue.Empty:
+            return None
+
+    def _handle(self, item: Item) -> None:
+        if isinstance(item, zenoh.Query):
+            self._join(item)
+            return
+        key = str(item.key_expr)
+        runner = runner_of(key)
+        if key != self._keys.alive(runner):
+            # A put may name its key with wildcards; only the exact one speaks for a runner.
+            speaker = runner if key == self._keys.answer(runner) else key
+            self._send(self._roster.answer(speaker, item.payload.to_bytes()))
+        elif item.kind == zenoh.SampleKind.DELETE:
+            self._present.discard(runner)
+            self._roster.gone(runner, "its process or its link is gone")
+        else:
+            self._present.add(runner)
+
+    def _join(self, query: zenoh.Query) -> None:
+        if self._session is None:
+            return
+        with query:  # a query that is kept alive holds the asker until its time-out
+            try:
+                runner, reply = self._roster.join(query.payload.to_bytes() if query.payload else b"")
+            except Refused as refusal:
+                query.reply_err(str(refusal))
+                return
+            self._frames[runner] = self._session.declare_publisher(
+                self._keys.frame(runner), congestion_control=self.congestion, express=True
+            )
+            self._allow_time()
+            query.reply(self._keys.join, reply)
+
+    def _tell_losses(self) -> None:
+        """A runner that was lost may be but slow: it is told to leave, since it has no robots any more."""
+        for loss in self._roster.losses[self._losses_told :]:
+            self._frames.pop(loss.runner).put(frames.encode("end", -1, {}))
+            self._present.discard(loss.runner)
+            self._around.lost(loss)
+        self._losses_told = len(self._roster.losses)

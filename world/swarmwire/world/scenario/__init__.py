@@ -1,0 +1,1 @@
+"""The scenario: from a file to checked, frozen tables."""

@@ -1,0 +1,64 @@
+"""The body of each group: one that comes with swarmwire, or a sheet of the user's own beside the scenario."""
+
+import tomllib
+from pathlib import Path
+
+from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
+from swarmwire.comms.bodies.body import Body, body_from, load_body
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.sheets import OwnSheet
+from swarmwire.comms.truth import Static
+from swarmwire.world.own.fitting import fitted
+from swarmwire.world.scenario.scenario import Scenario
+
+SUFFIX = ".toml"
+
+
+def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
+    """The body of each group, by the group's name; BadInput names the scenario, or the sheet of the user's own."""
+    known: dict[str, Body] = {}
+    bodies: dict[str, Body] = {}
+    for group, table in scenario.robots.items():
+        if table.body not in known:
+            known[table.body] = _body(table.body, where, f"robots.{group}.body")
+        bodies[group] = known[table.body]
+    return bodies
+
+
+def sheet_path(body: str, where: str) -> Path | None:
+    """Where the sheet lies that a scenario names as a `body`; None for one that comes with swarmwire."""
+    return (Path(where).parent / body).resolve() if body.endswith(SUFFIX) else None
+
+
+def own_code(static: Static) -> tuple[str, ...]:
+    """The classes of the bodies' own senses and actuators: "package.module:Class" or "/path/file.py:Class"."""
+    sheets = [
+        sheet for group in static.groups for sheet in (*group.body.senses.values(), *group.body.actuators.values())
+    ]
+    return tuple(dict.fromkeys(sheet.kind for sheet in sheets if isinstance(sheet, OwnSheet | ActuatorSheet)))
+
+
+def _body(name: str, where: str, key: str) -> Body:
+    if "\0" in name:
+        raise BadInput(where, key, "expected the name of a body or of a file, got a text with a zero byte")
+    path = sheet_path(name, where)
+    if path is None:
+        try:
+            return load_body(name)
+        except BadInput as error:
+            raise BadInput(where, key, error.expected) from None
+    return read_body(path, where, key)
+
+
+def read_body(path: Path, where: str, key: str) -> Body:
+    """The body of a sheet of the user's own, its own senses and actuators fitted.
+
+    BadInput names the sheet, or `where` and `key`, which name it, if it cannot be read.
+    """
+    try:
+        sheet = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadInput(where, key, f"expected a readable file: {path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise BadInput(str(path), "", f"expected TOML: {error}") from None
+    return fitted(body_from(sheet, str(path), path.parent), str(path))

@@ -1,0 +1,136 @@
+"""The scenario: everything that a run's file may say, as frozen tables. Unknown keys are refused."""
+
+from itertools import accumulate
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import Field, PrivateAttr, StringConstraints, field_validator, model_validator
+from pydantic_core import PydanticCustomError
+
+from swarmwire.comms.air.presets import with_preset
+from swarmwire.comms.air.propagation.parameters import OwnAntenna
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.events.event import Event
+from swarmwire.comms.events.registry import ACTIONS
+from swarmwire.comms.events.swarm import Groups
+from swarmwire.world.scenario.arena_tables import ArenaTable
+from swarmwire.world.scenario.place_tables import AtPoses, InArena, PlaceTable
+from swarmwire.world.scenario.schema import AsTable, OneOf
+from swarmwire.world.scenario.tables import Table
+
+GroupName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=40)]
+
+
+class TimeTable(Table):
+    """[time]: the base period of the run."""
+
+    rate_hz: int = Field(default=10, ge=1, le=1000, json_schema_extra={"unit": "Hz"})
+    """Ticks per second."""
+
+
+class PhysicsTable(Table):
+    """[physics]: how bodies move and touch."""
+
+    engine: Literal["auto", "discs", "pymunk", "kinematic"] = "auto"
+    """What moves bodies that have contacts: discs, or pymunk, which also moves obstacles; "auto" takes discs unless an
+    obstacle is movable. Bodies without contacts, and such as fly, are kinematic; "kinematic" makes all of them so."""
+    steps: int = Field(default=5, ge=1, le=1000)
+    """Physics steps per tick; refused if a robot with contacts at full speed would move over a quarter of its radius in
+    one."""
+
+
+class RobotsTable(Table):
+    """[robots.<group>]: robots of one kind that run the same agent."""
+
+    body: str = Field(min_length=1)
+    """Name of the body."""
+    count: int = Field(ge=1, le=1_000_000)
+    """How many robots."""
+    agent: str = Field(min_length=1)
+    """The agent's class, as module:Class or file.py:Class."""
+    act_every_ticks: int = Field(default=1, ge=1, le=1_000_000, json_schema_extra={"unit": "ticks"})
+    """They act when the tick modulo this is 0, and hear then what has arrived since they last acted."""
+    params: dict[str, Any] = Field(default_factory=dict)
+    """The agent's parameters."""
+    radio: Annotated[OwnAntenna, AsTable()] | None = None
+    """Their own power and gain; only of a radio with signals."""
+    place: PlaceTable = InArena(how="arena")
+    """Where the robots stand at the start."""
+
+    @model_validator(mode="after")
+    def _a_pose_each(self) -> "RobotsTable":
+        if isinstance(self.place, AtPoses) and len(self.place.poses) != self.count:
+            text = "expected a pose for each of the {count} robots, got {poses} poses"
+            raise PydanticCustomError("poses", text, {"count": self.count, "poses": len(self.place.poses)})
+        return self
+
+
+class RunTable(Table):
+    """[run]: what the loop does about runners."""
+
+    on_runner_loss: Literal["stop", "dead", "wait"] = "stop"
+    """A lost runner ends the run, its robots stand still, or they wait until another runner takes over."""
+    runner_timeout_s: float = Field(default=30.0, gt=0, le=86_400, json_schema_extra={"unit": "s"})
+    """A runner is lost if it gives no answer for so long."""
+    watchdog_s: float = Field(default=0.5, gt=0, le=86_400, json_schema_extra={"unit": "s"})
+    """In real time: a robot without fresh commands for so long, in simulated time, stops."""
+
+
+class Scenario(Table):
+    """One run: its arena, robots, radio and length."""
+
+    format: Literal[1]
+    """Version of this format."""
+    name: str = Field(min_length=1, max_length=200)
+    """What the run is about."""
+    seed: int = Field(default=1, ge=0, le=2**63 - 1)
+    """The seed of every draw of the run's arena."""
+    duration_s: float = Field(gt=0, le=1e9, json_schema_extra={"unit": "s"})
+    """Length of the run."""
+    time: TimeTable = TimeTable()
+    """The base period."""
+    physics: PhysicsTable = PhysicsTable()
+    """How bodies move."""
+    arena: ArenaTable
+    """The plane."""
+    robots: dict[GroupName, RobotsTable] = Field(min_length=1)
+    """The groups of robots, by name."""
+    radio: Annotated[Radio, AsTable()] | None = None
+    """The radio; without it robots hear nothing."""
+    events: tuple[Annotated[Event, OneOf("do", ACTIONS)], ...] = Field(default=(), strict=False)
+    """What happens to robots and radios on the way."""
+    run: RunTable = RunTable()
+    """Runners."""
+
+    @field_validator("radio", mode="before")
+    @classmethod
+    def _with_preset(cls, radio: Any) -> Any:
+        return with_preset(cast("dict[str, Any]", radio)) if isinstance(radio, dict) else radio
+
+    _source: str = PrivateAttr("")
+    _given: dict[str, Any] | None = PrivateAttr(None)
+
+    @property
+    def source(self) -> str:
+        """The file, or whatever else the scenario came from, for messages."""
+        return self._source
+
+    @property
+    def given(self) -> dict[str, Any] | None:
+        """The mapping that it was read from, with overrides; None if it was made in Python. `mapping_of` copies it."""
+        return self._given
+
+    def with_source(self, source: str, given: dict[str, Any] | None = None) -> "Scenario":
+        """This scenario, which says that it comes from `source`, and that it was read from the mapping `given`."""
+        self._source, self._given = source, given
+        return self
+
+    def groups(self) -> Groups:
+        """The indices within an arena of each group's robots."""
+        stops = accumulate(table.count for table in self.robots.values())
+        return {
+            name: range(stop - self.robots[name].count, stop) for name, stop in zip(self.robots, stops, strict=True)
+        }
+
+    def robot_names(self) -> tuple[str, ...]:
+        """`group-i` for each robot index of an arena."""
+        return tuple(f"{group}-{i}" for group, table in self.robots.items() for i in range(table.count))

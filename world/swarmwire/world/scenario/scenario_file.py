@@ -1,0 +1,95 @@
+"""From a file, a mapping and `--set` overrides to a checked scenario; every fault is one BadInput."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Any, cast
+
+from pydantic import ValidationError
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.world.scenario.checks import check
+from swarmwire.world.scenario.faults import fault
+from swarmwire.world.scenario.scenario import Scenario
+
+
+def scenario_schema() -> dict[str, Any]:
+    """The JSON schema of a scenario's file, with bounds, units and a description of every key."""
+    return Scenario.model_json_schema()
+
+
+def scenario_from(mapping: Mapping[str, Any], where: str) -> Scenario:
+    """The scenario that a mapping describes; BadInput names `where`, the key and what was expected."""
+    try:
+        scenario = Scenario.model_validate(dict(mapping))
+    except ValidationError as error:
+        raise fault(error, scenario_schema(), where) from None
+    check(scenario, where)
+    return scenario.with_source(where, deepcopy(dict(mapping)))
+
+
+def load_scenario(path: Path | str, overrides: Sequence[str] = ()) -> Scenario:
+    """The scenario in a TOML file, after `overrides` such as "robots.flock.count=30" (a TOML value, else a text)."""
+    where = str(path)
+    mapping = _read(path, where)
+    settings = [_parsed(text) for text in overrides]
+    for keys, value, text in settings:
+        _put(mapping, keys, value, text)
+    try:
+        return scenario_from(mapping, where)
+    except BadInput as error:
+        for keys, _, text in reversed(settings):
+            if error.key == ".".join(keys):  # the fault is the override's, not the file's
+                raise BadInput(f"--set {text}", error.key, error.expected) from None
+        raise
+
+
+def with_settings(mapping: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:
+    """The mapping, in which settings such as "radio.loss=0.1" were put; BadInput for a path that leads nowhere."""
+    for keys, value, text in map(_parsed, settings):
+        _put(mapping, keys, value, text)
+    return mapping
+
+
+def _read(path: Path | str, where: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput(where, "", f"expected TOML: {error}") from None
+    except UnicodeDecodeError:
+        raise BadInput(where, "", "expected TOML, which is UTF-8 text") from None
+    except OSError as error:
+        raise BadInput(where, "", f"expected a readable file: {error.strerror}") from None
+
+
+def _parsed(text: str) -> tuple[list[str], Any, str]:
+    path, equals, value = text.partition("=")
+    keys = [key.strip() for key in path.split(".")]
+    if not equals or not all(keys):
+        raise BadInput(f"--set {text}", "", "expected path=value, such as robots.flock.count=30")
+    try:
+        found = tomllib.loads(f"value = {value}")
+    except tomllib.TOMLDecodeError:
+        return keys, value.strip(), text
+    return keys, found["value"] if len(found) == 1 else value, text
+
+
+def _put(mapping: dict[str, Any], keys: list[str], value: Any, text: str) -> None:
+    """Set the value at a path of keys; a number is a place in a list."""
+    at: Any = mapping
+    for depth, key in enumerate(keys):
+        if isinstance(at, list):
+            items = cast("list[Any]", at)
+            if not key.isdecimal() or int(key) >= len(items):
+                expected = f"expected a place in a list of {len(items)}, counted from 0"
+                raise BadInput(f"--set {text}", ".".join(keys[: depth + 1]), expected)
+            holder, index = cast(Any, items), int(key)
+        elif isinstance(at, dict):
+            holder, index = cast(Any, at), key
+        else:
+            raise BadInput(f"--set {text}", ".".join(keys[: depth + 1]), f"{'.'.join(keys[:depth])} holds no keys")
+        if depth == len(keys) - 1:
+            holder[index] = value
+        else:
+            at = holder[index] if isinstance(at, list) else holder.setdefault(index, {})
