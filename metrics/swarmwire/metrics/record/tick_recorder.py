@@ -51,7 +51,7 @@ class TickRecorder:
 
     def see(self, truth: Truth) -> None:
         """Take one tick."""
-        self._columns.add(truth, self._metrics.latest)
+        self._columns.add(truth, self._metrics.values)
         if self._limit.reached(self._columns.ticks):
             self._hand_over()
 
