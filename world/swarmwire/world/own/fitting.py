@@ -90,8 +90,8 @@ def _made(base: type[K], kind: str, params: Mapping[str, Any], where: str, key: 
     except NotLoaded as error:
         raise BadInput(where, f"{key}.kind", str(error)) from error
     if not isinstance(found, type) or not issubclass(found, base) or not is_dataclass(found):
-        what = "not there" if found is None else f"{cast('object', found)!r}"
-        raise BadInput(where, f"{key}.kind", f"expected a dataclass below {base.__name__}; {kind} is {what}")
+        got = f"{kind} is {cast('object', found)!r}"
+        raise BadInput(where, f"{key}.kind", f"expected a dataclass below {base.__name__}; {got}")
     missing: frozenset[str] = getattr(found, "__abstractmethods__", frozenset())
     if missing:
         raise BadInput(where, f"{key}.kind", f"{found.__name__} has no {', '.join(sorted(missing))}")

@@ -33,28 +33,26 @@ def load_scenario(path: Path | str, overrides: Sequence[str] = ()) -> Scenario:
     """The scenario in a TOML file, after `overrides` such as "robots.flock.count=30" (a TOML value, else a text)."""
     where = str(path)
     mapping = _read(path, where)
-    settings = [_parsed(text) for text in overrides]
-    for keys, value, text in settings:
-        _put(mapping, keys, value, text)
+    settings = [(_put(mapping, *_parsed(text)), text) for text in overrides]
     try:
         return scenario_from(mapping, where)
     except BadInput as error:
-        for keys, _, text in reversed(settings):
-            if error.key == ".".join(keys):  # the fault is the override's, not the file's
+        for key, text in reversed(settings):
+            if f"{error.key}.".startswith(f"{key}."):  # the fault is the override's, not the file's
                 raise BadInput(f"--set {text}", error.key, error.expected) from None
         raise
 
 
 def with_settings(mapping: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:
     """The mapping, in which settings such as "radio.loss=0.1" were put; BadInput for a path that leads nowhere."""
-    for keys, value, text in map(_parsed, settings):
-        _put(mapping, keys, value, text)
+    for text in settings:
+        _put(mapping, *_parsed(text))
     return mapping
 
 
 def _read(path: Path | str, where: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except tomllib.TOMLDecodeError as error:
         raise BadInput(where, "", f"expected TOML: {error}") from None
     except UnicodeDecodeError:
@@ -75,9 +73,10 @@ def _parsed(text: str) -> tuple[list[str], Any, str]:
     return keys, found["value"] if len(found) == 1 else value, text
 
 
-def _put(mapping: dict[str, Any], keys: list[str], value: Any, text: str) -> None:
-    """Set the value at a path of keys; a number is a place in a list."""
+def _put(mapping: dict[str, Any], keys: list[str], value: Any, text: str) -> str:
+    """Set the value at a path of keys, in which a number is a place in a list; the path of what is new with it."""
     at: Any = mapping
+    new = len(keys)  # keys that lead to what is new
     for depth, key in enumerate(keys):
         if isinstance(at, list):
             items = cast("list[Any]", at)
@@ -89,7 +88,10 @@ def _put(mapping: dict[str, Any], keys: list[str], value: Any, text: str) -> Non
             holder, index = cast(Any, at), key
         else:
             raise BadInput(f"--set {text}", ".".join(keys[: depth + 1]), f"{'.'.join(keys[:depth])} holds no keys")
+        if isinstance(at, dict) and key not in at:
+            new = min(new, depth + 1)
         if depth == len(keys) - 1:
             holder[index] = value
         else:
             at = holder[index] if isinstance(at, list) else holder.setdefault(index, {})
+    return ".".join(keys[:new])
