@@ -1,7 +1,10 @@
 """Messages: what robots say to one another, with the exact bytes that go on air.
 
-    class Beacon(Message):
-        heading_rad: f4
+    >>> class Beacon(Message):
+    ...     heading_rad: f4
+    >>> on_air = Beacon(heading_rad=0.5).encode()
+    >>> len(on_air), Beacon.decode(on_air)
+    (6, Beacon(heading_rad=0.5))
 
 A message on air is a 2-byte tag made from its class name and fields, then its fields packed little-endian. To the type
 checker a field is a `float`, in the constructor and when read: a decoded field is widened to float64 whatever its width

@@ -35,7 +35,7 @@ class Outcomes:
         return self.result == SendResult.ACKNOWLEDGED
 
     def select(self, index: IntArray) -> "Outcomes":
-        """The rows of `index`, in its order."""
+        """The rows of `index` (k,), in its order."""
         return Outcomes(self.row[index], self.id[index], self.result[index])
 
     @classmethod
