@@ -175,7 +175,7 @@ FAULTS: list[tuple[str, Any, str]] = [
         "wind",
         [],
         "wind: unknown key; expected one of "
-        "format, name, seed, duration_s, time, physics, arena, robots, radio, events, run",
+        "format, name, seed, duration_s, time, physics, arena, robots, radio, events, metrics, run",
     ),
 ]
 
