@@ -5,8 +5,8 @@ import tomllib
 
 import pytest
 
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.parameters.propagation import Shadowing
-from swarmwire.comms.air.parameters.reception import Bursts
 from swarmwire.world.scenario.scenario_file import scenario_from
 from tests.deploy.commands import ROOT, called
 from tests.metrics.radio_fit.synthetic import csv_of, made

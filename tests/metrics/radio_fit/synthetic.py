@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.parameters.propagation import Shadowing
-from swarmwire.comms.air.parameters.reception import Bursts
 from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves, shadowing_db
 from swarmwire.comms.air.reception.burst_states import BurstStates
 from swarmwire.comms.clock import NS_PER_S

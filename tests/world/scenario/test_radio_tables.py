@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
+from swarmwire.comms.air.parameters.bursts import Bursts, bursts_from_steps
 from swarmwire.comms.air.parameters.propagation import OwnAntenna
-from swarmwire.comms.air.parameters.reception import Bursts, bursts_from_steps
 from swarmwire.comms.air.presets.registry import PRESETS
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.errors import BadInput

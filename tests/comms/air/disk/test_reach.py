@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.radio import BearingGiven, Gives, Radio, RangeGiven
+from swarmwire.comms.air.parameters.gives import BearingGiven, Gives, RangeGiven
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.truth import Obstacle
 from tests.comms.air.runs import at, everybody, make_air, packets, run, scattered

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.radio import BearingGiven, Gives, Radio, RangeGiven
+from swarmwire.comms.air.parameters.gives import BearingGiven, Gives, RangeGiven
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import is_blocked_on, obstacle_arrays, to_nearest

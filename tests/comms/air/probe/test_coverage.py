@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.air.parameters.access import Access
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.parameters.propagation import Antenna, Fading, Shadowing, Walls
-from swarmwire.comms.air.parameters.reception import Bursts
 from swarmwire.comms.air.probe.coverage import Coverage
 from swarmwire.comms.air.probe.survey import by_distance, coverage_map
 from swarmwire.comms.air.radio import Radio

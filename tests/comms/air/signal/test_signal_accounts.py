@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.jammers import NO_ROBOT, Jammers
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.parameters.propagation import Antenna, Bodies, Fading, Shadowing, Walls
-from swarmwire.comms.air.parameters.reception import Bursts
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST

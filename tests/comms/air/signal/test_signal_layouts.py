@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.parameters.propagation import Fading, Shadowing
-from swarmwire.comms.air.parameters.reception import Bursts
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.packets import BROADCAST, Sent
 from tests.comms.air.runs import Run, make_air, packets, run, scattered

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.parameters.propagation import Fading, Shadowing
-from swarmwire.comms.air.parameters.reception import Bursts, Reception
+from swarmwire.comms.air.parameters.reception import Reception
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.oqpsk import oqpsk_bit_errors
 from swarmwire.comms.fates import Fate

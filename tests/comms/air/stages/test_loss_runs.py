@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from swarmwire.comms.air.parameters.reception import Bursts
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.fates import Fate
 from tests.comms.air.runs import at, make_air, packets, run

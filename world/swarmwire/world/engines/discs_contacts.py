@@ -74,7 +74,7 @@ def _is_before(one, other):
 
 @njit(cache=True)
 def crowd_of(rows: int, contacts: AnyArray) -> tuple[IntArray, IntArray]:
-    """The rows near which something is listed, and the others; both rising."""
+    """The rows near which something is listed in `contacts` (k,) of dtype CONTACT, and the others; both rising."""
     crowded = np.zeros(rows, np.bool_)
     for k in range(len(contacts)):
         crowded[contacts[k].row] = True

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.air.parameters.reception import Bursts
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.reception.bursts import FORGOTTEN, bad_after
 from swarmwire.comms.arrays import BoolArray, IntArray, KeyArray
 from swarmwire.comms.borrowing import borrowing

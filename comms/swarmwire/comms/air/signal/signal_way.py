@@ -9,7 +9,7 @@ import numpy as np
 from swarmwire.comms.air.disruption import ALL, NEWEST, Disruption
 from swarmwire.comms.air.intake import Intake
 from swarmwire.comms.air.lives import Lives
-from swarmwire.comms.air.parameters.reception import Bursts
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.burst_states import BurstStates
 from swarmwire.comms.air.signal import backlog, event_loop, jamming

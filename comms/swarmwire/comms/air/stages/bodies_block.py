@@ -12,6 +12,8 @@ from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry import grid
 
+KEYS = ("bodies_block",)
+
 
 def stage(medium: Medium) -> Stage | None:
     """The stage, where the radio says so and there are bodies."""

@@ -1,4 +1,4 @@
-"""Bursts: links that are bad for a while lose more."""
+"""Burst loss: links that are bad for a while lose more."""
 
 import numpy as np
 
@@ -7,6 +7,8 @@ from swarmwire.comms.air.reception.burst_states import BurstStates
 from swarmwire.comms.air.stages.stage import Medium, Stage
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.fates import Fate
+
+KEYS = ("bursts",)
 
 
 def stage(medium: Medium) -> Stage | None:

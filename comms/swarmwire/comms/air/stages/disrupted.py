@@ -7,6 +7,8 @@ from swarmwire.comms.air.stages.stage import Medium, Stage
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.fates import Fate
 
+KEYS = ()  # events bring them
+
 
 def stage(medium: Medium) -> Stage | None:
     """The stage; every radio has it, since events may come."""

@@ -12,6 +12,7 @@ from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.fates import Fate
 
+KEYS = ("loss",)
 LOSS = purpose("fixed loss")
 
 

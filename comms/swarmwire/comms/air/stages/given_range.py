@@ -12,6 +12,7 @@ from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 from swarmwire.comms.geometry.obstacles import to_nearest
 
+KEYS = ("gives.range",)
 NOISE = purpose("range noise")
 
 

@@ -11,6 +11,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 
+KEYS = ("gives.rssi",)
 NOISE = purpose("rssi noise")
 
 

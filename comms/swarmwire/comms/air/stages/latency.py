@@ -1,4 +1,4 @@
-"""Delay: what passes between the end of the airtime and the moment at which a receiver has the packet."""
+"""Latency and jitter: what passes between the end of the airtime and the moment at which a receiver has the packet."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -12,15 +12,16 @@ from swarmwire.comms.clock import to_ns
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 
+KEYS = ("latency_s", "jitter_s")
 DELAY = purpose("delay")
 
 
 def stage(medium: Medium) -> Stage | None:
     """The stage, where the radio has latency or jitter."""
-    return Delay(medium) if medium.radio.latency_s > 0.0 or medium.radio.jitter_s > 0.0 else None
+    return Latency(medium) if medium.radio.latency_s > 0.0 or medium.radio.jitter_s > 0.0 else None
 
 
-class Delay(Stage):
+class Latency(Stage):
     """`heard_at = off_air_at + latency + U[0, jitter)`, in integer ns."""
 
     def __init__(self, medium: Medium) -> None:

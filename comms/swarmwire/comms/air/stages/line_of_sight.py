@@ -11,6 +11,8 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import is_blocked, is_blocked_on
 
+KEYS = ("line_of_sight",)
+
 
 def stage(medium: Medium) -> Stage | None:
     """The stage, where the radio needs a line of sight and there are obstacles."""

@@ -11,6 +11,8 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.geometry.obstacles import to_nearest
 
+KEYS = ("propagation_mps",)
+
 
 def stage(medium: Medium) -> Stage | None:
     """The stage, where the radio says how fast its waves are."""

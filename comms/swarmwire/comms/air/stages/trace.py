@@ -14,6 +14,7 @@ from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.fates import Fate
 
+KEYS = ("trace",)
 TRACE = purpose("trace")
 
 

@@ -1,4 +1,4 @@
-"""Delays: a further delay with a distribution of its own, before a receiver has the packet."""
+"""Varying delay: a further delay with a distribution of its own, before a receiver has the packet."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -12,6 +12,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 
+KEYS = ("delays",)
 DELAYS = purpose("delays")
 
 
