@@ -10,8 +10,9 @@ from rich.console import Console
 
 from swarmwire.agent import behaviours
 from swarmwire.agent.declared import REQUIRED, parameters_of
-from swarmwire.comms.air.radio import Gives, Radio
-from swarmwire.comms.air.stages import ORDER
+from swarmwire.comms.air.parameters.gives import Gives
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.stages.chain import ORDER
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES
 from swarmwire.comms.bodies.leds import Leds
@@ -108,6 +109,14 @@ def test_a_kind_is_what_its_registry_holds(kind, names):
     assert [entry.name for entry in entries] == names
 
 
+@pytest.mark.parametrize("module", ORDER, ids=lambda module: module.__name__.rpartition(".")[2])
+def test_a_stage_tells_the_keys_that_it_goes_by(module):
+    entry = find(f"stage:{module.__name__.rpartition('.')[2]}")
+    told = {parameter.name for table in entry.tables for parameter in table.parameters}
+    assert {f"radio.{key}" for key in module.KEYS} <= told
+    assert bool(told) == bool(module.KEYS)
+
+
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_every_thing_has_its_own_name_and_a_line_of_help(kind):
     entries = kind.entries()
@@ -167,9 +176,10 @@ def test_a_body_of_ones_own_tells_what_one_that_comes_along_does(tmp_path):
 
 def test_a_body_of_ones_own_tells_its_own_senses_and_actuators():
     text = told(str(ROOT / "examples" / "gas" / "sniffer.toml"))
-    gas, sealer = text[text.index("\nsense: gas\n") :], text[text.index("\nactuator: sealer\n") :]
-    assert_tells(gas, [("kind", "gas.py:Gas"), ("rate_hz", "5.0"), ("reach_m", "m", "1.0")])
-    assert_tells(sealer, [("kind", "gas.py:Sealer"), ("y_m", "m", "0.5")])
+    titles = "sense: gas, which reads concentration", "actuator: sealer"
+    gas, sealer = (text[text.index(f"\n{title}\n") :] for title in titles)
+    assert_tells(gas, [("kind", "gas.py:Gas"), ("rate_hz", "5.0"), ("reach_m", "m", "1.0", "fallen to 37 %")])
+    assert_tells(sealer, [("kind", "gas.py:Sealer"), ("arm_m", "m", "0.3", "how far it reaches")])
 
 
 @pytest.mark.parametrize("name", DRIVES)
@@ -287,7 +297,7 @@ def test_a_name_may_be_short_or_that_of_ones_own_group(asked, name):
         ("xyzzy", "nothing is near it"),
         ("blackout", "say which: event:blackout, fate:blackout"),
         ("size_m", "say which: arena.size_m, arena.obstacles.*.within.size_m"),
-        ("metrics", "swarmwire list metrics"),
+        ("fates", "swarmwire list fates"),
         ("absent.toml", "expected a readable file"),
         ("absent.py:Mine", "there is no file"),
         ("swarmwire.agent:Robot", "no Agent or VectorAgent"),

@@ -1,33 +1,18 @@
 """Robot: the handle through which an Agent's step sees and moves its one robot."""
 
-from functools import cached_property
-from typing import Any, TypeVar, overload
+from typing import Any, TypeVar, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.draw import Draw
-from swarmwire.agent.handle import Handle
 from swarmwire.agent.outcome import Outcome
 from swarmwire.agent.packet import Packet, Packets
-from swarmwire.agent.readings import (
-    BatteryReading,
-    BumperReading,
-    CameraReading,
-    CompassReading,
-    GroundReading,
-    ImuReading,
-    InfraredReading,
-    LightReading,
-    OdometryReading,
-    OwnReading,
-    PositioningReading,
-    ProximityReading,
-    ScanReading,
-)
-from swarmwire.agent.robots import forward_and_turn, had
+from swarmwire.agent.readings import BumperReading, CameraReading, OwnReading
+from swarmwire.agent.robots import forward_and_turn
+from swarmwire.agent.sensing import Sensing
 from swarmwire.agent.turn import Turn
-from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.leds import rgb_of
 from swarmwire.comms.messages import DICT_TAG, Message, decode_dict, encode_dict
 from swarmwire.comms.outcomes import SendResult
@@ -36,84 +21,33 @@ from swarmwire.comms.packets import Payloads
 M = TypeVar("M", bound=Message)
 
 
-class Robot(Handle):
+class Robot(Sensing[float]):
     """One robot in one tick. Senses raise NotDeclared unless the agent's `needs` name them."""
+
+    __slots__ = ("_draw", "_row", "radio")
 
     def __init__(self, turn: Turn, row: int) -> None:
         super().__init__(turn)
         self._row = row
+        self._draw: Draw | None = None
         self.radio = RadioPort(turn, row)
 
-    @cached_property
+    @property
     def draw(self) -> Draw:
         """Random draws of the robot's own."""
-        return Draw(self._turn.keys[self._row : self._row + 1], self._turn.tick)
-
-    @property
-    def proximity(self) -> ProximityReading:
-        """Rays around the body: value, distance_m and angle_rad, (rays,)."""
-        return ProximityReading(self._turn.field("proximity", "value")[self._row], had(self.body.proximity))
-
-    @property
-    def compass(self) -> CompassReading:
-        """Heading in the arena's frame."""
-        return CompassReading(float(self._turn.field("compass", "heading_rad")[self._row]))
-
-    @property
-    def odometry(self) -> OdometryReading:
-        """Wheel encoders."""
-        left, right = self._turn.field("odometry", "left_m"), self._turn.field("odometry", "right_m")
-        return OdometryReading(float(left[self._row]), float(right[self._row]))
-
-    @property
-    def light(self) -> LightReading:
-        """Photocells around the body: value and angle_rad, (cells,)."""
-        return LightReading(self._turn.field("light", "value")[self._row], had(self.body.light))
+        if self._draw is None:
+            self._draw = Draw(self._turn.keys[self._row : self._row + 1], self._turn.tick)
+        return self._draw
 
     @property
     def bumper(self) -> BumperReading:
         """Whether the body touched anything."""
-        return BumperReading(bool(self._turn.field("bumper", "pressed")[self._row]))
-
-    @property
-    def positioning(self) -> PositioningReading:
-        """Position in the arena's frame."""
-        x, y = self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m")
-        return PositioningReading(float(x[self._row]), float(y[self._row]))
-
-    @property
-    def imu(self) -> ImuReading:
-        """Acceleration and turn rate in the body's frame."""
-        turn, row = self._turn, self._row
-        names = "forward_mps2", "left_mps2", "turn_radps"
-        return ImuReading(*(float(turn.field("imu", name)[row]) for name in names))
-
-    @property
-    def battery(self) -> BatteryReading:
-        """Charge, 1 full and 0 empty, and voltage."""
-        charge, voltage = self._turn.field("battery", "charge"), self._turn.field("battery", "voltage_v")
-        return BatteryReading(float(charge[self._row]), float(voltage[self._row]))
-
-    @property
-    def infrared(self) -> InfraredReading:
-        """Light of other robots, by rays around the body: value, distance_m and angle_rad, (rays,)."""
-        return InfraredReading(self._turn.field("infrared", "value")[self._row], had(self.body.infrared))
-
-    @property
-    def scan(self) -> ScanReading:
-        """Laser scan: range_m and angle_rad, (rays,)."""
-        return ScanReading(self._turn.field("scan", "range_m")[self._row], had(self.body.scan))
-
-    @property
-    def ground(self) -> GroundReading:
-        """Shade of the floor under the sensors, (points,)."""
-        return GroundReading(self._turn.field("ground", "shade")[self._row])
+        return BumperReading(bool(self._number("bumper", "pressed")))
 
     @property
     def camera(self) -> CameraReading:
         """LEDs of other robots in sight."""
-        names = "distance_m", "bearing_rad", "colour"
-        return CameraReading.of(*(self._turn.field("camera", name)[self._row] for name in names))
+        return CameraReading.of(*(self._numbers("camera", name) for name in ("distance_m", "bearing_rad", "colour")))
 
     def sense(self, name: str) -> OwnReading:
         """What a sense of your own reads: each field as an attribute, a float or an array (width,)."""
@@ -123,7 +57,8 @@ class Robot(Handle):
     def drive(self, linear_mps: float, angular_radps: float, lateral_mps: float = 0.0) -> None:
         """Wanted forward speed and turn rate (positive to the left); they hold until the next call.
 
-        A body with a holonomic drive can also move sideways, positive to the left.
+        A body with a holonomic drive can also move sideways, positive to the left. What the body cannot do is clipped,
+        and nan is no command: the last one holds (`clipped_commands` and `nan_commands` in the summary).
         """
         self._turn.drive[self._row] = True
         self._turn.linear_mps[self._row] = linear_mps
@@ -152,6 +87,12 @@ class Robot(Handle):
         """Name what the robot is at ("search", "wait"), for recordings and pictures; it holds until the next call."""
         self._turn.note(np.array([self._row]), state)
 
+    def _number(self, sense: str, field: str) -> float:
+        return float(self._turn.field(sense, field)[self._row])
+
+    def _numbers(self, sense: str, field: str) -> FloatArray:
+        return self._turn.field(sense, field)[self._row]
+
 
 class RadioPort:
     """The robot's radio: an unreliable medium."""
@@ -165,7 +106,7 @@ class RadioPort:
     def heard(self, kind: type[dict[str, Any]]) -> "list[Packet[dict[str, Any]]]": ...
     def heard(self, kind: type[Any]) -> "list[Packet[Any]]":
         """The packets of a message class (or `dict`) heard since the robot's last step, by time."""
-        if issubclass(kind, Message):
+        if kind is not dict:
             packets = self._turn.packets(kind)
             span = self._span(packets.row)
             columns = {name: getattr(packets.message, name)[span.start : span.stop].tolist() for name in kind.ranges}
@@ -173,8 +114,6 @@ class RadioPort:
                 Packet(packets, at, kind(**{name: column[place] for name, column in columns.items()}))
                 for place, at in enumerate(span)
             ]
-        if not issubclass(kind, dict):
-            raise TypeError(f"expected a class of Message, or dict, got {kind}")
         table = self._turn.tagged(DICT_TAG)
         dicts = Packets[dict[str, Any]](self._turn.n, table, {}, self._turn.needs)
         return [
@@ -183,13 +122,12 @@ class RadioPort:
 
     def send(self, message: Message | dict[str, Any], to: int | None = None) -> int:
         """Send to all who hear it, or to the robot with index `to` in the arena; returns the packet's id."""
-        payload = encode_dict(message) if isinstance(message, dict) else message.encode()
-        return int(self._turn.send(np.array([self._row]), to, Payloads.of([payload]))[0])
+        return int(self._turn.send(np.array([self._row]), to, Payloads.of([_encoded(message)]))[0])
 
     @property
     def outcomes(self) -> list[Outcome]:
         """Packets sent to one robot that the radio is done with since the robot's last step, by id."""
-        table = self._turn.outcomes
+        table = self._turn.outcomes()
         ids, results = table.id.tolist(), table.result.tolist()
         return [Outcome(ids[at], SendResult(results[at])) for at in self._span(table.row)]
 
@@ -197,3 +135,11 @@ class RadioPort:
         if not len(row):
             return range(0)
         return range(int(row.searchsorted(self._row)), int(row.searchsorted(self._row + 1)))
+
+
+def _encoded(message: object) -> bytes:
+    if isinstance(message, Message):
+        return message.encode()
+    if isinstance(message, dict):
+        return encode_dict(cast("dict[str, Any]", message))
+    raise TypeError(f"send(message): expected a message or a dict, got {message!r}")

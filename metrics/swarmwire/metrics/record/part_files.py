@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarmwire.metrics.record.parquet_join import join_files
-from swarmwire.metrics.written_aside import written_aside
+from swarmwire.metrics.whole_file import written_aside
 
 if TYPE_CHECKING:
     import polars as pl

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import Field, PrivateAttr, StringConstraints, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from swarmwire.comms.air.presets import with_preset
-from swarmwire.comms.air.propagation.parameters import OwnAntenna
+from swarmwire.comms.air.parameters.propagation import OwnAntenna
+from swarmwire.comms.air.presets.registry import with_preset
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.registry import ACTIONS
@@ -98,6 +98,8 @@ class Scenario(Table):
     """The radio; without it robots hear nothing."""
     events: tuple[Annotated[Event, OneOf("do", ACTIONS)], ...] = Field(default=(), strict=False)
     """What happens to robots and radios on the way."""
+    metrics: tuple[Annotated[str, StringConstraints(min_length=1)], ...] = Field(default=(), strict=False)
+    """Metrics of your own, measured beside those of every run: classes, as module:Class or file.py:Class."""
     run: RunTable = RunTable()
     """Runners."""
 
