@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.lines import print_line, spread
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.signal.numbers import range_of
+from swarmwire.comms.air.signal.levels import range_of
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import WallClock, tick_start_ns
 from swarmwire.comms.draws import derive_key

@@ -4,7 +4,7 @@ import time
 from datetime import UTC, datetime
 from typing import Protocol
 
-NS_PER_S = 1_000_000_000
+NS_PER_S = 1_000_000_000  # all times are integers, in ns
 
 
 def tick_start_ns(tick: int, rate_hz: int) -> int:

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 
-BROADCAST = -1
+BROADCAST = -1  # addressed to whoever is within reach
 NOWHERE = -2  # addressed to a robot that is not there: numbered, never on air
 UNTOLD = -1  # the outcome id of a packet whose sender does not ask
 TAG_BYTES = 2

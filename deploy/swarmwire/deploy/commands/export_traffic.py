@@ -22,9 +22,9 @@ def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_
     from swarmwire.comms.clock import to_ns
     from swarmwire.metrics.capture.frames_on_air import frames_on_air
     from swarmwire.metrics.capture.write_capture import write_capture
-    from swarmwire.metrics.drawing.whole_file import check_path
     from swarmwire.metrics.run_folder import RunFolder
     from swarmwire.metrics.verify.sound_table import sound_table
+    from swarmwire.metrics.whole_file import check_path
 
     check_path(to, (SUFFIX,))
     _check_times(from_s, until_s)

@@ -35,7 +35,7 @@ def acting(part: Senses) -> IntArray:
 
 
 def split_heard(heard: Heard, owner: IntArray, slots: int) -> list[Heard]:
-    """What the robots of each of `slots` parts heard, with the payloads that it needs, once; `owner` is (rows,)."""
+    """What the robots of each of `slots` parts heard, each with its payloads, once; `owner` is (rows,)."""
     if not len(heard):
         return [heard] * slots
     by_slot = np.argsort(owner[heard.receiver], kind="stable")

@@ -32,7 +32,7 @@ CONTACT = np.dtype(
 )
 
 
-@borrowing()
+@borrowing(from_python=True)
 def contacts_of(contacts, robots, pairs, things, old):
     """Fill records (pairs + things,) for what is listed; touch and impulses are carried over from the `old` ones."""
     at = 0

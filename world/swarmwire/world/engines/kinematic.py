@@ -57,7 +57,7 @@ class KinematicEngine:
         return onsets
 
 
-@borrowing()
+@borrowing(from_python=True)
 def _move(around, wheel_base_m, radius_m, bottom_m, target, tick_s, state, travel_m, held):
     for arena in range(target.shape[0]):
         for i in range(target.shape[1]):
