@@ -1,5 +1,7 @@
 """The summary as people read it in a terminal."""
 
+from collections.abc import Mapping
+
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -9,8 +11,8 @@ from swarmwire.deploy.result import ArenaResult, Percentiles, Result
 WHOLE = 1000  # from here on numbers are shown without decimals, nor as powers of ten
 
 
-def print_result(result: Result, console: Console) -> None:
-    """What came of a run: one table for the run, and its first arena's radio and metrics."""
+def print_result(result: Result, units: Mapping[str, str], console: Console) -> None:
+    """What came of a run: one table for the run, and its first arena's radio and metrics, which have these units."""
     arena = result.arenas[0]
     table = Table(title=Text(result.scenario), show_header=False, title_justify="left", title_style="bold")
     table.add_column(style="cyan")
@@ -29,7 +31,7 @@ def print_result(result: Result, console: Console) -> None:
     for name, value in arena.metrics.items():
         if value.mean is not None:
             numbers = f"final {_number(value.final)}, mean {_number(value.mean)}, min {_number(value.min)}"
-            table.add_row(name, f"{numbers}{_unit(name)}")
+            table.add_row(name, f"{numbers} ({units[name]})" if units[name] else numbers)
     for body, senses in result.global_senses.items():
         table.add_row("global senses", f"{body}: {', '.join(senses)}")
     counts = [f"{name} {count}" for name, count in result.counts.items() if count]
@@ -67,15 +69,6 @@ def _add_radio(table: Table, arena: ArenaResult) -> None:
     table.add_row(
         "latency", f"on air {_percentiles(radio.latency_air_s)}; to the agent {_percentiles(radio.latency_agent_s)}"
     )
-
-
-def _unit(metric: str) -> str:
-    """The unit of a metric that has one and is known by name."""
-    # Imported here: metrics bring scipy, which --help should not wait for.
-    from swarmwire.metrics.registry import METRICS
-
-    kind = METRICS.get(metric)
-    return f" ({kind.unit})" if kind is not None and kind.unit else ""
 
 
 def _percentiles(value: Percentiles) -> str:
