@@ -66,6 +66,11 @@ class Metrics:
         """By name, per arena: each level in the tick last seen, each count's total so far; NaN where undefined."""
         return {metric.name: self._latest[row] for row, metric in enumerate(self.metrics)}
 
+    @property
+    def values(self) -> FloatArray:
+        """What `latest` tells, (metrics, arenas)."""
+        return self._latest
+
     def end(self, last: Tally | None) -> dict[str, Any]:
         """The statistics over the ticks seen."""
         mean = self._sum / np.where(self._seen > 0, self._seen, np.nan)
