@@ -10,6 +10,7 @@ from swarmwire.comms.fates import FATE_NAMES
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.result import Statistics
 from swarmwire.deploy.terminal.report import print_result
+from swarmwire.metrics.registry import METRICS
 from tests.deploy.commands import LOSSY
 
 
@@ -22,7 +23,8 @@ def shown(result: Result, **changes: object) -> str:
     """The table, of a run whose one arena is changed so."""
     out = StringIO()
     console = Console(file=out, width=160, color_system=None)
-    print_result(replace(result, arenas=(replace(result.arenas[0], **changes),)), console)  # pyright: ignore[reportArgumentType]
+    arena = replace(result.arenas[0], **changes)  # pyright: ignore[reportArgumentType]
+    print_result(replace(result, arenas=(arena,)), METRICS.values(), console)
     return out.getvalue()
 
 
