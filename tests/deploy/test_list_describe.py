@@ -10,6 +10,7 @@ from rich.console import Console
 
 from swarmwire.agent import behaviours
 from swarmwire.agent.declared import REQUIRED, parameters_of
+from swarmwire.agent.turn import OUTCOMES
 from swarmwire.comms.air.radio import Gives, Radio
 from swarmwire.comms.air.stages import ORDER
 from swarmwire.comms.bodies.body import body_names, load_body
@@ -92,7 +93,7 @@ def assert_tells(text: str, wanted: list[tuple[str, ...]]) -> None:
     ("kind", "names"),
     [
         ("bodies", body_names()),
-        ("senses", [*SHEETS, *(f"radio.{of.name}" for of in fields(Gives)), "radio.outcomes"]),
+        ("senses", [*SHEETS, *(f"radio.{of.name}" for of in fields(Gives)), OUTCOMES]),
         ("behaviours", behaviours.__all__),
         ("drives", list(DRIVES)),
         ("sheets", ["name", "source", "radius_m", "height_m", "mass_kg", "altitude_m", "contacts", "leds"]),

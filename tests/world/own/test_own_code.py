@@ -10,6 +10,7 @@ from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.bodies.body import body_from_mapping, load_body
 from swarmwire.comms.errors import BadInput, OwnCodeFailed
 from swarmwire.comms.senses import Actions
+from swarmwire.comms.sheets.own import MOST_WIDE
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.scenario_file import scenario_from
 from swarmwire.world.world import World
@@ -215,7 +216,10 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
         ('[senses."x.y"]\nkind = "a"', "senses.x.y: unknown sense"),
         (ACTUATOR + f'"{PAINT}"', "actuators.x.kind: expected a dataclass below OwnActuator"),
         (ACTUATOR + f'"{CODE}:NoWidth"', "actuators.x.kind: expected a width from 1 to 10000; NoWidth has 0"),
-        (ACTUATOR + f'"{CODE}:TooWide"', "actuators.x.kind: expected a width from 1 to 10000; TooWide has 10001"),
+        (
+            ACTUATOR + f'"{CODE}:TooWide"',
+            f"actuators.x.kind: expected a width from 1 to {MOST_WIDE}; TooWide has",
+        ),
         (SENSE + f'"{CODE}:WideField"', "senses.x.kind: the field x of WideField: expected a width from 0 to 10000"),
         (ACTUATOR + f'"{PAINTER}"\ngain = -1', "actuators.x.gain: expected more than 0, got -1.0"),
         ("[actuators.x]\ngain = 1", "actuators.x.kind: is missing"),

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from swarmwire.comms.air.signal.numbers import range_of
+from swarmwire.comms.air.nominal_range import range_of
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.draws import derive_key

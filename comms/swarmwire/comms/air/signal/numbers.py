@@ -46,16 +46,6 @@ def sensitivity_of(radio: Radio) -> float:
     return max(of_bits_dbm, reception.preamble_dbm)  # without a preamble there are no bits
 
 
-def range_of(radio: Radio) -> float | None:
-    """Nominal reach in m: where path loss alone leaves the sensitivity, or the disk's radius; never above `range_m`."""
-    if not radio.is_signal:
-        return radio.range_m
-    antenna = radio.antenna_or_default
-    most_db = antenna.power_dbm + 2.0 * antenna.gain_dbi - sensitivity_of(radio)
-    found_m = float(reach_m(radio.loss_model.curve(radio.frequency_hz), most_db))
-    return found_m if radio.range_m is None else min(found_m, radio.range_m)
-
-
 def rules_of(radio: Radio, robots: int) -> Rules:
     """What events go by."""
     reception, access, receiver = radio.reception_or_default, radio.access_or_default, receiver_for(radio)
