@@ -1,6 +1,6 @@
 """How far a radio reaches, in short."""
 
-# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false - of compiled functions
+# pyright: basic, reportUnknownMemberType=false
 
 from swarmwire.comms.air.propagation.path_loss import reach_m
 from swarmwire.comms.air.radio import Radio
