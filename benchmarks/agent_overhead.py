@@ -1,19 +1,21 @@
 """What the framework costs a single-robot `Agent` in process: per step, and per packet that it reads."""
 
+import statistics
 from dataclasses import dataclass
 
 import numpy as np
 
 from benchmarks.agents import Ping
+from benchmarks.lines import print_line, spread
 from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.clock import Clock
+from swarmwire.comms.clock import Clock, WallClock
 from swarmwire.comms.messages import encode_rows
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import GroupSenses
 
-RAYS = 24
+RAYS, PACKETS = 24, 10  # packets that a robot reads in a step
 
 
 @dataclass(frozen=True)
@@ -55,3 +57,14 @@ def _heard(robots: int, packets: int) -> Heard:
     sent = encode_rows(Ping, len(payload), {"number": 0.5})
     zero, range_m = np.zeros(len(payload), np.int64), np.ones(len(payload))
     return Heard(receiver, np.tile(np.arange(packets), robots), zero, zero, {"range_m": range_m}, payload, sent)
+
+
+def agent_overhead(name: str, repeats: int) -> None:
+    """What the framework costs a robot's step, where one robot is all and where there are many, and a packet read."""
+    told = {"body": "footbot", "rays": 24, "packets_per_step": PACKETS}
+    for robots, ticks in ((1, 5000), (100, 100)):
+        overhead(WallClock(), robots, PACKETS, ticks // 10)
+        found = [overhead(WallClock(), robots, PACKETS, ticks) for _ in range(repeats)]
+        for part, values in (("step", [one.step_us for one in found]), ("packet", [one.packet_us for one in found])):
+            line = {"robots": robots, **told, **spread(values)}
+            print_line(f"{name}-{part}", statistics.median(values), f"µs per {part}", line)

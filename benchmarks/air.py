@@ -4,14 +4,16 @@ What is timed is all that a run asks of the air in a tick: time passes, poses ar
 graph is drawn. One thread.
 """
 
+import statistics
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from benchmarks.lines import print_line, spread
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.signal.numbers import range_of
+from swarmwire.comms.air.signal.levels import range_of
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import WallClock, tick_start_ns
 from swarmwire.comms.draws import derive_key
@@ -113,3 +115,16 @@ def scaling() -> tuple[float, dict[str, Any]]:
     links_us = [1e6 * each.tick_s / each.told["robots"] / each.told["in_range"] for each in costs]
     told = {f"us_per_link_{robots}": round(us, 3) for robots, us in zip(SIZES, links_us, strict=True)}
     return max(links_us) / min(links_us), {**costs[-1].told, **told}
+
+
+def air_cost(name: str, repeats: int) -> None:
+    """Real-time factor of the air alone, without robots to act."""
+    costs = [cost(CASES[name]) for _ in range(repeats)]
+    factors = [each.realtime_factor for each in costs]
+    print_line(name, statistics.median(factors), "x real time", {**costs[0].told, **spread(factors)})
+
+
+def air_scaling(name: str, repeats: int) -> None:
+    """How much dearer a link is in one swarm than in another of the same density."""
+    ratio, told = scaling()
+    print_line(name, ratio, "dearest over cheapest", told)

@@ -3,6 +3,7 @@
 import json
 from typing import Any
 
+from benchmarks.targets import TARGETS
 from swarmwire.deploy import Result
 from swarmwire.deploy.record.machine import cpu
 
@@ -26,8 +27,10 @@ def report(name: str, value: float, unit: str, result: Result, config: dict[str,
 
 
 def print_line(name: str, value: float, unit: str, told: dict[str, Any]) -> None:
-    """Print a value with all that it was measured under."""
-    line = {"name": name, "value": round(value, 3), "unit": unit, **told, "cpu": cpu()}
+    """Print a value, its target, and all that it was measured under."""
+    target = TARGETS.get(name)
+    asked = {"at_most" if target.at_most else "at_least": target.value, "met": target.met_by(value)} if target else {}
+    line = {"name": name, "value": round(value, 3), "unit": unit, **asked, **told, "cpu": cpu()}
     print(json.dumps(line), flush=True)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.ns3_reference import radio_far_apart, recorded
 from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.propagation.parameters import Walls
+from swarmwire.comms.air.parameters.propagation import Walls
 from swarmwire.comms.air.propagation.path_loss import reach_m
 from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
 from swarmwire.comms.clock import NS_PER_S, tick_start_ns

@@ -11,8 +11,9 @@ from rich.console import Console
 from swarmwire.agent import behaviours
 from swarmwire.agent.declared import REQUIRED, parameters_of
 from swarmwire.agent.turn import OUTCOMES
-from swarmwire.comms.air.radio import Gives, Radio
-from swarmwire.comms.air.stages import ORDER
+from swarmwire.comms.air.parameters.gives import Gives
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.stages.chain import ORDER
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES
 from swarmwire.comms.bodies.leds import Leds
@@ -107,6 +108,14 @@ def assert_tells(text: str, wanted: list[tuple[str, ...]]) -> None:
 def test_a_kind_is_what_its_registry_holds(kind, names):
     entries = next(of for of in KINDS if of.name == kind).entries()
     assert [entry.name for entry in entries] == names
+
+
+@pytest.mark.parametrize("module", ORDER, ids=lambda module: module.__name__.rpartition(".")[2])
+def test_a_stage_tells_the_keys_that_it_goes_by(module):
+    entry = find(f"stage:{module.__name__.rpartition('.')[2]}")
+    told = {parameter.name for table in entry.tables for parameter in table.parameters}
+    assert {f"radio.{key}" for key in module.KEYS} <= told
+    assert bool(told) == bool(module.KEYS)
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)

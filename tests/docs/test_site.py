@@ -16,8 +16,8 @@ from swarmwire import agent, deploy
 from swarmwire.agent import behaviours, readings, testing
 from swarmwire.agent.declared import parameters_of
 from swarmwire.comms import errors
-from swarmwire.comms.air.presets import PRESETS
-from swarmwire.comms.air.radio import Gives
+from swarmwire.comms.air.parameters.gives import Gives
+from swarmwire.comms.air.presets.registry import PRESETS
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Holonomic, Twist, Wheels
 from swarmwire.comms.bodies.leds import Leds

@@ -7,8 +7,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from swarmwire.comms.air.disruption import Disruption
+from swarmwire.comms.air.parameters.access import Access
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.signal.parameters import Access
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.truth import Static, Truth
 from tests.comms.air.runs import make_air, scattered

@@ -3,9 +3,9 @@
 import numpy as np
 
 from reference.markdown import NOTHING, code, number, table
-from swarmwire.comms.air.frames import airtime_ns
-from swarmwire.comms.air.presets import PRESETS
-from swarmwire.comms.air.signal.numbers import range_of
+from swarmwire.comms.air.presets.registry import PRESETS
+from swarmwire.comms.air.signal.levels import range_of
+from swarmwire.comms.air.timing.frames import airtime_ns
 from swarmwire.deploy.radio.probe import radio_of
 
 HEADS = ["preset", "what it is", "reach, m", "longest frame, ms", "but"]

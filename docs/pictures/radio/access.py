@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.ns3_reference import AS_RUN, recorded
 from docs.pictures.radio.sheet import legend, line_color, panels, say, write
 from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.contention import contention
+from swarmwire.comms.air.probe.contention import contention
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.fates import Fate

@@ -5,8 +5,8 @@
 import numpy as np
 
 from docs.pictures.radio.sheet import legend, line_color, panels, say, write
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.reception.burst_states import BurstStates
-from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key

@@ -9,9 +9,9 @@ import numpy as np
 from benchmarks.ns3_reference import PRESETS, radio_far_apart
 from docs.pictures.radio.sheet import legend_below, line_color, panels, say, write
 from swarmwire.comms.air.air import Air
+from swarmwire.comms.air.parameters.access import Access
 from swarmwire.comms.air.propagation.path_loss import reach_m
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.signal.parameters import Access
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import obstacle_arrays

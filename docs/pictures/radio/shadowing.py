@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from docs.pictures.radio.sheet import legend, line_color, panels, say, scale, write
-from swarmwire.comms.air.propagation.parameters import Shadowing
+from swarmwire.comms.air.parameters.propagation import Shadowing
 from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves, shadowing_db
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import derive_key

@@ -1,7 +1,7 @@
 """The antennas of robots: their own where their group has any, else the radio's."""
 
 from swarmwire.comms.air.antennas import Antennas
-from swarmwire.comms.air.propagation.parameters import Antenna, OwnAntenna
+from swarmwire.comms.air.parameters.propagation import Antenna, OwnAntenna
 
 RADIO = Antenna(10.0, 2.0)
 

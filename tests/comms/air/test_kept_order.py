@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.air.disruption import Disruption
+from swarmwire.comms.air.parameters.delays import Delays
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.traffic.parameters import Delays
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import tick_start_ns
 from tests.comms.air.runs import RATE_HZ, TICK_NS, everybody, make_air, packets, run, scattered

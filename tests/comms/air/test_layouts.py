@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.radio import BearingGiven, Gives, Radio, RangeGiven
+from swarmwire.comms.air.parameters.gives import BearingGiven, Gives, RangeGiven
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.packets import Sent
 from swarmwire.comms.truth import Obstacle
 from tests.comms.air.runs import Run, make_air, packets, run, scattered

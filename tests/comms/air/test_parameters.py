@@ -4,31 +4,19 @@ import subprocess
 import sys
 from dataclasses import MISSING, fields, is_dataclass
 from importlib import import_module
+from pkgutil import iter_modules
 
 import pytest
 
+from swarmwire.comms.air import parameters
 from swarmwire.comms.parameters import fault_of, limits_of
 
+AIR = "swarmwire.comms.air"
 MODULES = [
-    f"swarmwire.comms.air.{name}"
-    for name in (
-        "radio",
-        "propagation.parameters",
-        "propagation.friis",
-        "propagation.log_distance",
-        "propagation.two_ray",
-        "propagation.itu_indoor",
-        "reception.parameters",
-        "reception.noise",
-        "signal.parameters",
-        "presets",
-        "preset_tables.success",
-        "radio_checks",
-        "traces.parameters",
-        "traffic.parameters",
-        "traffic.access_timing",
-        "traffic.airtime",
-    )
+    *(f"{AIR}.{name}" for name in ("radio", "radio_checks", "presets.registry", "reception.noise")),
+    *(f"{AIR}.propagation.{name}" for name in ("friis", "log_distance", "two_ray", "itu_indoor")),
+    *(f"{AIR}.timing.{name}" for name in ("access_timing", "airtime")),
+    *(f"{AIR}.parameters.{found.name}" for found in iter_modules(parameters.__path__)),
 ]
 PARAMETERS = {
     thing
@@ -43,9 +31,9 @@ def test_parameters_are_imported_without_a_compiler():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-@pytest.mark.parametrize("parameters", sorted(PARAMETERS, key=lambda kind: kind.__name__))
-def test_defaults_are_within_limits_and_every_parameter_has_help(parameters: type):
-    for field in fields(parameters):
+@pytest.mark.parametrize("kind", sorted(PARAMETERS, key=lambda one: one.__name__))
+def test_defaults_are_within_limits_and_every_parameter_has_help(kind: type):
+    for field in fields(kind):
         limits = limits_of(field)
         if "limits" not in field.metadata:
             continue

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.send_times import SendTimes
+from swarmwire.comms.air.timing.send_times import SendTimes
 from swarmwire.comms.clock import to_ns
 from tests.comms.air.runs import TICK_NS, at, everybody, make_air, packets, run, scattered
 

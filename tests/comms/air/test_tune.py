@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.radio import Gives, Radio, RangeGiven
+from swarmwire.comms.air.parameters.bursts import Bursts
+from swarmwire.comms.air.parameters.gives import Gives, RangeGiven
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.burst_states import BurstStates
-from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.clock import tick_start_ns
 from tests.comms.air.runs import RATE_HZ, Run, at, everybody, make_air, packets, scattered
 

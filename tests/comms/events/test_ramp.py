@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.radio import Gives, Radio, RangeGiven
-from swarmwire.comms.air.reception.parameters import Bursts
+from swarmwire.comms.air.parameters.bursts import Bursts
+from swarmwire.comms.air.parameters.gives import Gives, RangeGiven
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.tuning import number_of
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.errors import BadInput

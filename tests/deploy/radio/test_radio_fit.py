@@ -5,8 +5,8 @@ import tomllib
 
 import pytest
 
-from swarmwire.comms.air.propagation.parameters import Shadowing
-from swarmwire.comms.air.reception.parameters import Bursts
+from swarmwire.comms.air.parameters.bursts import Bursts
+from swarmwire.comms.air.parameters.propagation import Shadowing
 from swarmwire.world.scenario.scenario_file import scenario_from
 from tests.deploy.commands import ROOT, called
 from tests.metrics.radio_fit.synthetic import csv_of, made

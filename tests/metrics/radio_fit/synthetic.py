@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.air.propagation.parameters import Shadowing
+from swarmwire.comms.air.parameters.bursts import Bursts
+from swarmwire.comms.air.parameters.propagation import Shadowing
 from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves, shadowing_db
 from swarmwire.comms.air.reception.burst_states import BurstStates
-from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key
 from swarmwire.metrics.radio_fit.loss_sequences import LossSequences

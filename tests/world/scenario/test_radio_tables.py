@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
-from swarmwire.comms.air.presets import PRESETS
-from swarmwire.comms.air.propagation.parameters import OwnAntenna
+from swarmwire.comms.air.parameters.bursts import Bursts, bursts_from_steps
+from swarmwire.comms.air.parameters.propagation import OwnAntenna
+from swarmwire.comms.air.presets.registry import PRESETS
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.parameters import Bursts, bursts_from_steps
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.scenario.scenario_file import scenario_from
 from swarmwire.world.scenario.scenario_mapping import mapping_of

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from swarmwire.comms.air.radio import BearingGiven, Gives, Radio, RangeGiven
+from swarmwire.comms.air.parameters.gives import BearingGiven, Gives, RangeGiven
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.bodies.body import body_names
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.scenario.scenario import Scenario

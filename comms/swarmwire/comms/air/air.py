@@ -7,16 +7,16 @@ import numpy as np
 from swarmwire.comms.air import news
 from swarmwire.comms.air.accounts import Accounts
 from swarmwire.comms.air.antennas import Antennas
-from swarmwire.comms.air.disk_way import DiskWay
+from swarmwire.comms.air.disk.disk_way import DiskWay
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.kept_order import wait_for_earlier
 from swarmwire.comms.air.links import HEARD, THE_REST, Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.radio_checks import unfit_for_torus
-from swarmwire.comms.air.send_times import SendTimes
 from swarmwire.comms.air.signal.signal_way import SignalWay
-from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.air.stages.stage import Medium
+from swarmwire.comms.air.timing.send_times import SendTimes
 from swarmwire.comms.air.traces.link_traces import LinkTraces
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Way

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.air.propagation.parameters import Antenna, OwnAntenna
+from swarmwire.comms.air.parameters.propagation import Antenna, OwnAntenna
 from swarmwire.comms.arrays import FloatArray
 
 

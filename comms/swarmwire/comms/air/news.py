@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from swarmwire.comms.air.hearing_order import by_receiver
 from swarmwire.comms.air.links import HEARD, OUT_OF_RANGE, THE_REST, Links
-from swarmwire.comms.air.order import by_receiver
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.packets import Heard

@@ -2,65 +2,23 @@
 
 from dataclasses import dataclass, field
 
-from swarmwire.comms.air.presets import PRESETS
+from swarmwire.comms.air.parameters.access import Access
+from swarmwire.comms.air.parameters.bursts import Bursts
+from swarmwire.comms.air.parameters.delays import Delays
+from swarmwire.comms.air.parameters.gives import Gives
+from swarmwire.comms.air.parameters.propagation import Antenna, Bodies, Fading, Shadowing, Walls
+from swarmwire.comms.air.parameters.reception import Reception
+from swarmwire.comms.air.parameters.trace import Trace
+from swarmwire.comms.air.presets.registry import PRESETS
 from swarmwire.comms.air.propagation.friis import Friis
 from swarmwire.comms.air.propagation.itu_indoor import ItuIndoor
 from swarmwire.comms.air.propagation.log_distance import LogDistance
-from swarmwire.comms.air.propagation.parameters import Antenna, Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.air.propagation.two_ray import TwoRay
 from swarmwire.comms.air.reception.noise import Noise
-from swarmwire.comms.air.reception.parameters import Bursts, Reception
-from swarmwire.comms.air.signal.parameters import Access
-from swarmwire.comms.air.traces.parameters import Trace
-from swarmwire.comms.air.traffic.parameters import Delays
 from swarmwire.comms.parameters import parameter
 
 MODELS = ("disk", "log-distance", "friis", "two-ray", "itu-indoor")
 FRAMES = ("plain", "802.11a", "802.11b", "802.11g")
-
-
-@dataclass(frozen=True)
-class RangeGiven:
-    """A receiver learns the distance to the sender, in m, between centres."""
-
-    noise_m: float = parameter(0.0, help="standard deviation of the error", unit="m", at_least=0)
-
-
-@dataclass(frozen=True)
-class BearingGiven:
-    """A receiver learns the direction to the sender in its own frame, in rad, positive to the left."""
-
-    noise_rad: float = parameter(0.0, help="standard deviation of the error", unit="rad", at_least=0)
-
-
-@dataclass(frozen=True)
-class RssiGiven:
-    """A receiver learns the strength of the signal, in dBm; only of a radio that knows one."""
-
-    noise_db: float = parameter(0.0, help="standard deviation of the error", unit="dB", at_least=0)
-
-
-@dataclass(frozen=True)
-class Gives:
-    """What a receiver learns with a packet, taken when the packet went on air."""
-
-    range: RangeGiven | None = parameter(None, help="the distance to the sender")
-    bearing: BearingGiven | None = parameter(None, help="the direction to the sender")
-    rssi: RssiGiven | None = parameter(None, help="the strength of the signal; not with the model disk")
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the columns of `Heard.given`."""
-        return tuple(column for _, column, given in self._all() if given is not None)
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Names under which agents declare that they need these."""
-        return tuple(f"radio.{name}" for name, _, given in self._all() if given is not None)
-
-    def _all(self) -> tuple[tuple[str, str, object], ...]:
-        columns = (("range", "range_m"), ("bearing", "bearing_rad"), ("rssi", "rssi_dbm"))
-        return tuple((name, column, getattr(self, name)) for name, column in columns)
 
 
 @dataclass(frozen=True)

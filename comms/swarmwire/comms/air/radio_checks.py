@@ -1,10 +1,10 @@
 """Checks of a radio that need more than one key: contradictions are refused with the key that makes them."""
 
-from swarmwire.comms.air.propagation.parameters import Fading
+from swarmwire.comms.air.parameters.delays import refuse_negative
+from swarmwire.comms.air.parameters.propagation import Fading
+from swarmwire.comms.air.parameters.reception import Reception, refuse_unfit
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.parameters import Reception, refuse_unfit
-from swarmwire.comms.air.traffic.airtime import DSSS_RATES_BPS, OFDM_BITS_PER_SYMBOL
-from swarmwire.comms.air.traffic.parameters import refuse_negative
+from swarmwire.comms.air.timing.airtime import DSSS_RATES_BPS, OFDM_BITS_PER_SYMBOL
 from swarmwire.comms.errors import BadInput
 
 OF_SIGNALS = ("antenna", "shadowing", "walls", "bodies", "fading", "noise", "reception", "access")

@@ -2,8 +2,8 @@
 
 from typing import Any, cast
 
-from swarmwire.comms.air.preset import Preset
-from swarmwire.comms.air.presets import PRESETS
+from swarmwire.comms.air.presets.preset import Preset
+from swarmwire.comms.air.presets.registry import PRESETS
 from swarmwire.deploy.catalogue.entry import Entry
 
 

@@ -3,8 +3,8 @@
 import inspect
 from types import ModuleType
 
-from swarmwire.comms.air.stage import Stage
-from swarmwire.comms.air.stages import ORDER
+from swarmwire.comms.air.stages.chain import ORDER
+from swarmwire.comms.air.stages.stage import Stage
 from swarmwire.deploy.catalogue.docs import first_line, paragraphs
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
 from swarmwire.deploy.catalogue.scenario_keys import all_keys
@@ -21,7 +21,8 @@ def _stage(module: ModuleType, place: int) -> Entry:
     stages = [of for of in own if isinstance(of, type) and issubclass(of, Stage)]
     formulas = [of for of in own if not isinstance(of, type) and of is not module.__dict__["stage"]]
     texts = [inspect.getdoc(of) for of in (*stages, *formulas)]
-    keys = tuple(key for key in all_keys() if f"{key.name}.".startswith(f"radio.{name}."))
+    tables = tuple(f"radio.{key}." for key in module.__dict__["KEYS"])
+    keys = tuple(key for key in all_keys() if f"{key.name}.".startswith(tables))
     return Entry(
         kind="stage",
         name=name,

@@ -7,7 +7,7 @@ from typing import Any, get_args, get_type_hints
 from swarmwire.agent import Packet, Robot
 from swarmwire.agent.robot import RadioPort
 from swarmwire.agent.turn import OUTCOMES
-from swarmwire.comms.air.radio import Gives
+from swarmwire.comms.air.parameters.gives import Gives
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.outcomes import SendResult
 from swarmwire.comms.sheets import SHEETS

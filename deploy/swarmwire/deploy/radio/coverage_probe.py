@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from swarmwire.comms.air.antennas import Antennas
-from swarmwire.comms.air.coverage import Coverage
+from swarmwire.comms.air.probe.coverage import Coverage
+from swarmwire.comms.air.probe.survey import ByDistance, CoverageMap, by_distance, coverage_map
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.survey import ByDistance, CoverageMap, by_distance, coverage_map
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Static

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.comms.air.survey import Band
+from swarmwire.comms.air.probe.survey import Band
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.deploy.radio.coverage_probe import CoverageProbe
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
-    from swarmwire.comms.air.propagation.parameters import Antenna
+    from swarmwire.comms.air.parameters.propagation import Antenna
     from swarmwire.metrics.radio_fit.radio_fit import RadioFit
 
 DISK = {"range_m": 1.0}  # what a table without path loss is put into

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from swarmwire.comms.air.presets import PRESETS
+from swarmwire.comms.air.presets.registry import PRESETS
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.radio.around import checked_radio

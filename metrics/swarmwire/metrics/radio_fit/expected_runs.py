@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from swarmwire.comms.air.reception.parameters import Bursts
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.arrays import FloatArray
 
 

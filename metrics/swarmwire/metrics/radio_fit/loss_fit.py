@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 from scipy import optimize, special
 
-from swarmwire.comms.air.reception.parameters import Bursts
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.radio_fit.curvature import standard_errors
 from swarmwire.metrics.radio_fit.estimate import Estimate

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from swarmwire.comms.air.reception.parameters import Bursts
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.radio_fit.loss_sequences import LossSequences
 

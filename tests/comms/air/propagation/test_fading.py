@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import special, stats
 
+from swarmwire.comms.air.parameters.propagation import Fading
 from swarmwire.comms.air.propagation.fading import fading_gain, fading_law
 from swarmwire.comms.air.propagation.nakagami import nakagami_gain
-from swarmwire.comms.air.propagation.parameters import Fading
 from swarmwire.comms.air.propagation.scattering import WAVES, scattered_between
 from swarmwire.comms.draws import derive_key
 

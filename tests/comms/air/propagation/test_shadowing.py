@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from swarmwire.comms.air.propagation.parameters import Shadowing
+from swarmwire.comms.air.parameters.propagation import Shadowing
 from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves, shadowing_db
 from swarmwire.comms.air.propagation.waves import cosine, sine
 from swarmwire.comms.draws import derive_key

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from swarmwire.comms.air.parameters.bursts import Bursts, bursts_from_steps
 from swarmwire.comms.air.reception.burst_states import LEAST_CAPACITY, BurstStates
 from swarmwire.comms.air.reception.bursts import bad_after
-from swarmwire.comms.air.reception.parameters import Bursts, bursts_from_steps
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from swarmwire.comms.air.parameters.reception import Reception, SuccessTable, refuse_unfit
 from swarmwire.comms.air.reception import dsss, ofdm
-from swarmwire.comms.air.reception.parameters import Reception, SuccessTable, refuse_unfit
 from swarmwire.comms.air.reception.reception import (
     by_table,
     by_threshold,

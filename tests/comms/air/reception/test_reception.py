@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.air.decibels import from_db, to_db
+from swarmwire.comms.air.parameters.reception import SuccessTable
 from swarmwire.comms.air.reception import dsss, ofdm
 from swarmwire.comms.air.reception.bits import all_right
-from swarmwire.comms.air.reception.parameters import SuccessTable
 from swarmwire.comms.air.reception.reception import (
     by_table,
     by_threshold,

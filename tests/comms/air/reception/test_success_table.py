@@ -5,7 +5,7 @@ import math
 import pytest
 
 from swarmwire.comms.air.decibels import from_db
-from swarmwire.comms.air.reception.parameters import SuccessTable, refuse_unless_rising
+from swarmwire.comms.air.parameters.reception import SuccessTable, refuse_unless_rising
 from swarmwire.comms.air.reception.reception import by_table, chunk_success
 from swarmwire.comms.errors import BadInput
 

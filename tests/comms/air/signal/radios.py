@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 
+from swarmwire.comms.air.parameters.access import Access
+from swarmwire.comms.air.parameters.gives import BearingGiven, Gives, RangeGiven, RssiGiven
+from swarmwire.comms.air.parameters.reception import Reception
 from swarmwire.comms.air.propagation.log_distance import LogDistance
-from swarmwire.comms.air.radio import BearingGiven, Gives, Radio, RangeGiven, RssiGiven
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.noise import Noise
-from swarmwire.comms.air.reception.parameters import Reception
-from swarmwire.comms.air.signal.parameters import Access
 
 # As in ns-3: 5 MHz of noise, path loss 46.6777 dB at 1 m and exponent 3.
 IEEE_802_15_4 = Radio(

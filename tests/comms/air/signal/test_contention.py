@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from swarmwire.comms.air.contention import contention
-from swarmwire.comms.air.propagation.parameters import Antenna
+from swarmwire.comms.air.parameters.propagation import Antenna
+from swarmwire.comms.air.parameters.reception import Reception
+from swarmwire.comms.air.probe.contention import contention
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.noise import Noise
-from swarmwire.comms.air.reception.parameters import Reception
 from tests.comms.air.signal.radios import with_access
 
 CSMA = replace(with_access("csma-802154"), send_offset="uniform", queue_limit=10**6)

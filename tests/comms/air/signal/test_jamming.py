@@ -10,7 +10,7 @@ import pytest
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.jammers import NO_ROBOT, Jammers
-from swarmwire.comms.air.propagation.parameters import Shadowing, Walls
+from swarmwire.comms.air.parameters.propagation import Shadowing, Walls
 from swarmwire.comms.air.reception.noise import Noise
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import tick_start_ns

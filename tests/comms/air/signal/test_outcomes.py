@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.access import QUEUE_FULL
+from swarmwire.comms.air.disk.queue import QUEUE_FULL
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import FloatArray, IntArray

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swarmwire.comms.air.parameters.reception import Reception
 from swarmwire.comms.air.reception.noise import Noise
-from swarmwire.comms.air.reception.parameters import Reception
 from swarmwire.comms.fates import Fate
 from tests.comms.air.runs import at, make_air, packets, run
 from tests.comms.air.signal.radios import with_access

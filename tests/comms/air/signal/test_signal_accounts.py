@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.jammers import NO_ROBOT, Jammers
-from swarmwire.comms.air.propagation.parameters import Antenna, Bodies, Fading, Shadowing, Walls
+from swarmwire.comms.air.parameters.bursts import Bursts
+from swarmwire.comms.air.parameters.propagation import Antenna, Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST
 from tests.comms.air.runs import Run, at, everybody, make_air, packets, run, scattered

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.propagation.parameters import Fading, Shadowing
+from swarmwire.comms.air.parameters.bursts import Bursts
+from swarmwire.comms.air.parameters.propagation import Fading, Shadowing
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.packets import BROADCAST, Sent
 from tests.comms.air.runs import Run, make_air, packets, run, scattered
 from tests.comms.air.signal.radios import ALL_GIVEN, METHODS, with_access

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.propagation.parameters import Fading, Shadowing
+from swarmwire.comms.air.parameters.bursts import Bursts
+from swarmwire.comms.air.parameters.propagation import Fading, Shadowing
+from swarmwire.comms.air.parameters.reception import Reception
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.oqpsk import oqpsk_bit_errors
-from swarmwire.comms.air.reception.parameters import Bursts, Reception
 from swarmwire.comms.fates import Fate
 from tests.comms.air.runs import at, everybody, make_air, packets, run, scattered
 from tests.comms.air.signal.radios import METHODS, with_access

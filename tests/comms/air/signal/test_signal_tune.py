@@ -9,7 +9,7 @@ import pytest
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.antennas import Antennas
 from swarmwire.comms.air.disruption import ALL, DROP, NEWEST, Disruption
-from swarmwire.comms.air.propagation.parameters import Antenna, Fading, OwnAntenna, Shadowing
+from swarmwire.comms.air.parameters.propagation import Antenna, Fading, OwnAntenna, Shadowing
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.noise import Noise
 from swarmwire.comms.arrays import FloatArray

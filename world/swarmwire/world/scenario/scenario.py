@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import Field, PrivateAttr, StringConstraints, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from swarmwire.comms.air.presets import with_preset
-from swarmwire.comms.air.propagation.parameters import OwnAntenna
+from swarmwire.comms.air.parameters.propagation import OwnAntenna
+from swarmwire.comms.air.presets.registry import with_preset
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.registry import ACTIONS

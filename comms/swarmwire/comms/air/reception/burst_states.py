@@ -3,13 +3,15 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.reception.bursts import FORGOTTEN, bad_after
-from swarmwire.comms.air.reception.parameters import Bursts
 from swarmwire.comms.arrays import BoolArray, IntArray, KeyArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
@@ -18,6 +20,19 @@ STATE, LOSS = purpose("burst state"), purpose("burst loss")
 NOBODY = -1
 LEAST_CAPACITY = 1024
 SCATTER = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden section: Knuth's multiplicative hashing
+
+
+class Bursting(NamedTuple):
+    """Which links were good or bad, by place in a hash table, and the numbers by which they change."""
+
+    link: IntArray  # (capacity,) sender x rows + receiver, or NOBODY
+    at_ns: IntArray  # (capacity,) when it was last used
+    bad: BoolArray  # (capacity,)
+    added: IntArray  # (1,) links that kernels have added
+    a: float  # in 1/s: good turns bad
+    b: float  # in 1/s: bad turns good
+    loss_bad: float
+    loss_good: float
 
 
 class BurstStates:
@@ -48,24 +63,9 @@ class BurstStates:
         if not len(sender):
             return np.zeros(0, np.bool_)
         self.make_room(int(at_ns.min()), len(sender))
-        a, b = 1.0 / self._bursts.good_s, 1.0 / self._bursts.bad_s
-        ends, added = _lost(
-            self._link,
-            self._at_ns,
-            self._bad,
-            self._keys,
-            self._robots,
-            self._rows,
-            sender,
-            receiver,
-            sequence,
-            at_ns,
-            a,
-            b,
-            self._bursts.loss_bad,
-            self._bursts.loss_good,
-        )
-        self._kept += added
+        bursting = self.bursting
+        ends = _lost(bursting, self._keys, self._robots, self._rows, sender, receiver, sequence, at_ns)
+        self.count_added(bursting)
         return ends
 
     def make_room(self, now_ns: int, links: int) -> None:
@@ -74,13 +74,15 @@ class BurstStates:
             self._rebuild(now_ns, links)
 
     @property
-    def table(self) -> tuple[IntArray, IntArray, BoolArray]:
-        """Links, times and states for kernels, which add at most as many as there is room for; then call `added`."""
-        return self._link, self._at_ns, self._bad
+    def bursting(self) -> Bursting:
+        """For kernels, which add at most as many links as there is room for; then call `count_added`."""
+        bursts, added = self._bursts, np.zeros(1, np.int64)
+        a, b = 1.0 / bursts.good_s, 1.0 / bursts.bad_s
+        return Bursting(self._link, self._at_ns, self._bad, added, a, b, bursts.loss_bad, bursts.loss_good)
 
-    def added(self, links: int) -> None:
-        """A kernel added so many links to the table."""
-        self._kept += links
+    def count_added(self, bursting: Bursting) -> None:
+        """Kernels added links to the table."""
+        self._kept += int(bursting.added[0])
 
     def _clear(self, capacity: int) -> None:
         self._link = np.full(capacity, NOBODY, np.int64)
@@ -119,44 +121,26 @@ def _insert(links, links_at_ns, links_bad, link, at_ns, bad):
 
 
 @njit(cache=True)
-def _lost(
-    links,
-    links_at_ns,
-    links_bad,
-    keys,
-    robots,
-    rows,
-    sender,
-    receiver,
-    sequence,
-    at_ns,
-    a,
-    b,
-    loss_bad,
-    loss_good,
-):
+def _lost(bursting, keys, robots, rows, sender, receiver, sequence, at_ns):
     ends = np.zeros(len(sender), np.bool_)
-    added = 0
     for i in range(len(sender)):
         key, s, r = keys[sender[i] // robots], sender[i] % robots, receiver[i] % robots
         link = sender[i] * rows + receiver[i]
-        ends[i], new = takes(
-            links, links_at_ns, links_bad, link, key, s, r, sequence[i], 0, at_ns[i], a, b, loss_bad, loss_good
-        )
-        added += new
-    return ends, added
+        ends[i] = takes(bursting, link, key, s, r, sequence[i], 0, at_ns[i])
+    return ends
 
 
-@njit(cache=True)
-def takes(links, links_at_ns, links_bad, link, key, s, r, sequence, attempt, at_ns, a, b, loss_bad, loss_good):
-    """Whether a burst takes a packet from s to r, indices in the arena, at `at_ns`; and 1 if the link is new here."""
-    at = _place(links, link)
-    silent_s, new = np.inf, 0
-    if links[at] == NOBODY:
-        links[at] = link
-        new = 1
+@borrowing()
+def takes(bursting, link, key, s, r, sequence, attempt, at_ns):
+    """Whether a burst takes a packet from s to r, indices in the arena, at `at_ns`."""
+    at = _place(bursting.link, link)
+    silent_s = np.inf
+    if bursting.link[at] == NOBODY:
+        bursting.link[at] = link
+        bursting.added[0] += 1
     else:
-        silent_s = (at_ns - links_at_ns[at]) / NS_PER_S
-    bad = bad_after(links_bad[at], silent_s, a, b, uniform(key, s, r, sequence, STATE + attempt))
-    links_at_ns[at], links_bad[at] = at_ns, bad
-    return uniform(key, s, r, sequence, LOSS + attempt) < (loss_bad if bad else loss_good), new
+        silent_s = (at_ns - bursting.at_ns[at]) / NS_PER_S
+    u = uniform(key, s, r, sequence, STATE + attempt)
+    bad = bad_after(bursting.bad[at], silent_s, bursting.a, bursting.b, u)
+    bursting.at_ns[at], bursting.bad[at] = at_ns, bad
+    return uniform(key, s, r, sequence, LOSS + attempt) < (bursting.loss_bad if bad else bursting.loss_good)

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.reception.bits import all_right
-from swarmwire.comms.air.traffic.airtime import OFDM_BITS_PER_SYMBOL
+from swarmwire.comms.air.timing.airtime import OFDM_BITS_PER_SYMBOL
 
 BANDWIDTH_HZ = 20e6
 RATES_BPS = tuple(OFDM_BITS_PER_SYMBOL)

@@ -12,11 +12,11 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.decibels import from_db
+from swarmwire.comms.air.parameters.reception import Reception, SuccessTable
 from swarmwire.comms.air.reception import dsss, ofdm
 from swarmwire.comms.air.reception.dsss import dsss_success
 from swarmwire.comms.air.reception.ofdm import ofdm_success
 from swarmwire.comms.air.reception.oqpsk import oqpsk_success
-from swarmwire.comms.air.reception.parameters import Reception, SuccessTable
 from swarmwire.comms.air.reception.success_table import table_success
 from swarmwire.comms.air.reception.threshold import threshold_success
 from swarmwire.comms.arrays import FloatArray

@@ -9,8 +9,8 @@ was not understood the air counts as free only EIFS later (IEEE 802.11-2007, 9.2
 
 import numpy as np
 
+from swarmwire.comms.air.parameters.access import METHODS
 from swarmwire.comms.air.signal.event_queue import SEND, cancel, due_ns, schedule
-from swarmwire.comms.air.signal.parameters import METHODS
 from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.draws import purpose

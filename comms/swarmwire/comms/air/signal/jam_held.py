@@ -6,9 +6,9 @@ import numpy as np
 
 from swarmwire.comms.air.jammers import Jammers
 from swarmwire.comms.air.signal.jamming import powers_of
-from swarmwire.comms.air.signal.link_table import Surroundings
+from swarmwire.comms.air.signal.surroundings import Surroundings
 from swarmwire.comms.air.signal.tables import Jam
-from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.air.stages.stage import Medium
 from swarmwire.comms.arrays import FloatArray
 
 

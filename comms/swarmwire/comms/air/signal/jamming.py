@@ -15,8 +15,8 @@ from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.jammers import Jammers
 from swarmwire.comms.air.propagation.loss_between import loss_between_db
 from swarmwire.comms.air.signal import dcf
-from swarmwire.comms.air.signal.link_table import Surroundings
 from swarmwire.comms.air.signal.on_air import count_chunk
+from swarmwire.comms.air.signal.surroundings import Surroundings
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
@@ -53,7 +53,7 @@ def _powers(jammers, place, x, y, robots, obstacles, around):
     return power_mw
 
 
-@borrowing()
+@borrowing(from_python=True)
 def refresh(rules, state, queue, now_ns):
     """Jammers, what they do, or the radio's rules have changed: every robot's noise is what it should be."""
     for arena in range(len(state.keys)):

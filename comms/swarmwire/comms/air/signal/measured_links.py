@@ -4,8 +4,8 @@
 
 import numpy as np
 
-from swarmwire.comms.air.signal.tables import Traced
-from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.air.signal.losses import Traced
+from swarmwire.comms.air.stages.stage import Medium
 from swarmwire.comms.air.traces.link_traces import LinkTraces
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 

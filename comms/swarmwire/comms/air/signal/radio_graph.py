@@ -7,15 +7,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from swarmwire.comms.air.channel import ROUNDING
+from swarmwire.comms.air.disk.channel import ROUNDING
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.signal.frame_fate import lone_deliveries, lone_delivery
 from swarmwire.comms.air.signal.jam_held import JamHeld
-from swarmwire.comms.air.signal.link_table import Pairs
 from swarmwire.comms.air.signal.links_held import LinksHeld
+from swarmwire.comms.air.signal.losses import passing_share
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
-from swarmwire.comms.air.signal.outcome import lone_deliveries, lone_delivery
-from swarmwire.comms.air.signal.tables import Rules
-from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.air.signal.pairs import Pairs
+from swarmwire.comms.air.signal.rules import Rules
+from swarmwire.comms.air.stages.stage import Medium
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
 NEGLIGIBLE = 1e-3  # power of a jammer over that of the noise
@@ -31,7 +32,7 @@ class RadioGraph:
     def tune(self, radio: Radio, rules: Rules) -> None:
         """The radio has these numbers from now on."""
         self._rules, self._bits = rules, 8 * (radio.max_payload_bytes + radio.overhead_bytes)
-        others = passes_besides(radio)
+        others = passing_share(radio)
         self._least = radio.min_delivery / others if others > 0.0 else math.inf if radio.min_delivery > 0.0 else 0.0
         self._least_dbm = least_where(lambda dbm: lone_delivery(rules, dbm, self._bits) >= self._least - ROUNDING)
 
@@ -63,11 +64,6 @@ class RadioGraph:
                 delivery *= self._measured.ratio(sender, receiver)
             joined &= delivery >= self._least - ROUNDING
         return joined
-
-
-def passes_besides(radio: Radio) -> float:
-    """The share of packets that neither fixed loss nor bursts take."""
-    return (1.0 - radio.loss) * (1.0 - (radio.bursts.loss if radio.bursts else 0.0))
 
 
 def least_where(is_enough: Callable[[float], bool]) -> float:

@@ -7,9 +7,10 @@ import numpy as np
 from swarmwire.comms.air.links import HEARD, Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.signal.links_held import LinksHeld
-from swarmwire.comms.air.signal.tables import NOBODY, Table, Told
-from swarmwire.comms.air.stage import Medium
-from swarmwire.comms.air.stages import chain_after_reception
+from swarmwire.comms.air.signal.tables import NOBODY, Table
+from swarmwire.comms.air.signal.told import Told
+from swarmwire.comms.air.stages.chain import chain_after_reception
+from swarmwire.comms.air.stages.stage import Medium
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Decided
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
@@ -85,14 +86,6 @@ class Reports:
         meant = to_one | (to_all & lives.intended(packets.epoch[at], receiver))
         np.add.at(found, at[meant], 1)
         return found
-
-
-def taken_out(room: Told) -> Told:
-    """The rows that were told, out of `room`, which is empty again."""
-    count = int(room.count[0])
-    rows = Told._make([*(column[:count].copy() for column in room[:-1]), room.count.copy()])
-    room.count[0] = 0
-    return rows
 
 
 def _meant(queued: Transmissions, row: Told, lives: Lives) -> BoolArray:

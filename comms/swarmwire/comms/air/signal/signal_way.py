@@ -9,38 +9,35 @@ import numpy as np
 from swarmwire.comms.air.disruption import ALL, NEWEST, Disruption
 from swarmwire.comms.air.intake import Intake
 from swarmwire.comms.air.lives import Lives
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.burst_states import BurstStates
-from swarmwire.comms.air.reception.parameters import Bursts
-from swarmwire.comms.air.send_times import SendTimes
-from swarmwire.comms.air.signal import events, jamming, kept_back
+from swarmwire.comms.air.signal import backlog, event_loop, jamming
 from swarmwire.comms.air.signal.event_queue import event_queue
 from swarmwire.comms.air.signal.jam_held import JamHeld
-from swarmwire.comms.air.signal.learning import learned, sent_in_vain
-from swarmwire.comms.air.signal.link_table import Surroundings
 from swarmwire.comms.air.signal.links_held import LinksHeld
+from swarmwire.comms.air.signal.losses import NOT_TRACED, Losses, losses_of
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
-from swarmwire.comms.air.signal.numbers import levels_of, rules_of, surroundings_of
-from swarmwire.comms.air.signal.packet_rows import packet_rows
+from swarmwire.comms.air.signal.packets_held import PacketsHeld
 from swarmwire.comms.air.signal.radio_graph import RadioGraph
-from swarmwire.comms.air.signal.reports import Reports, taken_out
+from swarmwire.comms.air.signal.reports import Reports
+from swarmwire.comms.air.signal.rules import levels_of, rules_of
+from swarmwire.comms.air.signal.send_results import learned, sent_in_vain
+from swarmwire.comms.air.signal.surroundings import Surroundings, surroundings_of
 from swarmwire.comms.air.signal.tables import (
     KEPT_ALL,
     KEPT_NEWEST,
     NOBODY,
-    NOT_TRACED,
     NOTHING,
-    PACKET,
     RECEPTION,
     ROBOT,
     SILENT,
-    Bursting,
     State,
     Table,
-    Told,
-    told,
 )
-from swarmwire.comms.air.stage import Medium
+from swarmwire.comms.air.signal.told import Told, room_for, taken_out
+from swarmwire.comms.air.stages.stage import Medium
+from swarmwire.comms.air.timing.send_times import SendTimes
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Decided, Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
@@ -74,7 +71,7 @@ class SignalWay(Way):
         self._reception: Table = np.zeros(rows, RECEPTION)
         self._reception["locked_to"], self._reception["signal_mw"] = NOBODY, np.inf
         self._robot["free_from_ns"] = LONG_AGO_NS
-        self._queued, self._packet = Transmissions.none(), np.zeros(0, PACKET)
+        self._packets = PacketsHeld()
         self._hold, self._poses = 0, {0: np.zeros((rows, 3))}
         self._now_ns = self._told = 0
         self._outcomes: list[Outcomes] = []
@@ -82,7 +79,7 @@ class SignalWay(Way):
     @property
     def queued(self) -> Transmissions:
         """Packets that still wait, or are under way."""
-        return self._queued
+        return self._packets.queued
 
     def hold(self, pose: FloatArray) -> None:
         """Robots stand at `pose` (rows, 3) from now on."""
@@ -120,36 +117,35 @@ class SignalWay(Way):
         if self._rules.acknowledged:
             self._outcomes.append(sent_in_vain(sent, self._radio.max_payload_bytes))
         taken = self._intake.take(self._send_times.at(at_ns, tick), sent, others_alive, epoch)
-        self._packet = np.concatenate([self._packet, packet_rows(taken, self._radio, self._medium.robots)])
-        self._queued = self._queued.followed_by(taken)
+        self._packets.add(taken, self._radio, self._medium.robots)
         return taken
 
     def pass_time(self, until_ns: int, lives: Lives) -> Decided:
         """Let happen what is due before `until_ns`."""
         parts: list[Told] = []
-        if len(self._packet) or self._events.size[0] or self._jam.anything:
+        if len(self._packets) or self._events.size[0] or self._jam.anything:
             state, start = self._state(self._medium.disruption, until_ns)
-            bursts = self._bursting()
-            events.line_up(state, self._events, start)
+            losses = self._losses()
+            event_loop.line_up(state, self._events, start)
             most = int(max((state.places.stop - state.places.first).max(), _lengths(self._robot).max()))
-            room = told(max(LEAST_ROOM, 2 * (most + events.FEW + len(self._packet)), 2 * self._told))
+            room = room_for(max(LEAST_ROOM, 2 * (most + event_loop.FEW + len(self._packets)), 2 * self._told))
             done = False
             while not done:
-                done = events.run_until(self._rules, bursts, state, self._events, room, most, until_ns)
+                done = event_loop.run_until(self._rules, losses, state, self._events, room, most, until_ns)
                 parts.append(taken_out(room))
             self._told = sum(len(part.packet) for part in parts)
-            self._bursts.added(int(bursts.added[0]))
+            self._bursts.count_added(losses.bursts)
         self._now_ns = until_ns
         return self._decided(parts, lives)
 
     def disrupt(self, at_ns: int, coming: Disruption, lives: Lives) -> Decided:
         """The queues of the dead end, those of radios that are off may wait; they hear nothing of what is on air."""
         state, start = self._state(coming, at_ns)
-        events.line_up(state, self._events, start)
-        room = told(len(self._packet) + 1)
-        events.stop_the_dead(state, self._events, room, coming.alive, at_ns)
-        events.cut_off(self._rules, state, self._events, coming.alive, coming.radio_on, at_ns)
-        kept_back.switch(self._rules, state, self._events, room, at_ns)
+        event_loop.line_up(state, self._events, start)
+        room = room_for(len(self._packets) + 1)
+        event_loop.stop_the_dead(state, self._events, room, coming.alive, at_ns)
+        event_loop.cut_off(self._rules, state, self._events, coming.alive, coming.radio_on, at_ns)
+        backlog.switch(self._rules, state, self._events, room, at_ns)
         return self._decided([taken_out(room)], lives)
 
     def outcomes(self, alive: BoolArray) -> Outcomes:
@@ -159,10 +155,9 @@ class SignalWay(Way):
 
     def drain(self) -> Transmissions:
         """Take out all that is queued or under way."""
-        packets, self._queued, self._packet = self._queued, Transmissions.none(), np.zeros(0, PACKET)
         self._events.size[0] = 0
         self._events.place[:] = NOBODY
-        return packets
+        return self._packets.drain()
 
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
         """Pairs of robot rows a < b joined in the radio graph, sorted, (e, 2)."""
@@ -185,9 +180,7 @@ class SignalWay(Way):
 
     def _state(self, held: Disruption, until_ns: int) -> tuple[State, IntArray]:
         """What events work on until then, and where each robot's packets start in its order, (rows + 1,)."""
-        sender = self._packet["sender"]
-        order = np.argsort(sender, kind="stable")
-        start = np.searchsorted(sender[order], np.arange(len(self._robot) + 1))
+        order, start = self._packets.by_sender(len(self._robot))
         state = State(
             self._medium.keys,
             self._robot,
@@ -195,38 +188,28 @@ class SignalWay(Way):
             self._links.link,
             self._links.places,
             self._hold,
-            self._packet,
+            self._packets.table,
             order,
             _off(held),
             self._jam.between(self._now_ns, until_ns),
-            NOT_TRACED if self._measured is None else self._measured.traced,
         )
         return state, start
 
-    def _bursting(self) -> Bursting:
-        given = self._radio.bursts
-        bursts = given or Bursts()
-        if given is not None:
+    def _losses(self) -> Losses:
+        if self._radio.bursts is not None:
             self._bursts.make_room(self._now_ns, len(self._links.link.receiver))
-        link, at_ns, bad = self._bursts.table
-        a, b, added = 1.0 / bursts.good_s, 1.0 / bursts.bad_s, np.zeros(1, np.int64)
-        return Bursting(given is not None, link, at_ns, bad, added, a, b, bursts.loss_bad, bursts.loss_good)
+        traced = NOT_TRACED if self._measured is None else self._measured.traced
+        return losses_of(self._radio, traced, self._bursts)
 
     def _decided(self, parts: list[Told], lives: Lives) -> Decided:
         """What was told, as packets and links; packets that are done leave the queue."""
-        decided = self._reports.decided(parts, self._queued, self._packet, self._poses, lives)
+        packets = self._packets
+        decided = self._reports.decided(parts, packets.queued, packets.table, self._poses, lives)
         if parts:
-            self._forget_done()
+            if self._rules.acknowledged:
+                self._outcomes.append(learned(packets.table, packets.queued.outcome_id))
+            packets.forget_done()
         return decided
-
-    def _forget_done(self) -> None:
-        settled = self._packet["is_settled"] > 0
-        if self._rules.acknowledged:
-            self._outcomes.append(learned(self._packet, self._queued.outcome_id))
-        kept = np.flatnonzero(self._packet["is_done"] == 0)
-        self._packet["is_departed"] |= settled
-        queued = self._queued._replace(intended=np.where(settled, 0, self._queued.intended))
-        self._queued, self._packet = queued.select(kept), self._packet[kept]
 
 
 def _off(held: Disruption) -> IntArray:

@@ -1,4 +1,4 @@
-"""The tables that the run of events works on: robots, links, packets, and what it tells."""
+"""The tables that the run of events works on: robots, links, packets."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmwire.comms.air.reception.reception import Receiver
 from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray, KeyArray
 
 # What a robot's radio does with the packet at the head of its queue; from BACKING_OFF on there is one.
@@ -96,67 +95,6 @@ PACKET = np.dtype(
 Table = NDArray[np.void]
 
 
-class Rules(NamedTuple):
-    """The radio in numbers; powers in mW, times in ns."""
-
-    robots: int  # in each arena
-    method: int  # a place in METHODS
-    acknowledged: bool
-    queue_limit: int
-    noise_mw: float
-    least_sinr: float  # that a preamble needs
-    least_mw: float  # that a preamble needs
-    sure_sinr: float  # from here on all bits are right
-    take_over_ns: int  # how long after its start a frame gives way to a stronger one
-    loss: float
-    busy_mw: float
-    retries: int
-    # Acknowledgements.
-    short_space_ns: int
-    acknowledgement_ns: int  # airtime
-    acknowledgement_bits: int
-    patience_ns: int  # how long an acknowledgement is waited for
-    # CSMA.
-    backoff_ns: int
-    listen_ns: int
-    turnaround_ns: int
-    least_exponent: int
-    most_exponent: int
-    most_backoffs: int
-    # DCF.
-    slot_ns: int
-    difs_ns: int
-    distrust_ns: int  # EIFS - DIFS
-    least_window: int
-    most_window: int
-    receiver: Receiver
-    log_success: FloatArray  # by SINR, as `log_success_table` has it
-
-
-class Traced(NamedTuple):
-    """Links whose delivery ratio was measured, in every arena alike."""
-
-    link: IntArray  # (links,) sender x robots + receiver, as indices in the arena; rising
-    ratio: FloatArray  # (links,)
-
-
-NOT_TRACED = Traced(np.empty(0, np.int64), np.empty(0))
-
-
-class Bursting(NamedTuple):
-    """Which links were good or bad, as `BurstStates` keeps them."""
-
-    is_on: bool
-    link: IntArray
-    at_ns: IntArray
-    bad: BoolArray
-    added: IntArray  # (1,)
-    a: float
-    b: float
-    loss_bad: float
-    loss_good: float
-
-
 class LinkTable(NamedTuple):
     """Links by sender: to robots that may be told of a frame, and then to those that it only disturbs."""
 
@@ -167,26 +105,17 @@ class LinkTable(NamedTuple):
     now: ByteArray  # (links,) of the frame on air: RECEIVING or a fate
 
 
+NO_LINKS = LinkTable(
+    np.empty(0, np.int64), np.empty(0), np.empty(0, np.bool_), np.empty(0, np.uint8), np.empty(0, np.uint8)
+)
+
+
 class LinkPlaces(NamedTuple):
     """Where in a `LinkTable` each robot's links are, (rows,) each."""
 
     first: IntArray
     weak: IntArray  # the first that it only disturbs
     stop: IntArray
-
-
-class Told(NamedTuple):
-    """What the run of events tells, (capacity,) each: a row per packet and receiver, or per packet never on air."""
-
-    packet: IntArray
-    receiver: IntArray  # robot row or NOBODY
-    fate: IntArray
-    in_range: IntArray
-    final_at_ns: IntArray
-    hold: IntArray
-    on_air_at_ns: IntArray
-    power_mw: FloatArray  # at the receiver
-    count: IntArray  # (1,) rows told
 
 
 class Jam(NamedTuple):
@@ -213,10 +142,3 @@ class State(NamedTuple):
     order: IntArray  # packets by sender, in the order of sending
     off: IntArray  # (rows,) HEARD: the radio is on; else the fate of what it should send, or KEPT_ALL or KEPT_NEWEST
     jam: Jam
-    traced: Traced
-
-
-def told(capacity: int) -> Told:
-    """Room for so many rows."""
-    columns = (np.empty(capacity, np.int64) for _ in range(7))
-    return Told._make([*columns, np.empty(capacity), np.zeros(1, np.int64)])

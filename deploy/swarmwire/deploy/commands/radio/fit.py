@@ -8,7 +8,7 @@ import typer
 from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
-    from swarmwire.comms.air.propagation.parameters import Antenna
+    from swarmwire.comms.air.parameters.propagation import Antenna
     from swarmwire.metrics.radio_fit.radio_fit import RadioFit
 
 USUAL_SIZE_PX = 1280
@@ -78,7 +78,7 @@ def _antenna(power_dbm: float, gain_dbi: float) -> "Antenna":
     """The antenna that the robots had; BadInput for one that no scenario takes."""
     from dataclasses import fields
 
-    from swarmwire.comms.air.propagation.parameters import Antenna
+    from swarmwire.comms.air.parameters.propagation import Antenna
     from swarmwire.comms.parameters import fault_of, limits_of
 
     antenna = Antenna(power_dbm, gain_dbi)

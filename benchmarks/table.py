@@ -1,0 +1,45 @@
+"""The lines that benchmarks printed as the table of docs/performance.md: `python -m benchmarks.table < FILE`.
+
+Lines of the engine pymunk, where there are any, stand beside those of the default one.
+"""
+
+import json
+import sys
+from collections.abc import Iterable
+from typing import Any
+
+from benchmarks.targets import TARGETS
+
+Line = dict[str, Any]
+
+
+def rows(lines: Iterable[Line]) -> list[str]:
+    """A row for each benchmark, the last line of each counts."""
+    default: dict[str, Line] = {}
+    pymunk: dict[str, Line] = {}
+    for line in lines:
+        (pymunk if line.get("engine") == "pymunk" else default)[line["name"]] = line
+    head = [
+        "| name | target | measured (lowest to highest of three) | | pymunk | what |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    return head + [_row(line, pymunk.get(name)) for name, line in default.items()]
+
+
+def _row(line: Line, beside: Line | None) -> str:
+    name, target = line["name"], TARGETS.get(line["name"])
+    asked = f"{'≤' if target.at_most else '≥'} {_number(target.value)}" if target else ""
+    met = "" if target is None else "met" if target.met_by(line["value"]) else "**missed**"
+    between = f" ({_number(line['lowest'])} to {_number(line['highest'])})" if "lowest" in line else ""
+    other = _number(beside["value"]) if beside else ""
+    what = target.what if target else ""
+    return f"| `{name}` | {asked} | {_number(line['value'])} {line['unit']}{between} | {met} | {other} | {what} |"
+
+
+def _number(value: float) -> str:
+    """Three digits that count, with commas."""
+    return f"{float(f'{value:.3g}'):,.10g}"
+
+
+if __name__ == "__main__":
+    print("\n".join(rows(json.loads(line) for line in sys.stdin if line.startswith("{"))))

@@ -1,0 +1,62 @@
+"""What is asked of each benchmark, and what it measures in a few words."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Target:
+    """A number to reach: at least so much, or at most."""
+
+    value: float
+    what: str
+    at_most: bool = False
+
+    def met_by(self, value: float) -> bool:
+        """Whether a value is as good as asked."""
+        return value <= self.value if self.at_most else value >= self.value
+
+
+def most(value: float, what: str) -> Target:
+    """A target to stay below."""
+    return Target(value, what, at_most=True)
+
+
+TARGETS = {
+    "inprocess-1000-d1": Target(
+        800_000,
+        "1,000 foot-bots, 24 rays, diffusion at 0.05 m/s, 1 per square metre, 5 physics steps (pymunk: 250,000)",
+    ),
+    "inprocess-1000-d1-10steps": Target(
+        600_000, "the same with 10 physics steps, ARGoS's default (ARGoS at its best: 77,000)"
+    ),
+    "inprocess-1000-d4": Target(600_000, "4 per square metre, 5 steps (ARGoS: 75,000)"),
+    "inprocess-1000-d1-radio": Target(350_000, "d1 with a 10-byte broadcast of each robot and tick (ARGoS: 25,000)"),
+    "inprocess-1000-d4-radio": Target(200_000, "d4 with a broadcast (ARGoS, where bodies block: 8,800)"),
+    "inprocess-10000-d1": Target(600_000, "10,000 foot-bots (ARGoS: 63,000)"),
+    "inprocess-100000-d1": Target(1, "100,000 foot-bots at 10 Hz"),
+    "laser-1000": Target(1, "1,000 TurtleBots, 360 rays of 3.5 m at 5 Hz with noise"),
+    "single-10": Target(800, "one run of 10 foot-bots"),
+    "replicas-100x10": Target(500_000, "100 arenas of 10 foot-bots side by side"),
+    "wire-1000x2": Target(60_000, "`inprocess-1000-d1-radio`, its agents in 2 runner processes"),
+    "start-1000": most(2, "from the call to the first tick of a world with a radio, kernels cached, imports left out"),
+    "agent-overhead-step": most(20, "what an `Agent` costs in a step beyond its own code, alone with nothing heard"),
+    "agent-overhead-packet": most(2.5, "and for each packet that it reads"),
+    "record-cost": most(1.10, "`inprocess-1000-d1` for 600 ticks with its ticks and metrics recorded and joined"),
+    "record-cost-size": most(25, "Parquet of that run"),
+    "view-cost": most(15, "the same, recorded for the viewer; without a radio, so of a short tick"),
+    "view-cost-size": most(60, "`run.rrd` of that run"),
+    "view-cost-radio": most(15, "with the radio, 8.7 packets heard per robot and tick"),
+    "view-cost-radio-size": most(60, "`run.rrd` of that run"),
+    "air-802154-1000": Target(
+        20, "1,000 robots, 20 bytes, 29 in range, 802.15.4: shadowing, fading, CSMA, SINR to 10 dB below noise"
+    ),
+    "air-disk-1000": Target(100, "1,000 robots over a disk, 9 in range"),
+    "air-wifi-80": Target(80, "80 robots in one spot over `wifi-a-6M`, 128 bytes"),
+    "air-scaling": most(1.5, "the first with 100, 1,000 and 10,000 robots: the dearest link over the cheapest"),
+    "processes-100": Target(3, "100 e-pucks flocking, a process each, 11.4 packets heard per robot and tick"),
+    "processes-100-start": most(6, "from the call to the first tick, imports left out"),
+    "processes-100-uss": most(15, "memory that a runner does not share with others"),
+    "compile-world": most(30, "a machine's first run without a radio: what it takes longer than the next"),
+    "compile-disk": most(30, "with a disk radio"),
+    "compile-signals": most(30, "with a radio of signals"),
+}

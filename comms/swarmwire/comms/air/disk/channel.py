@@ -1,0 +1,92 @@
+"""The way from senders' radios to receivers: links in range, then the chain of stages."""
+
+import numpy as np
+
+from swarmwire.comms.air.disk.reach import Reach, links_in_reach, pairs_in_reach, reach
+from swarmwire.comms.air.disk.reach_torus import reach_on_torus
+from swarmwire.comms.air.links import HEARD, Links
+from swarmwire.comms.air.lives import Lives
+from swarmwire.comms.air.stages.chain import chain
+from swarmwire.comms.air.stages.stage import Medium
+from swarmwire.comms.air.transmissions import Transmissions
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import BROADCAST
+
+# 1 - 0.9 is a hair below 0.1.
+ROUNDING = 1e-9
+
+
+class Channel:
+    """Decides what becomes of packets at robots that stand at given poses: arrays that nobody writes to any more."""
+
+    def __init__(self, medium: Medium) -> None:
+        self._radio, self._arenas, self._size_m = medium.radio, len(medium.keys), medium.size_m
+        self._find_reach = reach_on_torus if medium.is_torus else reach
+        self._columns = len(medium.radio.gives.columns)
+        self._stages = chain(medium)
+        self._known_pose: FloatArray | None = None  # for which it is known who is in range
+
+    def tune(self, at_ns: int, medium: Medium) -> None:
+        """The medium's radio has other numbers from `at_ns` on; stages keep what they remember."""
+        before = {type(stage): stage for stage in self._stages if stage.remembers}
+        self._radio, self._stages, self._known_pose = medium.radio, chain(medium), None
+        for stage in self._stages:
+            if type(stage) in before:
+                stage.go_on_from(before[type(stage)], at_ns)
+
+    def decide(self, packets: Transmissions, pose: FloatArray, lives: Lives) -> Links:
+        """What becomes of packets that go on air, or are refused, while robots stand at `pose`."""
+        # No geometry for what is too large; for a full queue it tells how many it would have reached.
+        tried = np.flatnonzero(packets.fate != Fate.TOO_LARGE)
+        # Alive or not: some that are dead by now were meant, some alive by now were not.
+        robots, sender, to = len(pose) // self._arenas, packets.sender.take(tried), packets.to.take(tried)
+        found, receiver = links_in_reach(self._reach(pose), robots, sender, to)
+        packet = tried.take(found)
+        if lives.any_dead:
+            meant = lives.intended(packets.epoch[packet], receiver) | (packets.to[packet] != BROADCAST)
+            packet, receiver = packet[meant], receiver[meant]
+        refused, in_range = packets.fate != HEARD, np.zeros(len(packets.sender), np.int64)
+        if refused.any():
+            never = refused[packet]
+            in_range = self._would_reach(packets, packet[never], receiver[never], pose)
+            packet, receiver = packet[~never], receiver[~never]
+        links = Links.with_the_rest(packets, packet, receiver, in_range, self._columns)
+        under_way = links.first(len(packet))
+        for stage in self._stages:
+            stage.decide(under_way, pose)
+        return links
+
+    def _would_reach(self, packets: Transmissions, packet: IntArray, receiver: IntArray, pose: FloatArray) -> IntArray:
+        """How many receivers in range packets would have that never go on air, (packets,)."""
+        zero = np.zeros(len(packets.sender), np.int64)
+        links = Links.with_the_rest(packets, packet, receiver, zero, self._columns).first(len(packet))
+        for stage in self._stages:
+            if not stage.remembers:
+                stage.decide(links, pose)
+        found = zero.copy()
+        np.add.at(found, links.packet, links.in_range)
+        return found
+
+    def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
+        """Pairs of robot rows a < b joined in the radio graph at a time, sorted, (e, 2)."""
+        pair = pairs_in_reach(self._reach(pose), alive)
+        stages = [stage for stage in self._stages if not stage.lets_all_pass]
+        if not stages:
+            return pair
+        zero = np.zeros(len(pair), np.int64)
+        a, b = np.ascontiguousarray(pair.T)
+        links = Links.under_way(zero, a, b, zero, np.full(len(pair), at_ns), 0)
+        probability = np.ones(len(pair))
+        for stage in stages:
+            probability *= stage.delivery(links, pose)
+        joined = probability >= self._radio.min_delivery - ROUNDING
+        return pair if joined.all() else pair[joined]
+
+    def _reach(self, pose: FloatArray) -> Reach:
+        """Who is in range of whom; the poses of a tick serve its radio graph and the packets that go on air in it."""
+        if pose is not self._known_pose:
+            assert self._radio.range_m is not None  # `Air` has refused a disk without
+            self._known = self._find_reach(pose, self._arenas, self._size_m, self._radio.range_m)
+            self._known_pose = pose
+        return self._known

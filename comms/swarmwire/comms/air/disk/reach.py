@@ -1,0 +1,123 @@
+"""Which robots a packet might reach: the links of a disk, found on a grid."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.geometry import grid
+from swarmwire.comms.packets import BROADCAST
+
+# Two robots exactly `range_m` apart must not fall two cells apart by rounding.
+CELL_SLACK = 1.0 + 1e-9
+
+
+class Reach(NamedTuple):
+    """All robots in range of each: those of robot row r are other[first[r]:first[r + 1]], in the order of the grid."""
+
+    first: IntArray  # (rows + 1,)
+    other: IntArray  # robot rows
+
+
+def reach(pose: FloatArray, arenas: int, size_m: tuple[float, float], range_m: float) -> Reach:
+    """The robots within `range_m` of each other in the same arena, centre to centre, alive or not."""
+    x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
+    cells = grid.build(x, y, arenas, size_m, range_m * CELL_SLACK)
+    return Reach(*_within(x, y, len(x) // arenas, cells, range_m))
+
+
+@njit(cache=True)
+def links_in_reach(near: Reach, robots: int, sender: IntArray, to: IntArray) -> tuple[IntArray, IntArray]:
+    """The row of each packet and the robot row of each robot in range of its sender, packet by packet.
+
+    `sender` (k,) are robot rows, `to` (k,) the index in the arena of the one receiver, or BROADCAST.
+    """
+    most = 0
+    for s in sender:
+        most += near.first[s + 1] - near.first[s]
+    packet, receiver = np.empty(most, np.int64), np.empty(most, np.int64)
+    found = 0
+    for p in range(len(sender)):
+        s = sender[p]
+        for k in range(near.first[s], near.first[s + 1]):
+            packet[found], receiver[found] = p, near.other[k]
+            found += to[p] == BROADCAST or near.other[k] == s - s % robots + to[p]
+    return packet[:found], receiver[:found]
+
+
+@njit(cache=True)
+def pairs_in_reach(near: Reach, alive: BoolArray) -> IntArray:
+    """Robot rows a < b of all pairs alive in range of each other, sorted, (e, 2)."""
+    first, other = near.first, near.other.view(np.uint64)
+    pair = np.empty((len(other) + 1, 2), np.int64)
+    found = 0
+    for a in range(len(alive)):
+        of_a = found
+        for k in range(np.uint64(first[a]), np.uint64(first[a + 1] if alive[a] else first[a])):
+            b = other[k]
+            pair[np.uint64(found), 0], pair[np.uint64(found), 1] = a, b
+            found += (b > np.uint64(a)) & alive[b]
+        _sort(pair[of_a:found, 1])
+    return pair[:found]
+
+
+@njit(cache=True)
+def _sort(few):
+    for k in range(1, len(few)):
+        moved, place = few[k], k
+        while place > 0 and few[place - 1] > moved:
+            few[place] = few[place - 1]
+            place -= 1
+        few[place] = moved
+
+
+@njit(cache=True)
+def _within(x, y, robots, cells, range_m):
+    # In the grid's order, so that the strips around a robot are read from end to end.
+    order, there_x, there_y = cells.order.view(np.uint64), x[cells.order], y[cells.order]
+    begin, stop = _strips(x, y, robots, cells)
+    first, other = np.zeros(len(x) + 1, np.int64), np.empty((stop - begin).sum(), np.uint64)
+    found, square_m2 = 0, range_m * range_m
+    for s in range(len(x)):
+        own_x, own_y, own = x[s], y[s], np.uint64(s)
+        for j in range(3):
+            for k in range(np.uint64(begin[s, j]), np.uint64(stop[s, j])):
+                dx, dy, r = there_x[k] - own_x, there_y[k] - own_y, order[k]
+                # Written first and kept if it counts: a branch would be guessed wrong a third of the time.
+                other[np.uint64(found)] = r
+                found += (r != own) & (dx * dx + dy * dy <= square_m2)
+        first[s + 1] = found
+    return first, other[:found].view(np.int64)
+
+
+@njit(cache=True)
+def _strips(x, y, robots, cells):
+    """The strips below, at and above each robot row: first and stop in the grid's order, (rows, 3) each."""
+    first, stop = np.zeros((len(x), 3), np.int64), np.zeros((len(x), 3), np.int64)
+    nx, ny, start = cells.nx, cells.ny, cells.start  # out of the tuple once, which costs as much as the rest
+    for row in range(len(x)):
+        i = grid.cell_of(x[row], cells.left_m, cells.cell_m, nx)
+        j = grid.cell_of(y[row], cells.bottom_m, cells.cell_m, ny)
+        for below in range(max(j - 1, 0), min(j + 2, ny)):
+            left = ((row // robots) * ny + below) * nx
+            strip = below - j + 1
+            first[row, strip], stop[row, strip] = start[left + max(i - 1, 0)], start[left + min(i + 1, nx - 1) + 1]
+    return first, stop
+
+
+@borrowing()
+def strip(x, y, arena, cells, row):
+    """First and stop in the grid's order of the three cells side by side that are `row` rows above (x, y) in m.
+
+    `cells` is a `grid.Grid`; what lies beyond its edge is empty.
+    """
+    i = grid.cell_of(x, cells.left_m, cells.cell_m, cells.nx)
+    j = grid.cell_of(y, cells.bottom_m, cells.cell_m, cells.ny) + row
+    if j < 0 or j >= cells.ny:
+        return 0, 0
+    left = (arena * cells.ny + j) * cells.nx
+    return cells.start[left + max(i - 1, 0)], cells.start[left + min(i + 1, cells.nx - 1) + 1]

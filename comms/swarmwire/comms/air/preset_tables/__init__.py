@@ -1,1 +1,0 @@
-"""The presets by family, a table of them each."""

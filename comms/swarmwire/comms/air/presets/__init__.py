@@ -1,0 +1,1 @@
+"""Kinds of radio that a scenario may name."""

@@ -1,0 +1,1 @@
+"""What a radio does in an arena, without a run."""

@@ -1,0 +1,34 @@
+"""Kept back: what a radio that is off should send waits for it, or gives way to what is newer."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from swarmwire.comms.air.signal import sender_queue
+from swarmwire.comms.air.signal.event_queue import LISTENED, SEND, TIMER, cancel
+from swarmwire.comms.air.signal.tables import BACKING_OFF, HELD, KEPT_ALL, SILENT, TURNING
+from swarmwire.comms.borrowing import borrowing
+
+
+@borrowing(from_python=True)
+def switch(rules, state, queue, told, now_ns):
+    """Radios are off or on from now on, as `state.off` says; after `line_up`.
+
+    A packet whose turn it was goes back to the start: what its radio had listened to is long past when it is on again.
+    """
+    for r in range(len(state.robot)):
+        me = state.robot[r]
+        if state.off[r] <= KEPT_ALL:
+            _hold_back(state, queue, r)
+            sender_queue.keep_newest(rules, state, queue, told, r, now_ns)
+        elif me.stage == HELD:
+            sender_queue.begin(rules, state, queue, r, now_ns)
+
+
+@borrowing()
+def _hold_back(state, queue, r):
+    me = state.robot[r]
+    if BACKING_OFF <= me.stage <= TURNING:
+        cancel(queue, TIMER, r)
+        cancel(queue, LISTENED, r)
+        cancel(queue, SEND, r)
+        me.stage = HELD
+        state.reception[r].is_deaf = me.on_air != SILENT

@@ -1,0 +1,78 @@
+"""The surroundings of signals: propagation in numbers, as links are computed with."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmwire.comms.air.parameters.propagation import Bodies, Fading, Shadowing, Walls
+from swarmwire.comms.air.propagation.fading import FadingLaw, fading_law
+from swarmwire.comms.air.propagation.loss_curve import SPEED_OF_LIGHT_MPS, LossCurve
+from swarmwire.comms.air.propagation.path_loss import reach_m
+from swarmwire.comms.air.propagation.scattering import scatter_waves
+from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.signal.levels import cut_off_dbm
+from swarmwire.comms.arrays import FloatArray, KeyArray
+
+SHADOWS_CUT_OFF = 2.5  # deviations of shadowing by which a link may be better than its path loss
+
+
+class Surroundings(NamedTuple):
+    """Propagation in numbers."""
+
+    send_dbm: FloatArray  # (rows,) transmit power and antenna gain
+    receive_dbi: FloatArray  # (rows,) antenna gain
+    curve: LossCurve
+    reach_m: float  # no link is longer
+    least_dbm: float  # no link is weaker, fading apart
+    spread_db: float  # by how much shadowing may make up for path loss
+    shadows: bool
+    amplitude_db: float
+    field: FloatArray  # (arenas, 3, n), as `field_waves` has them
+    walls: bool
+    crossing_db: float
+    inside_db_per_m: float
+    line_of_sight: bool
+    bodies: bool
+    body_db: float
+    radius_m: FloatArray  # (rows,)
+    most_radius_m: float
+    fades: bool
+    law: FadingLaw
+    scatter: FloatArray  # (arenas, 5, n), as `scatter_waves` has them
+
+
+def surroundings_of(
+    radio: Radio, keys: KeyArray, radius_m: FloatArray, send_dbm: FloatArray, receive_dbi: FloatArray
+) -> Surroundings:
+    """What links go by; by robot row (rows,): radii, power and gain, and gain."""
+    shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
+    curve = radio.loss_model.curve(radio.frequency_hz)
+    law = fading_law(fading or Fading(), radio.frequency_hz, radio.propagation_mps or SPEED_OF_LIGHT_MPS)
+    spread_db = max(SHADOWS_CUT_OFF * shadowing.deviation_db - radio.cut_off_db, 0.0) if shadowing else 0.0
+    best_dbm = float(send_dbm.max() + receive_dbi.max())
+    far_m = float(reach_m(curve, best_dbm - cut_off_dbm(radio) + spread_db))
+    return Surroundings(
+        send_dbm=send_dbm,
+        receive_dbi=receive_dbi,
+        curve=curve,
+        reach_m=far_m if radio.range_m is None else min(far_m, radio.range_m),
+        least_dbm=cut_off_dbm(radio),
+        spread_db=spread_db,
+        shadows=shadowing is not None,
+        amplitude_db=amplitude_db(shadowing or Shadowing()),
+        field=field_waves(keys, shadowing or Shadowing()),
+        walls=walls is not None,
+        crossing_db=(walls or Walls()).crossing_db,
+        inside_db_per_m=(walls or Walls()).inside_db_per_m,
+        line_of_sight=radio.needs_line_of_sight,
+        bodies=bodies is not None,
+        body_db=(bodies or Bodies()).crossing_db,
+        radius_m=radius_m,
+        most_radius_m=float(radius_m.max()),
+        fades=fading is not None,
+        law=law,
+        scatter=np.array([scatter_waves(key, law.wave_number) for key in keys]),
+    )

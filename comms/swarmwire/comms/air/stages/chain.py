@@ -1,0 +1,45 @@
+"""The chain: every stage that a packet passes on its way to a receiver, in order.
+
+To add a stage:
+
+1. Write `stages/<name>.py` with one small compiled function (formula, source and units in its docstring; arrays in, one
+   array out), a `Stage` that applies it to the links, and `stage(medium)`, which returns it, or None where this radio
+   has none. Draws are keyed by the arena's key, (sender, receiver, sequence) as indices in the arena, and a purpose of
+   its own, so that no stage shifts the draws of another.
+2. Give `Radio` a field `<name>` with the stage's parameters (a frozen dataclass, None by default): the scenario's table
+   `[radio.<name>]` follows from it. A new way to end a packet is a new `Fate`; a column that later stages read, a new
+   field of `Links`.
+3. List the module below, where it belongs: propagation, disruption (what it ends does not interfere either),
+   interference, reception, bursts, trace, what the receiver learns, delay.
+"""
+
+from swarmwire.comms.air.stages import (
+    bodies_block,
+    burst_loss,
+    disrupted,
+    fixed_loss,
+    given_bearing,
+    given_range,
+    given_rssi,
+    latency,
+    line_of_sight,
+    propagation_delay,
+    trace,
+    varying_delay,
+)
+from swarmwire.comms.air.stages.stage import Medium, Stage
+
+AFTER_RECEPTION = (trace, given_range, given_bearing, given_rssi, latency, varying_delay, propagation_delay)
+ORDER = (line_of_sight, bodies_block, disrupted, fixed_loss, burst_loss, *AFTER_RECEPTION)  # order has a meaning
+
+
+def chain(medium: Medium) -> tuple[Stage, ...]:
+    """The stages that this medium has, in order."""
+    made = (module.stage(medium) for module in ORDER)
+    return tuple(stage for stage in made if stage is not None)
+
+
+def chain_after_reception(medium: Medium) -> tuple[Stage, ...]:
+    """Those of them that a signal passes once it was received: what comes before is one with its events."""
+    made = (module.stage(medium) for module in AFTER_RECEPTION)
+    return tuple(stage for stage in made if stage is not None)

@@ -1,0 +1,74 @@
+"""The bearing that a receiver learns with a packet."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.air.links import HEARD, Links
+from swarmwire.comms.air.stages.stage import Medium, Stage
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.draws import purpose
+from swarmwire.comms.draws_compiled import normal
+from swarmwire.comms.geometry.obstacles import to_nearest
+
+KEYS = ("gives.bearing",)
+NOISE = purpose("bearing noise")
+TURN = 2.0 * np.pi
+
+
+def stage(medium: Medium) -> Stage | None:
+    """The stage, where the radio gives the bearing."""
+    given = medium.radio.gives.bearing
+    return None if given is None else GivenBearing(medium, given.noise_rad)
+
+
+class GivenBearing(Stage):
+    """Where the sender was, seen from the receiver's body when the packet went on air, plus a normal error.
+
+    In the receiver's frame: 0 is ahead, positive to the left; wrapped to (-pi, pi].
+    """
+
+    def __init__(self, medium: Medium, noise_rad: float) -> None:
+        self._noise_rad, self._keys, self._robots = noise_rad, medium.keys, medium.robots
+        self._wrap_m = medium.wrap_m
+        self._column = medium.radio.gives.columns.index("bearing_rad")
+
+    def decide(self, links: Links, pose: FloatArray) -> None:
+        """Fill the column "bearing_rad"."""
+        links.given[:, self._column] = bearing_rad(
+            self._keys,
+            self._robots,
+            self._wrap_m,
+            pose,
+            links.sender,
+            links.receiver,
+            links.sequence,
+            links.fate,
+            self._noise_rad,
+        )
+
+
+@njit(cache=True)
+def bearing_rad(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise_rad):
+    """atan2(dy, dx) - heading + noise z, z normal, keyed by (sender, receiver, sequence); 0 for ended links; (k,)."""
+    out_rad = np.zeros(len(sender))
+    for i in range(len(out_rad)):
+        s, r = sender[i], receiver[i]
+        if fate[i] == HEARD:
+            dx, dy = pose[s, 0] - pose[r, 0], pose[s, 1] - pose[r, 1]
+            dx, dy = dx + to_nearest(dx, wrap_m[0]), dy + to_nearest(dy, wrap_m[1])
+            bearing = np.arctan2(dy, dx) - pose[r, 2]
+            if noise_rad > 0.0:
+                bearing += noise_rad * normal(keys[s // robots], s % robots, r % robots, sequence[i], NOISE)
+            out_rad[i] = wrapped(bearing)
+    return out_rad
+
+
+@njit(cache=True)
+def wrapped(angle):
+    """The angle in (-pi, pi]; one that lies there already is unchanged."""
+    if -np.pi < angle <= np.pi:
+        return angle
+    turned = angle - TURN * np.ceil((angle - np.pi) / TURN)
+    return min(turned, np.pi) if turned > -np.pi else np.pi

@@ -1,0 +1,61 @@
+"""The range that a receiver learns with a packet."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.air.links import HEARD, Links
+from swarmwire.comms.air.stages.stage import Medium, Stage
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.draws import purpose
+from swarmwire.comms.draws_compiled import normal
+from swarmwire.comms.geometry.obstacles import to_nearest
+
+KEYS = ("gives.range",)
+NOISE = purpose("range noise")
+
+
+def stage(medium: Medium) -> Stage | None:
+    """The stage, where the radio gives the range."""
+    given = medium.radio.gives.range
+    return None if given is None else GivenRange(medium, given.noise_m)
+
+
+class GivenRange(Stage):
+    """The distance between the centres when the packet went on air, plus a normal error; never below 0."""
+
+    def __init__(self, medium: Medium, noise_m: float) -> None:
+        self._noise_m, self._keys, self._robots = noise_m, medium.keys, medium.robots
+        self._wrap_m = medium.wrap_m
+        self._column = medium.radio.gives.columns.index("range_m")
+
+    def decide(self, links: Links, pose: FloatArray) -> None:
+        """Fill the column "range_m"."""
+        links.given[:, self._column] = range_m(
+            self._keys,
+            self._robots,
+            self._wrap_m,
+            pose,
+            links.sender,
+            links.receiver,
+            links.sequence,
+            links.fate,
+            self._noise_m,
+        )
+
+
+@njit(cache=True)
+def range_m(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise_m):
+    """max(0, distance + noise z), z normal, keyed by (sender, receiver, sequence); 0 for ended links; in m, (k,)."""
+    out_m = np.zeros(len(sender))
+    for i in range(len(out_m)):
+        s, r = sender[i], receiver[i]
+        if fate[i] == HEARD:
+            dx, dy = pose[s, 0] - pose[r, 0], pose[s, 1] - pose[r, 1]
+            dx, dy = dx + to_nearest(dx, wrap_m[0]), dy + to_nearest(dy, wrap_m[1])
+            out_m[i] = np.sqrt(dx * dx + dy * dy)
+            if noise_m > 0.0:
+                z = normal(keys[s // robots], s % robots, r % robots, sequence[i], NOISE)
+                out_m[i] = max(out_m[i] + noise_m * z, 0.0)
+    return out_m

@@ -1,0 +1,66 @@
+"""Draws docs/parts.svg: the five parts, their folders, and how many names each gives to the others."""
+
+from collections import Counter
+from pathlib import Path
+from textwrap import wrap
+
+from docs.pictures.svg import arrow, box, page, text
+
+ROOT = Path(__file__).parents[2]
+TO = ROOT / "docs" / "parts.svg"
+SEAMS = ROOT / "tests" / "stable" / "seams.txt"  # which a test compares with the code
+WIDTH, GAP = 880.0, 56.0  # between one row of parts and the next
+PLACES = {  # x, y, width, height
+    "deploy": (10.0, 10.0, 860.0, 74.0),
+    "world": (10.0, 140.0, 280.0, 118.0),
+    "metrics": (300.0, 140.0, 280.0, 118.0),
+    "agent": (590.0, 140.0, 280.0, 118.0),
+    "comms": (10.0, 314.0, 860.0, 89.0),
+}
+FILLS = {"deploy": "#f1f5f9", "world": "#dbeafe", "metrics": "#fef3c7", "agent": "#dcfce7", "comms": "#fae8ff"}
+
+
+def draw(to: Path = TO) -> None:
+    """Write the figure."""
+    given = crossings()
+    shapes: list[str] = []
+    for part in PLACES:
+        shapes += _part(part)
+    for user, giver in (("deploy", "world"), ("deploy", "metrics"), ("deploy", "agent")):
+        shapes += _import(PLACES[giver][0] + 140, PLACES[giver][1] - GAP, given[user, giver])
+    for user in ("world", "metrics", "agent"):
+        shapes += _import(PLACES[user][0] + 140, PLACES["comms"][1] - GAP, given[user, "comms"])
+    down = PLACES["comms"][1] + PLACES["comms"][3]
+    note = f"deploy also takes {given['deploy', 'comms']} names of comms."
+    shapes.append(text(WIDTH / 2, down + 24, f"An arrow is an import that is allowed. {note}", anchor="middle"))
+    to.write_text(page("The parts and who imports whom", WIDTH, down + 38, shapes), encoding="utf-8")
+
+
+def crossings() -> Counter[tuple[str, str]]:
+    """How many names each part takes of each other: (user, giver) -> names."""
+    counts: Counter[tuple[str, str]] = Counter()
+    for row in SEAMS.read_text(encoding="utf-8").splitlines():
+        name, _, users = row.partition(": ")
+        counts.update((user, name.split(".")[1]) for user in users.split(", "))
+    return counts
+
+
+def _part(part: str) -> list[str]:
+    x, y, width, height = PLACES[part]
+    code = ROOT / part / "swarmwire" / part
+    folders = sorted(path.parent.name for path in code.glob("*/__init__.py"))
+    files = sorted(path.stem for path in code.glob("*.py") if not path.stem.startswith("_"))
+    said = wrap(" · ".join([f"{folder}/" for folder in folders] + files), int(width / 6.1))
+    most = int((height - 29) / 15)
+    if len(said) > most:
+        said = [*said[: most - 1], f"{said[most - 1]} …"]
+    lines = [text(x + 10, y + 40 + 15 * i, row, 11) for i, row in enumerate(said)]
+    return [box(x, y, width, height, FILLS[part]), text(x + 10, y + 21, f"{part}/", 15, bold=True), *lines]
+
+
+def _import(x: float, y: float, names: int) -> list[str]:
+    return [arrow(x, y + 2, x, y + GAP - 2), text(x + 8, y + GAP / 2 + 4, f"{names} names")]
+
+
+if __name__ == "__main__":
+    draw()

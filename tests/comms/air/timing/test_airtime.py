@@ -1,0 +1,129 @@
+"""Airtime and access timing: integers that standards and ns-3's tests state."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.air.timing.access_timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G, IEEE_802_15_4
+from swarmwire.comms.air.timing.airtime import (
+    DSSS_RATES_BPS,
+    OFDM_BITS_PER_SYMBOL,
+    US,
+    at_bit_rate_ns,
+    ieee80211a_ns,
+    ieee80211b_ns,
+    ieee80211g_ns,
+)
+
+OCTETS = st.integers(0, 2304)
+
+
+@pytest.mark.parametrize(
+    ("psdu_octets", "stated_us"), [(5, 352), (11, 544), (20, 832), (31, 1184), (60, 2112), (100, 3392), (127, 4256)]
+)
+def test_802_15_4_takes_the_stated_time(psdu_octets: int, stated_us: int):
+    assert at_bit_rate_ns(6 + psdu_octets, 250_000) == stated_us * US
+
+
+@pytest.mark.parametrize(
+    ("octets", "rate_bps", "short_preamble", "stated_us"),
+    [
+        *((1023 + i, 11_000_000, False, 936 + i) for i in range(4)),
+        *((1023 + i, 11_000_000, True, 840 + i) for i in range(4)),
+        *((1023 + i, 5_500_000, True, us) for i, us in enumerate((1584, 1586, 1587, 1589))),
+        *((1023 + i, 2_000_000, False, us) for i, us in enumerate((4284, 4288, 4292, 4296))),
+        *((1023 + i, 1_000_000, False, us) for i, us in enumerate((8376, 8384, 8392, 8400))),
+        (14, 1_000_000, False, 304),
+        (1536, 11_000_000, False, 1310),
+        (76, 11_000_000, False, 248),
+        (14, 11_000_000, False, 203),
+    ],
+)
+def test_802_11b_takes_the_time_of_ns3(octets: int, rate_bps: int, short_preamble: bool, stated_us: int):
+    assert ieee80211b_ns(octets, rate_bps, short_preamble=short_preamble) == stated_us * US
+
+
+@pytest.mark.parametrize(("octets", "a_us", "g_us"), [(1536, 248, 254), (76, 32, 38), (14, 24, 30)])
+def test_802_11a_and_g_take_the_time_of_ns3(octets: int, a_us: int, g_us: int):
+    assert ieee80211a_ns(octets, 54_000_000) == a_us * US
+    assert ieee80211g_ns(octets, 54_000_000) == g_us * US
+
+
+def test_a_hundred_octets_over_udp_take_the_stated_time():
+    """Headers: MAC 24, FCS 4, LLC 8, IP and UDP 28; then DIFS and the mean backoff of a broadcast."""
+    octets = 100 + 24 + 4 + 8 + 28
+    b_ns, a_ns = ieee80211b_ns(octets, 1_000_000, short_preamble=False), ieee80211a_ns(octets, 6_000_000)
+    assert (b_ns, a_ns, ieee80211g_ns(octets, 6_000_000)) == (1504 * US, 244 * US, 250 * US)
+    for airtime_ns, dcf, stated_us in ((b_ns, IEEE_802_11B, 1864), (a_ns, IEEE_802_11A, 345.5)):
+        assert airtime_ns + dcf.difs_ns + dcf.least_window * dcf.slot_ns / 2 == stated_us * US
+
+
+@given(OCTETS, st.integers(1, 10**10))
+def test_airtimes_are_whole_bits_and_symbols_rounded_up(octets: int, bit_rate_bps: int):
+    """By exact fractions."""
+    assert at_bit_rate_ns(octets, bit_rate_bps) == math.ceil(Fraction(8 * octets * 10**9, bit_rate_bps))
+    for rate_bps in DSSS_RATES_BPS:
+        payload_us = math.ceil(Fraction(8 * octets * 10**6, rate_bps))
+        assert ieee80211b_ns(octets, rate_bps, short_preamble=False) == (192 + payload_us) * US
+    for rate_bps in OFDM_BITS_PER_SYMBOL:
+        symbols = math.ceil(Fraction(16 + 8 * octets + 6, 4 * rate_bps // 10**6))  # service field, PSDU, tail
+        assert ieee80211a_ns(octets, rate_bps) == (16 + 4 + 4 * symbols) * US
+        assert ieee80211g_ns(octets, rate_bps) == ieee80211a_ns(octets, rate_bps) + 6 * US
+
+
+def test_a_plain_bit_rate_rounds_up():
+    assert at_bit_rate_ns(100, 250_000) == 3_200_000
+    assert at_bit_rate_ns(1, 3_000_000) == 2667
+    assert at_bit_rate_ns(0, 9600) == 0
+
+
+@given(OCTETS, OCTETS)
+def test_more_octets_never_take_less_time(one: int, other: int):
+    few, many = sorted((one, other))
+    assert at_bit_rate_ns(few, 250_000) <= at_bit_rate_ns(many, 250_000)
+    for rate_bps in (1_000_000, 2_000_000, 5_500_000, 11_000_000):
+        short, long = (ieee80211b_ns(many, rate_bps, short_preamble=short) for short in (True, False))
+        assert short + 96 * US == long
+        assert ieee80211b_ns(few, rate_bps, short_preamble=True) <= short
+    for rate_bps in OFDM_BITS_PER_SYMBOL:
+        assert ieee80211a_ns(few, rate_bps) <= ieee80211a_ns(many, rate_bps)
+
+
+@pytest.mark.parametrize("rate_bps", OFDM_BITS_PER_SYMBOL)
+def test_ofdm_carries_its_rate_in_symbols_of_four_microseconds(rate_bps: int):
+    assert OFDM_BITS_PER_SYMBOL[rate_bps] * 250_000 == rate_bps
+
+
+def test_arrays_take_the_time_of_their_elements():
+    octets = np.array([0, 14, 76, 1536])
+    for airtime_ns in (
+        lambda n: at_bit_rate_ns(n, 9600),
+        lambda n: ieee80211b_ns(n, 5_500_000, short_preamble=True),
+        lambda n: ieee80211g_ns(n, 54_000_000),
+    ):
+        times_ns = airtime_ns(octets)
+        assert times_ns.dtype == np.int64
+        assert times_ns.tolist() == [airtime_ns(int(n)) for n in octets]
+
+
+def test_802_15_4_counts_its_waits_in_symbols():
+    """62 500 a second. For an acknowledgement: backoff, turnaround, 10 of the header and 12 of the frame."""
+    timing = IEEE_802_15_4
+    assert timing.symbol_ns * 62_500 == 10**9
+    stated = {"backoff_ns": 20, "cca_ns": 8, "turnaround_ns": 12, "short_space_ns": 12, "long_space_ns": 40}
+    for name, symbols in stated.items():
+        assert getattr(timing, name) == symbols * timing.symbol_ns, name
+    assert timing.acknowledgement_wait_ns == (20 + 12 + 10 + 12) * timing.symbol_ns
+    assert timing.space_ns(np.array([18, 19])).tolist() == [192 * US, 640 * US]
+
+
+@pytest.mark.parametrize(
+    ("dcf", "difs_us", "window"), [(IEEE_802_11B, 50, 31), (IEEE_802_11A, 34, 15), (IEEE_802_11G, 28, 15)]
+)
+def test_802_11_waits_for_difs_and_its_window(dcf, difs_us: int, window: int):
+    assert dcf.difs_ns == difs_us * US
+    assert (dcf.least_window, dcf.most_window) == (window, 1023)
