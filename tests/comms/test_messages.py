@@ -20,6 +20,7 @@ from swarmwire.comms.messages import (
     i1,
     i2,
     i4,
+    message_class,
     u1,
     u2,
     u4,
@@ -116,6 +117,13 @@ def test_messages_of_one_class_alone_are_decoded_alike() -> None:
     assert alike is not None
     assert alike["heading_rad"].tolist() == decode_rows(Beacon, Payloads.of(said), index)["heading_rad"].tolist()
     assert decode_alike(Beacon, Payloads.of([*said, Here().encode()]), index) is None
+
+
+@pytest.mark.parametrize("kind", [Message, Beacon(heading_rad=1.0), int, None])
+def test_what_is_no_class_of_messages_is_refused_as_one(kind: object) -> None:
+    assert message_class(Beacon) is Beacon
+    with pytest.raises(TypeError, match="expected a class of messages"):
+        message_class(kind)
 
 
 def test_a_message_is_frozen() -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.survey import Band, ByDistance, CoverageMap
+from swarmwire.comms.air.probe.survey import Band, ByDistance, CoverageMap
 from swarmwire.metrics.drawing.coverage_sheet import draw_coverage
 from tests.metrics.truths import static
 
