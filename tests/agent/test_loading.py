@@ -74,6 +74,10 @@ def test_a_module_that_is_not_there(text: str) -> None:
         ("Mine = 3\n", "holds no Agent or VectorAgent: 'Mine'"),
         ("class Mine: ...\n", "holds no Agent or VectorAgent: 'Mine'"),
         ("class Mine(Agent): ...\n", "Mine has no step method"),
+        (
+            "class Mine(Agent):\n    seen = {}\n    def step(self, robot): ...\n",
+            "Mine.seen: a dict that all robots would share: make it in __init__",
+        ),
         ("class Mine(VectorAgent): ...\n", "Mine has no step method"),
         (
             "class Mine(Agent):\n    speeds: list[float]\n    def step(self, robot): ...\n",

@@ -21,6 +21,7 @@ from swarmwire.comms.messages import (
     i2,
     i4,
     message_class,
+    message_classes,
     u1,
     u2,
     u4,
@@ -119,13 +120,6 @@ def test_messages_of_one_class_alone_are_decoded_alike() -> None:
     assert decode_alike(Beacon, Payloads.of([*said, Here().encode()]), index) is None
 
 
-@pytest.mark.parametrize("kind", [Message, Beacon(heading_rad=1.0), int, None])
-def test_what_is_no_class_of_messages_is_refused_as_one(kind: object) -> None:
-    assert message_class(Beacon) is Beacon
-    with pytest.raises(TypeError, match="expected a class of messages"):
-        message_class(kind)
-
-
 def test_a_message_is_frozen() -> None:
     beacon = Beacon(heading_rad=1.0)
     with pytest.raises(AttributeError, match=r"frozen: Beacon\.heading_rad"):
@@ -152,6 +146,19 @@ def test_a_missing_or_unknown_field_is_refused(fields: dict[str, float]) -> None
 def test_a_field_of_another_type_is_refused_where_the_class_is_made(hint: object) -> None:
     with pytest.raises(TypeError, match=r"Odd\.x: expected one of f4"):
         type("Odd", (Message,), {"__annotations__": {"x": hint}})
+
+
+@pytest.mark.parametrize("other", [Message, dict, "Beacon", None, Here()])
+def test_only_a_class_of_messages_is_one(other: object) -> None:
+    assert message_class(Beacon) is Beacon
+    with pytest.raises(TypeError, match="expected a class of messages, got"):
+        message_class(other)
+
+
+def test_every_class_of_messages_is_known_also_those_of_classes() -> None:
+    class Further(Beacon): ...
+
+    assert {Beacon, Further, Everything} <= set(message_classes())
 
 
 def test_a_field_has_no_default() -> None:
