@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from swarmwire.agent import Agent, VectorAgent
+from swarmwire.agent.readings import Blob
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.errors import AgentFailed
 
@@ -47,6 +48,7 @@ class Watcher(Agent):
         blobs = robot.camera.blobs
         assert robot.ground.shade.shape == (4,)
         if blobs:
+            assert isinstance(blobs[0], Blob)
             assert [type(value) for value in astuple(blobs[0])] == [float, float, int]
             robot.drive(0.1 * blobs[0].distance_m * robot.ground.shade[0], blobs[0].bearing_rad + 1e-9 * len(blobs))
             robot.led(*((blobs[-1].colour >> shift & 255) / 255 for shift in (16, 8, 0)))

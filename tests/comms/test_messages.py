@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.messages import (
     DICT_TAG,
     Message,
+    decode_alike,
     decode_dict,
     decode_rows,
     encode_dict,
@@ -108,6 +109,15 @@ def test_the_tag_differs_with_the_name_and_with_the_fields() -> None:
     assert len(set(kinds)) == len(kinds)
     assert made("A", x=f4) == made("A", x=f4)
     assert all(DICT_TAG < tag < 2**16 for tag in kinds)
+
+
+def test_messages_of_one_class_alone_are_decoded_alike() -> None:
+    said = [Beacon(heading_rad=0.5).encode(), Beacon(heading_rad=1.5).encode()]
+    index = np.array([1, 0, 1])
+    alike = decode_alike(Beacon, Payloads.of(said), index)
+    assert alike is not None
+    assert alike["heading_rad"].tolist() == decode_rows(Beacon, Payloads.of(said), index)["heading_rad"].tolist()
+    assert decode_alike(Beacon, Payloads.of([*said, Here().encode()]), index) is None
 
 
 def test_a_message_is_frozen() -> None:

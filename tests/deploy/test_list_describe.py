@@ -10,6 +10,7 @@ from rich.console import Console
 
 from swarmwire.agent import behaviours
 from swarmwire.agent.declared import REQUIRED, parameters_of
+from swarmwire.agent.turn import OUTCOMES
 from swarmwire.comms.air.parameters.gives import Gives
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.stages.chain import ORDER
@@ -93,7 +94,7 @@ def assert_tells(text: str, wanted: list[tuple[str, ...]]) -> None:
     ("kind", "names"),
     [
         ("bodies", body_names()),
-        ("senses", [*SHEETS, *(f"radio.{of.name}" for of in fields(Gives)), "radio.outcomes"]),
+        ("senses", [*SHEETS, *(f"radio.{of.name}" for of in fields(Gives)), OUTCOMES]),
         ("behaviours", behaviours.__all__),
         ("drives", list(DRIVES)),
         ("sheets", ["name", "source", "radius_m", "height_m", "mass_kg", "altitude_m", "contacts", "leds"]),

@@ -13,7 +13,7 @@ from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.cli import app
 from swarmwire.deploy.record.modules import PARTS, module_digests
 from swarmwire.deploy.repetition import RepeatedRun
-from swarmwire.metrics.record.names import DIGESTS
+from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS
 from swarmwire.world.scenario.scenario_file import load_scenario
 from swarmwire.world.scenario.scenario_mapping import same_content
 from tests.deploy.commands import LOSSY, ROOT, started
@@ -235,6 +235,7 @@ def test_a_run_that_was_killed_is_compared_as_far_as_it_came(tmp_path, mine, log
     with Simulation(mine, out=tmp_path / "run") as simulation:
         simulation.run(7)
         shutil.copytree(tmp_path / "run", tmp_path / "killed")
+    assert (tmp_path / "killed" / DIGESTS).stat().st_size == 7 * DIGEST_BYTES
     if not logged:
         (tmp_path / "killed" / DIGESTS).unlink()
     repetition = repeat(tmp_path / "killed", out=tmp_path / "again" if kept else None)

@@ -5,7 +5,7 @@ import json
 import pytest
 from scipy.stats import binomtest
 
-from swarmwire.deploy import run
+from swarmwire.deploy import Percentiles, run
 from tests.deploy.commands import LOSSY, swarmwire
 
 REQUIRED = {
@@ -51,6 +51,7 @@ def test_the_summary_of_the_command_is_the_result_from_python(tmp_path):
 def test_fates_add_up_and_the_loss_is_the_scenarios(tmp_path):
     radio = run(LOSSY, overrides=["duration_s=20"]).radio
     assert radio is not None
+    assert isinstance(radio.latency_air_s, Percentiles)
     assert sum(radio.fates.values()) == radio.intended
     heard, in_range = radio.fates["heard"], radio.in_range
     # False alarm once in 10,000 seeds; the seed is fixed.

@@ -53,8 +53,9 @@ def made_in(name: Name) -> Name:
 
 @cache
 def made_of() -> dict[Name, set[Name]]:
-    """What each function, class and value of ours mentions, its types too, by where it is made."""
+    """What each function, class and value of ours mentions, its types and a class's bases too, by where it is made."""
     found: dict[Name, set[Name]] = {}
+    bases: dict[Name, set[Name]] = {}
     for module, path in modules().items():
         tree = tree_of(path)
         own = {name: (module, name) for node in tree.body for name in names_of(node)}
@@ -62,7 +63,16 @@ def made_of() -> dict[Name, set[Name]]:
         for node in tree.body:
             mentioned = {made_in(name) for name in _mentioned(node, known) if name[0] in modules()}
             found |= {(module, name): mentioned for name in names_of(node)}
-    return found
+            if isinstance(node, ast.ClassDef):
+                bases[module, node.name] = {made_in(name) for base in node.bases for name in _mentioned(base, known)}
+    return {name: mentioned.union(*_of_bases(name, bases, found)) for name, mentioned in found.items()}
+
+
+def _of_bases(name: Name, bases: dict[Name, set[Name]], found: dict[Name, set[Name]]) -> Iterator[set[Name]]:
+    """What the classes that a class is made of mention."""
+    for base in bases.get(name, ()):
+        yield found.get(base, set())
+        yield from _of_bases(base, bases, found)
 
 
 def said_of(name: Name) -> str:

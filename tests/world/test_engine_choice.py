@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.world.physics import ENGINES
 from swarmwire.world.world import World
 from tests.world.samples import commanded, posed
 
@@ -24,7 +25,7 @@ def test_discs_move_robots_unless_an_obstacle_is_movable() -> None:
     assert engines(arena={**ARENA, "obstacles": [MOVABLE]}) == ("pymunk",)
 
 
-@pytest.mark.parametrize("engine", ["discs", "pymunk", "kinematic"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_an_engine_that_is_asked_for_is_taken(engine: str) -> None:
     assert engines(physics={"engine": engine}) == (engine,)
 

@@ -29,7 +29,6 @@ class Host:
 
     def __init__(self, assignment: Assignment) -> None:
         self._rate_hz = assignment.rate_hz
-        self._gives = assignment.gives or ()
         self._groups = {group.name: hosted(group, load_agent(group.agent)) for group in assignment.groups}
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:

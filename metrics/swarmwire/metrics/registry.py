@@ -19,6 +19,7 @@ from swarmwire.metrics.swarm.order_velocity import OrderVelocity
 from swarmwire.metrics.task.target_best import TargetBest
 from swarmwire.metrics.task.target_mean import TargetMean
 
+# By name, those of users too.
 METRICS: dict[str, type[Metric]] = {
     kind.name: kind
     for kind in (

@@ -8,6 +8,7 @@ import pytest
 from swarmwire.comms.air.parameters.bursts import Bursts, bursts_from_steps
 from swarmwire.comms.air.parameters.propagation import Antenna, Shadowing
 from swarmwire.metrics.radio_fit.expected_runs import expected_runs
+from swarmwire.metrics.radio_fit.fit_rows import Row, parameter_rows, residual_rows
 from swarmwire.metrics.radio_fit.link_field import link_covariance
 from swarmwire.metrics.radio_fit.loss_fit import LossFit, fit_losses
 from swarmwire.metrics.radio_fit.loss_sequences import loss_sequences
@@ -84,6 +85,14 @@ def test_the_table_has_the_scenarios_keys_and_what_the_antenna_took_part_in(fit)
     assert told_dbm == pytest.approx(fit.path_loss.rssi_at_1_m_dbm.value, abs=0.01)
     assert Shadowing(**table["shadowing"]).correlation_m == pytest.approx(fit.shadowing.correlation_m.value, rel=1e-3)
     assert Bursts(**table["bursts"]).bad_s == pytest.approx(fit.losses.chosen.bursts.bad_s, rel=1e-3)
+
+
+def test_people_read_every_parameter_with_its_error_and_what_the_line_leaves(fit):
+    rows: dict[str, Row] = {row.parameter: row for row in parameter_rows(fit)}
+    assert rows["path loss exponent"].estimate == fit.path_loss.exponent
+    assert (rows["shadowing: sigma"].unit, rows["bursts: mean duration"].unit) == ("dB", "s")
+    assert not any(row.left_out for row in rows.values())
+    assert dict(residual_rows(fit))["root mean square"] == f"{np.sqrt(np.mean(fit.residual_db**2)):.2f} dB"
 
 
 @pytest.mark.parametrize(

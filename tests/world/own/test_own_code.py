@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,10 @@ from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.bodies.body import body_from_mapping, load_body
 from swarmwire.comms.errors import BadInput, OwnCodeFailed
 from swarmwire.comms.senses import Actions
+from swarmwire.comms.sheets import OwnSheet
+from swarmwire.comms.sheets.own import MOST_WIDE
+from swarmwire.world.own.fitting import made_actuator, made_sensor
+from swarmwire.world.scenario.bodies import read_body
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.scenario_file import scenario_from
 from swarmwire.world.world import World
@@ -54,6 +59,17 @@ def test_an_own_sense_tells_what_an_own_actuator_did(tmp_path: Path) -> None:
     assert of.sense(1)["a"].fields["paint.amount"].tolist() == [0.0, 1.0, 0.5, 0.0]
     of.move(commanded(of, 0.0, 0.0))
     assert of.sense(2)["a"].fields["paint.amount"].tolist() == [0.0, 1.0, 0.5, 0.0]
+
+
+def test_a_sheets_own_code_is_made_with_its_parameters(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(BOTH)
+    body = read_body(tmp_path / "mine.toml", "s.toml", "robots.a.body")
+    paint, painter = body.senses["paint"], body.actuators["painter"]
+    assert isinstance(paint, OwnSheet)
+    made: Any = made_sensor(paint)
+    assert (type(made).__name__, made.scale) == ("Paint", 2.0)
+    assert type(made_actuator(painter)).__name__ == "Painter"
+    assert made_actuator(painter) is not made_actuator(painter)
 
 
 def test_an_arena_is_the_same_alone_and_among_others(tmp_path: Path) -> None:
@@ -216,7 +232,10 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
         (ACTUATOR + f'"{PAINT}"', "actuators.x.kind: expected a dataclass below OwnActuator"),
         (SENSE + f'"{CODE}:Frozen"', "senses.x.kind: expected a dataclass that is not frozen; Frozen is"),
         (ACTUATOR + f'"{CODE}:NoWidth"', "actuators.x.kind: expected a width from 1 to 10000; NoWidth has 0"),
-        (ACTUATOR + f'"{CODE}:TooWide"', "actuators.x.kind: expected a width from 1 to 10000; TooWide has 10001"),
+        (
+            ACTUATOR + f'"{CODE}:TooWide"',
+            f"actuators.x.kind: expected a width from 1 to {MOST_WIDE}; TooWide has",
+        ),
         (SENSE + f'"{CODE}:WideField"', "senses.x.kind: the field x of WideField: expected a width from 0 to 10000"),
         (ACTUATOR + f'"{PAINTER}"\ngain = -1', "actuators.x.gain: expected more than 0, got -1.0"),
         ("[actuators.x]\ngain = 1", "actuators.x.kind: is missing"),

@@ -16,6 +16,7 @@ from swarmwire.world.engines.engine import Engine, Setting, setting_of
 from swarmwire.world.engines.kinematic import KinematicEngine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
 
+# By the name that a scenario has for it.
 ENGINES: dict[EngineName, Callable[[Setting, FloatArray], Engine]] = {
     "discs": DiscsEngine,
     "pymunk": PymunkEngine,

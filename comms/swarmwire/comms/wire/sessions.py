@@ -40,9 +40,9 @@ def open_observed(endpoint: str) -> zenoh.Session:
     return zenoh.open(_config("router", {"listen": {"endpoints": [endpoint]}}))
 
 
-def open_observer(endpoint: str, connect_s: float = 2.0) -> zenoh.Session:
-    """A client of the observers' endpoint, tried for `connect_s`; zenoh.ZError if nobody answers."""
-    return open_runner(endpoint, connect_s)
+def open_observer(endpoint: str) -> zenoh.Session:
+    """A client of the observers' endpoint; zenoh.ZError if nobody answers within 2 s."""
+    return open_runner(endpoint, connect_s=2.0)
 
 
 def unix_endpoint(path: str) -> str:

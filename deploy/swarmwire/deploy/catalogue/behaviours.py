@@ -23,13 +23,10 @@ def behaviours() -> list[Entry]:
     return [behaviour(f"{shipped.__name__}:{name}") for name in shipped.__all__]
 
 
-def behaviour(spec: str, beside: Path | None = None) -> Entry:
-    """The agent class of "module:Class" or "file.py:Class", the file's path seen from `beside` (here if left out).
-
-    BadInput if there is none.
-    """
+def behaviour(spec: str) -> Entry:
+    """The agent class of "module:Class" or "file.py:Class", a file's path seen from here; BadInput if there is none."""
     try:
-        kind = load_agent(resolve(spec, beside or Path.cwd()))
+        kind = load_agent(resolve(spec, Path.cwd()))
     except NoAgent as error:
         raise BadInput(spec, "", str(error)) from error
     return _entry(kind, spec)

@@ -7,9 +7,8 @@ from typing import Annotated
 import typer
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.commands.options import Overrides, Seed
+from swarmwire.deploy.commands.options import USUAL_SIZE_PX, Overrides, Seed
 
-USUAL_SIZE_PX = 1280
 _ONLY_IN_BODIES = ("like", "drive", "radius_m")
 
 

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+USUAL_SIZE_PX = 1280  # of pictures, along the longer side
+
 ScenarioFile = Annotated[Path, typer.Argument(help="The scenario, a TOML file.", metavar="SCENARIO")]
 Overrides = Annotated[
     list[str] | None,

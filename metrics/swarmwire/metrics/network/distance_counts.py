@@ -9,7 +9,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.truth import Departed, Finished, Static, Truth
-from swarmwire.metrics.network.geometry_tick import geometry_tick
+from swarmwire.metrics.network.geometry_tick import POSES_KEPT_S, geometry_tick
 
 BINS_WITHIN_RANGE = 20  # at least
 RANGES_ACROSS = 40  # ranges that an arena has bins of their own for; of shorter ones it has 2000 bins at most
@@ -17,7 +17,6 @@ ROUND_WIDTHS = (1.0, 2.0, 5.0)
 PAIRS_PER_TICK = 5_000  # at most about, in an arena where each robot broadcasts once in a tick
 # Odd multipliers: that of Knuth's Fibonacci hashing (2^64 over the golden ratio), and another.
 SPREAD_SEQUENCE, SPREAD_SENDER = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xC2B2AE3D27D4EB4F)
-POSES_KEPT_S = 5.0  # simulated: of a packet that was on its way for longer the distance is unknown
 
 
 class DistanceCounts:

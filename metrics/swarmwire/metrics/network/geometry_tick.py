@@ -3,6 +3,8 @@
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import NS_PER_S
 
+POSES_KEPT_S = 5.0  # simulated: where robots were when a packet went on air is unknown of one on its way for longer
+
 
 def geometry_tick(on_air_at_ns: IntArray, rate_hz: int) -> IntArray:
     """The last tick that starts no later than the packet goes on air, (k,): the air takes geometry from its poses."""

@@ -4,10 +4,9 @@ import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.fates import FATE_NAMES
-from swarmwire.comms.truth import Finished, Static
+from swarmwire.comms.truth import NOBODY, Finished, Static
 
 FATES = len(FATE_NAMES)
-NOBODY = -1  # Finished's receiver of a packet that never went on air
 WAITING_ROWS = 250_000  # before they are added up
 
 

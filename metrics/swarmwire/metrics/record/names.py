@@ -2,11 +2,11 @@
 
 SUMMARY = "summary.json"  # written last: where it is, the run is over
 RUN_JSON = "run.json"  # from what the run was made, written first
-SCENARIO = "scenario.toml"
+SCENARIO = "scenario.toml"  # as run, with overrides and seed
 STATIC = "static.json"
-RECORDING = "run.rrd"
-DIGESTS = "trajectory.digests"
-INPUTS = "inputs/actions.frames"
-LOG = "log.txt"
+RECORDING = "run.rrd"  # for the viewer
+DIGESTS = "trajectory.digests"  # of each tick's state, for a repetition
+INPUTS = "inputs/actions.frames"  # what came from outside
+LOG = "log.txt"  # what people were told
 
 DIGEST_BYTES = 8  # of each tick in DIGESTS

@@ -9,7 +9,8 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.draws import LOW32, derive_key, purpose, uniform
 from swarmwire.comms.fates import FATE_NAMES
-from swarmwire.comms.truth import Finished, Static
+from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.truth import NOBODY, Finished, Static
 from swarmwire.metrics.network.geometry_tick import geometry_tick
 from swarmwire.metrics.shortest import shortest
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     import polars as pl
 
 OTHERWISE = ("rssi_dbm", "payload", "payloads")  # of Finished: not joined as columns of numbers
-NOBODY = -1  # Finished's receiver of a packet that never went on air, and whom a broadcast is addressed to
 
 
 def packet_schema() -> "dict[str, Any]":
@@ -77,7 +77,7 @@ class PacketColumns:
         keep = [self.sample(part) for part in self.parts]
         taken = {name: self._joined(name, keep) for name in Finished.__slots__ if name not in OTHERWISE}
         fate, tag = taken.pop("fate"), taken.pop("tag")
-        has_receiver, is_addressed = (pl.Series(taken[name] != NOBODY) for name in ("receiver", "to"))
+        has_receiver, is_addressed = pl.Series(taken["receiver"] != NOBODY), pl.Series(taken["to"] != BROADCAST)
         columns: dict[str, Any] = {
             **taken,
             "fate": pl.Series(FATE_NAMES).gather(fate),

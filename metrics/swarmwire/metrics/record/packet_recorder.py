@@ -8,12 +8,12 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Finished, Static, Tally, Truth
+from swarmwire.metrics.network.geometry_tick import POSES_KEPT_S
 from swarmwire.metrics.record.chunk_limit import ChunkLimit
 from swarmwire.metrics.record.packet_columns import PacketColumns, PacketSample, packet_schema
 from swarmwire.metrics.record.table_writer import Chunk, TableWriter
 
 CHUNK_ROWS = 100_000
-POSES_KEPT_S = 5.0  # simulated: of a packet that took longer from the antenna to its end the distance is unknown
 
 
 class PacketRecorder:

@@ -14,7 +14,7 @@ from swarmwire.comms.air.propagation.path_loss import loss_db
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.reception import chunk_success
 from swarmwire.comms.air.signal.levels import range_of, receiver_for, sensitivity_of
-from swarmwire.comms.air.timing.frames import airtime_ns
+from swarmwire.comms.air.timing.frames import acknowledgement_bytes, airtime_ns
 from tests.comms.air.runs import at, make_air, packets, run
 from tests.world.scenario.test_radio_tables import radio_of
 
@@ -28,6 +28,12 @@ def preset(name: str, **others: Any) -> Radio:
 
 def airtime_us(radio: Radio, payload_bytes: int) -> float:
     return float(airtime_ns(radio, np.array([payload_bytes + radio.overhead_bytes]))[0]) / 1e3
+
+
+@pytest.mark.parametrize(("name", "us"), [("ieee802154", 352), ("wifi-b-1M", 304), ("wifi-a-6M", 44)])
+def test_an_acknowledgement_takes_as_long_as_the_standard_says(name: str, us: int):
+    radio = preset(name)
+    assert airtime_ns(radio, np.array([acknowledgement_bytes(radio)])).tolist() == [us * 1000]
 
 
 def in_one_spot(radio: Radio, nodes: int, payload_bytes: int, interval_s: float, runs: int) -> Contention:

@@ -3,7 +3,7 @@
 from decimal import Decimal
 from typing import Any
 
-Node = dict[str, Any]
+Node = dict[str, Any]  # of a JSON schema
 BOUNDS = (
     ("minimum", "of at least"),
     ("exclusiveMinimum", "above"),

@@ -14,7 +14,6 @@ from numba import njit
 from swarmwire.comms.air.reception.bits import all_right
 from swarmwire.comms.air.timing.airtime import DSSS_RATES_BPS
 
-BANDWIDTH_HZ = 22e6
 DBPSK_1, DQPSK_2, CCK_5_5, CCK_11 = range(4)
 RATES_BPS = DSSS_RATES_BPS
 SQRT2 = math.sqrt(2.0)

@@ -14,7 +14,6 @@ from numba import njit
 from swarmwire.comms.air.reception.bits import all_right
 from swarmwire.comms.air.timing.airtime import OFDM_BITS_PER_SYMBOL
 
-BANDWIDTH_HZ = 20e6
 RATES_BPS = tuple(OFDM_BITS_PER_SYMBOL)
 # By rate: points of the constellation, and the code of SPECTRA.
 _POINTS = (2, 2, 4, 4, 16, 16, 64, 64)

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.commands.options import USUAL_SIZE_PX
 
 if TYPE_CHECKING:
     from swarmwire.comms.air.parameters.propagation import Antenna
     from swarmwire.metrics.radio_fit.radio_fit import RadioFit
-
-USUAL_SIZE_PX = 1280
 
 
 def fit_command(

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.commands.options import AsJson
+from swarmwire.deploy.commands.options import USUAL_SIZE_PX, AsJson
 
 if TYPE_CHECKING:
     from swarmwire.deploy.radio.coverage_probe import CoverageProbe
 
-USUAL_SIZE_PX = 1280
 POINTS, JSON_POINTS = 200, 50  # of the map, along the longer side of the arena
 
 
