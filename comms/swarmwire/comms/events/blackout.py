@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 from swarmwire.comms.air.disruption import BACKLOGS
 from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.events.conditions import Conditions
+from swarmwire.comms.events.conditions import Conditions, alone
 from swarmwire.comms.events.event import LastingEvent
-from swarmwire.comms.events.kill import check_robots
 from swarmwire.comms.events.selection import Selection
-from swarmwire.comms.events.swarm import Groups, Swarm
+from swarmwire.comms.events.swarm import Swarm
 from swarmwire.comms.parameters import parameter
 
 
@@ -29,19 +28,11 @@ class Blackout(LastingEvent):
     )
     needs_radio = True
 
-    def check(self, groups: Groups) -> None:
-        """Raise BadInput for robots that there are not."""
-        check_robots(self.robots, groups)
-
-    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
-        """Hold the radios off; changed are those that were on."""
-        on = conditions.radio_on
+    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+        """Hold the radios off."""
         conditions.backlogs[serial] = BACKLOGS.index(self.backlog)
         conditions.blackouts[serial] = self.robots.rows(serial, swarm, conditions.alive)
-        return on & ~conditions.radio_on
 
-    def end(self, serial: int, conditions: Conditions) -> BoolArray:
-        """Let go of the radios; changed are those that nothing else holds off."""
-        off = ~conditions.radio_on
-        del conditions.blackouts[serial], conditions.backlogs[serial]
-        return off & conditions.radio_on
+    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+        """Those whose radios nothing else holds off."""
+        return alone(serial, conditions.blackouts)

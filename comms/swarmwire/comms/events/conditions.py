@@ -1,6 +1,6 @@
 """What events hold over robots and radios now, by the event that does."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import reduce
 
 import numpy as np
@@ -21,27 +21,36 @@ class Conditions:
     """
 
     def __init__(self, rows: int) -> None:
-        self.rows = rows
-        self.kills: dict[int, BoolArray] = {}  # by event: (rows,) robots that it holds dead
-        self.failures: dict[int, Failing] = {}  # by event: parts that do not work
-        self.blackouts: dict[int, BoolArray] = {}  # by event: (rows,) robots whose radios it holds off
+        self.rows = rows  # robots of all arenas
+        # All else is by event: what stands under its place in the scenario.
+        self.kills: dict[int, BoolArray] = {}  # (rows,) robots held dead
+        self.failures: dict[int, Failing] = {}  # parts that do not work
+        self.blackouts: dict[int, BoolArray] = {}  # (rows,) robots whose radios are held off
         self.backlogs: dict[int, int] = {}  # by blackout: DROP, NEWEST or ALL
-        self.gains: dict[
-            int, FloatArray
-        ] = {}  # by event: (2, rows) dB added to what robots send, and to what they hear
-        self.jammers: dict[int, Jammers] = {}  # by event
-        self.slopes: dict[int, Slope] = {}  # by ramp, in the order in which they began
-        self.partitions: dict[int, IntArray] = {}  # by event: (rows,) the set of each robot, from 1; 0: in none
-        self.one_way: dict[int, IntArray] = {}  # by event: (rows,) the same, where the second does not hear the first
+        self.gains: dict[int, FloatArray] = {}  # (2, rows) dB added to what robots send, and to what they hear
+        self.jammers: dict[int, Jammers] = {}
+        self.slopes: dict[int, Slope] = {}  # in the order in which they began
+        self.partitions: dict[int, IntArray] = {}  # (rows,) each robot's set, from 1; 0: in none
+        self.one_way: dict[int, IntArray] = {}  # (rows,) the same, where the second does not hear the first
+
+    def let_go(self, serial: int) -> None:
+        """The event at this place in the scenario holds nothing any more."""
+        for name, held in vars(self).items():
+            if name != "rows":
+                held.pop(serial, None)
 
     @property
     def alive(self) -> BoolArray:
         """Which robots are alive, (rows,)."""
-        return ~self._any(self.kills.values())
+        return ~union(self.rows, self.kills.values())
 
     def failed(self, part: str) -> BoolArray:
         """Of which robots this part does not work, (rows,)."""
-        return self._any(failing.failed for failing in self.failures.values() if failing.part == part)
+        return union(self.rows, self.failed_by_event(part).values())
+
+    def failed_by_event(self, part: str) -> dict[int, BoolArray]:
+        """The robots of which each event holds this part, (rows,) each."""
+        return {serial: failing.failed for serial, failing in self.failures.items() if failing.part == part}
 
     @property
     def failed_parts(self) -> dict[str, BoolArray]:
@@ -51,7 +60,7 @@ class Conditions:
     @property
     def radio_on(self) -> BoolArray:
         """Which robots' radios are on, (rows,)."""
-        return ~self._any(self.blackouts.values())
+        return ~union(self.rows, self.blackouts.values())
 
     @property
     def backlog(self) -> IntArray:
@@ -82,8 +91,16 @@ class Conditions:
     def _sides(self, of: dict[int, IntArray]) -> IntArray:
         return np.array(list(of.values()), np.int64).reshape(-1, self.rows)
 
-    def _any(self, masks: Iterable[BoolArray]) -> BoolArray:
-        found = np.zeros(self.rows, np.bool_)
-        for mask in masks:
-            found |= mask
-        return found
+
+def union(rows: int, held: Iterable[BoolArray]) -> BoolArray:
+    """Robots that any of these holds, (rows,)."""
+    found = np.zeros(rows, np.bool_)
+    for one in held:
+        found |= one
+    return found
+
+
+def alone(serial: int, held: Mapping[int, BoolArray]) -> BoolArray:
+    """Robots that one event holds and no other, of those held by event, (rows,)."""
+    own = held[serial]
+    return own & ~union(len(own), (of for other, of in held.items() if other != serial))

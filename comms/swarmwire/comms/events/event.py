@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import ClassVar
 
 from swarmwire.comms.air.radio import Radio
@@ -11,6 +11,7 @@ from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
+from swarmwire.comms.events.selection import Selection
 from swarmwire.comms.events.swarm import Groups, Swarm
 from swarmwire.comms.parameters import parameter
 
@@ -26,6 +27,7 @@ class Event(ABC):
     at_s: float = parameter(help="when it happens", unit="s", at_least=0, at_most=1e9)
     do: str = parameter(help="what happens")
     needs_radio: ClassVar[bool] = False
+    needs_signals: ClassVar[bool] = False  # whose strength a radio knows
 
     @property
     def lasts_s(self) -> float | None:
@@ -37,12 +39,17 @@ class Event(ABC):
         """The part of a robot that it makes fail; empty if it does not."""
         return ""
 
-    @abstractmethod
     def check(self, groups: Groups) -> None:
         """Raise BadInput, with a key within the event's table, for what does not fit these groups of robots."""
+        for of in fields(self):
+            if isinstance(selection := getattr(self, of.name), Selection):
+                with within(of.name):
+                    selection.check(groups)
 
-    def check_radio(self, radio: Radio) -> None:  # noqa: B027 - most events fit any radio
+    def check_radio(self, radio: Radio) -> None:
         """Raise BadInput, with a key within the event's table, for what does not fit this radio; it needs one."""
+        if self.needs_signals and not radio.is_signal:
+            raise BadInput("", "do", f"expected a radio with signals for {self.do!r}: a disk knows no strength")
 
     def check_bodies(self, groups: Groups, bodies: Mapping[str, Body]) -> None:  # noqa: B027 - most fit any body
         """Raise BadInput, with a key within the event's table, for what does not fit the groups' bodies, by group."""
@@ -71,7 +78,7 @@ class Event(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class LastingEvent(Event):
-    """An event that may be undone after a time."""
+    """An event that may be undone after a time: until then it holds something in the conditions, under its serial."""
 
     for_s: float | None = parameter(
         None, help="undone after this time; never if left out", unit="s", above=0, at_most=1e9
@@ -81,6 +88,25 @@ class LastingEvent(Event):
     def lasts_s(self) -> float | None:
         """`for_s`."""
         return self.for_s
+
+    @abstractmethod
+    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+        """Put what it holds from now on into `conditions`, under `serial`: `end` takes out all that is there."""
+
+    @abstractmethod
+    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+        """The robots that would be otherwise without what it holds now, (rows,)."""
+
+    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
+        """Hold it."""
+        self.hold(serial, swarm, conditions)
+        return self.changed(serial, conditions)
+
+    def end(self, serial: int, conditions: Conditions) -> BoolArray:
+        """Let go of it."""
+        changed = self.changed(serial, conditions)
+        conditions.let_go(serial)
+        return changed
 
 
 @contextmanager

@@ -8,10 +8,9 @@ from swarmwire.comms.bodies.body import MOTORS, WHEELS, Body
 from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.events.conditions import Conditions
+from swarmwire.comms.events.conditions import Conditions, alone
 from swarmwire.comms.events.event import LastingEvent
 from swarmwire.comms.events.failing import BATTERY, Failing, Lifetimes
-from swarmwire.comms.events.kill import check_robots
 from swarmwire.comms.events.selection import Selection
 from swarmwire.comms.events.swarm import Groups, Swarm
 from swarmwire.comms.parameters import parameter
@@ -47,10 +46,6 @@ class Fail(LastingEvent):
         """`part`."""
         return self.part
 
-    def check(self, groups: Groups) -> None:
-        """Raise BadInput for robots that there are not."""
-        check_robots(self.robots, groups)
-
     def check_bodies(self, groups: Groups, bodies: Mapping[str, Body]) -> None:
         """Raise BadInput for a part that a body of these robots does not have."""
         for group in self.robots.groups(groups):
@@ -61,9 +56,8 @@ class Fail(LastingEvent):
                     "", "part", f"expected one of {', '.join(has)} of the body {body.name}; got {self.part!r}"
                 )
 
-    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
-        """Let the part fail, now or at the rate; changed are those whose part worked."""
-        before = conditions.failed(self.part)
+    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+        """Let the part fail, now or at the rate."""
         chosen = self.robots.rows(serial, swarm, conditions.alive)
         if self.per_hour is None:
             failing = Failing(self.part, chosen)
@@ -72,7 +66,10 @@ class Fail(LastingEvent):
         conditions.failures[serial] = failing
         if self.part == BATTERY:
             conditions.kills[serial] = failing.failed.copy()
-        return conditions.failed(self.part) & ~before
+
+    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+        """Those of which nothing else holds the part."""
+        return alone(serial, conditions.failed_by_event(self.part))
 
     def go_on(self, serial: int, now_ns: int, swarm: Swarm, conditions: Conditions) -> tuple[BoolArray, BoolArray]:
         """Let fail and be mended what is due by now; returns whose part failed, and whose works again, (rows,) each."""
@@ -83,13 +80,6 @@ class Fail(LastingEvent):
         if self.part == BATTERY:
             conditions.kills[serial] = conditions.kills[serial] & ~mended | fell
         return fell, mended
-
-    def end(self, serial: int, conditions: Conditions) -> BoolArray:
-        """Let the part work again; changed are those of which nothing else holds it."""
-        before = conditions.failed(self.part)
-        del conditions.failures[serial]
-        conditions.kills.pop(serial, None)
-        return before & ~conditions.failed(self.part)
 
     def _lifetimes(self, serial: int, swarm: Swarm) -> Lifetimes:
         assert self.per_hour is not None, "it fails at once"

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.event import LastingEvent
-from swarmwire.comms.events.kill import check_robots
 from swarmwire.comms.events.selection import Selection
 from swarmwire.comms.events.swarm import Groups, Swarm
 from swarmwire.comms.parameters import parameter
@@ -30,31 +28,19 @@ class Gain(LastingEvent):
     receive_db: float = parameter(
         0.0, help="added to the strength of all that they hear", unit="dB", at_least=-200, at_most=100
     )
-    needs_radio = True
+    needs_radio = needs_signals = True
 
     def check(self, groups: Groups) -> None:
         """Raise BadInput for robots that there are not, or if nothing would change."""
-        check_robots(self.robots, groups)
+        super().check(groups)
         if self.send_db == 0.0 and self.receive_db == 0.0:
             raise BadInput("", "", "expected send_db or receive_db")
 
-    def check_radio(self, radio: Radio) -> None:
-        """Raise BadInput for a disk."""
-        refuse_disk(self.do, radio)
-
-    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
-        """Change the antennas; changed are all that were chosen."""
+    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+        """Change the antennas."""
         chosen = self.robots.rows(serial, swarm, conditions.alive)
         conditions.gains[serial] = np.where(chosen, np.array([[self.send_db], [self.receive_db]]), 0.0)
-        return chosen
 
-    def end(self, serial: int, conditions: Conditions) -> BoolArray:
-        """Change them back."""
-        send_db, receive_db = conditions.gains.pop(serial)
-        return (send_db != 0.0) | (receive_db != 0.0)
-
-
-def refuse_disk(do: str, radio: Radio) -> None:
-    """Raise BadInput, with the key `do`, unless the radio's signals have a strength."""
-    if not radio.is_signal:
-        raise BadInput("", "do", f"expected a radio with signals for {do!r}: a disk knows no strength")
+    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+        """All that were chosen."""
+        return (conditions.gains[serial] != 0.0).any(axis=0)

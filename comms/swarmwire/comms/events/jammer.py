@@ -12,8 +12,6 @@ from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.event import LastingEvent
-from swarmwire.comms.events.gain import refuse_disk
-from swarmwire.comms.events.kill import check_robots
 from swarmwire.comms.events.selection import Selection
 from swarmwire.comms.events.swarm import Groups, Swarm
 from swarmwire.comms.parameters import parameter
@@ -39,43 +37,37 @@ class Jammer(LastingEvent):
     )
     duty: float = parameter(1.0, help="the share of time for which it is on", above=0, at_most=1)
     period_s: float = parameter(0.01, help="from one time that it goes on to the next", unit="s", above=0, at_most=1e6)
-    needs_radio = True
+    needs_radio = needs_signals = True
 
     def check(self, groups: Groups) -> None:
         """Raise BadInput for neither or both of place and robots, or robots that there are not."""
         if (self.at is None) == (self.robots is None):
             raise BadInput("", "", "expected either at = [x, y] or robots")
-        if self.robots is not None:
-            check_robots(self.robots, groups)
+        super().check(groups)
         if self.period_s < LEAST_PERIOD_S:
             raise BadInput("", "period_s", f"expected at least {LEAST_PERIOD_S:f} s, got {self.period_s!r}")
 
     def check_radio(self, radio: Radio) -> None:
         """Raise BadInput for a disk, or where nothing on air disturbs anything."""
-        refuse_disk(self.do, radio)
+        super().check_radio(radio)
         if radio.access_or_default.method == "none":
             raise BadInput("", "do", 'expected another radio.access.method than "none", with which nothing disturbs')
 
-    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
-        """Put them up; changed are those who carry one, or all robots."""
+    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+        """Put them up."""
         if self.robots is None:
-            arenas = len(swarm.keys)
-            carrier, changed = np.full(arenas, NO_ROBOT), np.ones(swarm.rows, np.bool_)
-            arena = np.arange(arenas)
+            arena = np.arange(len(swarm.keys))
+            carrier = np.full(len(arena), NO_ROBOT)
         else:
-            changed = self.robots.rows(serial, swarm, conditions.alive)
-            carrier = np.flatnonzero(changed)
+            carrier = np.flatnonzero(self.robots.rows(serial, swarm, conditions.alive))
             arena = carrier // swarm.robots
         conditions.jammers[serial] = self._jammers(serial, swarm, arena, carrier)
-        return changed
 
-    def end(self, serial: int, conditions: Conditions) -> BoolArray:
-        """Take them away; changed as before."""
-        changed = np.ones(conditions.rows, np.bool_)
-        gone = conditions.jammers.pop(serial)
+    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+        """Those who carry one, or all robots."""
+        changed = np.full(conditions.rows, self.robots is None)
         if self.robots is not None:
-            changed[:] = False
-            changed[gone.carrier] = True
+            changed[conditions.jammers[serial].carrier] = True
         return changed
 
     def _jammers(self, serial: int, swarm: Swarm, arena: IntArray, carrier: IntArray) -> Jammers:

@@ -61,15 +61,16 @@ class Partition(LastingEvent):
         if self.one_way and (self.isolate is not None or len(self.between or (1, 2)) != 2):
             raise BadInput("", "one_way", "expected two sets with it: the second does not hear the first")
 
-    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
-        """Hold the sets apart; changed are all robots in one of them."""
-        side = self._sides(swarm)
-        (conditions.one_way if self.one_way else conditions.partitions)[serial] = side
-        return side > 0
+    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+        """Hold the sets apart."""
+        self._held(conditions)[serial] = self._sides(swarm)
 
-    def end(self, serial: int, conditions: Conditions) -> BoolArray:
-        """Let them hear one another again."""
-        return (conditions.one_way if self.one_way else conditions.partitions).pop(serial) > 0
+    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+        """All robots in one of the sets."""
+        return self._held(conditions)[serial] > 0
+
+    def _held(self, conditions: Conditions) -> dict[int, IntArray]:
+        return conditions.one_way if self.one_way else conditions.partitions
 
     def _sides(self, swarm: Swarm) -> IntArray:
         if self.between is not None:

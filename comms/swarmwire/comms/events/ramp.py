@@ -12,7 +12,7 @@ from swarmwire.comms.clock import to_ns
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.event import LastingEvent
-from swarmwire.comms.events.swarm import Groups, Swarm
+from swarmwire.comms.events.swarm import Swarm
 from swarmwire.comms.parameters import parameter
 
 
@@ -34,9 +34,6 @@ class Ramp(LastingEvent):
     over_s: float = parameter(0.0, help="how long it takes; 0: it steps", unit="s", at_least=0, at_most=1e9)
     needs_radio = True
 
-    def check(self, groups: Groups) -> None:
-        """Whoever there is, a ramp fits."""
-
     def check_radio(self, radio: Radio) -> None:
         """Raise BadInput for what is no number of this radio, or a value that contradicts its other keys."""
         check_number(radio, self.what, self.to)
@@ -48,14 +45,12 @@ class Ramp(LastingEvent):
             except BadInput as error:
                 raise BadInput("", key, f"{error.key}: {error.expected}") from None
 
-    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
-        """Let the number move; changed are all robots."""
+    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+        """Let the number move; without it, it is at once what it was."""
         conditions.slopes[serial] = self._slope()
-        return np.ones(swarm.rows, np.bool_)
 
-    def end(self, serial: int, conditions: Conditions) -> BoolArray:
-        """Let the number be what it is without it."""
-        del conditions.slopes[serial]
+    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+        """All robots."""
         return np.ones(conditions.rows, np.bool_)
 
     def _slope(self) -> Slope:

@@ -7,9 +7,8 @@ from swarmwire.comms.clock import to_ns
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.failing import BATTERY
-from swarmwire.comms.events.kill import check_robots
 from swarmwire.comms.events.selection import Selection
-from swarmwire.comms.events.swarm import Groups, Swarm
+from swarmwire.comms.events.swarm import Swarm
 from swarmwire.comms.parameters import parameter
 
 
@@ -22,10 +21,6 @@ class Revive(Event):
 
     do: str = parameter("revive", help="robots that were killed act again", choices=("revive",))
     robots: Selection = parameter(help="which robots; share and count choose among those dead")
-
-    def check(self, groups: Groups) -> None:
-        """Raise BadInput for robots that there are not."""
-        check_robots(self.robots, groups)
 
     def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
         """Free the robots of every kill; changed are those that were dead."""

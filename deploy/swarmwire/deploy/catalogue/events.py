@@ -24,7 +24,7 @@ def _event(kind: type[Event]) -> Entry:
         help=limits_of(do).help,
         facts=(
             ("in a scenario", f'do = "{do.default}" in [[events]]'),
-            ("needs a radio", "yes" if kind.needs_radio else "no"),
+            ("needs a radio", "with signals" if kind.needs_signals else "yes" if kind.needs_radio else "no"),
         ),
         tables=(ParameterTable("keys", parameters_of_dataclass(kind)),),
         text=paragraphs(kind.__doc__),
