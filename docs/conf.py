@@ -3,7 +3,8 @@
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]  # the tables, and the list of what is public
 
 project = "swarmwire"
 author = copyright = "the swarmwire authors"  # noqa: A001 - the name that Sphinx reads

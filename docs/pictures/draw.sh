@@ -24,5 +24,6 @@ swarmwire export "$runs/warehouse" --pdr --to docs/delivery.png
 .ci/uv run --no-sync python docs/pictures/panel.py
 .ci/uv run --no-sync python -m docs.pictures.radio
 .ci/uv run --no-sync python -m docs.pictures.stages
+.ci/uv run --no-sync python -m docs.pictures.runner_states
 .ci/uv run --no-sync python -m docs.pictures.parts
 .ci/uv run --no-sync python -m docs.pictures.tick

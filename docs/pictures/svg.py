@@ -21,6 +21,12 @@ def arrow(x: float, y: float, to_x: float, to_y: float) -> str:
     return f'<path d="M{x:g} {y:g} L{to_x:g} {to_y:g}" stroke="{INK}" fill="none" marker-end="url(#tip)"/>'
 
 
+def arc(x: float, y: float, to_x: float, rise: float) -> str:
+    """A curve with a tip between two points of one height, which it overtops by `rise`."""
+    way = f"M{x:g} {y:g} Q{0.5 * (x + to_x):g} {y - 2 * rise:g} {to_x:g} {y:g}"
+    return f'<path d="{way}" stroke="{INK}" fill="none" marker-end="url(#tip)"/>'
+
+
 def line(x: float, y: float, to_x: float, to_y: float) -> str:
     """A faint line."""
     return f'<path d="M{x:g} {y:g} L{to_x:g} {to_y:g}" stroke="{FAINT}" stroke-dasharray="2 4" fill="none"/>'

@@ -185,24 +185,24 @@ class Remembering(VectorAgent):
     """Cheats: keeps on itself what belongs into its State."""
 
     needs: ClassVar[tuple[str, ...]] = ("compass",)
-    last = np.zeros(0)
+
+    def __init__(self) -> None:
+        self.last: dict[int, FloatColumn] = {}  # by the number of robots
 
     def step(self, robots: Robots, state: State) -> None:
-        if len(self.last) != robots.n:
-            self.last = np.zeros(robots.n)
-        robots.drive(0.1, self.last)
-        self.last = robots.compass.heading_rad
+        robots.drive(0.1, self.last.get(robots.n, 0.0))
+        self.last[robots.n] = robots.compass.heading_rad
 
 
 class Ageing(VectorAgent):
     """Cheats: counts on itself, for all robots, how often it was called."""
 
     def __init__(self) -> None:
-        self.calls = 0
+        self.calls = [0]
 
     def step(self, robots: Robots, state: State) -> None:
-        self.calls += 1
-        robots.drive(float(self.calls), 0.0)
+        self.calls[0] += 1
+        robots.drive(float(self.calls[0]), 0.0)
 
 
 class Reply(VectorAgent):

@@ -158,7 +158,7 @@ class BlinksAlike(BlinksToo):
 def test_equivalence_and_independence_hold_for_leds_too() -> None:
     assert_equivalent(Blinks, BlinksToo)
     assert_rows_independent(BlinksToo, Trial(body="footbot"))
-    with pytest.raises(AssertionError, match=r"in tick 0: leds"):
+    with pytest.raises(AssertionError, match=r"in tick 0, robot 0:\n  led 0: 0x"):
         assert_equivalent(Blinks, BlinksAlike)
-    with pytest.raises(AssertionError, match=r"in tick 0: leds"):
+    with pytest.raises(AssertionError, match=r"in tick 0, robot 0:\n  led 0: 0x"):
         assert_rows_independent(BlinksAlike)

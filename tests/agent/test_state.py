@@ -58,6 +58,22 @@ def test_a_column_of_another_type_is_refused_where_it_is_declared() -> None:
         type("Start", (State,), {"__annotations__": {"x": FloatColumn}, "x": 0.0})
 
 
+def test_a_number_that_a_column_cannot_hold_is_refused_and_none_is_cut() -> None:
+    state = Table.fresh(2)
+    with pytest.raises(TypeError, match=r"Table\.n: a column of int64 takes no float64"):
+        state.n = state.n + 0.5
+    with pytest.raises(TypeError):
+        state.n = 1.5
+    assert state.n.tolist() == [-1, -1]
+    state.x = 3
+    assert state.x.tolist() == [3.0, 3.0]
+
+
+def test_a_column_cannot_take_a_name_that_states_use() -> None:
+    with pytest.raises(TypeError, match=r"Bad\.moved: the name is taken by State"):
+        type("Bad", (State,), {"__annotations__": {"moved": FloatColumn}, "moved": column(0.0)})
+
+
 def test_a_state_inherits_columns_without_changing_its_base() -> None:
     class More(Table):
         seen: BoolColumn = column(False)

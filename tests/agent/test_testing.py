@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from swarmwire.agent import VectorAgent
+from swarmwire.agent import Agent, Robot, VectorAgent
 from swarmwire.agent.behaviours import Diffusion, Flocking, PsoSearch, PsoSearchPositioned
 from swarmwire.agent.loading import load_agent
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
@@ -19,6 +20,7 @@ from tests.agent.players import (
     Reply,
     Steps,
     VectorCounter,
+    Word,
 )
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "flocking_agent.py"
@@ -66,7 +68,7 @@ def test_packets_that_differ_are_caught() -> None:
             robots.radio.send = lambda *_, **__: None
             super().step(robots, state)
 
-    with pytest.raises(AssertionError, match="packets"):
+    with pytest.raises(AssertionError, match=r"packet 1: to: all \(MyFlocking\), nothing \(Silent\)"):
         assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), Silent)
 
 
@@ -82,3 +84,37 @@ def test_an_agent_that_raises_is_named() -> None:
 
     with pytest.raises(AgentFailed, match="KeyError"):
         assert_rows_independent(Raises)
+
+
+class Says(VectorAgent):
+    def step(self, robots, state) -> None:
+        robots.radio.send(Word, number=np.arange(robots.n, dtype=float))
+        robots.drive(0.0, 0.0)
+        robots.note("here")
+
+
+class SaysOther(Agent):
+    said = 0.0
+
+    def step(self, robot: Robot) -> None:
+        robot.radio.send(Word(number=self.said))
+        robot.drive(0.0, -self.said)
+        robot.note("here" if self.said else "there")
+
+
+def test_a_difference_names_the_tick_the_robots_and_what_each_did() -> None:
+    with pytest.raises(AssertionError) as caught:
+        assert_equivalent(SaysOther, Says, Trial(robots=3, seed=2))
+    assert str(caught.value).splitlines() == [
+        "SaysOther and Says differ in tick 0, robot 0:",
+        "  drive: angular_radps: -0.0 (SaysOther), 0.0 (Says)",
+        "  note: 'there' (SaysOther), 'here' (Says)",
+        "and so do robots 1, 2",
+    ]
+
+
+def test_a_difference_in_a_message_names_its_field() -> None:
+    different = type("Different", (SaysOther,), {"said": 0.25})
+    with pytest.raises(AssertionError) as caught:
+        assert_equivalent(different, Says, Trial(robots=1))
+    assert "  packet 1: Word.number: 0.25 (Different), 0.0 (Says)" in str(caught.value).splitlines()

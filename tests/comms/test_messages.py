@@ -136,7 +136,18 @@ def test_a_field_of_another_type_is_refused_where_the_class_is_made(hint: object
         type("Odd", (Message,), {"__annotations__": {"x": hint}})
 
 
-@pytest.mark.parametrize("name", ["encode", "on_air", "size_bytes", "tag"])
+def test_a_field_has_no_default() -> None:
+    with pytest.raises(TypeError, match=r"Odd\.x: a field has no default"):
+        type("Odd", (Message,), {"__annotations__": {"x": f4}, "x": 1.0})
+
+
+@pytest.mark.parametrize("value", [None, "fast", [1.0, 2.0], np.zeros(2)])
+def test_what_is_no_number_is_refused_by_the_fields_name(value: Any) -> None:
+    with pytest.raises(TypeError, match=r"Beacon\.heading_rad: expected a number, got"):
+        Beacon(heading_rad=value)
+
+
+@pytest.mark.parametrize("name", ["encode", "on_air", "rows", "size_bytes", "tag", "to"])
 def test_a_field_cannot_take_a_name_that_messages_use(name: str) -> None:
     with pytest.raises(TypeError, match=rf"Odd\.{name}: .*taken"):
         type("Odd", (Message,), {"__annotations__": {name: f4}})
@@ -145,7 +156,7 @@ def test_a_field_cannot_take_a_name_that_messages_use(name: str) -> None:
 @pytest.mark.parametrize(("name", "value"), [("a", 128), ("a", -129), ("d", -1), ("d", 256), ("e", 65536), ("f", -1)])
 def test_a_number_beyond_a_whole_field_is_refused(name: str, value: float) -> None:
     fields = dict.fromkeys(Everything.ranges or (), 0.0) | {name: value}
-    with pytest.raises(OverflowError, match=rf"Everything\.{name}: expected whole numbers from"):
+    with pytest.raises(OverflowError, match=rf"Everything\.{name}: expected whole numbers from .*, got {value}$"):
         Everything(**fields).encode()
 
 

@@ -93,3 +93,12 @@ def test_an_observer_that_fails_is_left_out_and_counted(capfd):
     result = run(LOSSY, overrides=["duration_s=0.5"], observers=[Broken()])
     assert (result.ticks, result.counts["observer_failed_Broken"]) == (5, 1)
     assert "the disk is full" in capfd.readouterr().err
+
+
+def test_people_are_told_once_of_a_packet_that_is_too_large(agent, capfd):
+    result = run(LOSSY, overrides=[*agent("Shouts"), "radio.max_payload_bytes=1"])
+    assert result.radio is not None
+    assert result.radio.fates["too_large"] > 19
+    told = [line for line in capfd.readouterr().err.splitlines() if "too_large" in line]
+    assert len(told) == 1
+    assert "sent 2 bytes, more than radio.max_payload_bytes" in told[0]

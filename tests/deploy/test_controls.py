@@ -13,8 +13,8 @@ from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.deploy.terminal.bindings import BINDINGS, press
 from swarmwire.world.crews.pace import Pace
+from tests.clocks import MS, FakeClock
 from tests.deploy.commands import LOSSY
-from tests.world.crews.test_pace import MS, FakeClock
 
 RATE_HZ = 10
 TICK_NS = NS_PER_S // RATE_HZ

@@ -24,24 +24,12 @@ from swarmwire.deploy.live.live_file import Live, read_live
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.live.sampling import Sampling, Since
 from swarmwire.metrics.metrics import Metrics
+from tests.clocks import StillClock
 from tests.deploy.commands import LOSSY
 from tests.deploy.watching import At, until, watcher
 from tests.metrics.truths import edges, finished, static, tally, truth
 
 MANY = ["robots.flock.count=300", 'robots.flock.place={how="arena"}', "arena.size_m=[20,20]", "duration_s=6"]
-
-
-class StepClock:
-    """A clock that moves when told."""
-
-    def __init__(self) -> None:
-        self.at_ns = 0
-
-    def now_ns(self):
-        return self.at_ns
-
-    def sleep_until(self, at_ns):
-        raise AssertionError("an observer does not wait")
 
 
 @pytest.fixture
@@ -110,7 +98,7 @@ def test_who_looks_on_gets_scene_ticks_and_metrics(tmp_path, every_tick):
 
 
 def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tmp_path):
-    of, clock = static(2), StepClock()
+    of, clock = static(2), StillClock()
     metrics, observer = publish(tmp_path, of, clock)
     try:
         with following(read_live(tmp_path)) as seen:
@@ -120,7 +108,7 @@ def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tm
                 kill = (Happened(tick, 0.0, "kill", False, np.ones(2, np.bool_)),) if tick == 50 else ()
                 now = truth(of, tick, tally=tally({Fate.HEARD: 2}), contact_onsets=np.array([[1, 0]]), events=kill)
                 metrics.see(now)
-                clock.at_ns += NS_PER_S // 100
+                clock.time_ns += NS_PER_S // 100
                 before = observer.frames
                 observer.see(now)
                 if observer.frames > before:

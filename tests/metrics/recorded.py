@@ -8,26 +8,14 @@ from swarmwire.comms.fates import Fate
 from swarmwire.comms.truth import Finished
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.recorders import record_summary, recorders
+from tests.clocks import StillClock
 from tests.metrics.truths import truth
-
-
-class SetClock:
-    """Time stands still until the test moves it."""
-
-    def __init__(self) -> None:
-        self.now_s = 0.0
-
-    def now_ns(self) -> int:
-        return round(self.now_s * 1e9)
-
-    def sleep_until(self, at_ns: int) -> None:
-        raise AssertionError("nothing that records waits for the time")
 
 
 def record(folder: Path, of, ticks, clock=None, **options):
     """Feed these ticks to all recorders of a run folder; the summary's `record`."""
     metrics = Metrics()
-    observers = [metrics, *recorders(folder, metrics, clock or SetClock(), **options)]
+    observers = [metrics, *recorders(folder, metrics, clock or StillClock(), **options)]
     for observer in observers:
         observer.begin(of)
     for seen in ticks:

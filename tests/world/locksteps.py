@@ -1,6 +1,6 @@
-"""Lockstep among two runners and eight robots, as tests play it."""
+"""Two runners and eight robots in lockstep, as tests play it; their hand-shake in real time, too."""
 
-from typing import Any
+from typing import Any, TypeVar
 
 import msgpack
 import numpy as np
@@ -11,8 +11,10 @@ from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.crews.lockstep import Lockstep
+from swarmwire.world.crews.realtime import RealTime
 from tests.agent.hosts import GIVES, assignment, group, senses
 
+R = TypeVar("R", Lockstep, RealTime)
 GROUPS = {"flock", "scouts", "lone"}
 FLOCK, SCOUTS = [0, 1, 4, 5], [2, 6]  # rows of the two groups; robot 3 and 7 are a third
 
@@ -35,20 +37,24 @@ def two() -> Lockstep:
     return Lockstep(two_parts())
 
 
+def two_in_real_time() -> RealTime:
+    return RealTime(two_parts(), watchdog_s=0.5, timeout_s=30.0, on_loss="stop")
+
+
 def request(runner: Any, version: Any = frames.VERSION) -> bytes:
     return msgpack.packb({"v": version, "runner": runner})
 
 
-def joined(lockstep: Lockstep, *names: str) -> Lockstep:
+def joined(roster: R, *names: str) -> R:
     for name in names:
-        lockstep.join(request(name))
-    return lockstep
+        roster.join(request(name))
+    return roster
 
 
-def ready(lockstep: Lockstep, *names: str) -> Lockstep:
+def ready(roster: R, *names: str) -> R:
     for name in names:
-        lockstep.answer(name, frames.encode("ready", -1, {}))
-    return lockstep
+        roster.answer(name, frames.encode("ready", -1, {}))
+    return roster
 
 
 def playing() -> Lockstep:
@@ -71,9 +77,11 @@ def rows_of(frame: bytes) -> list[int]:
     return [row for part in found.values() for row in part.rows.tolist()]
 
 
-def state(lockstep: Lockstep) -> Any:
-    slots = [(slot.runner, slot.state, slot.rows.tolist(), id(slot.actions)) for slot in lockstep._slots]
-    return slots, sorted(lockstep._by_runner), lockstep._tick
+def state(roster: Lockstep | RealTime) -> Any:
+    slots = [
+        (slot.runner, slot.state, slot.rows.tolist(), id(getattr(slot, "actions", None))) for slot in roster._slots
+    ]
+    return slots, sorted(roster._by_runner), roster._tick
 
 
 def sound(name: str = "a") -> bytes:

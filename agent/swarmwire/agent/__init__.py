@@ -1,6 +1,7 @@
 """The robots' side: write an `Agent` for one robot, or a `VectorAgent` for n at a time, and it runs anywhere."""
 
 from swarmwire.agent.agent import Agent
+from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.outcome import Outcome
 from swarmwire.agent.packet import Packet
 from swarmwire.agent.per_robot import PerRobot, per_robot
@@ -11,6 +12,7 @@ from swarmwire.comms.messages import Message, f4, f8, i1, i2, i4, u1, u2, u4
 from swarmwire.comms.outcomes import Outcomes, SendResult
 
 __all__ = [
+    "API_VERSION",
     "Agent",
     "BoolColumn",
     "FloatColumn",

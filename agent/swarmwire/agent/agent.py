@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
+from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.robot import Robot
 
 
@@ -12,9 +13,11 @@ class Agent(ABC):
     Annotated class attributes (float, int, bool, str) are its parameters, set before `__init__` runs; what it should
     remember it keeps in attributes of its own, made in `__init__`. `needs` names the senses of the body that it reads
     ("proximity", "compass", "odometry"), what it reads of a packet ("radio.range", "radio.bearing"), and
-    "radio.outcomes" if it wants to know what became of packets that it sent to one robot.
+    "radio.outcomes" if it wants to know what became of packets that it sent to one robot. `api = 1` in its class says
+    for which version of swarmwire.agent it was written: any other refuses it.
     """
 
+    api: ClassVar[int] = API_VERSION
     needs: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod

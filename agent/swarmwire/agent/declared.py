@@ -10,8 +10,8 @@ from swarmwire.agent.per_robot import PerRobot, PerRobotDefault
 from swarmwire.agent.vector_agent import VectorAgent
 
 T = TypeVar("T")
-TYPES: dict[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
-REQUIRED = object()
+TYPES: dict[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}  # in words
+REQUIRED = object()  # in place of a default
 
 
 class BadParameter(ValueError):
@@ -36,7 +36,7 @@ def parameters_of(kind: type) -> dict[str, Parameter]:
     """The parameters that an agent class declares, bases first; TypeError if a type is one that no scenario gives."""
     found: dict[str, Parameter] = {}
     for name, hint in get_type_hints(kind).items():
-        if name.startswith("_") or get_origin(hint) is ClassVar or hint is ClassVar:
+        if name.startswith("_") or name == "needs" or get_origin(hint) is ClassVar or hint is ClassVar:
             continue
         per_robot = get_origin(hint) is PerRobot
         if per_robot and VectorAgent not in kind.__mro__:

@@ -8,6 +8,8 @@ from swarmwire.comms.clock import to_s
 class Handle:
     """A view of one tick of one group."""
 
+    __slots__ = ("_turn",)
+
     def __init__(self, turn: Turn) -> None:
         self._turn = turn
 

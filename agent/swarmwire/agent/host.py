@@ -12,10 +12,10 @@ from swarmwire.agent.loading import AgentClass, load_agent
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.turn import Turn
-from swarmwire.agent.vector_agent import State, VectorAgent, state_of
+from swarmwire.agent.vector_agent import State, VectorAgent, freeze, state_of
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
-from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
@@ -79,7 +79,7 @@ class Hosted(ABC):
         if turn.n:  # no step for nobody: an agent must not tell whether others share its process
             self.step(turn)
         self._sent_before[place] = sent_before
-        return turn.actions()
+        return turn.end()
 
     def _own_outcomes(self, outcomes: Outcomes, rows: IntArray, place: slice | IntArray) -> Outcomes:
         """The outcomes of the robots `rows`, with the sender as a place in `rows`; a copy, which agents may write to.
@@ -110,17 +110,18 @@ class _Vector(Hosted):
         self._agent = make(kind, group.params, len(group.rows))
         per_robot = [name for name, parameter in parameters_of(kind).items() if parameter.per_robot]
         self._per_robot: dict[str, FloatArray | IntArray] = {name: getattr(self._agent, name) for name in per_robot}
+        freeze(self._agent, self._per_robot)
         self._state: State = state_of(kind).fresh(len(group.rows))
 
     def step(self, turn: Turn) -> None:
-        for name, values in self._per_robot.items():
-            setattr(self._agent, name, values[np.searchsorted(self.group.rows, turn.senses.rows)])
+        if self._per_robot:
+            place = np.searchsorted(self.group.rows, turn.senses.rows)
+            freeze(self._agent, {name: values[place] for name, values in self._per_robot.items()})
         try:
             self._agent.step(Robots(turn), self._state)
         except (Exception, SystemExit) as error:
             place = np.searchsorted(self.group.rows, turn.senses.rows)
-            names = robots_text([self.group.robot_names[at] for at in place])
-            raise AgentFailed(names, traceback.format_exc()) from error
+            raise _failed([self.group.robot_names[at] for at in place], error, turn) from error
 
     def keep(self, rows: IntArray) -> None:
         self._state = self._state.moved(self.rows, rows)
@@ -140,7 +141,7 @@ class _Single(Hosted):
                 self._agents[row].step(Robot(turn, at))
             except (Exception, SystemExit) as error:
                 name = self.group.robot_names[int(np.searchsorted(self.group.rows, row))]
-                raise AgentFailed(name, traceback.format_exc()) from error
+                raise _failed([name], error, turn) from error
 
     def keep(self, rows: IntArray) -> None:
         known = self._agents
@@ -154,7 +155,16 @@ def hosted(group: GroupAssignment, kind: AgentClass) -> Hosted:
     try:
         return _Vector(group, kind) if issubclass(kind, VectorAgent) else _Single(group, kind)
     except (Exception, SystemExit) as error:
-        raise AgentFailed(robots_text(list(group.robot_names)), traceback.format_exc()) from error
+        raise _failed(list(group.robot_names), error) from error
+
+
+def _failed(robots: list[str], error: BaseException, turn: Turn | None = None) -> AgentFailed:
+    """The failure of an agent, told from its own first line on, and when it was."""
+    own = error.__traceback__
+    while own is not None and own.tb_frame.f_globals["__name__"] in (__name__, make.__module__):
+        own = own.tb_next
+    when = f"in tick {turn.tick}, at {to_s(turn.time_ns):g} s\n" if turn else ""
+    return AgentFailed(robots_text(robots), "".join(traceback.format_exception(type(error), error, own)) + when)
 
 
 def _own(heard: Heard, rows: IntArray) -> Heard:

@@ -3,13 +3,12 @@
 from typing import Any, cast
 
 from swarmwire.agent.agent import Agent
+from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.declared import parameters_of
 from swarmwire.agent.vector_agent import VectorAgent
-from swarmwire.comms.loading import NotLoaded, load_named, resolve
+from swarmwire.comms.loading import NotLoaded, load_named
 
-AgentClass = type[Agent] | type[VectorAgent[Any]]
-
-__all__ = ["AgentClass", "NoAgent", "load_agent", "resolve"]
+AgentClass = type[Agent] | type[VectorAgent[Any]]  # what a scenario's `agent` names
 
 
 class NoAgent(ValueError):
@@ -29,6 +28,8 @@ def load_agent(spec: str) -> AgentClass:
     kind = cast(AgentClass, found)
     if getattr(kind, "__abstractmethods__", None):
         raise NoAgent(f"{name} has no step method")
+    if kind.api != API_VERSION:
+        raise NoAgent(f"{name}.api: expected {API_VERSION}, which swarmwire.agent has here, got {kind.api!r}")
     needs: Any = kind.needs  # the user's: it may be anything
     if type(needs) is not tuple or not all(type(need) is str for need in cast("tuple[object, ...]", needs)):
         raise NoAgent(f'{name}.needs: expected a tuple of texts such as ("proximity",), got {needs!r}')

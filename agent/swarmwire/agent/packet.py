@@ -15,7 +15,7 @@ class NotDeclared(AttributeError):
 
 
 class Columns:
-    """The fields of many messages of one class, each an array (k,) under its own name."""
+    """The fields of k messages of one class, each a float64 array (k,) under its own name."""
 
     def __init__(self, fields: dict[str, FloatArray]) -> None:
         self._fields = fields
@@ -28,6 +28,8 @@ class Columns:
 
 class Packets(Generic[M]):
     """All packets of one message class that n robots heard, k rows sorted by robot, then by time."""
+
+    message: Columns  # every field of the message under its name, (k,) each
 
     def __init__(self, robots: int, table: Heard, fields: dict[str, FloatArray], needs: tuple[str, ...]) -> None:
         self._robots, self._table, self._needs = robots, table, needs
@@ -91,6 +93,8 @@ class Packet(Generic[M]):
     """One packet that a robot heard."""
 
     __slots__ = ("_all", "_at", "message")
+
+    message: M  # what was sent, frozen; of a dict a copy
 
     def __init__(self, packets: Packets[M], at: int, message: M) -> None:
         self._all, self._at, self.message = packets, at, message

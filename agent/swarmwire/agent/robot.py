@@ -1,7 +1,6 @@
 """Robot: the handle through which an Agent's step sees and moves its one robot."""
 
-from functools import cached_property
-from typing import Any, TypeVar, overload
+from typing import Any, TypeVar, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,15 +38,20 @@ M = TypeVar("M", bound=Message)
 class Robot(Handle):
     """One robot in one tick. Senses raise NotDeclared unless the agent's `needs` name them."""
 
+    __slots__ = ("_draw", "_row", "radio")
+
     def __init__(self, turn: Turn, row: int) -> None:
         super().__init__(turn)
         self._row = row
+        self._draw: Draw | None = None
         self.radio = RadioPort(turn, row)
 
-    @cached_property
+    @property
     def draw(self) -> Draw:
         """Random draws of the robot's own."""
-        return Draw(self._turn.keys[self._row : self._row + 1], self._turn.tick)
+        if self._draw is None:
+            self._draw = Draw(self._turn.keys[self._row : self._row + 1], self._turn.tick)
+        return self._draw
 
     @property
     def proximity(self) -> ProximityReading:
@@ -123,7 +127,8 @@ class Robot(Handle):
     def drive(self, linear_mps: float, angular_radps: float, lateral_mps: float = 0.0) -> None:
         """Wanted forward speed and turn rate (positive to the left); they hold until the next call.
 
-        A body with a holonomic drive can also move sideways, positive to the left.
+        A body with a holonomic drive can also move sideways, positive to the left. What the body cannot do is clipped,
+        and nan is no command: the last one holds (`clipped_commands` and `nan_commands` in the summary).
         """
         self._turn.drive[self._row] = True
         self._turn.linear_mps[self._row] = linear_mps
@@ -165,7 +170,7 @@ class RadioPort:
     def heard(self, kind: type[dict[str, Any]]) -> "list[Packet[dict[str, Any]]]": ...
     def heard(self, kind: type[Any]) -> "list[Packet[Any]]":
         """The packets of a message class (or `dict`) heard since the robot's last step, by time."""
-        if issubclass(kind, Message):
+        if kind is not dict:
             packets = self._turn.packets(kind)
             span = self._span(packets.row)
             columns = {name: getattr(packets.message, name)[span.start : span.stop].tolist() for name in kind.ranges}
@@ -173,8 +178,6 @@ class RadioPort:
                 Packet(packets, at, kind(**{name: column[place] for name, column in columns.items()}))
                 for place, at in enumerate(span)
             ]
-        if not issubclass(kind, dict):
-            raise TypeError(f"expected a class of Message, or dict, got {kind}")
         table = self._turn.tagged(DICT_TAG)
         dicts = Packets[dict[str, Any]](self._turn.n, table, {}, self._turn.needs)
         return [
@@ -183,13 +186,12 @@ class RadioPort:
 
     def send(self, message: Message | dict[str, Any], to: int | None = None) -> int:
         """Send to all who hear it, or to the robot with index `to` in the arena; returns the packet's id."""
-        payload = encode_dict(message) if isinstance(message, dict) else message.encode()
-        return int(self._turn.send(np.array([self._row]), to, Payloads.of([payload]))[0])
+        return int(self._turn.send(np.array([self._row]), to, Payloads.of([_encoded(message)]))[0])
 
     @property
     def outcomes(self) -> list[Outcome]:
         """Packets sent to one robot that the radio is done with since the robot's last step, by id."""
-        table = self._turn.outcomes
+        table = self._turn.outcomes()
         ids, results = table.id.tolist(), table.result.tolist()
         return [Outcome(ids[at], SendResult(results[at])) for at in self._span(table.row)]
 
@@ -197,3 +199,11 @@ class RadioPort:
         if not len(row):
             return range(0)
         return range(int(row.searchsorted(self._row)), int(row.searchsorted(self._row + 1)))
+
+
+def _encoded(message: object) -> bytes:
+    if isinstance(message, Message):
+        return message.encode()
+    if isinstance(message, dict):
+        return encode_dict(cast("dict[str, Any]", message))
+    raise TypeError(f"send(message): expected a message or a dict, got {message!r}")

@@ -26,7 +26,7 @@ from swarmwire.agent.readings import (
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.bodies.leds import rgb_of
-from swarmwire.comms.messages import Message, encode_rows
+from swarmwire.comms.messages import Message, encode_rows, message_class
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.sheets import Sheet
 
@@ -37,6 +37,8 @@ N = TypeVar("N", float, FloatArray)
 
 class Robots(Handle):
     """n robots of one group in one tick; every array has a leading axis n. Senses raise NotDeclared unless needed."""
+
+    __slots__ = ("draw", "radio")
 
     def __init__(self, turn: Turn) -> None:
         super().__init__(turn)
@@ -126,7 +128,7 @@ class Robots(Handle):
         Bodies with a holonomic drive can also move sideways, positive to the left.
         """
         turn = self._turn
-        moved = True if rows is None else rows
+        moved = True if rows is None else turn.mask(rows)
         np.copyto(turn.drive, True, where=moved)
         np.copyto(turn.linear_mps, linear_mps, where=moved)
         np.copyto(turn.angular_radps, angular_radps, where=moved)
@@ -150,7 +152,7 @@ class Robots(Handle):
         Each share, 0 to 1, is (n,) or one number; all 0: dark. It holds until the next call. NotFitted if the bodies
         have no LEDs, ValueError if they have not that one.
         """
-        here = True if rows is None else rows[:, None]
+        here = True if rows is None else self._turn.mask(rows)[:, None]
         np.copyto(self._turn.leds(which), rgb_of(red, green, blue)[..., None], where=here)
 
     def actuate(self, name: str, values: ArrayLike, rows: BoolArray | None = None) -> None:
@@ -160,11 +162,11 @@ class Robots(Handle):
         they do not count. What they do, and for how long, is the actuator's to know. NotFitted if the bodies have none
         of this name, ValueError if the numbers do not fit or are not finite.
         """
-        self._turn.actuate(name, values, slice(None), rows)
+        self._turn.actuate(name, values, slice(None), None if rows is None else self._turn.mask(rows))
 
     def note(self, state: str, rows: BoolArray | None = None) -> None:
         """Name what the robots of the mask `rows`, or all, are at; for recordings and pictures, until the next call."""
-        self._turn.note(slice(None) if rows is None else rows, state)
+        self._turn.note(slice(None) if rows is None else self._turn.mask(rows), state)
 
 
 class RadioRows:
@@ -180,14 +182,15 @@ class RadioRows:
     @property
     def outcomes(self) -> Outcomes:
         """Packets sent to one robot that the radios are done with since the last step: row (0 to n - 1), id, result."""
-        return self._turn.outcomes
+        return self._turn.outcomes()
 
     def send(
         self,
         kind: type[Message],
+        /,
         rows: BoolArray | None = None,
         to: IntArray | int | None = None,
-        **fields: FloatArray | float,
+        **fields: ArrayLike,
     ) -> IntArray:
         """Send a message from each robot, or those of the mask `rows`; each field is (n,) or one number.
 
@@ -195,10 +198,10 @@ class RadioRows:
 
         Returns the ids of the packets, in the order of the robots that sent.
         """
-        n = self._turn.n
+        message_class(kind)
         if rows is None:
-            return self._turn.send(None, to, encode_rows(kind, n, fields))
-        row = np.flatnonzero(rows)
+            return self._turn.send(None, to, encode_rows(kind, self._turn.n, fields))
+        row = np.flatnonzero(self._turn.mask(rows))
         columns = {name: _of(rows, value) for name, value in fields.items()}
         return self._turn.send(row, None if to is None else _of(rows, to), encode_rows(kind, len(row), columns))
 

@@ -1,6 +1,6 @@
 """One tick of one group: what its robots sense and hear, and what they do, as arrays behind both kinds of handle."""
 
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,14 +11,14 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
 from swarmwire.comms.bodies.body import NotFitted
 from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
-from swarmwire.comms.messages import Message, decode_alike, decode_rows
+from swarmwire.comms.messages import Message, decode_alike, decode_rows, message_class
 from swarmwire.comms.notes import Notes, checked_state
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
 
 M = TypeVar("M", bound=Message)
-OUTCOMES = "radio.outcomes"
+OUTCOMES = "radio.outcomes"  # what `needs` calls the outcomes of addressed packets
 NOT_SWITCHED = -1
 
 
@@ -63,7 +63,6 @@ class Turn:
         of = f"{sense}."
         return {name.removeprefix(of): values for name, values in self.senses.fields.items() if name.startswith(of)}
 
-    @property
     def outcomes(self) -> Outcomes:
         """What became of packets that these robots sent; NotDeclared if the agent's needs do not name it."""
         self._require(OUTCOMES)
@@ -73,6 +72,7 @@ class Turn:
         """All packets of a message class that these robots heard."""
         known = self._packets.get(kind)
         if known is None:
+            message_class(kind)
             table = self.heard
             fields = decode_alike(kind, table.payloads, table.payload)
             if fields is None:  # messages of several kinds were heard
@@ -96,14 +96,21 @@ class Turn:
         receiver = np.full(len(payloads), BROADCAST)
         if to is not None:
             receiver[:] = to
-            if (receiver < 0).any():
-                raise ValueError("send(to=…): expected the index of a robot in the arena, 0 or more")
+            if (receiver < 0).any() or (receiver != to).any():
+                raise ValueError(f"send(to=…): expected the index of a robot in the arena, 0 or more, got {to}")
         ids = self._sent_before[place].copy()
         self._sent_before[place] += 1
         # Whoever does not ask is not told, and nothing of it crosses the wire.
         outcome_id = np.where(receiver == BROADCAST, UNTOLD, ids) if self._asks else None
         self._outbox.append(Sent(self.senses.rows[place], receiver, payloads, outcome_id))
         return ids
+
+    def mask(self, rows: BoolArray) -> BoolArray:
+        """The mask that a VectorAgent gives; TypeError unless it is one."""
+        given = np.asarray(rows)
+        if given.dtype != np.bool_ or given.shape != (self.n,):
+            raise TypeError(f"rows: expected a mask, bool ({self.n},), got {given.dtype} {given.shape}")
+        return given
 
     def note(self, rows: IntArray | BoolArray | slice, state: str) -> None:
         """Name a state for some of the robots; the last one named in a tick counts."""
@@ -146,8 +153,18 @@ class Turn:
             raise ValueError(f"actuate({name!r}, …): expected finite numbers, got {values!r}")
         of[here] = given
 
-    def actions(self) -> Actions:
-        """What the robots did."""
+    def end(self) -> Actions:
+        """What the robots did; whoever still has a handle of this tick is refused from now on."""
+        actions = self._actions()
+        vars(self).clear()
+        return actions
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name):
+            raise RuntimeError("robot and radio hold for one step: use those that this step is given, keep none")
+
+    def _actions(self) -> Actions:
         sent = Sent.joined(self._outbox)
         command = self.linear_mps, self.angular_radps, self.lateral_mps
         return Actions(

@@ -6,12 +6,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_arg
 import numpy as np
 from numpy.typing import NDArray
 
+from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.robots import Robots
-from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.arrays import FloatArray, IntArray
 
-FloatColumn = NDArray[np.float64]
-IntColumn = NDArray[np.int64]
-BoolColumn = NDArray[np.bool_]
+FloatColumn = NDArray[np.float64]  # float64, (n,)
+IntColumn = NDArray[np.int64]  # int64, (n,)
+BoolColumn = NDArray[np.bool_]  # bool, (n,)
+
+
+FROZEN = "_frozen"  # attribute of a VectorAgent once it is made
 
 
 class _Default:
@@ -39,6 +43,8 @@ class State:
         cls.columns = dict(cls.columns)
         for name, hint in get_type_hints(cls).items():
             default = getattr(cls, name, None)
+            if name != "columns" and hasattr(State, name):
+                raise TypeError(f"{cls.__name__}.{name}: the name is taken by State")
             if isinstance(default, _Default) and hint in (FloatColumn, IntColumn, BoolColumn):
                 dtype = np.dtype(get_args(get_args(hint)[1])[0])
                 cls.columns[name] = (dtype, default.value)
@@ -61,7 +67,12 @@ class State:
             raise AttributeError(
                 f"{type(self).__name__} has no column {name!r}; it has {', '.join(self.columns) or 'none'}"
             )
-        getattr(self, name)[...] = value
+        column = getattr(self, name)
+        if not np.can_cast(np.asarray(value).dtype, column.dtype, "same_kind"):
+            raise TypeError(
+                f"{type(self).__name__}.{name}: a column of {column.dtype} takes no {np.asarray(value).dtype}"
+            )
+        column[...] = value
 
     def moved(self, old_rows: IntArray, new_rows: IntArray) -> Self:
         """The state of robots `new_rows`: rows of those in `old_rows` (both rising) are kept, others start afresh."""
@@ -83,16 +94,30 @@ else:
 class VectorAgent(ABC, Generic[S]):
     """Decides for the robots of a group, n at a time, each row from its own senses and packets alone.
 
-    One instance serves all robots of a group in a process, over all arenas; so nothing may be kept on `self` but
-    parameters (annotated class attributes, as for Agent, or `PerRobot`). `class Search(VectorAgent[Memory])` names its
-    State.
+    One instance serves all robots of a group in a process, over all arenas; so nothing can be set on `self` once it is
+    made: it has parameters (annotated class attributes, as for Agent, or `PerRobot`) and what `__init__` makes of them.
+    What it remembers of its robots is in its State, which `class Search(VectorAgent[Memory])` names.
+    `api = 1` is as for Agent.
     """
 
+    api: ClassVar[int] = API_VERSION
     needs: ClassVar[tuple[str, ...]] = ()
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if FROZEN in vars(self):
+            raise AttributeError(
+                f"{type(self).__name__}.{name}: one instance serves many robots; memory goes into a State"
+            )
+        super().__setattr__(name, value)
 
     @abstractmethod
     def step(self, robots: Robots, state: S) -> None:
         """Called once a tick with the robots that act in it: read `robots`, then drive and send."""
+
+
+def freeze(agent: VectorAgent[Any], per_robot: dict[str, FloatArray | IntArray]) -> None:
+    """Let nothing be set on an agent any more, but, by calling this again, parameters per robot."""
+    vars(agent).update(per_robot, **{FROZEN: True})
 
 
 def state_of(kind: type[VectorAgent[Any]]) -> type[State]:

@@ -31,4 +31,4 @@ class Actuations:
         )
 
 
-NO_ACTUATIONS = Actuations(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
+NO_ACTUATIONS = Actuations(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))  # nobody acts

@@ -76,7 +76,7 @@ class Assignment:
 
 
 def params_of(params: dict[str, Any], index: IntArray) -> dict[str, Any]:
-    """The parameters of the robots `index` alone: of a list, which has a value for each robot, theirs."""
+    """The parameters of the robots `index` (k,) alone: of a list, which has a value for each robot, theirs."""
     return {
         name: [cast("list[Any]", value)[i] for i in index.tolist()] if isinstance(value, list) else value
         for name, value in params.items()
@@ -84,7 +84,11 @@ def params_of(params: dict[str, Any], index: IntArray) -> dict[str, Any]:
 
 
 def robots_text(names: list[str]) -> str:
-    """Robot names in a few words."""
+    """Robot names in a few words.
+
+    >>> robots_text(["flock-0", "flock-1", "flock-2", "flock-3"])
+    'flock-0 … flock-3 (4 robots)'
+    """
     if len(names) <= 3:
         return ", ".join(names)
     return f"{names[0]} … {names[-1]} ({len(names)} robots)"

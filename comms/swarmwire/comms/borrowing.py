@@ -4,15 +4,34 @@ By default compiled code counts a reference each time that it takes an array out
 functions pass such tuples on a million times a second, that is four fifths of the time. Kernels compiled by this
 allocate nothing, and their caller holds all the arrays until they return. (numba compiles parts of itself in this way.)
 They are inlined into one another, so that tuples are not copied from one to the next.
+
+Only those that Python calls have a way in from there: it unpacks every array of every tuple, and for a small function
+that takes twice as long to compile as the function.
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 from numba import njit
 
 
-def borrowing(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """`numba.njit` for kernels that allocate nothing."""
-    uncounted: dict[str, Any] = {"cache": True, "_nrt": False, "forceinline": True}
-    return njit(**uncounted, **options)
+def borrowing(*, from_python: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """`numba.njit` for kernels that allocate nothing; what is not called `from_python` other kernels alone can call."""
+    uncounted: dict[str, Any] = {"cache": True, "_nrt": False, "forceinline": True, "no_cfunc_wrapper": True}
+    compiled = njit(**uncounted, no_cpython_wrapper=not from_python, **options)
+    return compiled if from_python else lambda function: _for_kernels(compiled(function))
+
+
+def _for_kernels(kernel: Any) -> Any:
+    """The kernel, which raises TypeError if Python calls it: numba would call what is not there, and crash."""
+
+    def keep(compiled: Any) -> None:
+        kernel.overloads[tuple(compiled.signature.args)] = compiled
+
+    def refuse(*_: Any, **__: Any) -> NoReturn:
+        raise TypeError(
+            f"{kernel.__name__}: expected a call by another kernel, or from_python=True where it is defined"
+        )
+
+    kernel.add_overload, kernel._compile_for_args = keep, refuse
+    return kernel

@@ -4,11 +4,15 @@ import time
 from datetime import UTC, datetime
 from typing import Protocol
 
-NS_PER_S = 1_000_000_000
+NS_PER_S = 1_000_000_000  # all times are integers, in ns
 
 
 def tick_start_ns(tick: int, rate_hz: int) -> int:
-    """Start of a tick in ns since the start of the run: tick x 10^9 / rate, rounded down."""
+    """Start of a tick in ns since the start of the run: tick x 10^9 / rate, rounded down.
+
+    >>> [tick_start_ns(tick, rate_hz=30) for tick in range(4)]
+    [0, 33333333, 66666666, 100000000]
+    """
     return tick * NS_PER_S // rate_hz
 
 

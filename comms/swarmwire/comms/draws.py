@@ -19,7 +19,7 @@ Words = NDArray[np.uint64]
 MULTIPLIERS = (0xD2511F53, 0xCD9E8D57)
 WEYL = (0x9E3779B9, 0xBB67AE85)
 ROUNDS = 10
-LOW32 = 0xFFFFFFFF
+LOW32 = 0xFFFFFFFF  # the lower half of a key or a number of 64 bits
 TO_UNIT = 2.0**-53
 
 # Wichura's AS241 (PPND16), Applied Statistics 37 (1988): numerator and denominator of the three rational pieces.

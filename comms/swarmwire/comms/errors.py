@@ -5,6 +5,8 @@ SwarmwireError
 ├── AgentFailed         the user's agent raised (exit code 1)
 ├── OwnCodeFailed       the user's sensor or actuator raised (exit code 1)
 ├── RunnerLost          a runner's process or link is gone (exit code 1)
+├── RunGone             the run that a view is to follow does not answer (exit code 1); in deploy
+├── NoGraphics          this machine has nothing to draw with (exit code 1); in metrics
 ├── RecordFailed        a table of the run folder cannot be written: the run goes on without it
 ├── Interrupted         somebody asked for the end of the run (exit code 130)
 └── BadFrame            a message on the wire breaks the protocol: counted and dropped, never fatal

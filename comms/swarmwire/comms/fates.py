@@ -24,4 +24,4 @@ class Fate(Explained):
     JAMMED = 15, "a jammer drowned it: without it the packet would have been right"
 
 
-FATE_NAMES = tuple(fate.name.lower() for fate in Fate)
+FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # by number, as summaries and tables have them

@@ -28,4 +28,4 @@ class LedChanges:
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-NO_LED_CHANGES = LedChanges(*np.empty((3, 0), np.int64))
+NO_LED_CHANGES = LedChanges(*np.empty((3, 0), np.int64))  # nobody switches any

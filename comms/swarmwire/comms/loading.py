@@ -10,6 +10,7 @@ import importlib.util
 import sys
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from traceback import extract_tb
 from types import CodeType
 from typing import Any
 
@@ -38,8 +39,17 @@ def load_named(spec: str) -> object:
     try:
         module = _load_file(Path(place)) if of_file else importlib.import_module(place)
     except (Exception, SystemExit) as error:
-        raise NotLoaded(f"{place} does not import: {type(error).__name__}: {error}") from error
+        raise NotLoaded(f"{place} does not import: {type(error).__name__}: {error}{_hint(error, place)}") from error
     return getattr(module, name, None)
+
+
+def _hint(error: BaseException, place: str) -> str:
+    """In which line of the file it was, and what is amiss if that imports a file beside it."""
+    lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == place]
+    hint = f" (line {lines[-1]})" if lines else ""
+    if isinstance(error, ModuleNotFoundError) and error.name and Path(place).with_name(f"{error.name}.py").is_file():
+        hint += "; a file is loaded alone: it imports what is installed, not what lies beside it"
+    return hint
 
 
 class _SourceLoader(SourceFileLoader):

@@ -1,14 +1,17 @@
 """Messages: what robots say to one another, with the exact bytes that go on air.
 
-    class Beacon(Message):
-        heading_rad: f4
+    >>> class Beacon(Message):
+    ...     heading_rad: f4
+    >>> on_air = Beacon(heading_rad=0.5).encode()
+    >>> len(on_air), Beacon.decode(on_air)
+    (6, Beacon(heading_rad=0.5))
 
 A message on air is a 2-byte tag made from its class name and fields, then its fields packed little-endian. To the type
 checker a field is a `float`, in the constructor and when read: a decoded field is widened to float64 whatever its width
 on air, so that both kinds of agent compute with the same numbers.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from hashlib import blake2b
 from typing import Annotated, Any, ClassVar, Self, cast, dataclass_transform, get_args, get_origin, get_type_hints
 
@@ -18,15 +21,16 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import TAG_BYTES, Payloads
 
-f4 = Annotated[float, np.dtype("<f4")]
-f8 = Annotated[float, np.dtype("<f8")]
-i1 = Annotated[float, np.dtype("<i1")]
-i2 = Annotated[float, np.dtype("<i2")]
-i4 = Annotated[float, np.dtype("<i4")]
-u1 = Annotated[float, np.dtype("<u1")]
-u2 = Annotated[float, np.dtype("<u2")]
-u4 = Annotated[float, np.dtype("<u4")]
+f4 = Annotated[float, np.dtype("<f4")]  # float32 on air
+f8 = Annotated[float, np.dtype("<f8")]  # float64 on air
+i1 = Annotated[float, np.dtype("<i1")]  # int8 on air
+i2 = Annotated[float, np.dtype("<i2")]  # int16 on air
+i4 = Annotated[float, np.dtype("<i4")]  # int32 on air
+u1 = Annotated[float, np.dtype("<u1")]  # uint8 on air
+u2 = Annotated[float, np.dtype("<u2")]  # uint16 on air
+u4 = Annotated[float, np.dtype("<u4")]  # uint32 on air
 
+SEND_NAMES = ("rows", "to")  # arguments of a VectorAgent's `send`, beside which it takes the fields
 DICT_TAG = 0  # a dict in msgpack, for prototypes; no class has this tag
 
 
@@ -34,8 +38,9 @@ DICT_TAG = 0  # a dict in msgpack, for prototypes; no class has this tag
 class Message:
     """Base of all messages; subclasses declare their fields with `f4`, `f8`, `i1` … `u4`.
 
-    Raises TypeError where a class declares a field of another type or an instance is made with a missing or unknown
-    field; `encode` raises OverflowError where a number does not fit its field.
+    Raises TypeError where a class declares a field of another type or with a default, or an instance is made with a
+    missing or unknown field or with anything but numbers; `encode` rounds to whole numbers where a field takes no
+    others, and raises OverflowError where a number does not fit.
     """
 
     tag: ClassVar[int] = -1
@@ -50,11 +55,15 @@ class Message:
         for name, hint in get_type_hints(cls, include_extras=True).items():
             if get_origin(hint) is ClassVar:
                 continue
-            if hasattr(Message, name):
-                raise TypeError(f"{cls.__name__}.{name}: the name is taken by Message")
+            if hasattr(Message, name) or name in SEND_NAMES:
+                raise TypeError(
+                    f"{cls.__name__}.{name}: the name is taken by {'send' if name in SEND_NAMES else 'Message'}"
+                )
             dtype: object = get_args(hint)[-1] if get_origin(hint) is Annotated else None
             if not isinstance(dtype, np.dtype):
                 raise TypeError(f"{cls.__name__}.{name}: expected one of f4, f8, i1, i2, i4, u1, u2, u4")
+            if name in vars(cls):
+                raise TypeError(f"{cls.__name__}.{name}: a field has no default, every message says all of them")
             fields.append((name, cast("np.dtype[Any]", dtype)))
         cls.tag = _tag(cls.__name__, fields)
         cls.on_air = np.dtype([("tag", "<u2"), *fields])
@@ -66,7 +75,10 @@ class Message:
         if fields.keys() != self.ranges.keys():
             raise _wrong_fields(type(self), fields)
         for name, value in fields.items():
-            object.__setattr__(self, name, float(value))
+            try:
+                object.__setattr__(self, name, float(value))
+            except (TypeError, ValueError):
+                raise TypeError(f"{type(self).__name__}.{name}: expected a number, got {value!r}") from None
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a message is frozen: {type(self).__name__}.{name}")
@@ -93,6 +105,20 @@ class Message:
         return cls(**{name: float(fields[name]) for name in cls.ranges})
 
 
+def message_classes(of: type[Message] = Message) -> Iterator[type[Message]]:
+    """Every class of messages that this process knows."""
+    for kind in of.__subclasses__():
+        yield kind
+        yield from message_classes(kind)
+
+
+def message_class(kind: object) -> type[Message]:
+    """The class of messages that this is; TypeError if it is something else, such as a message."""
+    if not isinstance(kind, type) or not issubclass(kind, Message) or kind is Message:
+        raise TypeError(f"expected a class of messages, got {kind!r}")
+    return kind
+
+
 def encode_rows(kind: type[Message], rows: int, fields: dict[str, Any]) -> Payloads:
     """`rows` messages of one class at once; each field is a number or an array (rows,)."""
     if fields.keys() != kind.ranges.keys():
@@ -109,7 +135,9 @@ def encode_rows(kind: type[Message], rows: int, fields: dict[str, Any]) -> Paylo
                     table[name] = values
         except (FloatingPointError, OverflowError):
             what = "whole numbers" if whole else "numbers"
-            raise OverflowError(f"{kind.__name__}.{name}: expected {what} from {lowest:g} to {highest:g}") from None
+            got = _misfit(np.rint(values) if whole else values, lowest, highest)
+            wanted = f"expected {what} from {lowest:.10g} to {highest:.10g}"
+            raise OverflowError(f"{kind.__name__}.{name}: {wanted}, got {got:.10g}") from None
     return Payloads(table.view(np.uint8), np.arange(rows + 1) * kind.size_bytes)
 
 
@@ -150,7 +178,11 @@ def decode_dict(payload: bytes) -> dict[str, Any]:
 
 def _wrong_fields(kind: type[Message], given: Iterable[str]) -> TypeError:
     names = kind.ranges or ("(none)",)
-    return TypeError(f"{kind.__name__} has the fields {', '.join(names)}; got {', '.join(given)}")
+    return TypeError(f"{kind.__name__} has the fields {', '.join(names)}; got {', '.join(given) or 'none'}")
+
+
+def _misfit(values: FloatArray, lowest: float, highest: float) -> float:
+    return float(values[~((values >= lowest) & (values <= highest))].flat[0])
 
 
 def _whole(values: FloatArray, lowest: float, highest: float) -> FloatArray:

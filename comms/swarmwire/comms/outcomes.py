@@ -22,7 +22,7 @@ class SendResult(Explained):
 class Outcomes:
     """Packets that their senders' radios are done with, sorted by (row, id)."""
 
-    row: IntArray  # (k,) sender: robot row, arena x robots + index; to an agent its place among the robots that act
+    row: IntArray  # (k,) sender: to a VectorAgent 0 to n - 1, between crew and air arena x robots + index
     id: IntArray  # (k,) that `send` returned
     result: IntArray  # (k,) SendResult
 
@@ -35,7 +35,7 @@ class Outcomes:
         return self.result == SendResult.ACKNOWLEDGED
 
     def select(self, index: IntArray) -> "Outcomes":
-        """The rows of `index`, in its order."""
+        """The rows of `index` (k,), in its order."""
         return Outcomes(self.row[index], self.id[index], self.result[index])
 
     @classmethod
@@ -50,4 +50,4 @@ class Outcomes:
 
 _NOTHING = np.empty(0, np.int64)
 _NOTHING.setflags(write=False)
-NO_OUTCOMES = Outcomes(_NOTHING, _NOTHING, _NOTHING)
+NO_OUTCOMES = Outcomes(_NOTHING, _NOTHING, _NOTHING)  # nothing to tell

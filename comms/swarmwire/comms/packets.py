@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 
-BROADCAST = -1
+BROADCAST = -1  # addressed to whoever is within reach
 NOWHERE = -2  # addressed to a robot that is not there: numbered, never on air
 UNTOLD = -1  # the outcome id of a packet whose sender does not ask
 TAG_BYTES = 2
@@ -40,7 +40,7 @@ class Payloads:
         return self.data[start].astype(np.int64) | self.data[start + 1].astype(np.int64) << 8
 
     def rows(self, index: IntArray) -> "Payloads":
-        """The rows of `index`, in its order; a row may be taken more than once."""
+        """The rows of `index` (k,), in its order; a row may be taken more than once."""
         sizes = self.sizes
         if len(index) and (sizes == sizes[0]).all():  # as most often: whole rows at a time
             data = self.data.reshape(len(self), sizes[0]).take(index, axis=0)
@@ -103,7 +103,7 @@ class Sent:
         return np.full(len(self), UNTOLD) if self.outcome_id is None else self.outcome_id
 
     def select(self, index: IntArray) -> "Sent":
-        """The packets of `index`, in its order."""
+        """The packets of `index` (k,), in its order."""
         outcome_id = None if self.outcome_id is None else self.outcome_id[index]
         return Sent(self.sender[index], self.to[index], self.payloads.rows(index), outcome_id)
 
@@ -154,7 +154,7 @@ class Heard:
         return cls(_NOTHING, _NOTHING, _NOTHING, _NOTHING, given, _NOTHING, _NO_PAYLOADS)
 
     def select(self, index: IntArray) -> "Heard":
-        """The rows of `index`; the payload table stays shared."""
+        """The rows of `index` (k,); the payload table stays shared."""
         return Heard(
             self.receiver[index],
             self.sender[index],

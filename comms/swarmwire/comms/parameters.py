@@ -40,7 +40,11 @@ def limits_of(of: "Field[Any]") -> Limits:
 
 
 def fault_of(value: float, limits: Limits) -> str | None:
-    """What was expected of `value`, in words, or None if it is within its limits."""
+    """What was expected of `value`, in words, or None if it is within its limits.
+
+    >>> fault_of(-1.0, Limits("how long it lasts", unit="s", above=0.0))
+    'expected more than 0 s, got -1.0'
+    """
     unit = f" {limits.unit}" if limits.unit else ""
     if limits.at_least is not None and not value >= limits.at_least:
         return f"expected at least {limits.at_least:g}{unit}, got {value!r}"

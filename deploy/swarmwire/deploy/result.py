@@ -7,10 +7,9 @@ from typing import Any
 
 from swarmwire.deploy.record.inputs import InputsRecord
 from swarmwire.deploy.record.scenario_copy import CopiedFile
-from swarmwire.metrics.record.whole_text import write_whole
+from swarmwire.metrics.record.formats import SUMMARY_FORMAT
+from swarmwire.metrics.whole_file import write_whole
 from swarmwire.world.crews.realtime_crew import RealTimeReport
-
-SUMMARY_FORMAT = 1
 
 
 @dataclass(frozen=True)

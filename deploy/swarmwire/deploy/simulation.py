@@ -29,6 +29,7 @@ from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.record.run_record import RunRecord
 from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
+from swarmwire.deploy.too_large import TooLarge
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
@@ -107,7 +108,7 @@ class Simulation:
         self.controls = Controls(self._clock, rate_hz, self._pace)
         self.run_id, self.interrupt, self.metrics = new_run_id(), Interrupt(), Metrics()
         self._observers: list[Guarded] = []
-        for observer in (*self._recorders(what), *observers):
+        for observer in (TooLarge(self._record.say), *self._recorders(what), *observers):
             self.watch(observer)
         self._losses: list[Loss] = []
         self._crews = self._new_crews(socket)

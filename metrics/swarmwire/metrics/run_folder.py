@@ -2,14 +2,16 @@
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeGuard, cast
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.record.distance_totals import distance_totals_schema
 from swarmwire.metrics.record.event_recorder import event_schema
+from swarmwire.metrics.record.formats import SUMMARY_FORMAT, TABLES_FORMAT, refuse_other_format
 from swarmwire.metrics.record.link_totals import link_totals_schema
 from swarmwire.metrics.record.names import STATIC, SUMMARY
 from swarmwire.metrics.record.packet_columns import packet_schema
@@ -55,9 +57,10 @@ class RunFolder:
             return None
         except (OSError, ValueError) as error:
             raise BadInput(str(path), "", f"expected the summary of a run: {error}") from error
+        refuse_other_format(found, SUMMARY_FORMAT, path)
         if not _is_summary(found):
-            raise BadInput(str(path), "", "expected the summary of a run, format 1")
-        return cast("dict[str, Any]", found)
+            raise BadInput(str(path), "", "expected the summary of a run")
+        return found
 
     @cached_property
     def _static(self) -> Static:
@@ -162,6 +165,12 @@ class RunFolder:
         files = self.files(name)
         return str(files[0] if len(files) == 1 else self.path / name)
 
+    def _refuse_other_format(self) -> None:
+        """Tables are of the format of the static part; should that be missing or damaged, they can be read still."""
+        path = self.path / STATIC
+        with suppress(OSError, ValueError):
+            refuse_other_format(json.loads(path.read_text(encoding="utf-8")), TABLES_FORMAT, path)
+
     def _checked(self, arena: int) -> int:
         if not 0 <= arena < self.static.arenas:
             raise BadInput(str(self.path), "arena", f"expected 0 to {self.static.arenas - 1}, got {arena}")
@@ -170,6 +179,7 @@ class RunFolder:
     def _read(self, name: str, arena: int | None, left_out: Sequence[str] = ()) -> "pl.DataFrame":
         import polars as pl
 
+        self._refuse_other_format()
         for _ in range(CHANGES_UNDERFOOT):
             files = self.files(name)
             if not files:
@@ -198,14 +208,14 @@ def _repeated(rows: int, times: int) -> "pl.Series":
     return pl.Series(np.repeat(np.arange(rows, dtype=np.uint32), times))
 
 
-def _is_summary(found: object) -> bool:
+def _is_summary(found: object) -> TypeGuard[dict[str, Any]]:
     """Whether all is there, of the right kind, that is read from a summary."""
     if not isinstance(found, dict):
         return False
     summary = cast("dict[str, Any]", found)
     kinds = {"ticks": int, "sim_time_s": (int, float), "ended": str, "events": list, "metrics": (dict, list)}
-    kinds |= {"record": dict, "arenas": int, "trajectory_sha256": list}
-    if summary.get("format") != 1 or not all(isinstance(summary.get(key), kind) for key, kind in kinds.items()):
+    kinds |= {"record": dict, "arenas": int, "trajectory_sha256": list, "format": int}
+    if not all(isinstance(summary.get(key), kind) for key, kind in kinds.items()):
         return False
     hashes: list[Any] = summary["trajectory_sha256"]
     return summary["ticks"] >= 0 and len(hashes) == summary["arenas"] and all(isinstance(item, str) for item in hashes)

@@ -18,8 +18,8 @@ from swarmwire.deploy.terminal.sparkline import sparkline
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.runner_health import RunnerHealth
+from tests.clocks import MS, FakeClock
 from tests.metrics.truths import edges, poses, static, tally, truth
-from tests.world.crews.test_pace import MS, FakeClock
 
 TICKS = 1000
 HEALTH = RunnerHealth(ready=1000, lost=3, late_answers=123456, frames_dropped=7890, watchdog_stops=12)

@@ -11,7 +11,8 @@ from swarmwire.comms.truth import Happened
 from swarmwire.metrics.record import packet_recorder
 from swarmwire.metrics.record.packet_columns import PacketSample
 from swarmwire.metrics.record.packet_recorder import PacketRecorder
-from tests.metrics.recorded import SetClock, links, record
+from tests.clocks import StillClock
+from tests.metrics.recorded import links, record
 from tests.metrics.truths import static, truth
 
 TICK_NS = 100_000_000
@@ -92,7 +93,7 @@ def test_a_larger_share_keeps_what_a_smaller_one_does():
 @pytest.mark.parametrize("share", [0.0, -0.1, 1.1, float("nan")])
 def test_a_share_that_is_none_is_refused(tmp_path, share):
     with pytest.raises(BadInput, match="packets: expected a share above 0"):
-        PacketRecorder(tmp_path, SetClock(), share)
+        PacketRecorder(tmp_path, StillClock(), share)
 
 
 def test_packets_are_off_unless_asked_for(tmp_path):

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.fates import Fate
 from swarmwire.metrics.metrics import Metrics
@@ -12,7 +13,8 @@ from swarmwire.metrics.record.part_files import parts_of
 from swarmwire.metrics.record.tick_recorder import TickRecorder
 from swarmwire.metrics.registry import METRICS
 from swarmwire.metrics.swarm.order import Order
-from tests.metrics.recorded import SetClock, record, wandering
+from tests.clocks import StillClock
+from tests.metrics.recorded import record, wandering
 from tests.metrics.truths import edges, static, tally, truth
 
 FIELDS = {
@@ -54,7 +56,7 @@ def test_every_tick_comes_back_however_it_was_cut_into_parts(tmp_path_factory, t
 
 def test_metrics_are_those_measured_and_null_where_undefined(tmp_path):
     of, metrics = static(3, arenas=2), Metrics()
-    recorder = TickRecorder(tmp_path, metrics, SetClock())
+    recorder = TickRecorder(tmp_path, metrics, StillClock())
     expected = {name: [] for name in METRICS}
     for observer in (metrics, recorder):
         observer.begin(of)
@@ -78,7 +80,7 @@ def test_the_radios_counts_are_those_of_the_tick_and_null_without_a_radio(tmp_pa
 
 
 def test_a_slow_run_writes_a_part_every_two_seconds(tmp_path):
-    of, clock, metrics = static(2), SetClock(), Metrics()
+    of, clock, metrics = static(2), StillClock(), Metrics()
     recorder = TickRecorder(tmp_path, metrics, clock)
     for observer in (metrics, recorder):
         observer.begin(of)
@@ -86,7 +88,7 @@ def test_a_slow_run_writes_a_part_every_two_seconds(tmp_path):
     original = recorder._writer.put
     recorder._writer.put = lambda chunk: parts.append(chunk.rows) or original(chunk)
     for seen in wandering(of, 9):
-        clock.now_s += 0.7
+        clock.time_ns += 7 * NS_PER_S // 10
         for observer in (metrics, recorder):
             observer.see(seen)
     assert parts == [3, 3, 3]
@@ -101,4 +103,4 @@ def test_a_metric_named_like_a_column_is_refused(tmp_path):
 
     metrics = Metrics([Heard()])
     with pytest.raises(BadInput, match=r"metrics\.heard: expected another name"):
-        TickRecorder(tmp_path, metrics, SetClock()).begin(static(2))
+        TickRecorder(tmp_path, metrics, StillClock()).begin(static(2))

@@ -1,4 +1,4 @@
-"""The hand-shake with runners: who joins gets robots, and what does not fit is counted and changes nothing."""
+"""The hand-shake with runners, in lockstep and in real time: what does not fit is counted and changes nothing."""
 
 import msgpack
 import numpy as np
@@ -6,20 +6,28 @@ import pytest
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.wire import frames
-from swarmwire.world.crews.lockstep import Refused
+from swarmwire.world.crews.lockstep import Lockstep
+from swarmwire.world.crews.realtime import RealTime
+from swarmwire.world.crews.roster import Refused
 from tests.agent.hosts import GIVES, assignment, group
-from tests.world.locksteps import FLOCK, joined, ready, request, state, two
+from tests.world.locksteps import FLOCK, joined, ready, request, state, two, two_in_real_time
+
+Made = Lockstep | RealTime
 
 
-def test_runners_get_robots_in_the_order_in_which_they_join() -> None:
-    lockstep = two()
-    name, reply = lockstep.join(request("second-named-first"))
+@pytest.fixture(params=[two, two_in_real_time], ids=["lockstep", "real time"])
+def roster(request: pytest.FixtureRequest) -> Made:
+    return request.param()
+
+
+def test_runners_get_robots_in_the_order_in_which_they_join(roster: Made) -> None:
+    name, reply = roster.join(request("second-named-first"))
     assert name == "second-named-first"
     got = Assignment.from_mapping(msgpack.unpackb(reply))
     assert got.robots_text == "flock-0 … lone-3 (4 robots)"
     assert got.groups[0].keys.tolist() == group("", FLOCK).keys[:2].tolist()
-    assert Assignment.from_mapping(msgpack.unpackb(lockstep.join(request("a"))[1])).groups[0].rows.tolist() == [4, 5]
-    assert not lockstep.counts()
+    assert Assignment.from_mapping(msgpack.unpackb(roster.join(request("a"))[1])).groups[0].rows.tolist() == [4, 5]
+    assert not roster.counts()
 
 
 def test_an_assignment_comes_over_whole() -> None:
@@ -51,53 +59,52 @@ def test_an_assignment_comes_over_whole() -> None:
     ],
     ids=repr,
 )
-def test_a_bad_request_is_refused_counted_and_changes_nothing(bad: bytes) -> None:
-    lockstep = joined(two(), "a")
-    before = state(lockstep)
+def test_a_bad_request_is_refused_counted_and_changes_nothing(roster: Made, bad: bytes) -> None:
+    joined(roster, "a")
+    before = state(roster)
     with pytest.raises(Refused, match="expected a request of version 1"):
-        lockstep.join(bad)
-    assert state(lockstep) == before
-    assert lockstep.counts() == {"bad_join": 1}
+        roster.join(bad)
+    assert state(roster) == before
+    assert roster.counts() == {"bad_join": 1}
 
 
-def test_a_name_in_use_is_refused() -> None:
-    lockstep = joined(two(), "a")
-    before = state(lockstep)
+def test_a_name_in_use_is_refused(roster: Made) -> None:
+    joined(roster, "a")
+    before = state(roster)
     with pytest.raises(Refused, match="in use"):
-        lockstep.join(request("a"))
-    assert state(lockstep) == before
-    assert lockstep.counts() == {"refused_join": 1}
+        roster.join(request("a"))
+    assert state(roster) == before
+    assert roster.counts() == {"refused_join": 1}
 
 
-def test_who_comes_too_late_gets_no_robots() -> None:
-    lockstep = joined(two(), "a", "b")
-    before = state(lockstep)
+def test_who_comes_too_late_gets_no_robots(roster: Made) -> None:
+    joined(roster, "a", "b")
+    before = state(roster)
     with pytest.raises(Refused, match="all robots are taken"):
-        lockstep.join(request("c"))
-    assert state(lockstep) == before
-    assert lockstep.counts() == {"refused_join": 1}
+        roster.join(request("c"))
+    assert state(roster) == before
+    assert roster.counts() == {"refused_join": 1}
 
 
-def test_the_first_tick_may_begin_once_all_are_ready() -> None:
-    lockstep = two()
-    assert lockstep.waiting
-    assert lockstep.missing == ("that did not join", "flock-0 … lone-3 (4 robots)")
-    joined(lockstep, "a", "b")
-    assert lockstep.missing[0] == "a"
-    ready(lockstep, "a")
-    assert lockstep.waiting
-    assert lockstep.missing == ("b", "flock-4 … lone-7 (4 robots)")
-    ready(lockstep, "b")
-    assert not lockstep.waiting
-    assert not lockstep.counts()
+def test_the_first_tick_may_begin_once_all_are_ready(roster: Made) -> None:
+    assert roster.waiting
+    assert roster.missing == ("that did not join", "flock-0 … lone-3 (4 robots)")
+    joined(roster, "a", "b")
+    assert roster.missing[0] == "a"
+    ready(roster, "a")
+    assert roster.waiting
+    assert roster.missing == ("b", "flock-4 … lone-7 (4 robots)")
+    ready(roster, "b")
+    assert not roster.waiting
+    assert not roster.counts()
 
 
 @pytest.mark.parametrize("kind", ["actions", "ready"])
-def test_before_the_first_tick_only_a_first_ready_counts(kind: str) -> None:
-    lockstep = joined(two(), "a", "b")
+def test_before_the_first_tick_only_a_first_ready_counts(roster: Made, kind: str) -> None:
+    joined(roster, "a", "b")
     if kind == "ready":
-        ready(lockstep, "a")
-    before = state(lockstep)
-    lockstep.answer("a", frames.encode(kind, -1, {}))
-    assert state(lockstep) == before
-    assert lockstep.counts() == {{"ready": "unexpected_kind_frames", "actions": "wrong_tick_frames"}[kind]: 1}
+        ready(roster, "a")
+    before = state(roster)
+    roster.answer("a", frames.encode(kind, -1, {}))
+    assert state(roster) == before
+    assert roster.counts() == {{"ready": "unexpected_kind_frames", "actions": "wrong_tick_frames"}[kind]: 1}

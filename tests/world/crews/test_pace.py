@@ -6,24 +6,7 @@ from swarmwire.comms.packets import Heard
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime_crew import PacedCrew
 from tests.agent.hosts import GIVES, assignment, group, one_group, spec
-
-MS = NS_PER_S // 1000
-ORIGIN_NS = 77
-
-
-class FakeClock:
-    """A clock that moves only when it is told to, or slept on."""
-
-    def __init__(self) -> None:
-        self.time_ns = ORIGIN_NS
-        self.slept_until: list[int] = []
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, at_ns: int) -> None:
-        self.slept_until.append(at_ns)
-        self.time_ns = max(self.time_ns, at_ns)
+from tests.clocks import MS, ORIGIN_NS, FakeClock
 
 
 def paced(factor: float = 1.0, rate_hz: int = 10) -> tuple[FakeClock, Pace, list[str]]:

@@ -19,7 +19,7 @@ from swarmwire.world.crews.realtime import RealTime
 from swarmwire.world.crews.roster import OnLoss
 from swarmwire.world.crews.runner_health import RunnerHealth
 from tests.agent.hosts import GIVES, assignment, group, heard_from, one_group
-from tests.world.crews.test_pace import FakeClock
+from tests.clocks import FakeClock
 
 ROWS = [0, 1, 2, 3]
 OWN = {"a": [0, 2], "b": [1, 3]}

@@ -33,7 +33,7 @@ class Mailbox:
         return here.select(np.flatnonzero(acts))
 
     def hand_over_outcomes(self, tick: int, outcomes: Outcomes, alive: BoolArray) -> Outcomes:
-        """The same of `outcomes`."""
+        """The same of `outcomes`; `alive` is (rows,)."""
         if self._always:
             return outcomes
         here = Outcomes.joined([self._outcomes, outcomes])

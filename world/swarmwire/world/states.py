@@ -23,7 +23,7 @@ class States:
         self.dropped = 0
 
     def take(self, notes: Notes, alive: BoolArray) -> None:
-        """Take down what robots named in a tick; the dead name nothing."""
+        """Take down what robots named in a tick; only those `alive` (rows,) name anything."""
         if not len(notes):
             return
         order = np.argsort(notes.rows)

@@ -20,7 +20,7 @@ class TrajectoryHash:
         self._first_row = [arena * robots for arena in range(arenas + 1)]
 
     def add(self, pose: FloatArray, velocity: FloatArray, command: FloatArray, heard: Heard) -> None:
-        """One tick; tables have a row per robot of all arenas, `heard` is sorted by receiver."""
+        """One tick; tables are (rows, 3), a row per robot of all arenas, `heard` is sorted by receiver."""
         self._add(np.concatenate([pose, velocity, command], axis=1), self._first_row)
         if len(heard):
             first = np.searchsorted(heard.receiver, self._first_row)

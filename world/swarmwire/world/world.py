@@ -24,8 +24,8 @@ from swarmwire.world.engines.choice import engines_of
 from swarmwire.world.own.fitting import made_sensor
 from swarmwire.world.own.sensor import AskedSensor
 from swarmwire.world.physics import Physics
-from swarmwire.world.placement.layout import read_layout
-from swarmwire.world.placement.placement import place
+from swarmwire.world.placement.layout import Layout, read_layout
+from swarmwire.world.placement.placement import Placed, place
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.sensors import SENSORS, Scene
@@ -67,22 +67,9 @@ class World:
         self.keys: KeyArray = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
         layout = read_layout(scenario.arena, scenario.source)
         placed = [place(scenario, layout, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
-        obstacles, pose = tuple(p.obstacles for p in placed), np.stack([p.pose for p in placed])
-        self.static = Static(
-            name=scenario.name,
-            seeds=tuple(seeds),
-            rate_hz=scenario.time.rate_hz,
-            arena_size_m=layout.size_m,
-            boundary=scenario.arena.boundary,
-            obstacles=obstacles,
-            groups=groups,
-            robot_names=scenario.robot_names(),
-            range_m=range_of(scenario.radio) if scenario.radio else None,
-            lights=tuple(p.lights for p in placed),
-            floor=layout.floor,
-        )
-        self.obstacles = obstacle_arrays(obstacles)
-        engines = engines_of(scenario, bodies)
+        self.static = _static_of(scenario, groups, seeds, layout, placed)
+        self.obstacles = obstacle_arrays(self.static.obstacles)
+        engines, pose = engines_of(scenario, bodies), np.stack([p.pose for p in placed])
         self._physics = Physics(self.static, self.obstacles, engines, pose, scenario.physics.steps)
         self.actuators = Actuators(groups, self.keys)
         tick_s = 1.0 / scenario.time.rate_hz
@@ -212,6 +199,24 @@ def _groups(scenario: Scenario, bodies: Mapping[str, Body]) -> tuple[Group, ...]
         groups.append(Group(name, bodies[name], start, start + table.count, table.act_every_ticks))
         start += table.count
     return tuple(groups)
+
+
+def _static_of(
+    scenario: Scenario, groups: tuple[Group, ...], seeds: Sequence[int], layout: Layout, placed: Sequence[Placed]
+) -> Static:
+    return Static(
+        name=scenario.name,
+        seeds=tuple(seeds),
+        rate_hz=scenario.time.rate_hz,
+        arena_size_m=layout.size_m,
+        boundary=scenario.arena.boundary,
+        obstacles=tuple(arena.obstacles for arena in placed),
+        groups=groups,
+        robot_names=scenario.robot_names(),
+        range_m=range_of(scenario.radio) if scenario.radio else None,
+        lights=tuple(arena.lights for arena in placed),
+        floor=layout.floor,
+    )
 
 
 def _sensors(

@@ -19,7 +19,7 @@ class WheelNoise:
     factor_std: float = parameter(0.0, help="standard deviation of the factor f", at_least=0, at_most=0.5)
 
 
-NO_WHEEL_NOISE = WheelNoise()
+NO_WHEEL_NOISE = WheelNoise()  # wheels do as they are told
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,8 @@ class Holonomic:
         return self.max_speed_mps
 
 
-Drive = Wheels | Twist | Holonomic
+Drive = Wheels | Twist | Holonomic  # what a body has one of
+# By `kind` in a body's sheet.
 DRIVES: dict[str, type[Drive]] = {"wheels": Wheels, "twist": Twist, "holonomic": Holonomic}
 
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.parameters import parameter
 
-BRIGHTEST = 0xFFFFFF
+BRIGHTEST = 0xFFFFFF  # white: a byte each for red, green and blue
 
 
 @dataclass(frozen=True)

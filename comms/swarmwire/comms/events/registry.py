@@ -14,4 +14,5 @@ from swarmwire.comms.events.partition import Partition
 from swarmwire.comms.events.ramp import Ramp
 from swarmwire.comms.events.revive import Revive
 
+# All that `do` may name.
 ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Fail, Blackout, Partition, Ramp, Gain, Jammer)

@@ -9,7 +9,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import IntArray
 
-MOST_CELLS_PER_SIDE = 512
+MOST_CELLS_PER_SIDE = 512  # in each arena
 
 
 class Grid(NamedTuple):

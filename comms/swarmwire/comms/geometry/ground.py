@@ -53,7 +53,7 @@ def ground_of(floor: Floor | None, size_m: tuple[float, float], boundary: Bounda
     )
 
 
-@borrowing()
+@borrowing(from_python=True)
 def shade_at(ground, x, y):
     """The shade at a point of the arena in m, 0 black … 1 white; outside an arena that is no torus the rest's."""
     for k in range(len(ground.patch) - 1, -1, -1):

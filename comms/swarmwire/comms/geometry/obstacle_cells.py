@@ -109,7 +109,7 @@ def _is_near(x, y, half_x, half_y, shape, side_start, side, k, reach_m):
     return True
 
 
-@borrowing()
+@borrowing(from_python=True)
 def near_things(found, things, arena, x, y, reach_m, bottom_m):
     """Write into `found` the obstacles higher than `bottom_m` that may be within reach of a place; how many."""
     count = 0
@@ -124,7 +124,7 @@ def near_things(found, things, arena, x, y, reach_m, bottom_m):
     return count
 
 
-@borrowing()
+@borrowing(from_python=True)
 def ray_to_thing(px, py, dx, dy, things, k):
     """Distance along the unit ray (dx, dy) from (px, py) to an obstacle; 0 from inside, inf if it misses."""
     if things.side_start[k] == things.side_start[k + 1]:

@@ -20,6 +20,7 @@ from swarmwire.comms.sheets.ring import Ring
 from swarmwire.comms.sheets.scan import Scan
 from swarmwire.comms.sheets.sheet import RangedSheet, Sheet
 
+# By the name that a sheet and an agent's `needs` have for the sense.
 SHEETS: dict[str, type[Sheet]] = {
     "proximity": Proximity,
     "compass": Compass,

@@ -8,7 +8,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.parameters import parameter
 from swarmwire.comms.sheets.ring import Ring
 
-FORMS = ("rational", "inverse_square", "quadratic")
+FORMS = ("rational", "inverse_square", "quadratic")  # compiled code knows them by their places here
 SMALLEST = 1e-9  # values and distances that a curve is asked for, so that nothing is divided by 0
 
 

@@ -97,7 +97,7 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
 
 
 def decode_actions(frame: Frame, rows: IntArray) -> Actions:
-    """The actions of the robots `rows`; BadFrame if the frame is not for exactly these or contradicts itself."""
+    """The actions of the robots `rows` (n,); BadFrame if the frame is not for exactly these or contradicts itself."""
     n = len(rows)
     if (checked_array(frame, "rows", "<i8", (n,)) != rows).any():
         raise BadFrame("malformed", "rows: expected the runner's own robots")

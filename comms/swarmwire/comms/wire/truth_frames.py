@@ -26,6 +26,21 @@ _EVENT = [int, float, str, bool, str, bool]  # serial, at_s, do, ended, part, si
 def encode_truth(glimpse: Glimpse) -> bytes:
     """A `truth` frame."""
     truth = glimpse.truth
+    values: dict[str, Any] = {
+        "version": OBSERVED_VERSION,
+        "time_ns": truth.time_ns,
+        "serial": glimpse.serial,
+        "ticks": glimpse.ticks,
+        "states": truth.states,
+        "events": [
+            (event.serial, float(event.at_s), event.do, event.ended, event.part, event.singly) for event in truth.events
+        ],
+    }
+    return frames.encode("truth", truth.tick, _arrays(truth) | {"values": glimpse.values}, values)
+
+
+def _arrays(truth: Truth) -> dict[str, AnyArray]:
+    """The arrays of a tick that there are."""
     arrays: dict[str, AnyArray] = {
         "alive": truth.alive,
         "pose": truth.pose,
@@ -34,7 +49,6 @@ def encode_truth(glimpse: Glimpse) -> bytes:
         "state": truth.state,
         "leds": truth.leds,
         "contact_onsets": truth.contact_onsets,
-        "values": glimpse.values,
     }
     for name, group in truth.senses.items():
         arrays[f"sense/{name}/rows"] = group.rows
@@ -53,17 +67,7 @@ def encode_truth(glimpse: Glimpse) -> bytes:
             arrays["finished/rssi_dbm"] = truth.finished.rssi_dbm
     if truth.events:
         arrays["events"] = np.array([event.changed for event in truth.events])
-    values: dict[str, Any] = {
-        "version": OBSERVED_VERSION,
-        "time_ns": truth.time_ns,
-        "serial": glimpse.serial,
-        "ticks": glimpse.ticks,
-        "states": truth.states,
-        "events": [
-            (event.serial, float(event.at_s), event.do, event.ended, event.part, event.singly) for event in truth.events
-        ],
-    }
-    return frames.encode("truth", truth.tick, arrays, values)
+    return arrays
 
 
 def decode_truth(frame: Frame, scene: Scene) -> Glimpse:

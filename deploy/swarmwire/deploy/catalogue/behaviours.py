@@ -4,13 +4,13 @@ from abc import ABC
 from pathlib import Path
 from typing import Generic
 
+from swarmwire.agent import Agent, VectorAgent
 from swarmwire.agent import behaviours as shipped
-from swarmwire.agent.agent import Agent
 from swarmwire.agent.declared import REQUIRED, TYPES, parameters_of
 from swarmwire.agent.declared import Parameter as Declared
-from swarmwire.agent.loading import AgentClass, NoAgent, load_agent, resolve
-from swarmwire.agent.vector_agent import VectorAgent
+from swarmwire.agent.loading import AgentClass, NoAgent, load_agent
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.loading import resolve
 from swarmwire.deploy.catalogue.docs import comments_of, first_line, texts_of
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.units import unit_of

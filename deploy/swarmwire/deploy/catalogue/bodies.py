@@ -8,8 +8,7 @@ from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.leds import Leds
 from swarmwire.comms.parameters import limits_of
-from swarmwire.comms.sheets import OwnSheet
-from swarmwire.comms.sheets.sheet import RangedSheet
+from swarmwire.comms.sheets import OwnSheet, RangedSheet
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 from swarmwire.deploy.catalogue.units import unit_of

@@ -9,7 +9,7 @@ from swarmwire.deploy.catalogue.behaviours import behaviour
 from swarmwire.deploy.catalogue.bodies import body_of
 from swarmwire.deploy.catalogue.entry import Entry
 from swarmwire.deploy.catalogue.kinds import KINDS, Kind
-from swarmwire.world.scenario.bodies import SUFFIX
+from swarmwire.world.scenario.bodies import sheet_path
 
 
 def kind_named(name: str) -> Kind:
@@ -26,7 +26,7 @@ def find(name: str) -> Entry:
     Keys of a scenario may leave out how they begin, as far as that is clear, and may hold a group's name for `*`.
     BadInput if nothing has the name, with the nearest that there are, or if several things have it.
     """
-    if name.endswith(SUFFIX):
+    if sheet_path(name, ""):
         return body_of(Path(name))
     before, colon, rest = name.partition(":")
     chosen = [kind for kind in KINDS if colon and before.lower() in (kind.name, kind.one)]

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any, get_args, get_type_hints
 
-from swarmwire.agent.packet import Packet
-from swarmwire.agent.robot import RadioPort, Robot
+from swarmwire.agent import Packet, Robot
+from swarmwire.agent.robot import RadioPort
 from swarmwire.agent.turn import OUTCOMES
 from swarmwire.comms.air.parameters.gives import Gives
 from swarmwire.comms.bodies.body import body_names, load_body

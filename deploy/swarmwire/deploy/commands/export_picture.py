@@ -9,18 +9,17 @@ if TYPE_CHECKING:
     from swarmwire.metrics.drawing.film import Film
 
 END = "end"
-SUFFIXES = (".png", ".svg", ".pdf")
 
 
 def export_picture(run: Path, to: Path, arena: int, at: str, size_px: int, metrics: list[str] | None) -> None:
     """Draw the arena, and metrics beside it, `at` a time in s or END; BadInput if it was not recorded."""
+    from swarmwire.metrics.drawing.canvas import check_picture
     from swarmwire.metrics.drawing.film import film_of
     from swarmwire.metrics.drawing.film_figure import FilmFigure
-    from swarmwire.metrics.drawing.whole_file import check_path
     from swarmwire.metrics.run_folder import RunFolder
 
     film = film_of(RunFolder(run), arena, str(run))
-    check_path(to, SUFFIXES)
+    check_picture(to)
     figure = FilmFigure(film, size_px, metrics)
     figure.save(film.index_at(_time_s(at, film)), to)
 

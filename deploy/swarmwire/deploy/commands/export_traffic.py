@@ -1,8 +1,14 @@
 """`swarmwire export --to traffic.pcapng`: the frames of a run, for Wireshark."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from swarmwire.comms.errors import BadInput
+
+if TYPE_CHECKING:
+    from swarmwire.comms.air.radio import Radio
+    from swarmwire.metrics.capture.link_headers import Link
+    from swarmwire.metrics.run_folder import RunFolder
 
 SUFFIX = ".pcapng"
 MOST_S = 1e9  # above all that a run may last; in ns it still is a number of 64 bits
@@ -15,39 +21,50 @@ def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_
     """
     from swarmwire.comms.clock import to_ns
     from swarmwire.metrics.capture.frames_on_air import frames_on_air
-    from swarmwire.metrics.capture.link_headers import link_of
     from swarmwire.metrics.capture.write_capture import write_capture
-    from swarmwire.metrics.drawing.whole_file import check_path
-    from swarmwire.metrics.record.names import SCENARIO
     from swarmwire.metrics.run_folder import RunFolder
     from swarmwire.metrics.verify.sound_table import sound_table
-    from swarmwire.world.scenario.scenario_file import load_scenario
+    from swarmwire.metrics.whole_file import check_path
 
     check_path(to, (SUFFIX,))
+    _check_times(from_s, until_s)
+    folder = RunFolder(run)
+    if not 0 <= arena < folder.static.arenas:
+        raise BadInput("--arena", "", f"expected 0 to {folder.static.arenas - 1}, got {arena}")
+    radio, link = _radio_of(folder, run)
+    packets = sound_table(folder, "packets", folder.packets(arena))
+    first_ns = 0 if from_s is None else to_ns(from_s)
+    stop_ns = None if until_s is None else to_ns(until_s)
+    frames = (
+        frame
+        for frame in frames_on_air(packets, folder.static.robot_names)
+        if first_ns <= frame.on_air_at_ns and (stop_ns is None or frame.on_air_at_ns < stop_ns)
+    )
+    description = f"{folder.static.name}, seed {folder.static.seeds[arena]}: {radio.preset or radio.model}"
+    return write_capture(to, link, f"air-{arena}", description, frames)
+
+
+def _check_times(from_s: float | None, until_s: float | None) -> None:
     for option, value_s in (("--from", from_s), ("--until", until_s)):
         if value_s is not None and not 0.0 <= value_s <= MOST_S:
             raise BadInput(option, "", f"expected a time of 0 to {MOST_S:g} s, got {value_s:g}")
     if from_s is not None and until_s is not None and not from_s < until_s:
         raise BadInput("--until", "", f"expected a time after --from {from_s:g}, got {until_s:g}")
-    folder = RunFolder(run)
-    if not 0 <= arena < folder.static.arenas:
-        raise BadInput("--arena", "", f"expected 0 to {folder.static.arenas - 1}, got {arena}")
+
+
+def _radio_of(folder: "RunFolder", run: Path) -> "tuple[Radio, Link]":
+    """The radio of a run whose packets were recorded, and the kind of link that captures know it as."""
+    from swarmwire.metrics.capture.link_headers import link_of
+    from swarmwire.metrics.record.names import SCENARIO
+    from swarmwire.world.scenario.scenario_file import load_scenario
+
     radio = load_scenario(run / SCENARIO).radio
     if radio is None:
         raise BadInput(str(run), "radio", "expected a run with a radio: this one has none")
     if not folder.files("packets"):
         expected = "expected packets, recorded with --packets all; swarmwire repeat RUN --packets all --out … does it"
         raise BadInput(str(run), "packets", expected)
-    link, names = link_of(radio), folder.static.robot_names
-    if len(names) > link.most_robots:
+    link = link_of(radio)
+    if len(folder.static.robot_names) > link.most_robots:
         raise BadInput(str(run), "robots", f"expected at most {link.most_robots}, which have addresses of their own")
-    packets = sound_table(folder, "packets", folder.packets(arena))
-    first_ns = 0 if from_s is None else to_ns(from_s)
-    stop_ns = None if until_s is None else to_ns(until_s)
-    frames = (
-        frame
-        for frame in frames_on_air(packets, names)
-        if first_ns <= frame.on_air_at_ns and (stop_ns is None or frame.on_air_at_ns < stop_ns)
-    )
-    description = f"{folder.static.name}, seed {folder.static.seeds[arena]}: {radio.preset or radio.model}"
-    return write_capture(to, link, f"air-{arena}", description, frames)
+    return radio, link

@@ -4,13 +4,16 @@ import os
 import select
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.record.names import RECORDING
+
+if TYPE_CHECKING:
+    from swarmwire.deploy.live.showing import Way
 
 
 def view_command(
@@ -29,16 +32,12 @@ def view_command(
     """
     # Imported here: rerun and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.interrupt import Interrupt
-    from swarmwire.deploy.live.following import RunGone
-    from swarmwire.deploy.live.live_file import read_live
-    from swarmwire.deploy.live.showing import Way, show_live, show_recording
+    from swarmwire.deploy.live.showing import Way
     from swarmwire.deploy.live.viewer_program import has_screen
     from swarmwire.metrics.viewer.extra import need_view_extra
 
     need_view_extra("view")
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
-    live = read_live(run) if run.is_dir() else None
-    recording = run / RECORDING if run.is_dir() else run
     with Interrupt() as interrupt:
         way = Way(
             clock=WallClock(),
@@ -47,19 +46,28 @@ def view_command(
             web=web or port is not None or not has_screen(),
             port=port,
         )
-        if live is not None:
-            try:
-                show_live(live, way)
-            except RunGone:
-                if not recording.is_file():
-                    raise
-            else:
-                return
-        if not recording.is_file():
-            raise BadInput(
-                str(run), "", f"expected a run folder with {RECORDING} or a run that goes on, or a recording"
-            )
-        show_recording(recording, way)
+        _show(run, way)
+
+
+def _show(run: Path, way: "Way") -> None:
+    """Show a run that goes on; if it is over by now, or was before, its recording."""
+    from swarmwire.deploy.live.following import RunGone
+    from swarmwire.deploy.live.live_file import read_live
+    from swarmwire.deploy.live.showing import show_live, show_recording
+
+    live = read_live(run) if run.is_dir() else None
+    recording = run / RECORDING if run.is_dir() else run
+    if live is not None:
+        try:
+            show_live(live, way)
+        except RunGone:
+            if not recording.is_file():
+                raise
+        else:
+            return
+    if not recording.is_file():
+        raise BadInput(str(run), "", f"expected a run folder with {RECORDING} or a run that goes on, or a recording")
+    show_recording(recording, way)
 
 
 def _closed() -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.record.whole_text import write_whole
+from swarmwire.metrics.whole_file import write_whole
 
 LIVE = "live.json"
 

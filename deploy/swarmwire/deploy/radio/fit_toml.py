@@ -9,14 +9,6 @@ if TYPE_CHECKING:
     from swarmwire.comms.air.parameters.propagation import Antenna
     from swarmwire.metrics.radio_fit.radio_fit import RadioFit
 
-# A scenario around the table, to hold it against every bound and check.
-AROUND: dict[str, Any] = {
-    "format": 1,
-    "name": "fit",
-    "duration_s": 1.0,
-    "arena": {"size_m": [1.0, 1.0]},
-    "robots": {"one": {"body": "epuck", "count": 1, "agent": "fit:Agent"}},
-}
 DISK = {"range_m": 1.0}  # what a table without path loss is put into
 
 
@@ -42,10 +34,10 @@ def radio_fit_toml(fit: "RadioFit", antenna: "Antenna", file: Path) -> str:
 
 
 def _refuse_unfit(table: dict[str, Any], file: Path) -> None:
-    from swarmwire.world.scenario.scenario_file import scenario_from
+    from swarmwire.deploy.radio.around import checked_radio
 
     whole = table["radio"] if "model" in table["radio"] else {**DISK, **table["radio"]}
     try:
-        scenario_from({**AROUND, "radio": whole}, str(file))
+        checked_radio(whole, str(file))
     except BadInput as error:
         raise BadInput(str(file), f"fitted {error.key}", f"{error.expected}, which no scenario takes") from None

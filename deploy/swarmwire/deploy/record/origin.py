@@ -13,11 +13,10 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.record import machine
 from swarmwire.deploy.record.modules import changed_modules, module_digests
 from swarmwire.deploy.record.scenario_copy import CopiedFile, changed_files, copy_scenario
+from swarmwire.metrics.record.formats import RUN_FORMAT, refuse_other_format
 from swarmwire.metrics.record.names import RUN_JSON
-from swarmwire.metrics.record.whole_text import write_whole
+from swarmwire.metrics.whole_file import write_whole
 from swarmwire.world.scenario.scenario import Scenario
-
-RUN_FORMAT = 1
 
 
 @dataclass(frozen=True)
@@ -86,12 +85,10 @@ def read_origin(folder: Path) -> Origin:
     except ValueError:  # no JSON, or no UTF-8
         found = None
     try:
-        if found["format"] != RUN_FORMAT:
-            raise KeyError
+        refuse_other_format(found, RUN_FORMAT, path)
         return _origin(found)
     except (KeyError, TypeError, ValueError):
-        expected = f"expected what swarmwire writes at the start of a run, format {RUN_FORMAT}"
-        raise BadInput(str(path), "", expected) from None
+        raise BadInput(str(path), "", "expected what swarmwire writes at the start of a run") from None
 
 
 def _origin(found: dict[str, Any]) -> Origin:

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.messages import DICT_TAG, Message
+from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.record.folder import make_folder
@@ -47,7 +47,7 @@ class RunRecord:
             return ()
         found: list[Observer] = [TrajectoryLog(folder, hashes)]
         if what.tables:
-            topics = _topics(Message)
+            topics = {DICT_TAG: "dict"} | {kind.tag: kind.__name__ for kind in message_classes()}
             found += recorders(
                 folder,
                 metrics,
@@ -117,11 +117,3 @@ class RunRecord:
             self._log.close()
         if self.folder:
             result.write(self.folder / SUMMARY)
-
-
-def _topics(kind: type[Message]) -> dict[int, str]:
-    """The names of all messages that agents known to this process have defined, by tag."""
-    names = {DICT_TAG: "dict"}
-    for below in kind.__subclasses__():
-        names |= {below.tag: below.__name__, **_topics(below)}
-    return names

@@ -18,7 +18,7 @@ from typing import Any
 
 import tomli_w
 
-from swarmwire.agent.loading import resolve
+from swarmwire.comms.loading import resolve
 from swarmwire.deploy.radio.link_trace_file import trace_path
 from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.world.placement.grey_image import beside

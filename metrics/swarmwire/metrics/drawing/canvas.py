@@ -7,9 +7,8 @@ from swarmwire.comms.arrays import ByteArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.drawing.extra import need_report_extra
 from swarmwire.metrics.drawing.looks import LONG_SIDE_IN, PAPER
-from swarmwire.metrics.drawing.whole_file import check_path, whole_file
+from swarmwire.metrics.whole_file import check_path, chosen_file
 
-SUFFIXES = (".png", ".svg", ".pdf")
 LEAST_SIZE_PX, GREATEST_SIZE_PX = 100, 8000
 
 
@@ -39,14 +38,19 @@ def pixels(figure: Any) -> ByteArray:
     return np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
 
 
+def check_picture(to: Path) -> None:
+    """Return if a picture may be written there, of the kind that the file's name says; else BadInput."""
+    check_path(to, (".png", ".svg", ".pdf"))
+
+
 def save(figure: Any, to: Path) -> None:
     """Write a picture; its kind is that of the file's name. BadInput for another kind, or a path that cannot be."""
     import matplotlib as mpl
 
     fixed = cast("Any", mpl).rc_context
 
-    check_path(to, SUFFIXES)
+    check_picture(to)
     # Equal pictures are equal bytes: no date, and names within an SVG that do not change.
     undated = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[to.suffix.lower()]
-    with whole_file(to) as part, fixed({"svg.hashsalt": "swarmwire"}):
+    with chosen_file(to) as part, fixed({"svg.hashsalt": "swarmwire"}):
         figure.savefig(part, dpi=figure.dpi, metadata=undated)

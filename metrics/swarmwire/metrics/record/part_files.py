@@ -7,7 +7,7 @@ its name is whole: a Parquet file that is cut off is unreadable.
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.metrics.written_aside import written_aside
+from swarmwire.metrics.whole_file import written_aside
 
 if TYPE_CHECKING:
     import polars as pl

@@ -11,23 +11,21 @@ from swarmwire.comms.bodies.body import body_from_mapping
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
-from swarmwire.metrics.record.whole_text import write_whole
-
-FORMAT = 2
+from swarmwire.metrics.record.formats import TABLES_FORMAT, refuse_other_format
+from swarmwire.metrics.whole_file import write_whole
 
 
 def write_static(static: Static, path: Path) -> None:
     """Write it aside, then rename, so that no half of it is ever seen."""
-    write_whole(path, json.dumps({"format": FORMAT, **_finite(static)}, indent=2, allow_nan=False) + "\n")
+    write_whole(path, json.dumps({"format": TABLES_FORMAT, **_finite(static)}, indent=2, allow_nan=False) + "\n")
 
 
 def read_static(path: Path) -> Static:
     """What `write_static` wrote, equal to it; BadInput if there is no such file, or it holds something else."""
     try:
         read = json.loads(path.read_text(encoding="utf-8"))
-        found = read.pop("format")
-        if found != FORMAT:
-            raise BadInput(str(path), "format", f"expected {FORMAT}, got {found!r}")
+        refuse_other_format(read, TABLES_FORMAT, path)
+        del read["format"]
         return _static(read, str(path))
     except FileNotFoundError:
         raise BadInput(str(path), "", "expected a file that a run wrote; there is none") from None

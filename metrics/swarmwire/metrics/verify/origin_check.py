@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from swarmwire.metrics.record import formats
 from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS, INPUTS, RUN_JSON
 from swarmwire.metrics.verify.finding import Finding, State
 
@@ -19,10 +20,10 @@ def check_run_json(folder: Path) -> Finding:
     except (OSError, ValueError) as error:
         return Finding(RUN_JSON, State.DAMAGED, str(error))
     match found:
-        case {"format": 1, "seeds": list(), "ticks": int(ticks)}:
+        case {"format": formats.RUN_FORMAT, "seeds": list(), "ticks": int(ticks)}:
             return Finding(RUN_JSON, State.WHOLE, f"{ticks} ticks asked for")
         case _:
-            return Finding(RUN_JSON, State.DAMAGED, "expected what a run writes at its start, format 1")
+            return Finding(RUN_JSON, State.DAMAGED, f"expected the start of a run, format {formats.RUN_FORMAT}")
 
 
 def check_digests(folder: Path, summary: Mapping[str, Any] | None) -> Finding:

@@ -35,7 +35,10 @@ class Actuators:
         self._ticks = self._clipped = self._not_finite = 0
 
     def take(self, actions: Actions, alive: BoolArray) -> None:
-        """Take what agents decided in a tick. Robots without a new command keep the last one, the dead do nothing."""
+        """Take what agents decided in a tick. Robots without a new command keep the last one.
+
+        Those that are not `alive` (rows,) do nothing.
+        """
         self.command = self.command.copy()
         asked = actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps
         clipped, not_finite = take_commands(self._limits, alive, *asked, self.command)

@@ -41,7 +41,7 @@ class OwnActuators:
         self._ticks = self.not_there = 0
 
     def act(self, actuations: Actuations, alive: BoolArray) -> None:
-        """Let all of them act in a tick, those of the dead not; OwnCodeFailed if one raises or leaves inf or nan."""
+        """Let those of robots `alive` (rows,) act in a tick; OwnCodeFailed if one raises or leaves inf or nan."""
         rows, place = actuations.rows, actuations.place
         there = place < self._places[rows]
         self.not_there += int(np.count_nonzero(~there))

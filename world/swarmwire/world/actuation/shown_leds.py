@@ -26,7 +26,7 @@ class ShownLeds:
         self.not_there = 0
 
     def take(self, changes: LedChanges, alive: BoolArray) -> None:
-        """Switch what agents switched in a tick; the dead switch nothing."""
+        """Switch what agents of robots `alive` (rows,) switched in a tick."""
         if not len(changes):
             return
         there = changes.which < self._count[changes.rows % len(self._count)]

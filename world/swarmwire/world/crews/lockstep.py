@@ -1,10 +1,8 @@
 """The lockstep hand-shake with runners, without any I/O: bytes and tokens in, bytes and actions out.
 
-    tick      open_tick     ready -> waiting      (one frame is out to each runner of a group that acts)
-              "actions"     waiting -> ready      (all ready: the tick is complete)
-    takeover  "ready"       joined -> waiting     (the open tick's frame, if nobody has answered it; else -> ready)
-
-How runners join and are lost stands in `roster`, and so does what becomes of frames that do not fit.
+A tick opens with one frame to each runner of a group that acts, and is complete once all of them have answered. Who
+takes over within a tick gets its frame, if nobody has answered that. States and moves stand in `slot`; how runners join
+and are lost, and what becomes of frames that do not fit, in `roster`.
 """
 
 from collections.abc import Sequence
@@ -19,7 +17,8 @@ from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
-from swarmwire.world.crews.roster import OnLoss, Refused, Roster, Slot, rows_of
+from swarmwire.world.crews.roster import OnLoss, Refused, Roster
+from swarmwire.world.crews.slot import Slot, rows_of
 from swarmwire.world.crews.split_tick import acting, split_heard, split_outcomes, split_senses
 
 __all__ = ["Lockstep", "Refused", "standing"]
@@ -51,8 +50,8 @@ class Lockstep(Roster[_Slot]):
             if slot.state == "dead" or not part:
                 continue
             slot.frame = encode_tick(tick, part, own, its)
-            if slot.state == "ready":
-                slot.state = "waiting"
+            if slot.may("is asked"):
+                slot.move("is asked")
                 out.append((slot.runner or "", slot.frame))
         return out
 
@@ -62,15 +61,16 @@ class Lockstep(Roster[_Slot]):
         return Actions.joined([slot.actions for slot in self._slots if slot.actions is not None] + dead)
 
     def _acted(self, slot: _Slot, frame: Frame) -> None:
-        if frame.tick != self._tick or slot.state != "waiting":
+        if frame.tick != self._tick or not slot.may("answers"):
             raise BadFrame("wrong_tick", str(frame.tick))
         slot.actions = decode_actions(frame, slot.rows)
-        slot.state, slot.frame = "ready", None
+        slot.move("answers")
+        slot.frame = None
 
     def _catch_up(self, slot: _Slot) -> Sequence[bytes]:
         if slot.frame is None:
             return ()
-        slot.state = "waiting"
+        slot.move("is asked")
         return (slot.frame,)
 
     def _lose(self, slot: _Slot, reason: str) -> None:

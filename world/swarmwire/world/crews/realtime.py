@@ -32,8 +32,9 @@ from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
-from swarmwire.world.crews.roster import OnLoss, Roster, Slot, rows_of
+from swarmwire.world.crews.roster import OnLoss, Roster
 from swarmwire.world.crews.runner_health import RunnerHealth
+from swarmwire.world.crews.slot import Slot, rows_of
 from swarmwire.world.crews.split_tick import acting, split_heard, split_outcomes, split_senses
 
 ANSWERED = -1

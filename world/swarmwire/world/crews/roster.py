@@ -1,13 +1,13 @@
 """Who plays which robots, without any I/O: slots, the runners that join them, and what follows when one is lost.
 
-    slot      joins         free -> joined            (a runner asks and gets the slot's robots)
-              "ready"       joined -> ready           (its agents are built)
-    any       "failed"      AgentFailed               (ends the run)
-    loss      stop          RunnerLost                (ends the run; so does any loss before the first tick)
-              dead          joined, … -> dead         (its robots stand still to the end)
-              wait          joined, … -> free         (whoever joins next takes over, with fresh agents)
+The states of a slot and the moves between them stand in `slot`. Beside them,
 
-Whatever does not fit is counted by name and dropped; it never changes the state.
+    a frame "failed"        AgentFailed               (ends the run)
+    a loss    stop          RunnerLost                (ends the run; so does any loss before the first tick)
+              dead          the slot is given up      (its robots stand still to the end)
+              wait          the slot is free again    (whoever joins next takes over, with fresh agents)
+
+Whatever else does not fit is counted by name and dropped; it never changes the state.
 """
 
 import re
@@ -21,11 +21,10 @@ import msgpack
 import numpy as np
 from msgpack.exceptions import UnpackException
 
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
 from swarmwire.comms.wire import frames
 from swarmwire.world.crews.runner_health import RunnerHealth
+from swarmwire.world.crews.slot import Slot
 
 NAME = re.compile(r"[\w.-]{1,64}", re.ASCII)  # of a runner: it is part of a key, so no wildcard, slash or hash
 OnLoss = Literal["stop", "dead", "wait"]
@@ -33,21 +32,6 @@ OnLoss = Literal["stop", "dead", "wait"]
 
 class Refused(Exception):
     """A request to join that is not granted; the text goes back to the runner."""
-
-
-@dataclass
-class Slot:
-    """Some robots, and the runner that plays them."""
-
-    assignment: Assignment
-    rows: IntArray  # (n,) that act in the tick that is open, in the order of the answer: group after group
-    runner: str | None = None
-    state: str = "free"
-
-    @property
-    def all_rows(self) -> IntArray:
-        """Every robot of the slot, (n,)."""
-        return rows_of(self.assignment)
 
 
 @dataclass(frozen=True)
@@ -115,11 +99,12 @@ class Roster(ABC, Generic[S]):
             case _:
                 self._counts["bad_join"] += 1
                 raise Refused(f"expected a request of version {frames.VERSION} with a runner's name")
-        free = next((slot for slot in self._slots if slot.state == "free"), None)
+        free = next((slot for slot in self._slots if slot.may("joins")), None)
         if runner in self._by_runner or free is None:
             self._counts["refused_join"] += 1
             raise Refused("this name is in use" if runner in self._by_runner else "all robots are taken")
-        free.runner, free.state = runner, "joined"
+        free.move("joins")
+        free.runner = runner
         self._by_runner[runner] = free
         return runner, msgpack.packb(free.assignment.as_mapping())
 
@@ -144,8 +129,8 @@ class Roster(ABC, Generic[S]):
             frame = frames.decode(data)
             if frame.kind == "failed":
                 self._failed(slot, frame)
-            elif frame.kind == "ready" and slot.state == "joined":
-                slot.state = "ready"
+            elif frame.kind == "ready" and slot.may("is ready"):
+                slot.move("is ready")
                 return [(runner, missed) for missed in self._catch_up(slot)]
             elif frame.kind != "actions":
                 raise BadFrame("unexpected_kind", frame.kind)
@@ -170,8 +155,9 @@ class Roster(ABC, Generic[S]):
         loss = Loss(slot.runner or "that did not join", slot.assignment.robots_text, reason)
         if not self.bears_losses:
             raise RunnerLost(loss.runner, loss.robots, reason)
+        slot.move("is given up" if self._on_loss == "dead" else "is lost")
         del self._by_runner[loss.runner]
-        slot.runner, slot.state = None, "dead" if self._on_loss == "dead" else "free"
+        slot.runner = None
         self._counts["runners_lost"] += 1
         self.losses.append(loss)
 
@@ -181,8 +167,3 @@ class Roster(ABC, Generic[S]):
                 raise AgentFailed(robots, traceback)
             case _:
                 raise AgentFailed(slot.assignment.robots_text, "(the runner sent no traceback)")
-
-
-def rows_of(assignment: Assignment) -> IntArray:
-    """The robot rows of an assignment, group after group."""
-    return np.concatenate([group.rows for group in assignment.groups])

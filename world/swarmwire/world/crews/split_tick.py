@@ -12,7 +12,7 @@ from swarmwire.comms.senses import GroupSenses, Senses
 
 
 def split_senses(senses: Senses, owner: IntArray, assignments: list[Assignment]) -> list[Senses]:
-    """What the robots of each assignment sense; `owner` names the assignment of each robot row."""
+    """What the robots of each assignment sense; `owner` (rows,) names the assignment of each robot row."""
     parts: list[Senses] = [{} for _ in assignments]
     for name, group in senses.items():
         owners = owner[group.rows]
@@ -35,7 +35,7 @@ def acting(part: Senses) -> IntArray:
 
 
 def split_heard(heard: Heard, owner: IntArray, slots: int) -> list[Heard]:
-    """What the robots of each of `slots` parts heard, each with the payloads that it needs, once."""
+    """What the robots of each of `slots` parts heard, each with its payloads, once; `owner` is (rows,)."""
     if not len(heard):
         return [heard] * slots
     by_slot = np.argsort(owner[heard.receiver], kind="stable")
@@ -62,7 +62,7 @@ def split_heard(heard: Heard, owner: IntArray, slots: int) -> list[Heard]:
 
 
 def split_outcomes(outcomes: Outcomes, owner: IntArray, slots: int) -> list[Outcomes]:
-    """What the robots of each of `slots` parts learn of their packets."""
+    """What the robots of each of `slots` parts learn of their packets; `owner` is (rows,)."""
     if not len(outcomes):
         return [NO_OUTCOMES] * slots
     slot_of = owner[outcomes.row]

@@ -32,7 +32,7 @@ CONTACT = np.dtype(
 )
 
 
-@borrowing()
+@borrowing(from_python=True)
 def contacts_of(contacts, robots, pairs, things, old):
     """Fill records (pairs + things,) for what is listed; touch and impulses are carried over from the `old` ones."""
     at = 0
@@ -74,7 +74,7 @@ def _is_before(one, other):
 
 @njit(cache=True)
 def crowd_of(rows: int, contacts: AnyArray) -> tuple[IntArray, IntArray]:
-    """The rows near which something is listed, and the others; both rising."""
+    """The rows near which something is listed in `contacts` (k,) of dtype CONTACT, and the others; both rising."""
     crowded = np.zeros(rows, np.bool_)
     for k in range(len(contacts)):
         crowded[contacts[k].row] = True

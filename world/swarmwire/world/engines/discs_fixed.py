@@ -31,7 +31,7 @@ def gap_to_circle(x, y, radius_m, circle_x, circle_y, circle_radius_m):
     return apart - radius_m - circle_radius_m, dx / apart, dy / apart
 
 
-@borrowing()
+@borrowing(from_python=True)
 def gap_to_polygon(x, y, radius_m, polygon, side_start, side):
     """As `gap_to_wall`, to the side or corner of a convex polygon that is nearest to the disc's centre.
 

@@ -66,7 +66,7 @@ def fixed_near(
     return things[:count]
 
 
-@borrowing()
+@borrowing(from_python=True)
 def _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs):
     """Fill `pairs`, and return how many there are, whether there is room for them or not."""
     count = 0
@@ -101,7 +101,7 @@ def _insert(pairs, begin, count, row, other):
     pairs[place, 0], pairs[place, 1] = row, other
 
 
-@borrowing()
+@borrowing(from_python=True)
 def _list_fixed(robots, state, per_arena, size_m, walled, obstacles, cells, margin_m, things):
     """Fill `things`, and return how many there are, whether there is room for them or not."""
     half_size_m = (0.5 * size_m[0], 0.5 * size_m[1])

@@ -11,13 +11,13 @@ from swarmwire.world.engines.discs_solver import separate, solve
 from swarmwire.world.engines.discs_touches import begin_tick, note_touches
 
 
-@borrowing()
+@borrowing(from_python=True)
 def needed_margin_m(fastest_mps, widest_m, dt_s, steps):
     """How far robots may get in so many steps, and look ahead after them."""
     return (steps + 1) * dt_s * fastest_mps + LOOK_AHEAD * widest_m
 
 
-@borrowing()
+@borrowing(from_python=True)
 def advance(
     step, steps, dt_s, margin_m, widest_m, half_size_m, per_arena, robots, state, travel_m, touched, braked, target,
     contacts, met, crowd, loners, circle, side_start, side, onsets,

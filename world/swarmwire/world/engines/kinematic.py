@@ -57,43 +57,50 @@ class KinematicEngine:
         return onsets
 
 
-@borrowing()
+@borrowing(from_python=True)
 def _move(around, wheel_base_m, radius_m, bottom_m, target, tick_s, state, travel_m, held):
-    half_x_m, half_y_m, wraps = around.half_x_m, around.half_y_m, around.wraps
     for arena in range(target.shape[0]):
         for i in range(target.shape[1]):
             forward, turn, left = target[arena, i, 0], target[arena, i, 1], target[arena, i, 2]
-            x, y, heading = state[arena, i, 0], state[arena, i, 1], state[arena, i, 2]
-            way_m = tick_s * np.sqrt(forward * forward + left * left)
-            near = any_near(around, arena, x, y, radius_m[i] + way_m, bottom_m[i])
-            pieces = max(int(np.ceil(way_m / (PIECE_OF_RADIUS * radius_m[i]))), 1) if near else 1
-            piece_s = tick_s / pieces
-            half = 0.5 * turn * piece_s
-            chord_s = piece_s * np.sin(half) / half if half != 0.0 else piece_s  # a chord is shorter than its arc
-            vx = vy = rolled = 0.0
-            stopped = False
-            for _ in range(pieces):
-                cos, sin = np.cos(heading + half), np.sin(heading + half)
-                dx, dy = (forward * cos - left * sin) * chord_s, (forward * sin + left * cos) * chord_s
-                nx, ny, pushed, free = x + dx, y + dy, False, True
-                out = abs(nx) + radius_m[i] > half_x_m or abs(ny) + radius_m[i] > half_y_m
-                if near or (around.walled and out):
-                    nx, ny, pushed, free = held_back(around, arena, nx, ny, radius_m[i], bottom_m[i], near)
-                if not free:  # wedged in
-                    nx, ny = x, y
-                rolled += forward * piece_s + (nx - x - dx) * cos + (ny - y - dy) * sin
-                heading += 2.0 * half
-                vx, vy = (
-                    forward * np.cos(heading) - left * np.sin(heading),
-                    forward * np.sin(heading) + left * np.cos(heading),
-                )
-                if pushed:
-                    vx, vy, stopped = (nx - x) / piece_s, (ny - y) / piece_s, True
-                x, y = nx, ny
-            x, y = shortest(x, half_x_m, wraps), shortest(y, half_y_m, wraps)
-            state[arena, i, 0], state[arena, i, 1], state[arena, i, 2] = x, y, heading
-            state[arena, i, 3], state[arena, i, 4], state[arena, i, 5] = vx, vy, turn
-            held[arena, i] = stopped
+            size = radius_m[i], bottom_m[i]
+            rolled, held[arena, i] = _go(around, arena, size, forward, turn, left, tick_s, state[arena, i])
             apart = 0.5 * tick_s * turn * wheel_base_m[i]
             travel_m[arena, i, 0] += rolled - apart
             travel_m[arena, i, 1] += rolled + apart
+
+
+@borrowing()
+def _go(around, arena, size, forward, turn, left, tick_s, state):
+    """Bring the state (6,) of one robot of this radius and height to the end of the tick.
+
+    Returns how far it rolled forward, and whether something held it back.
+    """
+    radius_m, bottom_m = size
+    x, y, heading = state[0], state[1], state[2]
+    way_m = tick_s * np.sqrt(forward * forward + left * left)
+    near = any_near(around, arena, x, y, radius_m + way_m, bottom_m)
+    pieces = max(int(np.ceil(way_m / (PIECE_OF_RADIUS * radius_m))), 1) if near else 1
+    piece_s = tick_s / pieces
+    half = 0.5 * turn * piece_s
+    chord_s = piece_s * np.sin(half) / half if half != 0.0 else piece_s  # a chord is shorter than its arc
+    vx = vy = rolled = 0.0
+    stopped = False
+    for _ in range(pieces):
+        cos, sin = np.cos(heading + half), np.sin(heading + half)
+        dx, dy = (forward * cos - left * sin) * chord_s, (forward * sin + left * cos) * chord_s
+        nx, ny, pushed, free = x + dx, y + dy, False, True
+        out = abs(nx) + radius_m > around.half_x_m or abs(ny) + radius_m > around.half_y_m
+        if near or (around.walled and out):
+            nx, ny, pushed, free = held_back(around, arena, nx, ny, radius_m, bottom_m, near)
+        if not free:  # wedged in
+            nx, ny = x, y
+        rolled += forward * piece_s + (nx - x - dx) * cos + (ny - y - dy) * sin
+        heading += 2.0 * half
+        cos, sin = np.cos(heading), np.sin(heading)
+        vx, vy = forward * cos - left * sin, forward * sin + left * cos
+        if pushed:
+            vx, vy, stopped = (nx - x) / piece_s, (ny - y) / piece_s, True
+        x, y = nx, ny
+    state[0], state[1] = shortest(x, around.half_x_m, around.wraps), shortest(y, around.half_y_m, around.wraps)
+    state[2], state[3], state[4], state[5] = heading, vx, vy, turn
+    return rolled, stopped

@@ -42,7 +42,10 @@ def _walls(size_m: tuple[float, float], widest_m: float) -> tuple[Obstacle, ...]
 
 
 class ArenaSpace:
-    """The pymunk space of one arena and the buffers through which all its bodies are read and written at once."""
+    """The pymunk space of one arena and the buffers through which all its bodies are read and written at once.
+
+    Robots start at `pose` (n, 3); `force` (n and loads, 3) in N, N, N m is read in every step, from where it lies.
+    """
 
     def __init__(
         self,

@@ -14,7 +14,7 @@ QUARTERS_PER_RAD = 2.0 / np.pi
 QUARTER_HIGH, QUARTER_LOW = 1.5707963267341256, 6.077100506506192e-11  # pi / 2; the first has 33 bits
 
 
-@borrowing()
+@borrowing(from_python=True)
 def sine_cosine(angle_rad):
     """The sine and the cosine of an angle up to some 1e6 rad, within 2e-16."""
     quarters = np.floor(angle_rad * QUARTERS_PER_RAD + 0.5)

@@ -17,22 +17,12 @@ from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Group, Light, Obstacle
 from swarmwire.world.placement.angles import wrapped
-from swarmwire.world.placement.free_places import (
-    BOX,
-    DISC,
-    GAP_M,
-    MOST_CANDIDATES,
-    RING,
-    Disc,
-    Region,
-    Taken,
-    free_circle,
-    free_polygon,
-    put_robots,
-)
+from swarmwire.world.placement.free_places import MOST_CANDIDATES, free_circle, free_polygon, put_robots
 from swarmwire.world.placement.layout import Layout
 from swarmwire.world.placement.obstacles import heading_of, obstacle_at
+from swarmwire.world.placement.region import BOX, DISC, RING, Region
 from swarmwire.world.placement.standing import Standing
+from swarmwire.world.placement.taken import GAP_M, Disc, Taken
 from swarmwire.world.scenario import place_tables
 from swarmwire.world.scenario.arena_tables import CylinderTable, ObstacleTable
 from swarmwire.world.scenario.place_tables import AtPoses, OnGrid, PlaceTable, RegionTable

@@ -8,9 +8,9 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.grid import MOST_CELLS_PER_SIDE
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Group, Light, Obstacle
-from swarmwire.world.placement.free_places import Taken
 from swarmwire.world.placement.layout import Layout
 from swarmwire.world.placement.obstacles import obstacle_at
+from swarmwire.world.placement.taken import Taken
 from swarmwire.world.scenario.arena_tables import ArenaTable, CylinderTable, ObstacleTable
 
 

@@ -11,8 +11,6 @@ from swarmwire.comms.truth import Static
 from swarmwire.world.own.fitting import fitted
 from swarmwire.world.scenario.scenario import Scenario
 
-SUFFIX = ".toml"
-
 
 def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
     """The body of each group, by the group's name; BadInput names the scenario, or the sheet of the user's own."""
@@ -27,7 +25,7 @@ def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
 
 def sheet_path(body: str, where: str) -> Path | None:
     """Where the sheet lies that a scenario names as a `body`; None for one that comes with swarmwire."""
-    return (Path(where).parent / body).resolve() if body.endswith(SUFFIX) else None
+    return (Path(where).parent / body).resolve() if body.endswith(".toml") else None
 
 
 def own_code(static: Static) -> tuple[str, ...]:

@@ -19,37 +19,36 @@ def scenario_schema() -> dict[str, Any]:
     return Scenario.model_json_schema()
 
 
-def scenario_from(mapping: Mapping[str, Any], where: str) -> Scenario:
-    """The scenario that a mapping describes; BadInput names `where`, the key and what was expected."""
-    try:
-        scenario = Scenario.model_validate(dict(mapping))
-    except ValidationError as error:
-        raise fault(error, scenario_schema(), where) from None
-    check(scenario, where)
-    return scenario.with_source(where, deepcopy(dict(mapping)))
+def scenario_from(mapping: Mapping[str, Any], where: str, overrides: Sequence[str] = ()) -> Scenario:
+    """The scenario of a mapping, after `overrides` such as "robots.flock.count=30" (a TOML value, else a text).
 
-
-def load_scenario(path: Path | str, overrides: Sequence[str] = ()) -> Scenario:
-    """The scenario in a TOML file, after `overrides` such as "robots.flock.count=30" (a TOML value, else a text)."""
-    where = str(path)
-    mapping = _read(path, where)
+    BadInput names `where`, or the override, the key and what was expected.
+    """
+    given = deepcopy(dict(mapping))
     settings = [_parsed(text) for text in overrides]
     for keys, value, text in settings:
-        _put(mapping, keys, value, text)
+        _put(given, keys, value, text)
     try:
-        return scenario_from(mapping, where)
+        return _checked(given, where)
     except BadInput as error:
         for keys, _, text in reversed(settings):
-            if error.key == ".".join(keys):  # the fault is the override's, not the file's
+            if error.key == ".".join(keys):  # the fault is the override's, not the scenario's
                 raise BadInput(f"--set {text}", error.key, error.expected) from None
         raise
 
 
-def with_settings(mapping: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:
-    """The mapping, in which settings such as "radio.loss=0.1" were put; BadInput for a path that leads nowhere."""
-    for keys, value, text in map(_parsed, settings):
-        _put(mapping, keys, value, text)
-    return mapping
+def load_scenario(path: Path | str, overrides: Sequence[str] = ()) -> Scenario:
+    """The scenario in a TOML file, after `overrides` as for `scenario_from`."""
+    return scenario_from(_read(path, str(path)), str(path), overrides)
+
+
+def _checked(given: dict[str, Any], where: str) -> Scenario:
+    try:
+        scenario = Scenario.model_validate(given)
+    except ValidationError as error:
+        raise fault(error, scenario_schema(), where) from None
+    check(scenario, where)
+    return scenario.with_source(where, deepcopy(given))
 
 
 def _read(path: Path | str, where: str) -> dict[str, Any]:

@@ -61,7 +61,7 @@ class CameraSensor:
         return blobs
 
 
-@borrowing()
+@borrowing(from_python=True)
 def _watch(blobs, crowd, things, mirror, leds, places):
     """Set distance, bearing and colour (arenas, n, blobs each)."""
     sort(crowd.cells, crowd.state)

@@ -85,7 +85,7 @@ class FanSight:
         return near
 
 
-@borrowing()
+@borrowing(from_python=True)
 def _look(value, crowd, alive, things, fan, active, answers):
     """Set value (arenas, n, rays) of robots that have anything near; with `answers` the response to the distance."""
     sort(crowd.cells, crowd.state)

@@ -30,7 +30,7 @@ class GroundSensor:
         return (shade,)
 
 
-@borrowing()
+@borrowing(from_python=True)
 def _look_down(shade, state, start, points, ground):
     """Set shade (arenas, n, points)."""
     for arena in range(shade.shape[0]):

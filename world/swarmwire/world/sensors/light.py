@@ -51,7 +51,7 @@ class LightSensor:
         return (value,)
 
 
-@borrowing()
+@borrowing(from_python=True)
 def _shine(value, start, angle, crowd, widest_m, things, arena_of, lights):
     """Add what the cells of each robot (arenas, n, sensors) see of each light."""
     sort(crowd.cells, crowd.state)

@@ -72,7 +72,7 @@ class ScanSensor:
         return (near,)
 
 
-@borrowing()
+@borrowing(from_python=True)
 def _scan(near, crowd, things, laser):
     """Set near (arenas, n, rays)."""
     sort(crowd.cells, crowd.state)

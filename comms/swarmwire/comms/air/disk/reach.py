@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry import grid
 from swarmwire.comms.packets import BROADCAST
 
@@ -108,7 +109,7 @@ def _strips(x, y, robots, cells):
     return first, stop
 
 
-@njit(cache=True)
+@borrowing()
 def strip(x, y, arena, cells, row):
     """First and stop in the grid's order of the three cells side by side that are `row` rows above (x, y) in m.
 

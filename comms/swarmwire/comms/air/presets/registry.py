@@ -14,7 +14,7 @@ from swarmwire.comms.air.presets.simulators import SIMULATORS
 from swarmwire.comms.air.presets.standards import STANDARDS
 
 PATH_LOSS = ("log_distance", "two_ray", "itu_indoor")
-PRESETS: dict[str, Preset] = {**DISKS, **STANDARDS, **SIMULATORS, **OTHER_MEDIA}
+PRESETS: dict[str, Preset] = {**DISKS, **STANDARDS, **SIMULATORS, **OTHER_MEDIA}  # by name
 
 
 def with_preset(radio: Mapping[str, Any]) -> dict[str, Any]:

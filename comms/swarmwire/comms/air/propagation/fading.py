@@ -12,6 +12,7 @@ from swarmwire.comms.air.propagation.loss_curve import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.air.propagation.nakagami import nakagami_gain
 from swarmwire.comms.air.propagation.scattering import scattered_between
 from swarmwire.comms.air.propagation.waves import cosine, sine
+from swarmwire.comms.borrowing import borrowing
 
 RAYLEIGH, RICIAN, NAKAGAMI = range(len(FADINGS))
 
@@ -41,7 +42,7 @@ def fading_gain(law, key, a, b, ax, ay, bx, by):
     return gain_of(law, h, math.sqrt((bx - ax) ** 2 + (by - ay) ** 2))
 
 
-@njit(cache=True)
+@borrowing()
 def gain_of(law, h, distance_m):
     """The gain by the law, of `scattered`'s h between robots so many m apart; a ratio, mean 1."""
     real, imaginary = h

@@ -24,10 +24,16 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.propagation.waves import cosine, sine, total
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 
-WAVES, GENERATOR = 32, 19  # v's index is GENERATOR x u's: near the golden section, and without common divisor
+WAVES, SUMS, GENERATOR = (
+    32,
+    16,
+    19,
+)  # GENERATOR: v's index is GENERATOR x u's: near the golden section, and without common divisor
+SCALE = 1.0 / math.sqrt(WAVES)
 FADING = purpose("fading")
 TURN_U, TURN_V, PHASE, OWN = range(4)  # what draws are for
 _MIX = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB), np.uint64(0x9E3779B97F4A7C15)
@@ -74,21 +80,26 @@ def signs_of(number_a, number_b):
     return z ^ (z >> np.uint64(31))
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing(error_model="numpy")
 def scattered(signs, at, a, b, real, imaginary):
-    """Real and imaginary part of h for robots a < b (indices in the arena); 0.02 us.
+    """Real and imaginary part of h for robots a < b (indices in the arena); 0.013 us.
 
     `signs` are the pair's, `at` (rows, 4, WAVES) the waves arriving at robots, of which a and b are rows; `real` and
-    `imaginary` (WAVES,) are for use in here.
+    `imaginary` (SUMS,) are for use in here.
     """
-    half = np.uint32(signs >> np.uint64(WAVES))
-    for n in range(WAVES):
-        sign = np.float32(1) - np.float32(2) * np.float32((half >> np.uint32(n)) & np.uint32(1))
-        u_real, u_imaginary, v_real, v_imaginary = at[a, 0, n], at[a, 1, n], at[b, 2, n], at[b, 3, n]
-        real[n] = sign * (u_real * v_real - u_imaginary * v_imaginary)
-        imaginary[n] = sign * (u_real * v_imaginary + u_imaginary * v_real)
-    scale = 1.0 / math.sqrt(WAVES)
-    return total(real) * scale, total(imaginary) * scale
+    half, a, b = np.uint32(signs >> np.uint64(WAVES)), np.uint64(a), np.uint64(b)
+    for n in range(SUMS):
+        one_real, one_imaginary = _wave(half, at, a, b, np.uint64(n))
+        other_real, other_imaginary = _wave(half, at, a, b, np.uint64(n + SUMS))
+        real[n], imaginary[n] = one_real + other_real, one_imaginary + other_imaginary
+    return total(real) * SCALE, total(imaginary) * SCALE
+
+
+@borrowing(error_model="numpy")
+def _wave(half, at, a, b, n):
+    sign = np.float32(1) - np.float32(2) * np.float32((half >> np.uint32(n)) & np.uint32(1))
+    u_real, u_imaginary, v_real, v_imaginary = at[a, 0, n], at[a, 1, n], at[b, 2, n], at[b, 3, n]
+    return sign * (u_real * v_real - u_imaginary * v_imaginary), sign * (u_real * v_imaginary + u_imaginary * v_real)
 
 
 @njit(cache=True)
@@ -96,7 +107,7 @@ def scattered_between(key, wave_number, a, b, ax, ay, bx, by):
     """`scattered` of one link: robots a and b, indices in the arena with this key, at (ax, ay) and (bx, by) in m."""
     if b < a:
         a, ax, ay, b, bx, by = b, bx, by, a, ax, ay
-    at, parts = np.empty((2, 4, WAVES), np.float32), np.empty((2, WAVES), np.float32)
+    at, parts = np.empty((2, 4, WAVES), np.float32), np.empty((2, SUMS), np.float32)
     waves = scatter_waves(key, wave_number)
     arriving(waves, ax, ay, at[0])
     arriving(waves, bx, by, at[1])

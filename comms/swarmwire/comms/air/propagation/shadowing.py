@@ -25,9 +25,10 @@ from numba import njit
 from swarmwire.comms.air.parameters.propagation import Shadowing
 from swarmwire.comms.air.propagation.waves import sine, total
 from swarmwire.comms.arrays import FloatArray, KeyArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.draws import purpose, uniform
 
-WAVES = 128
+WAVES, SUMS = 128, 16
 NEARLY_NO_TURN = np.float32(1e-30)  # so that touching robots do not divide by 0
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 SHADOWING = purpose("shadowing")
@@ -57,9 +58,7 @@ def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
     height = np.empty((2, waves.shape[1]))
     heights(waves, ax, ay, height[0])
     heights(waves, bx, by, height[1])
-    return between_db(
-        waves.reshape((1, 3, -1)), 0, amplitude_db, height, 0, 1, bx - ax, by - ay, np.empty(waves.shape[1])
-    )
+    return between_db(waves.reshape((1, 3, -1)), 0, amplitude_db, height, 0, 1, bx - ax, by - ay, np.empty(SUMS))
 
 
 @njit(cache=True, error_model="numpy")
@@ -69,15 +68,25 @@ def heights(waves, x, y, out):
         out[n] = sine(waves[0, n] * x + waves[1, n] * y + waves[2, n])
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing(error_model="numpy")
 def between_db(field, arena, amplitude_db, height, a, b, dx, dy, parts):
     """X between robots a and b, rows of `height` (robots, WAVES), where b stands (dx, dy) m from a.
 
     `field` (arenas, 3, WAVES) are the waves of all arenas. A wave's mean along the link is the difference of its sines
-    at both ends over that of its phases. `parts` (WAVES,) is for use in here. In single precision, if all arrays and
-    distances have it: 0.03 us.
+    at both ends over that of its phases. `parts` (SUMS,) is for use in here. In single precision, if all arrays and
+    distances have it: 0.016 us.
     """
-    for n in range(len(parts)):
-        turns = field[arena, 0, n] * dx + field[arena, 1, n] * dy
-        parts[n] = (height[b, n] - height[a, n]) * turns / (turns * turns + NEARLY_NO_TURN)
+    link = field, np.uint64(arena), height, np.uint64(a), np.uint64(b), dx, dy
+    for n in range(SUMS):
+        even = (_mean(link, n) + _mean(link, n + 64)) + (_mean(link, n + 32) + _mean(link, n + 96))
+        odd = (_mean(link, n + 16) + _mean(link, n + 80)) + (_mean(link, n + 48) + _mean(link, n + 112))
+        parts[n] = even + odd
     return total(parts) * (amplitude_db / (2.0 * math.pi)) * math.sqrt(math.sqrt(dx * dx + dy * dy))
+
+
+@borrowing(error_model="numpy")
+def _mean(link, wave):
+    field, arena, height, a, b, dx, dy = link
+    n = np.uint64(wave)
+    turns = field[arena, 0, n] * dx + field[arena, 1, n] * dy
+    return (height[b, n] - height[a, n]) * turns / (turns * turns + NEARLY_NO_TURN)

@@ -69,7 +69,8 @@ def send(rules, state, queue, told, r, now_ns):
         _take_links(state, r)
     else:
         me.first_link = me.weak_link = me.stop_link = 0
-    on_air.put_on_air(rules, state, queue, r, DATA, now_ns, packet.airtime_ns, packet.bits)
+    me.on_air = DATA
+    on_air.put_on_air(rules, state, queue, r, now_ns, packet.airtime_ns, packet.bits)
 
 
 @borrowing()
@@ -123,9 +124,8 @@ def answer(rules, state, queue, r, now_ns):
     if me.on_air != SILENT or me.stage == TURNING or state.off[r] != HEARD:
         return
     _take_links(state, r)
-    on_air.put_on_air(
-        rules, state, queue, r, ACKNOWLEDGEMENT, now_ns, rules.acknowledgement_ns, rules.acknowledgement_bits
-    )
+    me.on_air = ACKNOWLEDGEMENT
+    on_air.put_on_air(rules, state, queue, r, now_ns, rules.acknowledgement_ns, rules.acknowledgement_bits)
 
 
 @borrowing()

@@ -21,7 +21,7 @@ def fate_of_sending(held: Disruption) -> IntArray:
     return np.where(held.alive, np.where(held.radio_on, int(Fate.HEARD), off), int(Fate.SENDER_DEAD))
 
 
-@borrowing()
+@borrowing(from_python=True)
 def switch(rules, state, queue, told, now_ns):
     """Radios are off or on from now on, as `state.off` says; after `line_up`.
 

@@ -12,7 +12,7 @@ SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_
 FEW = 64  # rows that any one event tells beyond a frame's links
 
 
-@borrowing()
+@borrowing(from_python=True)
 def line_up(state, queue, start):
     """Before events run: the packets of robot r are order[start[r]:start[r + 1]], those done taken out."""
     for r in range(len(state.robot)):
@@ -32,7 +32,7 @@ def line_up(state, queue, start):
             schedule(queue, ENTER, r, state.packet[state.order[at]].sent_at_ns)
 
 
-@borrowing()
+@borrowing(from_python=True)
 def run_until(rules, losses, state, queue, told, most_links, until_ns):
     """Let happen what is due before `until_ns`; False if `told` has no more room: then take it out and call again.
 
@@ -68,7 +68,7 @@ def run_until(rules, losses, state, queue, told, most_links, until_ns):
     return True
 
 
-@borrowing()
+@borrowing(from_python=True)
 def stop_the_dead(state, queue, told, alive, now_ns):
     """The queues of robots that are not alive (rows,) end; after `line_up`."""
     for r in range(len(state.robot)):
@@ -76,7 +76,7 @@ def stop_the_dead(state, queue, told, alive, now_ns):
             sender_queue.stop(state, queue, told, r, now_ns, SENDER_DEAD)
 
 
-@borrowing()
+@borrowing(from_python=True)
 def cut_off(rules, state, queue, alive, radio_on, now_ns):
     """Robots that are dead (rows,), or whose radio is off, do not hear the frames on air to their end."""
     for s in range(len(state.robot)):

@@ -58,7 +58,7 @@ def alone_log_success(rules, power_mw, bits):
     return log_success(rules.log_success, rules.receiver, power_mw / rules.noise_mw, bits)
 
 
-@borrowing()
+@borrowing(from_python=True)
 def lone_delivery(rules, mean_dbm, bits):
     """The probability that a lone frame of so many bits is right at this power."""
     return math.exp(alone_log_success(rules, from_db(mean_dbm), bits))

@@ -53,7 +53,7 @@ def _powers(jammers, place, x, y, robots, obstacles, around):
     return power_mw
 
 
-@borrowing()
+@borrowing(from_python=True)
 def refresh(rules, state, queue, now_ns):
     """Jammers, what they do, or the radio's rules have changed: every robot's noise is what it should be."""
     for arena in range(len(state.keys)):

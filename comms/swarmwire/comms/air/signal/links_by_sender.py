@@ -5,12 +5,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from swarmwire.comms.air.decibels import NEPERS, from_db
+from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.signal.pairs import Pairs
 from swarmwire.comms.air.signal.tables import LinkPlaces, LinkTable
 from swarmwire.comms.arrays import ByteArray, FloatArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.fates import Fate
 
 HEARD = int(Fate.HEARD)
@@ -26,70 +26,67 @@ class Levels(NamedTuple):
 
 
 def links_by_sender(
-    pairs: Pairs, send_dbm: FloatArray, receive_dbi: FloatArray, fate: ByteArray, levels: Levels
+    pairs: Pairs, send_dbm: FloatArray, receive_dbi: FloatArray, fate: ByteArray, levels: Levels, kept: LinkTable
 ) -> tuple[LinkTable, LinkPlaces]:
-    """The links of pairs, both ways.
+    """The links of pairs, both ways, after those kept, and where they are.
 
     `send_dbm` and `receive_dbi` (rows,) hold under events, too; `fate` (2, k) are HEARD where nothing closes the link
     of pair i from a to b, and back.
     """
-    both_alike = pairs.back_db is pairs.loss_db
-    kind, power_mw, counts = _kinds(pairs, both_alike, send_dbm, receive_dbi, fate, levels)
-    stop = np.cumsum(counts.sum(axis=1))
-    first = stop - counts.sum(axis=1)
-    places = LinkPlaces(first, first + counts[:, STRONG], stop)
-    return _filled(pairs.a, pairs.b, fate, kind, power_mw, places, int(stop[-1]) if len(stop) else 0), places
+    k, rows = len(pairs.a), len(send_dbm)
+    kind, power_mw, counts = np.empty((2, k), np.uint8), np.empty((2, k)), np.zeros((rows, 3), np.int64)
+    both_alike, own = pairs.back_db is pairs.loss_db, np.empty((2, rows))
+    _find_kinds(kind, power_mw, counts, own, pairs, both_alike, send_dbm, receive_dbi, fate, levels)
+    per_robot = counts[:, WEAK] + counts[:, STRONG]
+    before, stop = len(kept.receiver), np.cumsum(per_robot) + len(kept.receiver)
+    first = stop - per_robot
+    weak, links = first + counts[:, STRONG], before + int(per_robot.sum())
+    # One place more, for whom is left out.
+    table = LinkTable._make(np.empty(links + 1, column.dtype) for column in kept)
+    for column, earlier in zip(table, kept, strict=True):
+        column[:before] = earlier
+    table.now[before:] = HEARD
+    next_place = np.column_stack([np.full(rows, links), weak, first])
+    _fill(table, next_place, pairs.a, pairs.b, fate[0], kind[0], power_mw[0])
+    _fill(table, next_place, pairs.b, pairs.a, fate[1], kind[1], power_mw[1])
+    return LinkTable._make(column[:links] for column in table), LinkPlaces(first, weak, stop)
 
 
-@njit(cache=True)
-def _kinds(pairs, both_alike, send_dbm, receive_dbi, fate, levels):
-    """What each link is, whether it is listed (4), its power, and how many of each kind each robot has."""
-    k = len(pairs.a)
-    kind, power_mw, counts = np.empty((2, k), np.uint8), np.empty((2, k)), np.zeros((len(send_dbm), 3), np.int64)
-    send_mw, receive = np.exp(send_dbm * NEPERS), np.exp(receive_dbi * NEPERS)
-    for i in range(k):
-        power_mw[:, i] = from_db(-pairs.loss_db[i]) * pairs.gain[i]
+@borrowing(from_python=True)
+def _find_kinds(kind, power_mw, counts, own, pairs, both_alike, send_dbm, receive_dbi, fate, levels):
+    """What each link is, 4 more if it is listed, its power, and how many of each kind each robot has."""
+    a, b, there_db, back_db, gain, _ = pairs
+    send, receive = own  # as ratios
+    for r in range(len(send)):
+        send[r], receive[r] = from_db(send_dbm[r]), from_db(receive_dbi[r])
+    for i in range(len(a)):
+        s, r = np.uint64(a[i]), np.uint64(b[i])
+        there_mw = back_mw = from_db(-there_db[i]) * gain[i]
         if not both_alike:
-            power_mw[1, i] = from_db(-pairs.back_db[i]) * pairs.gain[i]
-    for way in range(2):
-        sender, receiver = (pairs.a, pairs.b) if way == 0 else (pairs.b, pairs.a)
-        loss_db = pairs.loss_db if way == 0 else pairs.back_db
-        for i in range(k):
-            s, r = sender[i], receiver[i]
-            mean_dbm = send_dbm[s] + receive_dbi[r] - loss_db[i]
-            power_mw[way, i] *= send_mw[s] * receive[r]
-            is_listed, is_open = mean_dbm >= levels.listed_dbm, fate[way, i] == HEARD
-            is_strong = is_listed | (is_open & (power_mw[way, i] >= levels.heard_mw))
-            is_weak = is_open & (mean_dbm >= levels.least_dbm) & (not is_strong)
-            of_kind = STRONG * is_strong + WEAK * is_weak
-            counts[s, of_kind] += 1
-            kind[way, i] = of_kind + 4 * is_listed
-    counts[:, LEFT_OUT] = 0
-    return kind, power_mw, counts
+            back_mw = from_db(-back_db[i]) * gain[i]
+        there_mw *= send[s] * receive[r]
+        back_mw *= send[r] * receive[s]
+        there = _kind(send_dbm[s] + receive_dbi[r] - there_db[i], there_mw, fate[0, i] == HEARD, levels)
+        back = _kind(send_dbm[r] + receive_dbi[s] - back_db[i], back_mw, fate[1, i] == HEARD, levels)
+        kind[0, i], kind[1, i], power_mw[0, i], power_mw[1, i] = there, back, there_mw, back_mw
+        counts[s, np.uint64(there & 3)] += 1
+        counts[r, np.uint64(back & 3)] += 1
 
 
-@njit(cache=True)
-def _filled(a, b, fate, kind, power_mw, places, links):
-    table = LinkTable(
-        np.empty(links, np.int64),
-        np.empty(links),
-        np.zeros(links, np.bool_),
-        np.zeros(links, np.uint8),
-        np.zeros(links, np.uint8),
-    )
-    strong, weak = places.first.copy(), places.weak.copy()
-    for way in range(2):
-        sender, receiver = (a, b) if way == 0 else (b, a)
-        for i in range(len(a)):
-            of_kind = kind[way, i] & 3
-            if of_kind == STRONG:
-                at = strong[sender[i]]
-                strong[sender[i]] += 1
-                table.is_listed[at], table.fate[at] = kind[way, i] >= 4, fate[way, i]
-            elif of_kind == WEAK:
-                at = weak[sender[i]]
-                weak[sender[i]] += 1
-            else:
-                continue
-            table.receiver[at], table.power_mw[at] = receiver[i], power_mw[way, i]
-    return table
+@borrowing()
+def _kind(mean_dbm, power_mw, is_open, levels):
+    is_listed = mean_dbm >= levels.listed_dbm
+    is_strong = is_listed | (is_open & (power_mw >= levels.heard_mw))
+    is_weak = is_open & (mean_dbm >= levels.least_dbm) & (not is_strong)
+    return STRONG * is_strong + WEAK * is_weak + 4 * is_listed
+
+
+@borrowing(from_python=True)
+def _fill(table, next_place, sender, receiver, fate, kind, power_mw):
+    """Put in the links of one way; `next_place` (rows, 3), where each robot's next of a kind goes, moves on."""
+    for i in range(len(kind)):
+        s, of_kind = np.uint64(sender[i]), np.uint64(kind[i] & 3)
+        at = np.uint64(next_place[s, of_kind])
+        next_place[s, of_kind] += of_kind != LEFT_OUT
+        table.receiver[at], table.power_mw[at] = receiver[i], power_mw[i]
+        table.is_listed[at], table.fate[at] = kind[i] >= 4, fate[i]

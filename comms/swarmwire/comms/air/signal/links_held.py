@@ -9,7 +9,7 @@ from swarmwire.comms.air.signal.links_by_sender import Levels, links_by_sender
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.air.signal.pairs import Pairs, pairs_of
 from swarmwire.comms.air.signal.surroundings import Surroundings
-from swarmwire.comms.air.signal.tables import NOBODY, SILENT, LinkPlaces, LinkTable, Table
+from swarmwire.comms.air.signal.tables import NO_LINKS, NOBODY, SILENT, LinkPlaces, LinkTable, Table
 from swarmwire.comms.air.stages.stage import Medium
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.fates import Fate
@@ -32,7 +32,7 @@ class LinksHeld:
         rows = len(medium.keys) * medium.robots
         self.pose = np.zeros((rows, 3))
         self.pairs = self.pairs_at(self.pose)
-        self.link, self.places = self._links()
+        self.link, self.places = self._links(NO_LINKS)
 
     def pairs_at(self, pose: FloatArray) -> Pairs:
         """The pairs of robots that stand at `pose` (rows, 3)."""
@@ -53,10 +53,7 @@ class LinksHeld:
         """Robots stand at `pose` from now on; tables of dtype ROBOT and RECEPTION are told where their links are."""
         kept = self._keep_on_air(robot, reception)
         self.pose, self.pairs = pose, self.pairs_at(pose)
-        link, places = self._links()
-        before = len(kept.receiver)
-        self.link = LinkTable._make(np.concatenate(columns) for columns in zip(kept, link, strict=True))
-        self.places = LinkPlaces._make(place + before for place in places)
+        self.link, self.places = self._links(kept)
 
     def reached(self, sender: IntArray) -> tuple[IntArray, IntArray]:
         """The place of each sender and the receivers in range of it, which nothing blocks, under the poses held."""
@@ -66,10 +63,10 @@ class LinksHeld:
         counts_as = self.link.is_listed[link] & (self.link.fate[link] != Fate.BLOCKED)
         return at[counts_as], self.link.receiver[link[counts_as]]
 
-    def _links(self) -> tuple[LinkTable, LinkPlaces]:
+    def _links(self, kept: LinkTable) -> tuple[LinkTable, LinkPlaces]:
         pairs, now = self.pairs, self._medium.disruption
         fate = np.stack([_fates(now, *ends, pairs.blocked) for ends in ((pairs.a, pairs.b), (pairs.b, pairs.a))])
-        return links_by_sender(pairs, self.around.send_dbm, self.around.receive_dbi, fate, self._levels)
+        return links_by_sender(pairs, self.around.send_dbm, self.around.receive_dbi, fate, self._levels, kept)
 
     def _keep_on_air(self, robot: Table, reception: Table) -> LinkTable:
         """The links of frames on air, and where they are from now on."""

@@ -25,10 +25,10 @@ ALONE = METHODS.index("none")
 
 
 @borrowing()
-def put_on_air(rules, state, queue, s, kind, now_ns, airtime_ns, bits):
-    """The frame of robot s starts; its links are those from `first_link` to `stop_link`."""
+def put_on_air(rules, state, queue, s, now_ns, airtime_ns, bits):
+    """The frame of robot s, `on_air`, starts; its links are those from `first_link` to `stop_link`."""
     me = state.robot[s]
-    me.on_air, me.on_air_ns, me.airtime_ns, me.bits = kind, now_ns, airtime_ns, bits
+    me.on_air_ns, me.airtime_ns, me.bits = now_ns, airtime_ns, bits
     schedule(queue, OFF_AIR, s, now_ns + airtime_ns)
     robot, reception = state.robot, state.reception
     receiver, power_mw, fate, now = state.link.receiver, state.link.power_mw, state.link.fate, state.link.now
@@ -38,16 +38,17 @@ def put_on_air(rules, state, queue, s, kind, now_ns, airtime_ns, bits):
         return
     turn_away(state, s)
     dcf.sense(rules, state, queue, s, now_ns)
-    for i in range(me.first_link, me.weak_link):
+    first, weak, stop = np.uint64(me.first_link), np.uint64(me.weak_link), np.uint64(me.stop_link)
+    for i in range(first, weak):
         if fate[i] != HEARD:
             now[i] = fate[i]
             continue
-        it = reception[receiver[i]]
+        it = reception[np.uint64(receiver[i])]
         count_chunk(rules, robot, it, now_ns)
         _arrive(rules, robot, it, now, s, i, power_mw[i], now_ns)
         dcf.sense(rules, state, queue, receiver[i], now_ns)
-    for i in range(me.weak_link, me.stop_link):
-        it = reception[receiver[i]]
+    for i in range(weak, stop):
+        it = reception[np.uint64(receiver[i])]
         count_chunk(rules, robot, it, now_ns)
         _add(it, power_mw[i])
         dcf.sense(rules, state, queue, receiver[i], now_ns)
@@ -67,22 +68,23 @@ def take_off_air(rules, losses, state, queue, s, now_ns):
         return
     # Nothing but noise could take a frame.
     is_sure = takes_none(losses) and me.on_air == DATA
-    for i in range(me.first_link, me.weak_link):
+    first, weak, stop = np.uint64(me.first_link), np.uint64(me.weak_link), np.uint64(me.stop_link)
+    for i in range(first, weak):
         if fate[i] != HEARD:
             continue
-        it = reception[receiver[i]]
+        it = reception[np.uint64(receiver[i])]
         count_chunk(rules, robot, it, now_ns)
         _remove(it, power_mw[i])
-        if it.locked_to == s and it.link == i:
+        if (it.locked_to == s) & (it.link == np.int64(i)):
             let_go(it)
             if is_sure and it.log_success == 0.0:
                 now[i] = HEARD
             else:
-                now[i] = outcome(rules, losses, state, s, i, it.log_success)
+                now[i] = outcome(rules, losses, state, s, np.int64(i), it.log_success)
             robot[receiver[i]].trust_from_ns = 0 if now[i] == HEARD else now_ns + rules.distrust_ns
         dcf.sense(rules, state, queue, receiver[i], now_ns)
-    for i in range(me.weak_link, me.stop_link):
-        it = reception[receiver[i]]
+    for i in range(weak, stop):
+        it = reception[np.uint64(receiver[i])]
         count_chunk(rules, robot, it, now_ns)
         _remove(it, power_mw[i])
         dcf.sense(rules, state, queue, receiver[i], now_ns)
@@ -126,8 +128,8 @@ def _remove(it, power_mw):
 def _arrive(rules, robot, it, now, s, i, power_mw, now_ns):
     """Frame s comes to a robot on link i; it locks to the frame, or takes it for noise."""
     noise_mw = rules.noise_mw + it.jam_mw
-    could = power_mw >= rules.least_mw and power_mw >= rules.least_sinr * rules.noise_mw
-    does = could and power_mw >= rules.least_sinr * (noise_mw + it.power_mw) and not it.is_deaf
+    could = (power_mw >= rules.least_mw) & (power_mw >= rules.least_sinr * rules.noise_mw)
+    does = could & (power_mw >= rules.least_sinr * (noise_mw + it.power_mw)) & (it.is_deaf == 0)
     now[i] = COLLIDED if could else TOO_WEAK
     if it.jam_mw > 0.0 and could and not (does or it.is_deaf) and it.locked_to == NOBODY:
         would = power_mw >= rules.least_sinr * (rules.noise_mw + it.power_mw)
@@ -152,9 +154,9 @@ def _arrive(rules, robot, it, now, s, i, power_mw, now_ns):
 def count_chunk(rules, robot, it, now_ns):
     """The interference at a robot is about to change: what it received so far counts."""
     # Without a branch for robots that receive nothing, which would be guessed wrong often: their signal is infinite.
-    others_mw = max(it.power_mw - it.signal_mw, 0.0) if it.signals > 1 else 0.0
+    others_mw = max(it.power_mw - it.signal_mw, 0.0) * (it.signals > 1)
     noise_mw = rules.noise_mw + it.jam_mw + others_mw
-    if it.signal_mw < rules.sure_sinr * noise_mw and it.log_success > HOPELESS:
+    if (it.signal_mw < rules.sure_sinr * noise_mw) & (it.log_success > HOPELESS):
         sender = robot[it.locked_to]
         bits = sender.bits * ((now_ns - it.since_ns) / sender.airtime_ns)
         log_right = log_success(rules.log_success, rules.receiver, it.signal_mw / noise_mw, bits)

@@ -22,6 +22,7 @@ from swarmwire.comms.air.propagation.walls import wall_loss_db
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.air.signal.surroundings import Surroundings
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry import grid
 from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
 
@@ -49,16 +50,15 @@ def pairs_of(
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     robots = len(x) // len(keys)
     cells = grid.build(x, y, len(keys), size_m, around.reach_m * CELL_SLACK)
-    a, b, loss = _near(x, y, robots, cells, around.reach_m, around.curve)
-    # Who is near enough must not depend on other robots' antennas, of which `reach_m` knows the best.
-    a, b, loss = _above(around.least_dbm - around.spread_db, around.send_dbm, around.receive_dbi, a, b, loss)
+    a, b, loss = _near(x, y, robots, cells, around)
     if around.shadows:
         _add_shadows(loss, x, y, robots, around.field, around.amplitude_db, a, b)
     if around.walls:
         _add_walls(loss, x, y, robots, obstacles, around.crossing_db, around.inside_db_per_m, a, b)
     if around.bodies:
         _add_bodies(loss, x, y, robots, cells, around.radius_m, around.most_radius_m, around.body_db, a, b)
-    a, b, loss = _above(around.least_dbm, around.send_dbm, around.receive_dbi, a, b, loss)
+    kept = int(_above(around.least_dbm, around.send_dbm, around.receive_dbi, a, b, loss))
+    a, b, loss = a[:kept], b[:kept], loss[:kept]
     if measured is not None:
         a, b, loss = measured.with_unlisted(a, b, loss)
     gain, blocked = np.ones(len(a)), np.zeros(len(a), np.int64)
@@ -82,52 +82,71 @@ def _measured(pairs: Pairs, measured: MeasuredLinks) -> Pairs:
 
 
 @njit(cache=True)
-def _near(x, y, robots, cells, reach_m, curve):
-    """Pairs within reach, and their path loss in dB."""
+def _near(x, y, robots, cells, around):
+    """Pairs above the cut-off by path loss alone, but for what shadowing may add, and this loss in dB."""
+    ahead = np.empty((len(x), 2, 2), np.uint64)
+    most = _look_ahead(ahead, x, y, robots, cells)
+    a, b, loss = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
+    near, metres2 = np.empty(2 * len(x), np.uint64), np.empty(2 * len(x))
+    there_x, there_y = x[cells.order], y[cells.order]
+    found = _join(a, b, loss, cells.order, there_x, there_y, ahead, around, near, metres2)
+    return a[:found], b[:found], loss[:found]
+
+
+@borrowing()
+def _look_ahead(ahead, x, y, robots, cells):
+    """Whom the robot at each place in the grid's order makes pairs with, and how many pairs there are at most.
+
+    What comes later in its own row of cells (j = 0), and the row above (j = 1): from ahead[place, j, 0] on to before
+    ahead[place, j, 1].
+    """
     most = 0
-    for at in range(len(x)):
-        for j in range(2):
-            first, stop = _ahead(x, y, robots, cells, at, j)
-            most += stop - first
-    a, b, metres2 = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
-    found = 0
     for at in range(len(x)):
         s = cells.order[at]
         for j in range(2):
-            first, stop = _ahead(x, y, robots, cells, at, j)
-            for k in range(first, stop):
-                r = cells.order[k]
-                dx, dy = x[r] - x[s], y[r] - y[s]
+            first, stop = strip(x[s], y[s], s // robots, cells, j)
+            first = at + 1 if j == 0 else first
+            ahead[at, j, 0], ahead[at, j, 1] = first, stop
+            most += stop - first
+    return most
+
+
+@borrowing()
+def _join(a, b, loss, order, x, y, ahead, around, near, metres2):
+    """Put in the pairs, and say how many; `x` and `y` are in the grid's order."""
+    found, square_m2, curve = np.uint64(0), around.reach_m * around.reach_m, around.curve
+    send_dbm, receive_dbi, least_dbm = around.send_dbm, around.receive_dbi, around.least_dbm - around.spread_db
+    for at in range(np.uint64(len(x))):
+        few, s = np.uint64(0), order[at]
+        for j in range(2):
+            for k in range(ahead[at, j, 0], ahead[at, j, 1]):
+                dx, dy = x[k] - x[at], y[k] - y[at]
                 # Written first and kept if it counts: a branch would be guessed wrong too often.
-                a[found], b[found], metres2[found] = min(s, r), max(s, r), dx * dx + dy * dy
-                found += metres2[found] <= reach_m * reach_m
-    loss = np.empty(found)
-    for i in range(found):
-        loss[i] = loss_db(curve, math.sqrt(metres2[i]))
-    return a[:found].copy(), b[:found].copy(), loss
-
-
-@njit(cache=True)
-def _ahead(x, y, robots, cells, at, j):
-    """First and stop in the grid's order of those that the robot at `at` in it makes pairs with.
-
-    What comes later in its own row of cells (j = 0), and the row above (j = 1).
-    """
-    s = cells.order[at]
-    first, stop = strip(x[s], y[s], s // robots, cells, j)
-    return (at + 1, stop) if j == 0 else (first, stop)
+                near[few], metres2[few] = k, dx * dx + dy * dy
+                few += np.uint64(metres2[few] <= square_m2)
+        for k in range(few):
+            r = order[near[k]]
+            a[found], b[found], loss[found] = min(s, r), max(s, r), loss_db(curve, math.sqrt(metres2[k]))
+            # Who is near enough must not depend on other robots' antennas, of which `reach_m` knows the best.
+            found += np.uint64(_best_dbm(send_dbm, receive_dbi, s, r) - loss[found] >= least_dbm)
+    return found
 
 
 @njit(cache=True)
 def _add_shadows(loss, x, y, robots, field, amplitude_db, a, b):
-    waves, single = field.shape[2], np.float32
-    height, parts, coarse = np.empty((len(x), waves), single), np.empty(waves, single), field.astype(single)
+    single = np.float32
+    height = np.empty((len(x), field.shape[2]), single)
     for r in range(len(x)):
         shadowing.heights(field[r // robots], x[r], y[r], height[r])
+    _add_between(loss, x, y, robots, field.astype(single), amplitude_db, a, b, height, np.empty(shadowing.SUMS, single))
+
+
+@borrowing()
+def _add_between(loss, x, y, robots, field, amplitude_db, a, b, height, parts):
     for i in range(len(a)):
         s, r = a[i], b[i]
-        dx, dy = single(x[r] - x[s]), single(y[r] - y[s])
-        loss[i] += shadowing.between_db(coarse, s // robots, amplitude_db, height, s, r, dx, dy, parts)
+        dx, dy = np.float32(x[r] - x[s]), np.float32(y[r] - y[s])
+        loss[i] += shadowing.between_db(field, s // robots, amplitude_db, height, s, r, dx, dy, parts)
 
 
 @njit(cache=True)
@@ -143,26 +162,36 @@ def _add_bodies(loss, x, y, robots, cells, radius_m, most_radius_m, body_db, a, 
         loss[i] += body_db * bodies_between(x, y, radius_m, most_radius_m, cells, robots, a[i], b[i])
 
 
-@njit(cache=True)
+@borrowing(from_python=True)
 def _above(least_dbm, send_dbm, receive_dbi, a, b, loss):
-    """Pairs in which either hears the other with so much power."""
-    kept = 0
+    """Put pairs in which either hears the other with so much power before the others, and say how many there are."""
+    kept = np.uint64(0)
     for i in range(len(a)):
         s, r = a[i], b[i]
-        best_dbm = max(send_dbm[s] + receive_dbi[r], send_dbm[r] + receive_dbi[s]) - loss[i]
         a[kept], b[kept], loss[kept] = s, r, loss[i]
-        kept += best_dbm >= least_dbm
-    return a[:kept].copy(), b[:kept].copy(), loss[:kept].copy()
+        kept += np.uint64(_best_dbm(send_dbm, receive_dbi, s, r) - loss[i] >= least_dbm)
+    return kept
+
+
+@borrowing()
+def _best_dbm(send_dbm, receive_dbi, s, r):
+    """The power with which the better of both would hear the other, without losses."""
+    s, r = np.uint64(s), np.uint64(r)
+    return max(send_dbm[s] + receive_dbi[r], send_dbm[r] + receive_dbi[s])
 
 
 @njit(cache=True)
 def _fade(gain, x, y, robots, keys, scatter, law, a, b):
-    waves = scatter.shape[2]
-    at, parts = np.empty((len(x), 4, waves), np.float32), np.empty((2, waves), np.float32)
-    real, imaginary, number = parts[0], parts[1], np.empty(len(x), np.uint64)
+    at, number = np.empty((len(x), 4, scatter.shape[2]), np.float32), np.empty(len(x), np.uint64)
     for r in range(len(x)):
         scattering.arriving(scatter[r // robots], x[r], y[r], at[r])
         number[r] = scattering.own_number(keys[r // robots], r % robots)
+    parts = np.empty((2, scattering.SUMS), np.float32)
+    _gains(gain, x, y, at, number, law, a, b, parts[0], parts[1])
+
+
+@borrowing()
+def _gains(gain, x, y, at, number, law, a, b, real, imaginary):
     for i in range(len(a)):
         s, r = a[i], b[i]
         h = scattering.scattered(scattering.signs_of(number[s], number[r]), at, s, r, real, imaginary)

@@ -106,6 +106,11 @@ class LinkTable(NamedTuple):
     now: ByteArray  # (links,) of the frame on air: RECEIVING or a fate
 
 
+NO_LINKS = LinkTable(
+    np.empty(0, np.int64), np.empty(0), np.empty(0, np.bool_), np.empty(0, np.uint8), np.empty(0, np.uint8)
+)
+
+
 class LinkPlaces(NamedTuple):
     """Where in a `LinkTable` each robot's links are, (rows,) each."""
 

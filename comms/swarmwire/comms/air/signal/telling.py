@@ -43,15 +43,14 @@ def report(rules, state, queue, told, r, now_ns):
     packet = state.packet[me.packet]
     me.last_fate, me.last_in_range, me.last_mw = NOBODY, 0, 0.0
     link, to, hold, index = state.link, packet.to, me.hold, me.packet
-    to_all = to == NOBODY
+    if to == NOBODY:
+        _tell_all(state, told, r, now_ns)
+        return
     for i in range(me.first_link, me.weak_link):
         receiver, fate, power_mw = link.receiver[i], np.int64(link.now[i]), link.power_mw[i]
-        if not ((to_all or to == receiver) and (link.is_listed[i] or fate == HEARD)):
+        if to != receiver or not (link.is_listed[i] or fate == HEARD):
             continue
         in_range = 0 if fate == BLOCKED else 1
-        if to_all:
-            _tell(state, told, index, receiver, fate, in_range, now_ns, hold, power_mw)
-            continue
         me.last_fate, me.last_in_range, me.last_mw = fate, in_range, power_mw
         if fate == HEARD:
             if not packet.is_settled:
@@ -60,6 +59,20 @@ def report(rules, state, queue, told, r, now_ns):
             if rules.acknowledged:
                 state.robot[receiver].answers_to = r
                 schedule(queue, ANSWER, receiver, now_ns + rules.short_space_ns)
+
+
+@borrowing()
+def _tell_all(state, told, r, now_ns):
+    me, link = state.robot[r], state.link
+    on_air_at_ns, at = state.packet[me.packet].on_air_at_ns, np.uint64(told.count[0])
+    for i in range(np.uint64(me.first_link), np.uint64(me.weak_link)):
+        fate = link.now[i]
+        # Written first and kept if it counts: a branch would be guessed wrong too often.
+        told.packet[at], told.receiver[at], told.fate[at] = me.packet, link.receiver[i], fate
+        told.in_range[at], told.final_at_ns[at], told.hold[at] = fate != BLOCKED, now_ns, me.hold
+        told.on_air_at_ns[at], told.power_mw[at] = on_air_at_ns, link.power_mw[i]
+        at += np.uint64(link.is_listed[i] | (fate == HEARD))
+    told.count[0] = at
 
 
 @borrowing()

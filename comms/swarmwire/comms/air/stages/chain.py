@@ -33,7 +33,7 @@ from swarmwire.comms.air.stages import (
 from swarmwire.comms.air.stages.stage import Medium, Stage
 
 AFTER_RECEPTION = (trace, given_range, given_bearing, given_rssi, latency, varying_delay, propagation_delay)
-ORDER = (line_of_sight, bodies_block, disrupted, fixed_loss, burst_loss, *AFTER_RECEPTION)
+ORDER = (line_of_sight, bodies_block, disrupted, fixed_loss, burst_loss, *AFTER_RECEPTION)  # order has a meaning
 
 
 def chain(medium: Medium) -> tuple[Stage, ...]:

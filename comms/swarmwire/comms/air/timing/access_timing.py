@@ -58,6 +58,6 @@ class Dcf:
 
 
 IEEE_802_15_4 = UnslottedCsma()
-IEEE_802_11B = Dcf(10 * US, 20 * US, 31)
-IEEE_802_11A = Dcf(16 * US, 9 * US, 15)
+IEEE_802_11B = Dcf(10 * US, 20 * US, 31)  # of frames by DSSS and CCK
+IEEE_802_11A = Dcf(16 * US, 9 * US, 15)  # of frames by OFDM at 5 GHz
 IEEE_802_11G = Dcf(10 * US, 9 * US, 15)  # where no station of 802.11b is near: short slots, CWmin of OFDM

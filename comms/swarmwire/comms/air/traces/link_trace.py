@@ -11,7 +11,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 
-Quantity = Literal["delivery_ratio", "rssi_dbm", "delay_s"]
+Quantity = Literal["delivery_ratio", "rssi_dbm", "delay_s"]  # what may be measured
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,12 +43,13 @@ def fit_command(
 
     from swarmwire.deploy.radio.fit_report import print_fit
     from swarmwire.deploy.radio.fit_toml import radio_fit_toml
-    from swarmwire.metrics.drawing.whole_file import check_path
+    from swarmwire.metrics.drawing.canvas import check_picture
+    from swarmwire.metrics.whole_file import check_path
 
     if write is not None:
         check_path(write, (".toml",))
     if to is not None:
-        check_path(to, (".png", ".svg", ".pdf"))
+        check_picture(to)
     antenna = _antenna(power_dbm, gain_dbi)
     fit = _fit(file, within)
     text = radio_fit_toml(fit, antenna, file)
@@ -89,11 +90,11 @@ def _antenna(power_dbm: float, gain_dbi: float) -> "Antenna":
 
 
 def _write(text: str, to: Path | None) -> None:
-    from swarmwire.metrics.drawing.whole_file import whole_file
+    from swarmwire.metrics.whole_file import chosen_file
 
     if to is None:
         typer.echo(text, nl=False)
         return
-    with whole_file(to) as part:
+    with chosen_file(to) as part:
         part.write_text(text, encoding="utf-8")
     typer.echo(f"written: {to}")

@@ -91,11 +91,10 @@ def _probe_scenario(
     from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.radio.coverage_probe import probe_coverage
     from swarmwire.deploy.radio.coverage_report import coverage_json, print_coverage
-    from swarmwire.metrics.drawing.canvas import SUFFIXES
-    from swarmwire.metrics.drawing.whole_file import check_path
+    from swarmwire.metrics.drawing.canvas import check_picture
 
     if to is not None:
-        check_path(to, SUFFIXES)
+        check_picture(to)
     with compiling_told(Console(stderr=True)):
         probe = probe_coverage(
             Path(scenario),

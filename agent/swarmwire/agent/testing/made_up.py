@@ -1,29 +1,23 @@
-"""Checks for agents, ours and users': two agents that are the same rule, and rows that do not see one another.
+"""What robots of a trial sense and hear, made up and keyed by its seed.
 
-Both feed made-up senses and packets, keyed by a seed, through the same host that runs agents anywhere: ragged packets
-(what robots sent a tick ago, heard by some), outcomes of addressed ones if the agent asks, robots that drop out and
-come back, any body and parameters.
+Ragged packets (what robots sent a tick ago, heard by some), outcomes of addressed ones, robots that drop out and come
+back.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.agent.agent import Agent
-from swarmwire.agent.host import Hosted, hosted
-from swarmwire.agent.loading import AgentClass
-from swarmwire.agent.vector_agent import VectorAgent
+from swarmwire.agent.testing.trial import Trial
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.assignment import GroupAssignment, params_of
-from swarmwire.comms.bodies.body import Body, load_body
+from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.leds import BRIGHTEST
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import UNTOLD, Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions, GroupSenses
+from swarmwire.comms.senses import GroupSenses
 from swarmwire.comms.sheets import Camera, GroundColour, OwnSheet
 
 RATE_HZ = 10
@@ -31,53 +25,6 @@ GIVEN = ("range_m", "bearing_rad", "rssi_dbm")
 DROP_OUT = 0.1  # share of the robots missing in a tick
 HEARING = 0.4  # share of the senders that a robot hears
 LEARNING = 0.6  # share of the outcomes still to come that come in a tick
-
-
-@dataclass(frozen=True)
-class Trial:
-    """What to try an agent with."""
-
-    robots: int = 7
-    ticks: int = 12
-    seed: int = 1
-    body: str | Body = "epuck"  # one that comes with swarmwire, or any other
-    params: dict[str, Any] | None = None  # a list has a value for each robot
-
-
-def assert_equivalent(single: type[Agent], vector: type[VectorAgent[Any]], trial: Trial | None = None) -> None:
-    """AssertionError unless both do exactly the same, bit for bit, for robots that sense and hear the same."""
-    trial = trial or Trial()
-    one, other = (_host(kind, trial, np.arange(trial.robots)) for kind in (single, vector))
-    for given, show in _inputs(trial):
-        first, second = one.act(*given), other.act(*given)
-        names = f"{single.__name__} and {vector.__name__}"
-        _assert_same(first, second, f"{names} differ in tick {given.time[0]}")
-        show(first.sent)
-
-
-def assert_rows_independent(vector: type[VectorAgent[Any]], trial: Trial | None = None) -> None:
-    """AssertionError unless n rows at once do exactly what each row does alone, bit for bit: so no row peeks."""
-    trial = trial or Trial()
-    together = _host(vector, trial, np.arange(trial.robots))
-    alone = [_host(vector, trial, np.array([row])) for row in range(trial.robots)]
-    for given, show in _inputs(trial):
-        at_once = together.act(*given)
-        each = [host.act(*_only(row, given)) for row, host in enumerate(alone)]
-        text = f"rows of {vector.__name__} are not independent in tick {given.time[0]}"
-        _assert_same(at_once, Actions.joined(each), text)
-        show(at_once.sent)
-
-
-def _body(trial: Trial) -> Body:
-    return load_body(trial.body) if isinstance(trial.body, str) else trial.body
-
-
-def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> Hosted:
-    keys = np.array([draws.derive_key("trial", trial.seed, int(row)) for row in rows], np.uint64)
-    names = tuple(f"robot-{row}" for row in rows)
-    params = params_of(trial.params or {}, rows)
-    group = GroupAssignment("trial", "", params, _body(trial), rows, names, keys)
-    return hosted(group, kind)
 
 
 class _Ether:
@@ -111,8 +58,8 @@ class _Ether:
         return Heard(rows[receiver], sender, np.full(len(receiver), tick), at_ns, given, payload, payloads)
 
 
-class _Given(NamedTuple):
-    """What a group is given in a tick."""
+class Given(NamedTuple):
+    """What a group is given in a tick: time (its number, start and length in ns), senses, packets and outcomes."""
 
     time: tuple[int, int, int]
     senses: GroupSenses
@@ -120,16 +67,16 @@ class _Given(NamedTuple):
     outcomes: Outcomes
 
 
-def _inputs(trial: Trial) -> Iterator[tuple[_Given, Callable[[Sent], None]]]:
+def inputs(trial: Trial) -> Iterator[tuple[Given, Callable[[Sent], None]]]:
     """What the robots are given, tick by tick, and whom to show what they sent."""
-    key = draws.derive_key("inputs", trial.seed)
-    body, ether = _body(trial), _Ether(key)
+    key, body = draws.derive_key("inputs", trial.seed), trial.sheet
+    ether = _Ether(key)
     for tick in range(trial.ticks):
         rows = np.flatnonzero(_uniform(key, tick, "drop-out", (trial.robots,)) >= DROP_OUT)
         time_ns = tick_start_ns(tick, RATE_HZ)
         time = (tick, time_ns, tick_start_ns(tick + 1, RATE_HZ) - time_ns)
         senses = GroupSenses(rows, _senses(body, key, tick, rows))
-        yield _Given(time, senses, ether.heard(tick, rows), ether.outcomes(tick)), ether.show
+        yield Given(time, senses, ether.heard(tick, rows), ether.outcomes(tick)), ether.show
 
 
 def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatArray]:
@@ -189,48 +136,3 @@ def _seen(body: Body, key: int, tick: int, n: int) -> dict[str, FloatArray]:
 def _uniform(key: int, tick: int, purpose: str, shape: tuple[int, ...]) -> FloatArray:
     count = np.arange(int(np.prod(shape))).reshape(shape)
     return draws.uniform(key, tick, count, 0, draws.purpose(purpose))
-
-
-def _only(row: int, given: _Given) -> _Given:
-    at = np.flatnonzero(given.senses.rows == row)
-    own = GroupSenses(given.senses.rows[at], {name: column[at] for name, column in given.senses.fields.items()})
-    heard = given.heard.select(np.flatnonzero(given.heard.receiver == row))
-    return _Given(given.time, own, heard, given.outcomes.select(np.flatnonzero(given.outcomes.row == row)))
-
-
-def _assert_same(first: Actions, second: Actions, text: str) -> None:
-    for name in ("rows", "drive", "linear_mps", "angular_radps", "lateral_mps"):
-        one, other = getattr(first, name), getattr(second, name)
-        if not np.array_equal(one, other, equal_nan=name not in ("rows", "drive")):
-            raise AssertionError(f"{text}: {name}\n{one}\n{other}")
-    if _states(first) != _states(second):
-        raise AssertionError(f"{text}: states\n{_states(first)}\n{_states(second)}")
-    if _leds(first) != _leds(second):
-        raise AssertionError(f"{text}: leds\n{_leds(first)}\n{_leds(second)}")
-    if _actuations(first) != _actuations(second):
-        raise AssertionError(f"{text}: actuators\n{_actuations(first)}\n{_actuations(second)}")
-    if _packets(first.sent) != _packets(second.sent):
-        raise AssertionError(f"{text}: packets\n{_packets(first.sent)}\n{_packets(second.sent)}")
-
-
-def _states(actions: Actions) -> dict[int, str]:
-    notes = actions.notes
-    return {int(row): notes.names[code] for row, code in zip(notes.rows, notes.code, strict=True)}
-
-
-def _leds(actions: Actions) -> dict[tuple[int, int], int]:
-    """The colours that LEDs were switched to, by robot and LED."""
-    rows, which, rgb = actions.leds.rows.tolist(), actions.leds.which.tolist(), actions.leds.rgb.tolist()
-    return dict(zip(zip(rows, which, strict=True), rgb, strict=True))
-
-
-def _actuations(actions: Actions) -> dict[tuple[int, int], float]:
-    """What own actuators were set to, by robot and place."""
-    rows, place, value = actions.own.rows.tolist(), actions.own.place.tolist(), actions.own.value.tolist()
-    return dict(zip(zip(rows, place, strict=True), value, strict=True))
-
-
-def _packets(sent: Sent) -> list[tuple[int, int, int, bytes]]:
-    of = sent.select(np.argsort(sent.sender, kind="stable"))
-    numbers = zip(of.sender.tolist(), of.to.tolist(), of.outcome_ids.tolist(), strict=True)
-    return [(*three, of.payloads.row(i)) for i, three in enumerate(numbers)]

@@ -1,0 +1,18 @@
+"""Versions of what stands in a run folder: another one is refused. Something that is added keeps the version."""
+
+from pathlib import Path
+from typing import cast
+
+from swarmwire.comms.errors import BadInput
+
+SUMMARY_FORMAT = 1  # of summary.json
+RUN_FORMAT = 1  # of run.json
+TABLES_FORMAT = 2  # of static.json, which has it, and of the tables
+
+
+def refuse_other_format(written: object, known: int, path: Path) -> None:
+    """Return if what a file holds names the known format, or none; BadInput if it names another."""
+    if isinstance(written, dict):
+        found = cast("dict[str, object]", written).get("format", known)
+        if type(found) is not int or found != known:
+            raise BadInput(str(path), "format", f"expected {known}, got {found!r}: by another version of swarmwire")

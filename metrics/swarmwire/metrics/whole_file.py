@@ -1,0 +1,50 @@
+"""Files that are there whole or not at all: written under another name beside their place, then renamed.
+
+Against a killed process and a full disk; there is no sync to disk for a power cut.
+"""
+
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from swarmwire.comms.errors import BadInput
+
+
+@contextmanager
+def written_aside(to: Path) -> Generator[Path]:
+    """A path to write to; when the block ends well that file takes its place, which it may replace, else it is gone.
+
+    OSError if nothing can be written there.
+    """
+    aside = to.with_name(f".aside-{to.name}")  # the ending stays: writers go by it
+    aside.touch()
+    try:
+        yield aside
+        aside.replace(to)
+    finally:  # however the block ended: on a full disk the half of a file is in the way
+        aside.unlink(missing_ok=True)
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file so that no half of it is ever seen; OSError if the disk will not."""
+    with written_aside(path) as aside:
+        aside.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def chosen_file(to: Path) -> Generator[Path]:
+    """As `written_aside`, for a path that a person chose: BadInput if nothing can be written there."""
+    with ExitStack() as stack:
+        try:
+            aside = stack.enter_context(written_aside(to))
+        except OSError as error:
+            raise BadInput(str(to), "", f"expected a file that can be written: {error.strerror}") from None
+        yield aside
+
+
+def check_path(to: Path, suffixes: tuple[str, ...]) -> None:
+    """Return if a person may have a file of one of these kinds there; else BadInput."""
+    if to.suffix.lower() not in suffixes:
+        raise BadInput(str(to), "", f"expected a file name that ends in {' or '.join(suffixes)}")
+    if not to.parent.is_dir() or to.is_dir():
+        raise BadInput(str(to), "", "expected a path in a folder that exists")
