@@ -176,9 +176,10 @@ def test_a_body_of_ones_own_tells_what_one_that_comes_along_does(tmp_path):
 
 def test_a_body_of_ones_own_tells_its_own_senses_and_actuators():
     text = told(str(ROOT / "examples" / "gas" / "sniffer.toml"))
-    gas, sealer = text[text.index("\nsense: gas\n") :], text[text.index("\nactuator: sealer\n") :]
-    assert_tells(gas, [("kind", "gas.py:Gas"), ("rate_hz", "5.0"), ("reach_m", "m", "1.0")])
-    assert_tells(sealer, [("kind", "gas.py:Sealer"), ("y_m", "m", "0.5")])
+    titles = "sense: gas, which reads concentration", "actuator: sealer"
+    gas, sealer = (text[text.index(f"\n{title}\n") :] for title in titles)
+    assert_tells(gas, [("kind", "gas.py:Gas"), ("rate_hz", "5.0"), ("reach_m", "m", "1.0", "fallen to 37 %")])
+    assert_tells(sealer, [("kind", "gas.py:Sealer"), ("arm_m", "m", "0.3", "how far it reaches")])
 
 
 @pytest.mark.parametrize("name", DRIVES)
@@ -296,7 +297,7 @@ def test_a_name_may_be_short_or_that_of_ones_own_group(asked, name):
         ("xyzzy", "nothing is near it"),
         ("blackout", "say which: event:blackout, fate:blackout"),
         ("size_m", "say which: arena.size_m, arena.obstacles.*.within.size_m"),
-        ("metrics", "swarmwire list metrics"),
+        ("fates", "swarmwire list fates"),
         ("absent.toml", "expected a readable file"),
         ("absent.py:Mine", "there is no file"),
         ("swarmwire.agent:Robot", "no Agent or VectorAgent"),

@@ -50,6 +50,18 @@ class Painter(OwnActuator):
         self.scene.target[arena[stopped], robot[stopped]] = 0.0
 
 
+@dataclass(frozen=True)
+class Frozen(OwnSensor):
+    """Cannot be told its scene."""
+
+    @property
+    def fields(self) -> Any:
+        return (Field("x"),)
+
+    def truth(self, tick: int) -> Any:
+        raise AssertionError("nobody asks")
+
+
 @dataclass
 class Alone(OwnSensor):
     """A single field needs no tuple."""

@@ -6,27 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.draw import Draw
-from swarmwire.agent.handle import Handle
 from swarmwire.agent.outcome import Outcome
 from swarmwire.agent.packet import Packet, Packets
-from swarmwire.agent.readings import (
-    BatteryReading,
-    BumperReading,
-    CameraReading,
-    CompassReading,
-    GroundReading,
-    ImuReading,
-    InfraredReading,
-    LightReading,
-    OdometryReading,
-    OwnReading,
-    PositioningReading,
-    ProximityReading,
-    ScanReading,
-)
-from swarmwire.agent.robots import forward_and_turn, had
+from swarmwire.agent.readings import BumperReading, CameraReading, OwnReading
+from swarmwire.agent.robots import forward_and_turn
+from swarmwire.agent.sensing import Sensing
 from swarmwire.agent.turn import Turn
-from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.leds import rgb_of
 from swarmwire.comms.messages import DICT_TAG, Message, decode_dict, encode_dict
 from swarmwire.comms.outcomes import SendResult
@@ -35,7 +21,7 @@ from swarmwire.comms.packets import Payloads
 M = TypeVar("M", bound=Message)
 
 
-class Robot(Handle):
+class Robot(Sensing[float]):
     """One robot in one tick. Senses raise NotDeclared unless the agent's `needs` name them."""
 
     __slots__ = ("_draw", "_row", "radio")
@@ -54,70 +40,14 @@ class Robot(Handle):
         return self._draw
 
     @property
-    def proximity(self) -> ProximityReading:
-        """Rays around the body: value, distance_m and angle_rad, (rays,)."""
-        return ProximityReading(self._turn.field("proximity", "value")[self._row], had(self.body.proximity))
-
-    @property
-    def compass(self) -> CompassReading:
-        """Heading in the arena's frame."""
-        return CompassReading(float(self._turn.field("compass", "heading_rad")[self._row]))
-
-    @property
-    def odometry(self) -> OdometryReading:
-        """Wheel encoders."""
-        left, right = self._turn.field("odometry", "left_m"), self._turn.field("odometry", "right_m")
-        return OdometryReading(float(left[self._row]), float(right[self._row]))
-
-    @property
-    def light(self) -> LightReading:
-        """Photocells around the body: value and angle_rad, (cells,)."""
-        return LightReading(self._turn.field("light", "value")[self._row], had(self.body.light))
-
-    @property
     def bumper(self) -> BumperReading:
         """Whether the body touched anything."""
-        return BumperReading(bool(self._turn.field("bumper", "pressed")[self._row]))
-
-    @property
-    def positioning(self) -> PositioningReading:
-        """Position in the arena's frame."""
-        x, y = self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m")
-        return PositioningReading(float(x[self._row]), float(y[self._row]))
-
-    @property
-    def imu(self) -> ImuReading:
-        """Acceleration and turn rate in the body's frame."""
-        turn, row = self._turn, self._row
-        names = "forward_mps2", "left_mps2", "turn_radps"
-        return ImuReading(*(float(turn.field("imu", name)[row]) for name in names))
-
-    @property
-    def battery(self) -> BatteryReading:
-        """Charge, 1 full and 0 empty, and voltage."""
-        charge, voltage = self._turn.field("battery", "charge"), self._turn.field("battery", "voltage_v")
-        return BatteryReading(float(charge[self._row]), float(voltage[self._row]))
-
-    @property
-    def infrared(self) -> InfraredReading:
-        """Light of other robots, by rays around the body: value, distance_m and angle_rad, (rays,)."""
-        return InfraredReading(self._turn.field("infrared", "value")[self._row], had(self.body.infrared))
-
-    @property
-    def scan(self) -> ScanReading:
-        """Laser scan: range_m and angle_rad, (rays,)."""
-        return ScanReading(self._turn.field("scan", "range_m")[self._row], had(self.body.scan))
-
-    @property
-    def ground(self) -> GroundReading:
-        """Shade of the floor under the sensors, (points,)."""
-        return GroundReading(self._turn.field("ground", "shade")[self._row])
+        return BumperReading(bool(self._number("bumper", "pressed")))
 
     @property
     def camera(self) -> CameraReading:
         """LEDs of other robots in sight."""
-        names = "distance_m", "bearing_rad", "colour"
-        return CameraReading.of(*(self._turn.field("camera", name)[self._row] for name in names))
+        return CameraReading.of(*(self._numbers("camera", name) for name in ("distance_m", "bearing_rad", "colour")))
 
     def sense(self, name: str) -> OwnReading:
         """What a sense of your own reads: each field as an attribute, a float or an array (width,)."""
@@ -156,6 +86,12 @@ class Robot(Handle):
     def note(self, state: str) -> None:
         """Name what the robot is at ("search", "wait"), for recordings and pictures; it holds until the next call."""
         self._turn.note(np.array([self._row]), state)
+
+    def _number(self, sense: str, field: str) -> float:
+        return float(self._turn.field(sense, field)[self._row])
+
+    def _numbers(self, sense: str, field: str) -> FloatArray:
+        return self._turn.field(sense, field)[self._row]
 
 
 class RadioPort:

@@ -6,36 +6,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.draw import Draws
-from swarmwire.agent.handle import Handle
 from swarmwire.agent.packet import Packets
-from swarmwire.agent.readings import (
-    BatteryReadings,
-    BumperReadings,
-    CameraReadings,
-    CompassReadings,
-    GroundReadings,
-    ImuReadings,
-    InfraredReadings,
-    LightReadings,
-    OdometryReadings,
-    OwnReading,
-    PositioningReadings,
-    ProximityReadings,
-    ScanReadings,
-)
+from swarmwire.agent.readings import BumperReadings, CameraReadings, OwnReading
+from swarmwire.agent.sensing import Sensing
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.bodies.leds import rgb_of
 from swarmwire.comms.messages import Message, encode_rows, message_class
 from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.sheets import Sheet
 
 M = TypeVar("M", bound=Message)
-S = TypeVar("S", bound=Sheet)
 N = TypeVar("N", float, FloatArray)
 
 
-class Robots(Handle):
+class Robots(Sensing[FloatArray]):
     """n robots of one group in one tick; every array has a leading axis n. Senses raise NotDeclared unless needed."""
 
     __slots__ = ("draw", "radio")
@@ -51,66 +35,14 @@ class Robots(Handle):
         return self._turn.n
 
     @property
-    def proximity(self) -> ProximityReadings:
-        """Rays around the bodies: value and distance_m (n, rays), angle_rad (rays,)."""
-        value = self._turn.field("proximity", "value")
-        return ProximityReadings(value, had(self.body.proximity))
-
-    @property
-    def compass(self) -> CompassReadings:
-        """Headings in the arena's frame: heading_rad (n,)."""
-        return CompassReadings(self._turn.field("compass", "heading_rad"))
-
-    @property
-    def odometry(self) -> OdometryReadings:
-        """Wheel encoders: left_m and right_m (n,)."""
-        return OdometryReadings(self._turn.field("odometry", "left_m"), self._turn.field("odometry", "right_m"))
-
-    @property
-    def light(self) -> LightReadings:
-        """Photocells around the bodies: value (n, cells), angle_rad (cells,)."""
-        return LightReadings(self._turn.field("light", "value"), had(self.body.light))
-
-    @property
     def bumper(self) -> BumperReadings:
         """Bumpers: pressed (n,), 1 or 0."""
-        return BumperReadings(self._turn.field("bumper", "pressed"))
-
-    @property
-    def positioning(self) -> PositioningReadings:
-        """Positions in the arena's frame: x_m and y_m (n,)."""
-        return PositioningReadings(self._turn.field("positioning", "x_m"), self._turn.field("positioning", "y_m"))
-
-    @property
-    def imu(self) -> ImuReadings:
-        """Accelerations and turn rates in the bodies' frames: forward_mps2, left_mps2 and turn_radps (n,)."""
-        return ImuReadings(*(self._turn.field("imu", name) for name in ("forward_mps2", "left_mps2", "turn_radps")))
-
-    @property
-    def battery(self) -> BatteryReadings:
-        """Batteries: charge, 1 full and 0 empty, and voltage_v (n,)."""
-        return BatteryReadings(self._turn.field("battery", "charge"), self._turn.field("battery", "voltage_v"))
-
-    @property
-    def infrared(self) -> InfraredReadings:
-        """Light of other robots, by rays around the bodies: value and distance_m (n, rays), angle_rad (rays,)."""
-        return InfraredReadings(self._turn.field("infrared", "value"), had(self.body.infrared))
-
-    @property
-    def scan(self) -> ScanReadings:
-        """Laser scans: range_m (n, rays), angle_rad (rays,)."""
-        return ScanReadings(self._turn.field("scan", "range_m"), had(self.body.scan))
-
-    @property
-    def ground(self) -> GroundReadings:
-        """Shades of the floor under the sensors: shade (n, points)."""
-        return GroundReadings(self._turn.field("ground", "shade"))
+        return BumperReadings(self._number("bumper", "pressed"))
 
     @property
     def camera(self) -> CameraReadings:
         """LEDs of other robots in sight: distance_m, bearing_rad and colour (n, most_blobs), count (n,)."""
-        names = "distance_m", "bearing_rad", "colour"
-        return CameraReadings(*(self._turn.field("camera", name) for name in names))
+        return CameraReadings(*(self._numbers("camera", name) for name in ("distance_m", "bearing_rad", "colour")))
 
     def sense(self, name: str) -> OwnReading:
         """What a sense of your own reads: each field as an attribute, (n,) or (n, width)."""
@@ -168,6 +100,12 @@ class Robots(Handle):
         """Name what the robots of the mask `rows`, or all, are at; for recordings and pictures, until the next call."""
         self._turn.note(slice(None) if rows is None else self._turn.mask(rows), state)
 
+    def _number(self, sense: str, field: str) -> FloatArray:
+        return self._turn.field(sense, field)
+
+    def _numbers(self, sense: str, field: str) -> FloatArray:
+        return self._turn.field(sense, field)
+
 
 class RadioRows:
     """The radios of n robots: an unreliable medium."""
@@ -214,10 +152,3 @@ def _of(rows: BoolArray, value: Any) -> Any:
 def forward_and_turn(left_mps: N, right_mps: N, wheel_base_m: float) -> tuple[N, N]:
     """Forward speed and turn rate (positive to the left) of a body whose wheels roll so fast."""
     return 0.5 * (left_mps + right_mps), (right_mps - left_mps) / wheel_base_m
-
-
-def had(sheet: S | None) -> S:
-    """The data sheet of a sense that the body has (needs are checked before a run)."""
-    if sheet is None:
-        raise AttributeError("the body does not have this sense")
-    return sheet

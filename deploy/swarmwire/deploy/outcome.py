@@ -13,8 +13,6 @@ from swarmwire.metrics.record.recorders import record_summary
 from swarmwire.world.crews.realtime_crew import RealTimeReport
 from swarmwire.world.crews.roster import Loss
 
-GLOBAL_SENSES = ("compass", "positioning")
-
 
 def outcome(
     static: Static,
@@ -68,7 +66,8 @@ def outcome(
 
 
 def _global_senses(static: Static) -> dict[str, list[str]]:
-    found = {group.body.name: [s for s in GLOBAL_SENSES if s in group.body.senses] for group in static.groups}
+    bodies = [group.body for group in static.groups]
+    found = {body.name: [name for name, sheet in body.senses.items() if sheet.is_global] for body in bodies}
     return {body: senses for body, senses in found.items() if senses}
 
 

@@ -12,6 +12,7 @@ from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.antennas import Antennas
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.comms.loading import resolve
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.agents import agent_specs, check_agents
@@ -33,6 +34,8 @@ from swarmwire.deploy.too_large import TooLarge
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.metrics.own_metrics import own_metrics
+from swarmwire.metrics.registry import METRICS
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.crews.remote_crew import RemoteCrew
@@ -65,7 +68,7 @@ class Simulation:
         ticks: of the whole run.
         runners: processes that run the agents; 0: none, they are in this one.
         agents: the spec of each group's agent.
-        code: the specs of all classes of users': agents, own senses and actuators.
+        code: the specs of all classes of users': agents, own senses, actuators and metrics.
         inputs: of a run that is repeated, what came into it from outside.
         interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
         controls: pause, step, speed and end of `run`, for other threads.
@@ -92,7 +95,9 @@ class Simulation:
         factor = real_time_factor(realtime)
         self.agents = agent_specs(self.scenario)
         self.world = self._new_world(seed, seeds)
-        self.code = tuple(dict.fromkeys([*self.agents.values(), *own_code(self.world.static)]))
+        measures = [resolve(spec, Path(self.scenario.source).parent) for spec in self.scenario.metrics]
+        self.metrics = Metrics([*METRICS, *own_metrics(measures, self.scenario.source)])
+        self.code = tuple(dict.fromkeys([*self.agents.values(), *own_code(self.world.static), *measures]))
         self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else _ticks(self.scenario)
         self.inputs = replay.inputs if replay else None
@@ -106,7 +111,7 @@ class Simulation:
         rate_hz = self.scenario.time.rate_hz
         self._pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
         self.controls = Controls(self._clock, rate_hz, self._pace)
-        self.run_id, self.interrupt, self.metrics = new_run_id(), Interrupt(), Metrics()
+        self.run_id, self.interrupt = new_run_id(), Interrupt()
         self._observers: list[Guarded] = []
         for observer in (TooLarge(self._record.say), *self._recorders(what), *observers):
             self.watch(observer)

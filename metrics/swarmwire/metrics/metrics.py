@@ -2,6 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+import traceback
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.errors import OwnCodeFailed
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -33,7 +35,7 @@ class Metrics:
         """Start afresh."""
         shape = (len(self.metrics), static.arenas)
         self._static = static
-        self._measures: list[Measure] = [metric.begin(static) for metric in self.metrics]
+        self._measures: list[Measure] = [self._begun(metric) for metric in self.metrics]
         self._counts: BoolArray = np.array([metric.kind == "count" for metric in self.metrics], np.bool_)
         self._seen: IntArray = np.zeros(shape, np.int64)
         self._sum: FloatArray = np.zeros(shape)
@@ -42,18 +44,32 @@ class Metrics:
         self._latest: FloatArray = np.full(shape, np.nan)
 
     def see(self, truth: Truth) -> None:
-        """Measure a tick."""
+        """Measure a tick; OwnCodeFailed names a metric that raises, or has no value per arena."""
         moment = Moment(self._static, truth)
         value = np.empty_like(self._sum)
-        for row, measure in enumerate(self._measures):
-            value[row] = measure(moment)
+        for row, (metric, measure) in enumerate(zip(self.metrics, self._measures, strict=True)):
+            try:
+                value[row] = measure(moment)
+            except (Exception, SystemExit) as error:
+                raise _failed(metric) from error
         _add(value, self._counts, self._seen, self._sum, self._min, self._max)
         self._latest = value
+
+    def _begun(self, metric: Metric) -> Measure:
+        try:
+            return metric.begin(self._static)
+        except (Exception, SystemExit) as error:
+            raise _failed(metric) from error
 
     @property
     def latest(self) -> dict[str, FloatArray]:
         """By name, per arena: each level in the tick last seen, each count's total so far; NaN where undefined."""
         return {metric.name: self._latest[row] for row, metric in enumerate(self.metrics)}
+
+    @property
+    def values(self) -> FloatArray:
+        """What `latest` tells, (metrics, arenas)."""
+        return self._latest
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """The statistics over the ticks seen."""
@@ -68,6 +84,10 @@ class Metrics:
                 for arena in range(self._static.arenas)
             ]
         }
+
+
+def _failed(metric: Metric) -> OwnCodeFailed:
+    return OwnCodeFailed(f"the metric {metric.name} ({type(metric).__name__})", traceback.format_exc())
 
 
 @njit(cache=True)

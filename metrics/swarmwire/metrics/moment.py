@@ -56,11 +56,6 @@ class Moment:
         """Headings in the arena's frame, (arenas, robots), of the dead too."""
         return self.pose[:, :, 2]
 
-    @property
-    def velocity_mps(self) -> FloatArray:
-        """Velocities in the arena's frame, (arenas, robots, 2), of the dead too."""
-        return self.velocity[:, :, :2]
-
     def sum_alive(self, values: FloatArray) -> FloatArray:
         """The sum of `values` (arenas, robots) over the robots alive of each arena, (arenas,)."""
         return np.add.reduce(values, 1, where=self._counted)

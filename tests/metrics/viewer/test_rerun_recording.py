@@ -11,6 +11,7 @@ from swarmwire.comms.truth import Finished, Group, Happened, Light, Obstacle
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.viewer.colors import DEAD, FATES, packed
 from swarmwire.metrics.viewer.recording import RerunRecording
+from tests.metrics.recorded import SetClock
 from tests.metrics.truths import edges, static, tally, truth
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
@@ -28,7 +29,7 @@ def strict():
 
 def record(path: Path, of, ticks, arena=0):
     metrics = Metrics()
-    recording = RerunRecording(path, metrics, arena)
+    recording = RerunRecording(path, metrics, SetClock(), arena)
     observers = (metrics, recording)
     for observer in observers:
         observer.begin(of)
@@ -226,23 +227,43 @@ def test_events_are_told_and_marked_where_they_take_effect(tmp_path):
     assert list(column(tmp_path / "run.rrd", "/plots/shares/event", "Scalars:scalars")) == [2]
 
 
-def test_calls_per_tick_do_not_depend_on_the_number_of_robots(tmp_path, monkeypatch):
-    calls, log = [], rerun.RecordingStream.log
-    monkeypatch.setattr(rerun.RecordingStream, "log", lambda *args, **more: (calls.append(args[1]), log(*args, **more)))
-    per_tick = []
-    for robots in (3, 150):
-        of, metrics = static(robots), Metrics()
-        recording = RerunRecording(tmp_path / f"{robots}.rrd", metrics)
-        metrics.begin(of)
-        recording.begin(of)
-        for seen in moving(of, 3, edges=edges((0, 1), (1, 2)), tally=tally({Fate.HEARD: robots})):
-            calls.clear()
-            metrics.see(seen)
-            recording.see(seen)
-        per_tick.append(sorted(calls))
-        recording.end(None)
-    assert per_tick[0] == per_tick[1]
-    assert len(per_tick[0]) == len(set(per_tick[0])) < 15
+def test_an_entity_is_sent_at_once_for_all_ticks_of_two_seconds_of_the_clock(tmp_path, monkeypatch):
+    calls = []
+    for name in ("log", "send_columns"):
+        original = getattr(rerun.RecordingStream, name)
+        monkeypatch.setattr(
+            rerun.RecordingStream,
+            name,
+            lambda *args, original=original, **more: (calls.append(args[1]), original(*args, **more)),
+        )
+    of, metrics, clock = static(150), Metrics(), SetClock()
+    recording = RerunRecording(tmp_path / "run.rrd", metrics, clock)
+    for observer in (metrics, recording):
+        observer.begin(of)
+    sent = []
+    for seen in moving(of, 9, edges=edges((0, 1), (1, 2)), tally=tally({Fate.HEARD: 150})):
+        calls.clear()
+        clock.now_s += 0.7
+        for observer in (metrics, recording):
+            observer.see(seen)
+        sent.append([call for call in calls if call.startswith("world/")])
+    assert [bool(names) for names in sent] == [False, False, True] * 3
+    assert set(sent[5]) == set(sent[8]) >= {"world/robots", "world/headings", "world/links", "world/selected"}
+    assert len(set(sent[5])) == len(sent[5]) < 10
+    recording.end(None)
+
+
+def test_what_is_much_is_sent_before(tmp_path, monkeypatch):
+    monkeypatch.setattr("swarmwire.metrics.viewer.recording.RerunRecording._send_bytes", 10_000)
+    record(tmp_path / "run.rrd", static(100), moving(static(100), 20))
+    chunks = rerun.chunk.RrdReader(str(tmp_path / "run.rrd")).stream().filter(content="/world/headings")
+    rows = [
+        len(batch)
+        for batch in (chunk.to_record_batch() for chunk in chunks)
+        if "Arrows2D:vectors" in batch.schema.names
+    ]
+    assert sum(rows) == 20
+    assert len(rows) > 3
 
 
 def view_names(path):
@@ -330,4 +351,4 @@ def test_an_arena_that_is_not_there_is_refused(tmp_path):
 def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("swarmwire.metrics.viewer.extra.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r"run\.rrd: needs rerun-sdk: install swarmwire-metrics\[view\]"):
-        RerunRecording(tmp_path / "run.rrd", Metrics())
+        RerunRecording(tmp_path / "run.rrd", Metrics(), SetClock())

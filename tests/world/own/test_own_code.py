@@ -214,6 +214,7 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
         ),
         ('[senses."x.y"]\nkind = "a"', "senses.x.y: unknown sense"),
         (ACTUATOR + f'"{PAINT}"', "actuators.x.kind: expected a dataclass below OwnActuator"),
+        (SENSE + f'"{CODE}:Frozen"', "senses.x.kind: expected a dataclass that is not frozen; Frozen is"),
         (ACTUATOR + f'"{CODE}:NoWidth"', "actuators.x.kind: expected a width from 1 to 10000; NoWidth has 0"),
         (ACTUATOR + f'"{CODE}:TooWide"', "actuators.x.kind: expected a width from 1 to 10000; TooWide has 10001"),
         (SENSE + f'"{CODE}:WideField"', "senses.x.kind: the field x of WideField: expected a width from 0 to 10000"),

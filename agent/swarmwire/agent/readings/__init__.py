@@ -1,44 +1,35 @@
-"""What a robot's senses read in this tick, a file per sense. Arrays have a leading axis n for a VectorAgent."""
+"""What senses read in this tick: of one robot, and with a leading axis n, here written …, of n robots.
 
-from swarmwire.agent.readings.battery import BatteryReading, BatteryReadings
+Where a robot has one number it is a float for an Agent, and (n,) for a VectorAgent.
+"""
+
+from swarmwire.agent.readings.around import InfraredReading, LightReading, ProximityReading
+from swarmwire.agent.readings.battery import BatteryReading
 from swarmwire.agent.readings.bumper import BumperReading, BumperReadings
 from swarmwire.agent.readings.camera import Blob, CameraReading, CameraReadings
-from swarmwire.agent.readings.compass import CompassReading, CompassReadings
-from swarmwire.agent.readings.ground import GroundReading, GroundReadings
-from swarmwire.agent.readings.imu import ImuReading, ImuReadings
-from swarmwire.agent.readings.infrared import InfraredReading, InfraredReadings
-from swarmwire.agent.readings.light import LightReading, LightReadings
-from swarmwire.agent.readings.odometry import OdometryReading, OdometryReadings
+from swarmwire.agent.readings.compass import CompassReading
+from swarmwire.agent.readings.ground import GroundReading
+from swarmwire.agent.readings.imu import ImuReading
+from swarmwire.agent.readings.odometry import OdometryReading
 from swarmwire.agent.readings.own import OwnReading
-from swarmwire.agent.readings.positioning import PositioningReading, PositioningReadings
-from swarmwire.agent.readings.proximity import ProximityReading, ProximityReadings
-from swarmwire.agent.readings.scan import ScanReading, ScanReadings
+from swarmwire.agent.readings.positioning import PositioningReading
+from swarmwire.agent.readings.scan import ScanReading
 
 __all__ = [
     "BatteryReading",
-    "BatteryReadings",
     "Blob",
     "BumperReading",
     "BumperReadings",
     "CameraReading",
     "CameraReadings",
     "CompassReading",
-    "CompassReadings",
     "GroundReading",
-    "GroundReadings",
     "ImuReading",
-    "ImuReadings",
     "InfraredReading",
-    "InfraredReadings",
     "LightReading",
-    "LightReadings",
     "OdometryReading",
-    "OdometryReadings",
     "OwnReading",
     "PositioningReading",
-    "PositioningReadings",
     "ProximityReading",
-    "ProximityReadings",
     "ScanReading",
-    "ScanReadings",
 ]

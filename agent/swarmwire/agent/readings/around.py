@@ -1,18 +1,21 @@
-"""Readings of sensors around a body. Arrays have a leading axis n for a VectorAgent."""
+"""Readings of sensors around a body."""
 
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from functools import cached_property
+from typing import Generic, TypeVar, cast
 
 import numpy as np
 
+from swarmwire.agent.readings.number import N
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.sheets import Ring
+from swarmwire.comms.sheets import Infrared, Light, Proximity, Rim, Ring
 
 S = TypeVar("S", bound=Ring)
+R = TypeVar("R", bound=Rim)
 
 
 @dataclass(frozen=True)
-class Around(Generic[S]):
+class Around(Generic[N, S]):
     """Sensors around a body, in the data sheet's order (use the angles, never the indices)."""
 
     value: FloatArray  # (…, sensors) the response, 0 to 1
@@ -23,20 +26,26 @@ class Around(Generic[S]):
         """Where the sensors look in the body's frame, (sensors,)."""
         return self.sheet.angle_rad
 
-
-class AroundOne(Around[S]):
-    """Those of one robot."""
-
-    def vector_sum(self) -> tuple[float, float]:
+    def vector_sum(self) -> tuple[N, N]:
         """X and y of the sum of the sensors as vectors, `value` long towards `angle_rad`: where most of it is."""
-        cosine, sine = self.sheet.direction
-        return float(np.add.reduce(self.value * cosine)), float(np.add.reduce(self.value * sine))
+        x, y = (np.add.reduce(self.value * axis, -1) for axis in self.sheet.direction)
+        return cast("tuple[N, N]", (float(x), float(y)) if self.value.ndim == 1 else (x, y))
 
 
-class AroundMany(Around[S]):
-    """Those of n robots."""
+class _AtRim(Around[N, R]):
+    @cached_property
+    def distance_m(self) -> FloatArray:
+        """Distance from the rim at which an ideal sensor answers `value`; the reach if it sees nothing, (…, rays)."""
+        return self.sheet.response.distance_m(self.value)
 
-    def vector_sum(self) -> tuple[FloatArray, FloatArray]:
-        """X and y, (n,) each, of the sum of each robot's sensors as vectors, `value` long towards `angle_rad`."""
-        cosine, sine = self.sheet.direction
-        return np.add.reduce(self.value * cosine, 1), np.add.reduce(self.value * sine, 1)
+
+class ProximityReading(_AtRim[N, Proximity]):
+    """The rays of proximity, (…, rays): value is 0 for nothing, 1 for touching."""
+
+
+class InfraredReading(_AtRim[N, Infrared]):
+    """The rays of passive infrared, (…, rays): value is 0 for no robot, 1 for touching one."""
+
+
+class LightReading(Around[N, Light]):
+    """Photocells, (…, cells): value is 0 for dark."""

@@ -1,21 +1,14 @@
-"""Readings of the battery."""
+"""The reading of the battery."""
 
 from dataclasses import dataclass
+from typing import Generic
 
-from swarmwire.comms.arrays import FloatArray
-
-
-@dataclass(frozen=True)
-class BatteryReading:
-    """One robot's battery."""
-
-    charge: float  # 1 full, 0 empty: the motors stop
-    voltage_v: float
+from swarmwire.agent.readings.number import N
 
 
 @dataclass(frozen=True)
-class BatteryReadings:
-    """The batteries of n robots."""
+class BatteryReading(Generic[N]):
+    """The battery's gauge."""
 
-    charge: FloatArray  # (n,)
-    voltage_v: FloatArray  # (n,)
+    charge: N  # 1 full, 0 empty: the motors stop
+    voltage_v: N

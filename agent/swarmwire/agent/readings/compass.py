@@ -1,19 +1,13 @@
-"""Readings of the compass."""
+"""The reading of the compass."""
 
 from dataclasses import dataclass
+from typing import Generic
 
-from swarmwire.comms.arrays import FloatArray
-
-
-@dataclass(frozen=True)
-class CompassReading:
-    """One robot's compass."""
-
-    heading_rad: float  # 0 along the arena's +x, counter-clockwise, in (-pi, pi]
+from swarmwire.agent.readings.number import N
 
 
 @dataclass(frozen=True)
-class CompassReadings:
-    """The compasses of n robots."""
+class CompassReading(Generic[N]):
+    """The heading."""
 
-    heading_rad: FloatArray  # (n,)
+    heading_rad: N  # 0 along the arena's +x, counter-clockwise, in (-pi, pi]

@@ -1,4 +1,4 @@
-"""Readings of the ground sensors."""
+"""The reading of the ground sensors."""
 
 from dataclasses import dataclass
 
@@ -7,13 +7,6 @@ from swarmwire.comms.arrays import FloatArray
 
 @dataclass(frozen=True)
 class GroundReading:
-    """The floor under one robot's sensors, in the data sheet's order."""
+    """The floor under the sensors, in the data sheet's order."""
 
-    shade: FloatArray  # (points,) 0 black to 1 white
-
-
-@dataclass(frozen=True)
-class GroundReadings:
-    """The floor under the sensors of n robots."""
-
-    shade: FloatArray  # (n, points) 0 black to 1 white
+    shade: FloatArray  # (…, points) 0 black to 1 white

@@ -1,23 +1,15 @@
-"""Readings of the IMU."""
+"""The reading of the IMU."""
 
 from dataclasses import dataclass
+from typing import Generic
 
-from swarmwire.comms.arrays import FloatArray
-
-
-@dataclass(frozen=True)
-class ImuReading:
-    """What one robot's IMU feels, in the body's frame: the mean over the tick before."""
-
-    forward_mps2: float  # acceleration towards ahead
-    left_mps2: float  # acceleration to the left: in a left turn it is positive
-    turn_radps: float  # turn rate, positive to the left
+from swarmwire.agent.readings.number import N
 
 
 @dataclass(frozen=True)
-class ImuReadings:
-    """What the IMUs of n robots feel."""
+class ImuReading(Generic[N]):
+    """What the IMU feels, in the body's frame: the mean over the tick before."""
 
-    forward_mps2: FloatArray  # (n,)
-    left_mps2: FloatArray  # (n,)
-    turn_radps: FloatArray  # (n,)
+    forward_mps2: N  # acceleration towards ahead
+    left_mps2: N  # acceleration to the left: in a left turn it is positive
+    turn_radps: N  # turn rate, positive to the left

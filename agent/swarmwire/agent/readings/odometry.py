@@ -1,21 +1,14 @@
-"""Readings of the wheel encoders."""
+"""The reading of the wheel encoders."""
 
 from dataclasses import dataclass
+from typing import Generic
 
-from swarmwire.comms.arrays import FloatArray
-
-
-@dataclass(frozen=True)
-class OdometryReading:
-    """One robot's wheel encoders."""
-
-    left_m: float  # travelled by the left wheel since the start
-    right_m: float
+from swarmwire.agent.readings.number import N
 
 
 @dataclass(frozen=True)
-class OdometryReadings:
-    """The wheel encoders of n robots."""
+class OdometryReading(Generic[N]):
+    """The wheel encoders."""
 
-    left_m: FloatArray  # (n,)
-    right_m: FloatArray  # (n,)
+    left_m: N  # travelled by the left wheel since the start
+    right_m: N

@@ -1,21 +1,14 @@
-"""Readings of positioning."""
+"""The reading of positioning."""
 
 from dataclasses import dataclass
+from typing import Generic
 
-from swarmwire.comms.arrays import FloatArray
-
-
-@dataclass(frozen=True)
-class PositioningReading:
-    """Where one robot is told to be, arena frame."""
-
-    x_m: float
-    y_m: float
+from swarmwire.agent.readings.number import N
 
 
 @dataclass(frozen=True)
-class PositioningReadings:
-    """Where n robots are told to be, arena frame."""
+class PositioningReading(Generic[N]):
+    """Where the robot is told to be, arena frame."""
 
-    x_m: FloatArray  # (n,)
-    y_m: FloatArray  # (n,)
+    x_m: N
+    y_m: N

@@ -1,4 +1,4 @@
-"""Readings of the laser scanner."""
+"""The reading of the laser scanner."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,9 @@ from swarmwire.comms.sheets import Scan
 
 
 @dataclass(frozen=True)
-class _Scanned:
+class ScanReading:
+    """The rays of the scanner."""
+
     range_m: FloatArray  # (…, rays) from the scanner; inf where nothing is within its range
     sheet: Scan
 
@@ -15,11 +17,3 @@ class _Scanned:
     def angle_rad(self) -> FloatArray:
         """Where the rays look in the body's frame, (rays,)."""
         return self.sheet.angle_rad
-
-
-class ScanReading(_Scanned):
-    """One robot's rays, (rays,)."""
-
-
-class ScanReadings(_Scanned):
-    """The rays of n robots, (n, rays)."""

@@ -1,6 +1,7 @@
 """What every sense's data sheet says: how often it reads, how late it tells, how much it loses, in which steps."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from swarmwire.comms.parameters import parameter
 
@@ -12,6 +13,8 @@ class Sheet:
     A reading passes through these stages, in this order: the truth, taken at `rate_hz`; noise; outliers; rounding to
     steps; clipping to the range; drop-out. It is shown `delay_s` later, and until the next one is.
     """
+
+    is_global: ClassVar[bool] = False  # whether it tells more than what is around the robot
 
     rate_hz: float = parameter(
         0.0, help="new readings per second, taken at ticks; 0: one in each tick", unit="Hz", at_least=0

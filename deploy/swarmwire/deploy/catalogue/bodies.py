@@ -1,10 +1,10 @@
 """Bodies: kinds of robot, from their data sheets."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.leds import Leds
 from swarmwire.comms.parameters import limits_of
@@ -12,6 +12,7 @@ from swarmwire.comms.sheets import OwnSheet, RangedSheet
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 from swarmwire.deploy.catalogue.units import unit_of
+from swarmwire.world.own.fitting import made_actuator, made_sensor
 from swarmwire.world.scenario.bodies import read_body
 
 GEOMETRY = ("radius_m", "height_m", "mass_kg", "altitude_m", "contacts")
@@ -32,10 +33,10 @@ def _body(body: Body, named: str) -> Entry:
     geometry = [key for key in parameters_of_dataclass(Body) if key.name in GEOMETRY]
     leds = [] if body.leds is None else [_sheet("leds", Leds, sheet["leds"])]
     senses = [
-        _own(f"sense: {name}", of) if isinstance(of, OwnSheet) else _sheet(f"sense: {name}", type(of), asdict(of))
+        _own_sense(name, of) if isinstance(of, OwnSheet) else _sheet(f"sense: {name}", type(of), asdict(of))
         for name, of in body.senses.items()
     ]
-    actuators = [_own(f"actuator: {name}", of) for name, of in body.actuators.items()]
+    actuators = [_own(f"actuator: {name}", of.kind, made_actuator(of)) for name, of in body.actuators.items()]
     return Entry(
         kind="body",
         name=body.name,
@@ -60,12 +61,17 @@ def _sheet(title: str, kind: type[Any], values: dict[str, Any]) -> ParameterTabl
     return ParameterTable(title, tuple(_with_values(parameters_of_dataclass(kind), values)), "value")
 
 
-def _own(title: str, sheet: OwnSheet | ActuatorSheet) -> ParameterTable:
-    """Keys of a class of the user's own are known by name alone, those that every sense has in full."""
-    shared = _with_values(parameters_of_dataclass(RangedSheet), asdict(sheet)) if isinstance(sheet, OwnSheet) else []
-    keys = [Parameter(name, "", unit_of(name), value) for name, value in sheet.params.items()]
-    told = next(limits_of(of).help for of in fields(sheet) if of.name == "kind")
-    return ParameterTable(title, (Parameter("kind", told, value=sheet.kind), *shared, *keys), "value")
+def _own_sense(name: str, sheet: OwnSheet) -> ParameterTable:
+    shared = _with_values(parameters_of_dataclass(RangedSheet), asdict(sheet))
+    return _own(f"sense: {name}, which reads {', '.join(sheet.fields)}", sheet.kind, made_sensor(sheet), shared)
+
+
+def _own(title: str, kind: str, made: Any, shared: Sequence[Parameter] = ()) -> ParameterTable:
+    """What `kind` leads to, the keys shared with others, and those of the class of the user's own."""
+    told = next(limits_of(of).help for of in fields(OwnSheet) if of.name == "kind")
+    limits = {of.name: limits_of(of) for of in fields(made)}
+    keys = [Parameter(name, of.help, of.unit or unit_of(name), getattr(made, name)) for name, of in limits.items()]
+    return ParameterTable(title, (Parameter("kind", told, value=kind), *shared, *keys), "value")
 
 
 def _with_values(parameters: "list[Parameter] | tuple[Parameter, ...]", values: dict[str, Any]) -> list[Parameter]:

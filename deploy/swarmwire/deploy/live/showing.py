@@ -72,7 +72,7 @@ class Drawer(threading.Thread):
     def __init__(self, run: Following, url: str, way: Way) -> None:
         super().__init__(name="drawer", daemon=True)
         self._run, self._way, self._evened = run, way, Evened()
-        self._drawing = RerunLive(url, run, selected=run.scene.selected)
+        self._drawing = RerunLive(url, run, way.clock, selected=run.scene.selected)
         self.fault: Exception | None = None
 
     def run(self) -> None:

@@ -58,7 +58,7 @@ class RunRecord:
                 may_drop=may_drop,
             )
         if what.rrd:
-            found.append(RerunRecording(folder / RECORDING, metrics, selected=what.select))
+            found.append(RerunRecording(folder / RECORDING, metrics, clock, selected=what.select))
         return (*found, Published(folder, run_id, metrics, clock, selected=what.select))
 
     def begin(

@@ -1,8 +1,8 @@
 """The scenario as run, in the run folder, with the files that it names: the folder needs the original no more.
 
     scenario.toml      overrides applied, the seed as run; what was left out stays left out
-    files/<name>       agent files, measured links, pictures of the arena, byte for byte; bodies of the user's own with
-                       the files of their senses and actuators, which lie beside them
+    files/<name>       agents, metrics, measured links, pictures of the arena, byte for byte; bodies of the user's own
+                       with the files of their senses and actuators, which lie beside them
 
 Other bodies come with swarmwire and are covered by the digests of its parts. An agent file is loaded without its folder
 on `sys.path`, so there is nothing beside it that it could have imported; installed modules are not copied but named by
@@ -35,7 +35,7 @@ class CopiedFile:
 
     path: str  # within the run folder
     sha256: str
-    what: str  # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "own sense" | "own actuator"
+    what: str  # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "own sense" | "own actuator" | "metric"
 
 
 def copy_scenario(scenario: Scenario, seeds: tuple[int, ...], folder: Path) -> tuple[CopiedFile, ...]:
@@ -43,13 +43,14 @@ def copy_scenario(scenario: Scenario, seeds: tuple[int, ...], folder: Path) -> t
     mapping = mapping_of(scenario)
     mapping["seed"] = seeds[0]
     copies = _Copies(folder)
+    near = Path(scenario.source).parent
     for group in mapping["robots"].values():
-        path, _, name = resolve(group["agent"], Path(scenario.source).parent).rpartition(":")
-        if path.endswith(".py"):
-            group["agent"] = f"{copies.add(Path(path), 'agent')}:{name}"
+        group["agent"] = copies.class_of(group["agent"], near, "agent")
         body = sheet_path(group["body"], scenario.source)
         if body is not None:
             group["body"] = _copied_body(body, copies)
+    if "metrics" in mapping:
+        mapping["metrics"] = [copies.class_of(spec, near, "metric") for spec in mapping["metrics"]]
     trace = trace_path(scenario)
     if trace is not None:
         mapping["radio"]["trace"]["file"] = copies.add(trace, "trace")
@@ -67,9 +68,8 @@ def _copied_body(sheet: Path, copies: "_Copies") -> str:
     body: dict[str, Any] = tomllib.loads(sheet.read_text(encoding="utf-8"))
     for what, tables in (("own sense", body.get("senses", {})), ("own actuator", body.get("actuators", {}))):
         for table in tables.values():
-            path, _, name = resolve(table.get("kind", ""), sheet.parent).rpartition(":")
-            if path.endswith(".py"):
-                table["kind"] = f"{Path(copies.add(Path(path), what)).name}:{name}"
+            if "kind" in table:
+                table["kind"] = copies.class_of(table["kind"], sheet.parent, what).removeprefix(f"{FILES}/")
     return copies.add(sheet, "body", tomli_w.dumps(body).encode())
 
 
@@ -103,6 +103,11 @@ class _Copies:
             self._places[original] = place
             self.made.append(CopiedFile(place, _sha256(data), what))
         return self._places[original]
+
+    def class_of(self, spec: str, beside: Path, what: str) -> str:
+        """The spec of a class, whose file, if it is of one as seen from `beside`, is copied and named instead."""
+        path, _, name = resolve(spec, beside).rpartition(":")
+        return f"{self.add(Path(path), what)}:{name}" if path.endswith(".py") else spec
 
     def _free(self, original: Path) -> str:
         taken, place, number = set(self._places.values()), f"{FILES}/{original.name}", 1

@@ -54,6 +54,8 @@ class DistanceCounts:
 
     def see(self, truth: Truth) -> None:
         """Add what a tick brought."""
+        if self._static.range_m is None:  # there is no radio
+            return
         shape = self._static.arenas, self._static.robots
         x_m, y_m = truth.pose[:, 0].reshape(shape), truth.pose[:, 1].reshape(shape)
         self._places[truth.tick] = Places(x_m, y_m, truth.alive.reshape(shape), self._wrap_m)

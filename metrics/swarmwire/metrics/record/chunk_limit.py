@@ -1,4 +1,4 @@
-"""When the rows gathered so far go to disk: once they are many, or old."""
+"""When what was gathered so far goes to disk: once it is much, or old."""
 
 from swarmwire.comms.clock import Clock, to_ns
 
@@ -8,14 +8,15 @@ LONGEST_S = 2.0  # of wall time: a run that is killed loses no more than this, a
 class ChunkLimit:
     """Tells when a chunk is due that began when this was made or last `restart`ed."""
 
-    def __init__(self, rows: int, clock: Clock) -> None:
-        self._rows, self._clock = rows, clock
+    def __init__(self, size: int, clock: Clock) -> None:
+        """It is due at this size, in rows or bytes, or 2 s of `clock` after it began."""
+        self._size, self._clock = size, clock
         self.restart()
 
     def restart(self) -> None:
         """A new chunk begins."""
         self._due_ns = self._clock.now_ns() + to_ns(LONGEST_S)
 
-    def reached(self, rows: int) -> bool:
-        """Whether a chunk of so many rows should be closed now."""
-        return rows >= self._rows or self._clock.now_ns() >= self._due_ns
+    def reached(self, size: int) -> bool:
+        """Whether a chunk of this size should be closed now."""
+        return size >= self._size or self._clock.now_ns() >= self._due_ns

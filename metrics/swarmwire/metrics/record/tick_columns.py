@@ -9,7 +9,7 @@ from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.clock import to_s
 from swarmwire.comms.fates import Fate
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import Static, Truth
 
 if TYPE_CHECKING:
     import polars as pl
@@ -75,12 +75,11 @@ class TickColumns:
         self._alive: AnyArray = np.empty(of_robots, np.bool_)
         self._state: AnyArray = np.empty(of_robots, np.uint16)
         self._states: tuple[str, ...] = ("",)
-        self._measured: AnyArray = np.empty((len(metrics), *shape), np.float64)
-        self._radio: AnyArray = np.empty((len(RADIO), *shape), np.int64)
-        self._has_radio: AnyArray = np.empty(ticks, np.bool_)
+        self._measured: AnyArray = np.empty((ticks, len(metrics), static.arenas), np.float64)
+        self._radio: AnyArray = np.full((ticks, len(RADIO), static.arenas), np.nan)  # which it stays without a radio
 
-    def add(self, truth: Truth, latest: dict[str, FloatArray]) -> None:
-        """Copy a tick, with what the metrics say of it (arenas,) each."""
+    def add(self, truth: Truth, measured: FloatArray) -> None:
+        """Copy a tick, with what the metrics say of it, (metrics, arenas)."""
         at, shape = self.ticks, (self._static.arenas, self._static.robots)
         self._tick[at], self._time_s[at] = truth.tick, to_s(truth.time_ns)
         self._pose[at] = truth.pose.reshape(*shape, -1)
@@ -91,11 +90,9 @@ class TickColumns:
         self._alive[at] = truth.alive.reshape(shape)
         self._state[at] = truth.state.reshape(shape)
         self._states = truth.states  # it only grows
-        for place, name in enumerate(self._metrics):
-            self._measured[place, at] = latest[name]
-        self._has_radio[at] = truth.tally is not None
+        self._measured[at] = measured
         if truth.tally is not None:
-            self._radio[:, at] = _counts(truth.tally)
+            self._radio[at] = truth.tally.sent, truth.tally.fates[:, Fate.HEARD], truth.tally.in_range
         self.ticks += 1
 
     def frame(self) -> "pl.DataFrame":
@@ -119,14 +116,8 @@ class TickColumns:
         columns["state"] = pl.Series(self._states).gather(self._state[:ticks].reshape(-1)).reshape(per_robot)
         for place, name in enumerate(movable_columns(self._static)):
             columns[name] = np.ascontiguousarray(self._movable[:ticks, ..., place]).reshape(ticks * arenas, -1)
-        measured = {name: self._measured[row, :ticks].reshape(-1) for row, name in enumerate(self._metrics)}
-        columns |= {name: pl.Series(values).fill_nan(None) for name, values in measured.items()}
-        no_radio = pl.Series(np.repeat(~self._has_radio[:ticks], arenas))
-        for row, name in enumerate(RADIO):
-            columns[name] = pl.Series(self._radio[row, :ticks].reshape(-1)).set(no_radio, None)
+        for names, values in ((self._metrics, self._measured), (RADIO, self._radio)):
+            for place, name in enumerate(names):
+                numbers = np.ascontiguousarray(values[:ticks, place]).reshape(-1)
+                columns[name] = pl.Series(numbers, nan_to_null=True).cast(schema[name])
         return pl.DataFrame(columns, schema=schema)
-
-
-def _counts(tally: Tally) -> AnyArray:
-    """Packets sent, receivers that heard, receivers in range, (3, arenas)."""
-    return np.stack([tally.sent, tally.fates[:, Fate.HEARD], tally.in_range])

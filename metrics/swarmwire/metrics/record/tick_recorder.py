@@ -19,7 +19,7 @@ from swarmwire.metrics.record.tick_columns import (
     tick_schema,
 )
 
-CHUNK_BYTES = 2_000_000
+CHUNK_BYTES = 4_000_000
 MOST_TICKS = 4096  # in a chunk, however small the swarm
 
 
@@ -51,7 +51,7 @@ class TickRecorder:
 
     def see(self, truth: Truth) -> None:
         """Take one tick."""
-        self._columns.add(truth, self._metrics.latest)
+        self._columns.add(truth, self._metrics.values)
         if self._limit.reached(self._columns.ticks):
             self._hand_over()
 

@@ -10,8 +10,9 @@ from swarmwire.metrics.shortest import link_lines
 from swarmwire.metrics.viewer.colors import LIGHT, WALL
 from swarmwire.metrics.viewer.floor import log_floor
 from swarmwire.metrics.viewer.leds import RerunLeds
-from swarmwire.metrics.viewer.lost import begin_lost, log_lost
+from swarmwire.metrics.viewer.lost import add_lost, begin_lost
 from swarmwire.metrics.viewer.robots import RerunRobots
+from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selected import RerunSelected
 
 LINKS_EVERY_TICK_UP_TO = 200  # robots; links are most of a recording's bytes and time
@@ -30,7 +31,7 @@ class RerunArena:
     def __init__(self, static: Static, arena: int, selected: str) -> None:
         """Draw this arena of the run, and this robot in detail."""
         self._static, self._arena = static, arena
-        self._rows = slice(arena * static.robots, (arena + 1) * static.robots)
+        self._own = slice(arena * static.robots, (arena + 1) * static.robots)
         self._robots = RerunRobots(static)
         self._leds = RerunLeds(static)
         self._selected = RerunSelected(static, arena, selected, self._robots.radius_m, self._robots.heading_m)
@@ -47,39 +48,40 @@ class RerunArena:
         rec.log("world/links", links, static=True)
         begin_lost(rec)
         self._robots.begin(rec)
+        self._leds.begin(rec)
         self._selected.begin(rec)
 
-    def log(self, rec: Any, truth: Truth) -> None:
-        """Log one tick."""
+    def add(self, rows: RerunRows, truth: Truth) -> None:
+        """Add one tick."""
         full = truth.tick % self.links_every_ticks == 0
-        self._robots.log(rec, truth, self._rows, trails=full)
-        self._leds.log(rec, truth.leds[self._rows], truth.pose[self._rows])
-        self._selected.log(rec, truth, full=full)
+        self._robots.add(rows, truth, self._own, trails=full)
+        self._leds.add(rows, truth, self._own)
+        self._selected.add(rows, truth, full=full)
         if truth.movable is not None:
-            self._log_movable(rec, truth.movable[self._arena])
+            self._add_movable(rows, truth.movable[self._arena])
         if full:
-            self._log_radio(rec, truth, truth.pose[self._rows, :2])
+            self._add_radio(rows, truth, truth.pose[self._own, :2])
 
-    def _log_movable(self, rec: Any, pose: FloatArray) -> None:
+    def _add_movable(self, rows: RerunRows, pose: FloatArray) -> None:
         import rerun as rr
 
         strips = [_outline(obstacle) for obstacle in self._static.movable_at(self._arena, pose)]
-        rec.log("world/movable", rr.LineStrips2D.from_fields(strips=strips))
+        rows.add("world/movable", rr.LineStrips2D.columns, strips=strips)
 
-    def _log_radio(self, rec: Any, truth: Truth, position_m: FloatArray) -> None:
+    def _add_radio(self, rows: RerunRows, truth: Truth, position_m: FloatArray) -> None:
         import rerun as rr
 
         if truth.edges is not None:
             ends = self._edges(truth.edges)
             lines = link_lines(position_m, ends, self._static)
-            rec.log("world/links", rr.LineStrips2D.from_fields(strips=lines.astype(np.float32)))
+            rows.add("world/links", rr.LineStrips2D.columns, strips=lines.astype(np.float32))
         if truth.finished is not None:
-            log_lost(rec, truth.finished, self._arena, position_m)
+            add_lost(rows, truth.finished, self._arena, position_m)
 
     def _edges(self, edges: IntArray) -> IntArray:
         """The arena's own edges, as indices of its robots."""
-        start = self._rows.start
-        own = (edges[:, 0] >= start) & (edges[:, 0] < self._rows.stop)
+        start = self._own.start
+        own = (edges[:, 0] >= start) & (edges[:, 0] < self._own.stop)
         return edges[own] - start
 
     def _log_fixed(self, rec: Any) -> None:

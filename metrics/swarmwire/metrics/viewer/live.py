@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from swarmwire.comms.clock import Clock
 from swarmwire.metrics.viewer.plotted import Measured
 from swarmwire.metrics.viewer.recording import RerunRecording
 
@@ -12,13 +13,14 @@ class RerunLive(RerunRecording):
     For a process of its own: a call waits for a viewer that does not take what it is sent.
     """
 
-    def __init__(self, url: str, metrics: Measured, arena: int = 0, selected: str | None = None) -> None:
+    _send_bytes = 0  # people wait for it
+
+    def __init__(self, url: str, metrics: Measured, clock: Clock, arena: int = 0, selected: str | None = None) -> None:
         """Draw in the viewer at "rerun+http://…/proxy"; BadInput without the extra [view]."""
-        super().__init__(None, metrics, arena, selected)
+        super().__init__(None, metrics, clock, arena, selected)
         self._url = url
 
     def _connect(self, layout: Any) -> None:
         layout.time_panel.play_state = "following"
         self._arena_view.links_every_ticks = 1  # whoever publishes the ticks has thinned the links already
-        self._plots.send_every_ticks = 1  # people wait for it
         self._rec.connect_grpc(self._url, default_blueprint=layout)

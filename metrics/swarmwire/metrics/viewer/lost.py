@@ -8,6 +8,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.truth import Finished
 from swarmwire.metrics.viewer.colors import FATES, packed
+from swarmwire.metrics.viewer.rows import RerunRows
 
 _ALPHA = 110
 _LOST_ALPHA = 40  # loss is everywhere, a third of all packets or so: it must not drown the robots, nor the rarer fates
@@ -26,8 +27,8 @@ def begin_lost(rec: Any) -> None:
     rec.log("world/lost_packets", look, static=True)
 
 
-def log_lost(rec: Any, finished: Finished, arena: int, position_m: FloatArray) -> None:
-    """Log the packets of an arena that ended unheard since the last tick, as lines between its robots' positions.
+def add_lost(rows: RerunRows, finished: Finished, arena: int, position_m: FloatArray) -> None:
+    """Add the packets of an arena that ended unheard since the last tick, as lines between its robots' positions.
 
     position_m (robots, 2) is where they are now, which is not quite where they were when the packet went on air. A
     packet that never did has no receiver, and so no line.
@@ -37,4 +38,4 @@ def log_lost(rec: Any, finished: Finished, arena: int, position_m: FloatArray) -
     own = (finished.arena == arena) & (finished.receiver >= 0) & (finished.fate != Fate.HEARD)
     ends = np.column_stack([finished.sender[own], finished.receiver[own]])
     strips, colors = position_m[ends].astype(np.float32), _COLORS[finished.fate[own]]
-    rec.log("world/lost_packets", rr.LineStrips2D.from_fields(strips=strips, colors=colors))
+    rows.add("world/lost_packets", rr.LineStrips2D.columns, strips=strips, colors=colors)

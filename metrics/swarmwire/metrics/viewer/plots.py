@@ -12,9 +12,9 @@ from swarmwire.comms.truth import Happened, Static, Truth
 from swarmwire.metrics.palette import Color
 from swarmwire.metrics.viewer.colors import FATES, MARK
 from swarmwire.metrics.viewer.plotted import Plotted
+from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.series import RerunSeries
 
-SEND_EVERY_S = 5.0  # of the run; each time costs half a kilobyte and more per entity, whatever it holds
 _EVENT_MARK = 1.04  # where the mark of an event stands among the shares: above them all
 _FATES = {fate: FATE_NAMES[fate].replace("_", " ") for fate in FATES}
 _PLOTS = {"m": "distances", "s": "times", "bit/s": "rates"}  # by a metric's unit; the others are shares or numbers
@@ -38,8 +38,6 @@ class RerunPlots:
         self._series = {plot: RerunSeries(f"plots/{plot}") for plot in self._names}
         self._series["packets"] = RerunSeries("plots/packets", fates)
         self._occurred: set[str] = set()  # fates
-        self.send_every_ticks = round(SEND_EVERY_S * static.rate_hz)
-        self._send_at_tick = 0
         self._second: deque[IntArray] = deque(maxlen=static.rate_hz)  # per tick: (fates,), in range
 
     def begin(self, rec: Any) -> None:
@@ -49,8 +47,8 @@ class RerunPlots:
         look = rr.SeriesPoints(names="event", colors=MARK, markers="Diamond", marker_sizes=4.0)
         rec.log("plots/shares/event", look, static=True)
 
-    def log(self, rec: Any, latest: Mapping[str, FloatArray], truth: Truth) -> None:
-        """Log the numbers of a tick; they are sent every few ticks, and by `flush`."""
+    def add(self, rows: RerunRows, latest: Mapping[str, FloatArray], truth: Truth) -> None:
+        """Add the numbers of a tick."""
         import rerun as rr
 
         numbers = {plot: {name: latest[name][self._arena] for name in names} for plot, names in self._names.items()}
@@ -59,17 +57,9 @@ class RerunPlots:
             numbers["shares"]["delivery"] = per_second[Fate.HEARD] / in_range if in_range > 0 else np.nan
             numbers["packets"] = self._by_name(per_second)
         for plot, value in numbers.items():
-            self._series[plot].add(rec, truth.tick, truth.time_ns, value)
+            self._series[plot].add(rows, value)
         if any(self._concerns(event) for event in truth.events):
-            rec.log("plots/shares/event", rr.Scalars(_EVENT_MARK))
-        if truth.tick >= self._send_at_tick:
-            self._send_at_tick = truth.tick + self.send_every_ticks
-            self.flush(rec)
-
-    def flush(self, rec: Any) -> None:
-        """Send the numbers that were not yet."""
-        for series in self._series.values():
-            series.flush(rec)
+            rows.add("plots/shares/event", rr.Scalars.columns, scalars=[_EVENT_MARK])
 
     def _concerns(self, event: Happened) -> bool:
         own = slice(self._arena * self._robots, (self._arena + 1) * self._robots)

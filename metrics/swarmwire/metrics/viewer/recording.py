@@ -3,18 +3,21 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.metrics.event_log import names
+from swarmwire.metrics.record.chunk_limit import ChunkLimit
 from swarmwire.metrics.viewer.about import about
 from swarmwire.metrics.viewer.arena import RerunArena
 from swarmwire.metrics.viewer.extra import need_view_extra
 from swarmwire.metrics.viewer.layout import layout
 from swarmwire.metrics.viewer.plots import RerunPlots
 from swarmwire.metrics.viewer.plotted import Measured
+from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selected import selected_robot
+
+SEND_BYTES = 3_000_000  # each time costs half a kilobyte and more per entity, whatever it holds
 
 
 class RerunRecording:
@@ -26,15 +29,20 @@ class RerunRecording:
     time in it), but not equal bytes: rerun numbers its chunks at random and cuts them as they come.
     """
 
-    def __init__(self, path: Path | None, metrics: Measured, arena: int = 0, selected: str | None = None) -> None:
-        """Record to this file, which is replaced; BadInput without the extra [view].
+    _send_bytes = SEND_BYTES
+
+    def __init__(
+        self, path: Path | None, metrics: Measured, clock: Clock, arena: int = 0, selected: str | None = None
+    ) -> None:
+        """Record to this file, which is replaced, at least every 2 s of `clock`; BadInput without the extra [view].
 
         `selected` names the robot that is shown in detail: its rays, its ring, its radio's range. None: the first robot
         of the first group that has rays or photocells. A subclass that leads elsewhere has no path.
         """
         self._what = f"recording {path.name}" if path else "live view"
         need_view_extra(self._what)
-        self._path, self._metrics, self._arena, self._selected = path, metrics, arena, selected
+        self._path, self._metrics, self._clock = path, metrics, clock
+        self._arena, self._selected = arena, selected
 
     def begin(self, static: Static) -> None:
         """Open the file and log what does not change; BadInput if there is no such arena or selected robot."""
@@ -58,24 +66,29 @@ class RerunRecording:
         self._rec.log("about", rr.TextDocument(text, media_type="text/markdown"), static=True)
         self._arena_view.begin(self._rec)
         self._plots.begin(self._rec)
+        self._rows, self._limit = RerunRows(self._rec), ChunkLimit(self._send_bytes, self._clock)
         self._ticks = 0
 
     def see(self, truth: Truth) -> None:
         """Record one tick."""
         import rerun as rr
 
-        self._rec.set_time("tick", sequence=truth.tick)
-        self._rec.set_time("sim_time", duration=np.timedelta64(truth.time_ns, "ns"))
-        self._arena_view.log(self._rec, truth)
-        if not self._ticks:
-            self._rec.log("events", rr.TextLog(f"the run begins: {self._static.robots} robots"))
-        self._ticks += 1
+        rows = self._rows
+        rows.begin_tick(truth.tick, truth.time_ns)
+        self._arena_view.add(rows, truth)
+        told = [] if self._ticks else [f"the run begins: {self._static.robots} robots"]
         for event in truth.events:
             robots = ", ".join(names(event, self._static)[self._arena])
             if event.singly and not robots:
                 continue
-            self._rec.log("events", rr.TextLog(f"{event.words}: {robots or 'no robot'}"))
-        self._plots.log(self._rec, self._metrics.latest, truth)
+            told.append(f"{event.words}: {robots or 'no robot'}")
+        for text in told:
+            rows.add("events", rr.TextLog.columns, text=[text])
+        self._plots.add(rows, self._metrics.latest, truth)
+        self._ticks += 1
+        if self._limit.reached(rows.kept_bytes):
+            rows.send()
+            self._limit.restart()
 
     def _connect(self, layout: Any) -> None:
         """Lead the stream to where it goes."""
@@ -83,7 +96,7 @@ class RerunRecording:
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """Close the file. Summary part: `record_rrd`, as of the tables; its rows are ticks."""
-        self._plots.flush(self._rec)
+        self._rows.send()
         self._rec.flush()
         self._rec.disconnect()
         return {"record_rrd": {"rows": self._ticks, "dropped": 0}}

@@ -4,12 +4,13 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.metrics.palette import robot_color
 from swarmwire.metrics.viewer.classes import RerunClasses
 from swarmwire.metrics.viewer.colors import shown
+from swarmwire.metrics.viewer.rows import RerunRows
 
 _TRAIL_ALPHA = 170
 _TRAILS, _HEADINGS, _ROBOTS = 2.0, 3.0, 4.0  # drawn in this order, above the links
@@ -29,7 +30,7 @@ class RerunRobots:
         least = min(_LEAST_HEADING, _CROWDED / math.sqrt(static.robots))
         self.heading_m = np.maximum(_HEADING_RADII * self.radius_m, least * max(static.arena_size_m))  # (robots,)
         self._arrow_m = self.heading_m[:, None].astype(np.float32)
-        self._was: tuple[BoolArray, IntArray] | None = None  # who was alive and at what when the colours were logged
+        self._was: tuple[bytes, bytes] | None = None  # who was alive and at what when the colours were logged
 
     def begin(self, rec: Any) -> None:
         """Log what does not change."""
@@ -47,21 +48,32 @@ class RerunRobots:
         headings = rr.Arrows2D.from_fields(radii=width, show_labels=False, draw_order=_HEADINGS)
         rec.log("world/headings", headings, static=True)
 
-    def log(self, rec: Any, truth: Truth, rows: slice, *, trails: bool) -> None:
-        """Log a tick of the robots in these rows; without `trails` their places are not kept for those."""
+    def add(self, rows: RerunRows, truth: Truth, own: slice, *, trails: bool) -> None:
+        """Add a tick of the robots in these rows of the world; without `trails` their places are not kept for those."""
         import rerun as rr
 
-        pose, alive, state = truth.pose[rows], truth.alive[rows], truth.state[rows]
-        position_m, heading_rad = pose[:, :2].astype(np.float32), pose[:, 2].astype(np.float32)
-        points = rr.Points2D.from_fields(positions=position_m)
-        rec.log("world/robots", points)
+        pose, alive, state = truth.pose[own].astype(np.float32), truth.alive[own], truth.state[own]
+        rows.add("world/robots", _points, pose=pose)
         if trails:
-            rec.log("world/trails", points)
-        ahead = np.stack([np.cos(heading_rad), np.sin(heading_rad)], axis=1) * self._arrow_m
-        rec.log("world/headings", rr.Arrows2D.from_fields(origins=position_m, vectors=ahead))
-        now = alive, state
-        if self._was is None or not all(map(np.array_equal, now, self._was)):
-            class_id = self._classes.of(rec, alive, state, truth.states)
-            rec.log("world/robots", rr.Points2D.from_fields(class_ids=class_id))
-            rec.log("world/headings", rr.Arrows2D.from_fields(class_ids=class_id))
-            self._was = alive.copy(), state.copy()
+            rows.add("world/trails", _points, pose=pose)
+        rows.add("world/headings", self._arrows, pose=pose)
+        now = alive.tobytes(), state.tobytes()
+        if now != self._was:
+            self._was = now
+            class_id = self._classes.of(rows.rec, alive, state, truth.states)
+            rows.add("world/robots", rr.Points2D.columns, class_ids=class_id)
+            rows.add("world/headings", rr.Arrows2D.columns, class_ids=class_id)
+
+    def _arrows(self, pose: NDArray[np.float32]) -> Any:
+        """The headings at the poses of one tick or many, (ticks x robots, 3)."""
+        import rerun as rr
+
+        ahead = np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])], axis=1).reshape(-1, self._static.robots, 2)
+        ahead *= self._arrow_m
+        return rr.Arrows2D.columns(origins=np.ascontiguousarray(pose[:, :2]), vectors=ahead.reshape(-1, 2))
+
+
+def _points(pose: NDArray[np.float32]) -> Any:
+    import rerun as rr
+
+    return rr.Points2D.columns(positions=np.ascontiguousarray(pose[:, :2]))

@@ -10,6 +10,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sheets import Light, Proximity
 from swarmwire.comms.truth import Group, Static, Truth
 from swarmwire.metrics.viewer.colors import LIGHT, MARK, packed
+from swarmwire.metrics.viewer.rows import RerunRows
 
 _FRAME = "world/selected"  # moves with the robot, axes as the arena's
 EYE = f"{_FRAME}/eye"  # what looks on from there sees y point up
@@ -82,12 +83,12 @@ class RerunSelected:
         rays = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(0.8), draw_order=_ORDER)
         rec.log(f"{_FRAME}/rays", rays, static=True)
 
-    def log(self, rec: Any, truth: Truth, *, full: bool) -> None:
-        """Log a tick; if it is not to be logged in full, rays that see nothing stay as they are."""
+    def add(self, rows: RerunRows, truth: Truth, *, full: bool) -> None:
+        """Add a tick; if it is not to be recorded in full, rays that see nothing stay as they are."""
         import rerun as rr
 
         x_m, y_m, heading_rad = truth.pose[self._row].tolist()
-        rec.log(_FRAME, rr.Transform3D.from_fields(translation=[x_m, y_m, 0.0]))
+        rows.add(_FRAME, rr.Transform3D.columns, translation=[[x_m, y_m, 0.0]])
         self._remember(truth)
         saw, self._sees = self._sees, any(bool(value.any()) for value in self._sensed.values())
         if not (full or saw or self._sees or not truth.alive[self._row]):
@@ -105,7 +106,7 @@ class RerunSelected:
             colors.append(np.full(len(length_m), _LIGHT_BAR, np.uint32))
         lines = np.concatenate(strips).astype(np.float32)
         if len(lines) or self._drawn:
-            rec.log(f"{_FRAME}/rays", rr.LineStrips2D.from_fields(strips=lines, colors=np.concatenate(colors)))
+            rows.add(f"{_FRAME}/rays", rr.LineStrips2D.columns, strips=lines, colors=np.concatenate(colors))
         self._drawn = len(lines) > 0
 
     def _remember(self, truth: Truth) -> None:

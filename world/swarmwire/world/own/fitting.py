@@ -1,7 +1,7 @@
 """Own senses and actuators at the door: their classes are found, and their keys checked, before a run."""
 
 from collections.abc import Mapping
-from dataclasses import is_dataclass, replace
+from dataclasses import replace
 from importlib.metadata import entry_points
 from typing import Any, TypeVar, cast
 
@@ -9,7 +9,7 @@ from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.loading import NotLoaded, load_named
+from swarmwire.comms.own_class import own_class
 from swarmwire.comms.sheets import OwnSheet, Sheet
 from swarmwire.comms.sheets.own import MOST_WIDE
 from swarmwire.world.own.actuator import OwnActuator
@@ -85,16 +85,9 @@ def _asked(own: object, name: str, where: str, key: str) -> object:
 
 def _made(base: type[K], kind: str, params: Mapping[str, Any], where: str, key: str) -> K:
     """An instance of the class `kind` below `base`; BadInput if it is none, or does not take these parameters."""
-    try:
-        found = load_named(kind)
-    except NotLoaded as error:
-        raise BadInput(where, f"{key}.kind", str(error)) from error
-    if not isinstance(found, type) or not issubclass(found, base) or not is_dataclass(found):
-        what = "not there" if found is None else f"{cast('object', found)!r}"
-        raise BadInput(where, f"{key}.kind", f"expected a dataclass below {base.__name__}; {kind} is {what}")
-    missing: frozenset[str] = getattr(found, "__abstractmethods__", frozenset())
-    if missing:
-        raise BadInput(where, f"{key}.kind", f"{found.__name__} has no {', '.join(sorted(missing))}")
+    found = own_class(base, kind, where, f"{key}.kind")
+    if cast("Any", found).__dataclass_params__.frozen:  # it is told its scene and group
+        raise BadInput(where, f"{key}.kind", f"expected a dataclass that is not frozen; {found.__name__} is")
     try:
         return built(found, params, where, key)
     except BadInput:

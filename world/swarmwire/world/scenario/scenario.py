@@ -98,6 +98,8 @@ class Scenario(Table):
     """The radio; without it robots hear nothing."""
     events: tuple[Annotated[Event, OneOf("do", ACTIONS)], ...] = Field(default=(), strict=False)
     """What happens to robots and radios on the way."""
+    metrics: tuple[Annotated[str, StringConstraints(min_length=1)], ...] = Field(default=(), strict=False)
+    """Metrics of your own, measured beside those of every run: classes, as module:Class or file.py:Class."""
     run: RunTable = RunTable()
     """Runners."""
 

@@ -1,0 +1,26 @@
+"""A metric of one's own: how many of the robots seal the leak."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.moment import Moment
+
+
+@dataclass(frozen=True)
+class Sealing(Metric):
+    """By what robots say that they are at."""
+
+    name = "sealing"
+    help = "share of the robots alive that seal the leak"
+    bounds = (0.0, 1.0)
+
+    def begin(self, static: Static) -> Measure:
+        def measure(moment: Moment):
+            states, state = moment.truth.states, moment.truth.state.reshape(moment.alive.shape)
+            sealing = state == states.index("sealing") if "sealing" in states else state < 0
+            return moment.sum_alive(sealing.astype(np.float64)) / moment.per_robot_alive
+
+        return measure
