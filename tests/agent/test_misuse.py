@@ -79,6 +79,14 @@ def test_misuse_of_a_robot_is_refused(deed: Callable[[Any], object], told: str) 
         (lambda robots: robots.note("up", rows=np.array([0, 1])), "rows: expected a mask"),
         (lambda robots: robots.led(0.1, 0.0, 0.0, rows=np.ones(2, bool)), "rows: expected a mask"),
         (lambda robots: robots.radio.send(Word, np.array([1]), number=1.0), "rows: expected a mask"),
+        (
+            lambda robots: robots.radio.send(Word, number=np.zeros(7)),
+            "Word.number: expected one number or an array (3,)",
+        ),
+        (
+            lambda robots: robots.radio.send(Word, np.array([True, False, True]), number=np.zeros(2)),
+            "expected one number or an array (3,), also with rows=, got (2,)",
+        ),
         (lambda robots: setattr(robots, "linear_mps", 0.1), "no attribute 'linear_mps'"),
     ],
 )

@@ -19,6 +19,8 @@ from swarmwire.comms.messages import (
     i1,
     i2,
     i4,
+    message_class,
+    message_classes,
     u1,
     u2,
     u4,
@@ -134,6 +136,19 @@ def test_a_missing_or_unknown_field_is_refused(fields: dict[str, float]) -> None
 def test_a_field_of_another_type_is_refused_where_the_class_is_made(hint: object) -> None:
     with pytest.raises(TypeError, match=r"Odd\.x: expected one of f4"):
         type("Odd", (Message,), {"__annotations__": {"x": hint}})
+
+
+@pytest.mark.parametrize("other", [Message, dict, "Beacon", None, Here()])
+def test_only_a_class_of_messages_is_one(other: object) -> None:
+    assert message_class(Beacon) is Beacon
+    with pytest.raises(TypeError, match="expected a class of messages, got"):
+        message_class(other)
+
+
+def test_every_class_of_messages_is_known_also_those_of_classes() -> None:
+    class Further(Beacon): ...
+
+    assert {Beacon, Further, Everything} <= set(message_classes())
 
 
 def test_a_field_has_no_default() -> None:

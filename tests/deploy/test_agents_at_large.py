@@ -8,10 +8,13 @@ from tests.deploy.commands import LOSSY
 
 AGENTS = """
 import sys
-from swarmwire.agent import Message, Robots, State, VectorAgent
+from swarmwire.agent import Message, Robots, State, VectorAgent, f8
 
 class Hello(Message):
     pass
+
+class Tale(Message):
+    number: f8
 
 class Writes(VectorAgent):
     needs = ("proximity",)
@@ -35,6 +38,10 @@ class Prints(VectorAgent):
 class Shouts(VectorAgent):
     def step(self, robots: Robots, state: State) -> None:
         robots.radio.send(Hello)
+
+class Rambles(VectorAgent):
+    def step(self, robots: Robots, state: State) -> None:
+        robots.radio.send(Tale, number=1.0)
 """
 
 
@@ -96,9 +103,9 @@ def test_an_observer_that_fails_is_left_out_and_counted(capfd):
 
 
 def test_people_are_told_once_of_a_packet_that_is_too_large(agent, capfd):
-    result = run(LOSSY, overrides=[*agent("Shouts"), "radio.max_payload_bytes=1"])
+    result = run(LOSSY, overrides=[*agent("Rambles"), "radio.max_payload_bytes=9"])
     assert result.radio is not None
     assert result.radio.fates["too_large"] > 19
     told = [line for line in capfd.readouterr().err.splitlines() if "too_large" in line]
     assert len(told) == 1
-    assert "sent 2 bytes, more than radio.max_payload_bytes" in told[0]
+    assert "sent 10 bytes, more than radio.max_payload_bytes" in told[0]

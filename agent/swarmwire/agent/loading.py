@@ -23,8 +23,7 @@ def load_agent(spec: str) -> AgentClass:
         raise NoAgent(str(error)) from error.__cause__
     place, _, name = spec.rpartition(":")
     if not isinstance(found, type) or not issubclass(found, Agent | VectorAgent):
-        what = "no such name" if found is None else "no Agent or VectorAgent"
-        raise NoAgent(f"{place} holds {what}: {name!r}")
+        raise NoAgent(f"{place} holds no Agent or VectorAgent: {name!r}")
     kind = cast(AgentClass, found)
     if getattr(kind, "__abstractmethods__", None):
         raise NoAgent(f"{name} has no step method")
@@ -33,8 +32,15 @@ def load_agent(spec: str) -> AgentClass:
     needs: Any = kind.needs  # the user's: it may be anything
     if type(needs) is not tuple or not all(type(need) is str for need in cast("tuple[object, ...]", needs)):
         raise NoAgent(f'{name}.needs: expected a tuple of texts such as ("proximity",), got {needs!r}')
+    shared = [attribute for base in kind.__mro__ for attribute in vars(base).items() if _is_shared(*attribute)]
+    for attribute, value in shared:
+        raise NoAgent(f"{name}.{attribute}: a {type(value).__name__} that all robots would share: make it in __init__")
     try:
         parameters_of(kind)
     except (TypeError, NameError) as error:
         raise NoAgent(str(error)) from error
     return kind
+
+
+def _is_shared(attribute: str, value: object) -> bool:
+    return not attribute.startswith("__") and isinstance(value, list | dict | set)

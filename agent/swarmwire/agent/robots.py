@@ -146,7 +146,11 @@ class RadioRows:
 
 def _of(rows: BoolArray, value: Any) -> Any:
     """The values of the rows of a mask; one number serves them all."""
-    return value if np.ndim(value) == 0 else np.asarray(value)[rows]
+    if np.ndim(value) == 0:
+        return value
+    if np.shape(value) != (len(rows),):
+        raise ValueError(f"expected one number or an array ({len(rows)},), also with rows=, got {np.shape(value)}")
+    return np.asarray(value)[rows]
 
 
 def forward_and_turn(left_mps: N, right_mps: N, wheel_base_m: float) -> tuple[N, N]:

@@ -26,6 +26,8 @@ S = TypeVar("S", bound=Sheet)
 class Sensing(Handle, Generic[N]):
     """The senses of one robot, or of n with a leading axis n, here written …; but for those that differ in form."""
 
+    __slots__ = ()  # what is set on a handle by mistake is refused
+
     @abstractmethod
     def _number(self, sense: str, field: str) -> N:
         """A field that has one number for a robot."""

@@ -127,6 +127,8 @@ def encode_rows(kind: type[Message], rows: int, fields: dict[str, Any]) -> Paylo
     table["tag"] = kind.tag
     for name, (lowest, highest, whole) in kind.ranges.items():
         values = np.asarray(fields[name], np.float64)
+        if values.shape not in ((), (rows,)):
+            raise ValueError(f"{kind.__name__}.{name}: expected one number or an array ({rows},), got {values.shape}")
         try:
             if whole:
                 table[name] = _whole(values, lowest, highest)

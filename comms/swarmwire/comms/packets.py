@@ -9,7 +9,7 @@ from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 BROADCAST = -1  # addressed to whoever is within reach
 NOWHERE = -2  # addressed to a robot that is not there: numbered, never on air
 UNTOLD = -1  # the outcome id of a packet whose sender does not ask
-TAG_BYTES = 2
+TAG_BYTES = 2  # at the start of a payload: which class of messages it is
 
 
 @dataclass(frozen=True, slots=True)

@@ -181,7 +181,7 @@ class SignalWay(Way):
 
     def _losses(self) -> Losses:
         if self._radio.bursts is not None:
-            self._bursts.make_room(self._now_ns, len(self._links.link.receiver))
+            self._bursts.make_room(self._now_ns, len(self._links.link))
         traced = NOT_TRACED if self._measured is None else self._measured.traced
         return losses_of(self._radio, traced, self._bursts)
 
