@@ -17,6 +17,7 @@ KEPT_ALL, KEPT_NEWEST = -1, -2
 SILENT, DATA, ACKNOWLEDGEMENT = range(3)
 RECEIVING = 255  # of a link, beside the fates: the frame on air may still be heard
 NOBODY = -1
+LONG_AGO_NS = -(10**15)
 NOT_LEARNED = -1  # the result of a packet whose sender died while it was on air
 
 _I, _F = np.int64, np.float64
@@ -139,3 +140,18 @@ class State(NamedTuple):
     order: IntArray  # packets by sender, in the order of sending
     off: IntArray  # (rows,) HEARD: the radio is on; else the fate of what it should send, or KEPT_ALL or KEPT_NEWEST
     jam: Jam
+
+
+def robots_at_rest(rows: int) -> Table:
+    """A table of dtype ROBOT: nobody has a packet, and the air has been free for long."""
+    robot: Table = np.zeros(rows, ROBOT)
+    robot["packet"] = robot["answers_to"] = NOBODY
+    robot["free_from_ns"] = LONG_AGO_NS
+    return robot
+
+
+def receptions_of_nothing(rows: int) -> Table:
+    """A table of dtype RECEPTION: nothing is on air."""
+    reception: Table = np.zeros(rows, RECEPTION)
+    reception["locked_to"], reception["signal_mw"] = NOBODY, np.inf
+    return reception
