@@ -14,8 +14,8 @@ from swarmwire.deploy.cli import app
 from swarmwire.deploy.record.modules import PARTS, module_digests
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS
+from swarmwire.world.scenario.as_mapping import same_content
 from swarmwire.world.scenario.scenario_file import load_scenario
-from swarmwire.world.scenario.scenario_mapping import same_content
 from tests.deploy.commands import LOSSY, ROOT, started
 
 SHORT = ["duration_s=2"]

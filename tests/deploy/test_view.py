@@ -20,8 +20,8 @@ from swarmwire.deploy.live.following import following
 from swarmwire.deploy.live.live_file import read_live
 from swarmwire.deploy.live.live_view import LiveView
 from swarmwire.deploy.live.published import Published
-from swarmwire.deploy.live.recording import whole
 from swarmwire.deploy.live.showing import Drawer, Way
+from swarmwire.deploy.live.whole_recording import whole
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.viewer.program import end, free_port, is_open, program
 from tests.deploy.commands import LOSSY

@@ -11,8 +11,8 @@ from swarmwire.comms.geometry.obstacles import is_blocked_on, obstacle_arrays
 from swarmwire.comms.truth import Light
 from swarmwire.metrics.drawing.radio_range import in_range
 from swarmwire.metrics.network.distance_counts import Places
-from swarmwire.metrics.shortest import link_lines, shortest, whole_path
 from swarmwire.metrics.swarm.min_gap import smallest_gap_m
+from swarmwire.metrics.torus import link_lines, shortest, whole_path
 from tests.metrics.films import OBSTACLES
 from tests.metrics.truths import measured, static, truth
 

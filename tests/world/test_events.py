@@ -14,7 +14,7 @@ from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.world.crews import assignments
+from swarmwire.world.crews import split_robots as assignments
 from swarmwire.world.loop import Loop
 from swarmwire.world.world import World
 from tests.world.samples import commanded, posed

@@ -12,7 +12,7 @@ from swarmwire.comms.protocols import Crew
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.endpoint import local_endpoint
 from swarmwire.deploy.runner_processes import RunnerProcesses
-from swarmwire.world.crews import assignments
+from swarmwire.world.crews import split_robots as assignments
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.crews.remote_crew import RemoteCrew

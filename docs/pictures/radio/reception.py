@@ -10,7 +10,7 @@ import numpy as np
 from docs.pictures.radio.sheet import line_color, panels, say, write
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.reception import dsss, ofdm
-from swarmwire.comms.air.reception.reception import Receiver, chunk_success, ieee80211ag, ieee80211b, ieee802154
+from swarmwire.comms.air.reception.receiver import Receiver, chunk_success, ieee80211ag, ieee80211b, ieee802154
 from swarmwire.comms.air.reception.sensitivity import sinr_for_db
 
 POINTS = 141

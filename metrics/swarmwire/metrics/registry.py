@@ -7,7 +7,7 @@ from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.network.age_of_information import AgeOfInformation
 from swarmwire.metrics.network.airtime import Airtime
 from swarmwire.metrics.network.components import ComponentCount
-from swarmwire.metrics.network.fragmentations import Fragmentations
+from swarmwire.metrics.network.fragmentation_count import Fragmentations
 from swarmwire.metrics.network.largest_component import LargestComponent
 from swarmwire.metrics.network.rejoin import RejoinMedian, RejoinWorst
 from swarmwire.metrics.network.throughput import Throughput

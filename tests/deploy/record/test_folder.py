@@ -7,7 +7,7 @@ from threading import Barrier
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.record.folder import make_folder
+from swarmwire.deploy.record.new_folder import make_folder
 
 RUNS = 4
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.network.fragmentations import Fragmentations
+from swarmwire.metrics.network.fragmentation_count import Fragmentations
 from swarmwire.metrics.network.rejoin import RejoinMedian, RejoinWorst
 from swarmwire.metrics.network.unrejoined import Unrejoined
 from tests.metrics.truths import edges, static, truth

@@ -6,12 +6,12 @@ import pytest
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Obstacle
-from swarmwire.world.engines import discs
-from swarmwire.world.engines.discs import DiscsEngine
-from swarmwire.world.engines.discs_fixed import CIRCLE, POLYGON, gap_to_polygon
-from swarmwire.world.engines.discs_near import fixed_near, pairs_near
-from swarmwire.world.engines.discs_obstacle_cells import obstacle_cells
-from swarmwire.world.engines.discs_robots import ROBOT
+from swarmwire.world.engines.discs import discs
+from swarmwire.world.engines.discs.discs import DiscsEngine
+from swarmwire.world.engines.discs.fixed import CIRCLE, POLYGON, gap_to_polygon
+from swarmwire.world.engines.discs.near import fixed_near, pairs_near
+from swarmwire.world.engines.discs.obstacle_cells import obstacle_cells
+from swarmwire.world.engines.discs.robots import ROBOT
 from tests.world.engines.conformance import R, asked, made, packed
 
 

@@ -9,8 +9,8 @@ from swarmwire.comms.air.parameters.propagation import OwnAntenna
 from swarmwire.comms.air.presets.registry import PRESETS
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.errors import BadInput
+from swarmwire.world.scenario.as_mapping import mapping_of
 from swarmwire.world.scenario.scenario_file import scenario_from
-from swarmwire.world.scenario.scenario_mapping import mapping_of
 from tests.world.samples import SAMPLE
 
 

@@ -4,8 +4,8 @@ import tomllib
 
 import pytest
 
+from swarmwire.world.scenario.as_mapping import mapping_of, same_content
 from swarmwire.world.scenario.scenario_file import load_scenario, scenario_from
-from swarmwire.world.scenario.scenario_mapping import mapping_of, same_content
 from tests.deploy.commands import LOSSY, ROOT
 
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))

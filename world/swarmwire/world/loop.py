@@ -15,7 +15,7 @@ from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.comms.truth import Tally, Truth
 from swarmwire.world.events import Events
 from swarmwire.world.mailbox import Mailbox
-from swarmwire.world.trajectory import TrajectoryHash
+from swarmwire.world.trajectory_hash import TrajectoryHash
 from swarmwire.world.world import World
 
 

@@ -21,9 +21,9 @@ from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.actuation.own_actuators import OwnActuators
 from swarmwire.world.engines.choice import engines_of
+from swarmwire.world.engines.physics import Physics
 from swarmwire.world.own.fitting import made_sensor
 from swarmwire.world.own.sensor import AskedSensor
-from swarmwire.world.physics import Physics
 from swarmwire.world.placement.layout import Layout, read_layout
 from swarmwire.world.placement.placement import Placed, place
 from swarmwire.world.scenario.bodies import bodies_of

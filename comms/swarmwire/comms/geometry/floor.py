@@ -1,4 +1,4 @@
-"""What the floor of an arena looks like, as plain values; `comms.ground` has it as arrays."""
+"""What the floor of an arena looks like, as plain values; `comms.geometry.ground` has it as arrays."""
 
 import base64
 import zlib

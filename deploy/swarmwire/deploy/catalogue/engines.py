@@ -4,7 +4,7 @@ import sys
 
 from swarmwire.deploy.catalogue.docs import first_line
 from swarmwire.deploy.catalogue.entry import Entry
-from swarmwire.world.physics import ENGINES
+from swarmwire.world.engines.physics import ENGINES
 
 AUTO = "discs, or pymunk where an obstacle is movable; robots that fly or have no contacts are kinematic"
 

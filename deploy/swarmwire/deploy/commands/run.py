@@ -11,7 +11,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
 from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
 from swarmwire.deploy.commands.options import Links, Overrides, Packets, Quiet, Runners, ScenarioFile, Seed
-from swarmwire.deploy.record.folder import default_folder
+from swarmwire.deploy.record.new_folder import default_folder
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.terminal.report import print_result
 

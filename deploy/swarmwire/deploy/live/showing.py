@@ -10,8 +10,8 @@ from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.deploy.live.evened import Evened
 from swarmwire.deploy.live.following import Following, following
 from swarmwire.deploy.live.live_file import Live
-from swarmwire.deploy.live.recording import whole
 from swarmwire.deploy.live.viewer_program import Viewer, viewer
+from swarmwire.deploy.live.whole_recording import whole
 from swarmwire.metrics.viewer.live import RerunLive
 
 PAUSE_NS = NS_PER_S // 100  # between looks whether something has come

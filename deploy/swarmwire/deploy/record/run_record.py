@@ -10,8 +10,8 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.deploy.live.published import Published
-from swarmwire.deploy.record.folder import make_folder
 from swarmwire.deploy.record.inputs import InputsRecord, RecordedCrew
+from swarmwire.deploy.record.new_folder import make_folder
 from swarmwire.deploy.record.origin import Origin, origin_of
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.record.trajectory_log import TrajectoryLog

@@ -22,9 +22,9 @@ from swarmwire.comms.loading import resolve
 from swarmwire.deploy.radio.link_trace_file import trace_path
 from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.world.placement.grey_image import beside
+from swarmwire.world.scenario.as_mapping import mapping_of
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario
-from swarmwire.world.scenario.scenario_mapping import mapping_of
 
 FILES = "files"
 

@@ -24,7 +24,7 @@ from swarmwire.metrics.drawing.metric_strip import MetricStrip, choose
 from swarmwire.metrics.drawing.radio_range import in_range
 from swarmwire.metrics.drawing.scenery import draw_scale_bar, draw_scenery, place_movable
 from swarmwire.metrics.drawing.swarm import Swarm
-from swarmwire.metrics.shortest import whole_path
+from swarmwire.metrics.torus import whole_path
 
 TRAIL_S = 5.0
 MOST_TRAIL_POINTS = 64

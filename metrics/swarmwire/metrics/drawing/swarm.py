@@ -10,7 +10,7 @@ from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.discs import Discs
 from swarmwire.metrics.drawing.looks import DEAD, LINK, OTHER_STATE, STATE_COLORS, rgb, shade
 from swarmwire.metrics.palette import robot_color
-from swarmwire.metrics.shortest import link_lines
+from swarmwire.metrics.torus import link_lines
 
 _LEAST, _CROWDED = 0.0105, 0.2  # least radius of a disc by the arena's longer side; and that times sqrt(robots)
 _FADING = (0.2, 0.4, 0.6, 0.8)  # opacity of a trail's parts, the oldest first

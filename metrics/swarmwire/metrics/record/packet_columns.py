@@ -12,7 +12,7 @@ from swarmwire.comms.fates import FATE_NAMES
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.truth import NOBODY, Finished, Static
 from swarmwire.metrics.network.geometry_tick import geometry_tick
-from swarmwire.metrics.shortest import shortest
+from swarmwire.metrics.torus import shortest
 
 if TYPE_CHECKING:
     import polars as pl

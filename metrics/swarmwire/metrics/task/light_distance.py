@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.moment import Moment
-from swarmwire.metrics.shortest import shortest
+from swarmwire.metrics.torus import shortest
 
 
 def light_distance(static: Static) -> Callable[[Moment], FloatArray] | None:

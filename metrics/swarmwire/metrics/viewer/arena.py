@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.truth import Obstacle, Static, Truth
-from swarmwire.metrics.shortest import link_lines
+from swarmwire.metrics.torus import link_lines
 from swarmwire.metrics.viewer.colors import LIGHT, WALL
 from swarmwire.metrics.viewer.floor import log_floor
 from swarmwire.metrics.viewer.leds import RerunLeds

@@ -12,7 +12,7 @@ from swarmwire.comms.air.presets.registry import PRESETS
 from swarmwire.comms.air.probe.contention import Contention, contention
 from swarmwire.comms.air.propagation.path_loss import loss_db
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.reception import chunk_success
+from swarmwire.comms.air.reception.receiver import chunk_success
 from swarmwire.comms.air.signal.levels import range_of, receiver_for, sensitivity_of
 from swarmwire.comms.air.timing.frames import acknowledgement_bytes, airtime_ns
 from tests.comms.air.runs import at, make_air, packets, run

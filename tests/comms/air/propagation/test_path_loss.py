@@ -14,7 +14,7 @@ from swarmwire.comms.air.propagation.log_distance import LogDistance
 from swarmwire.comms.air.propagation.loss_curve import LossCurve
 from swarmwire.comms.air.propagation.path_loss import loss_db, reach_m
 from swarmwire.comms.air.propagation.two_ray import TwoRay
-from swarmwire.comms.air.reception.reception import chunk_success, ieee802154
+from swarmwire.comms.air.reception.receiver import chunk_success, ieee802154
 
 getcontext().prec = 40
 PI = Decimal("3.1415926535897932384626433832795028841972")

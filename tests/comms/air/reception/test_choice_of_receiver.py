@@ -4,7 +4,7 @@ import pytest
 
 from swarmwire.comms.air.parameters.reception import Reception, SuccessTable, refuse_unfit
 from swarmwire.comms.air.reception import dsss, ofdm
-from swarmwire.comms.air.reception.reception import (
+from swarmwire.comms.air.reception.receiver import (
     by_table,
     by_threshold,
     chunk_success,

@@ -11,7 +11,7 @@ from swarmwire.comms.air.decibels import from_db, to_db
 from swarmwire.comms.air.parameters.reception import SuccessTable
 from swarmwire.comms.air.reception import dsss, ofdm
 from swarmwire.comms.air.reception.bits import all_right
-from swarmwire.comms.air.reception.reception import (
+from swarmwire.comms.air.reception.receiver import (
     by_table,
     by_threshold,
     chunk_success,

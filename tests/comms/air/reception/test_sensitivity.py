@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.parameters.reception import SuccessTable
 from swarmwire.comms.air.reception.noise import Noise, noise_dbm
-from swarmwire.comms.air.reception.reception import by_table, chunk_success, ieee80211ag, ieee802154
+from swarmwire.comms.air.reception.receiver import by_table, chunk_success, ieee80211ag, ieee802154
 from swarmwire.comms.air.reception.sensitivity import LEAST_DB, MOST_DB, sensitivity_dbm, sinr_for_db
 
 getcontext().prec = 40

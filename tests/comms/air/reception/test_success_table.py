@@ -6,7 +6,7 @@ import pytest
 
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.parameters.reception import SuccessTable, refuse_unless_rising
-from swarmwire.comms.air.reception.reception import by_table, chunk_success
+from swarmwire.comms.air.reception.receiver import by_table, chunk_success
 from swarmwire.comms.errors import BadInput
 
 MEASURED = SuccessTable((-94.0, -93.0, -90.0), (0.4, 0.6, 0.86), 800)

@@ -1,13 +1,10 @@
 """Which engine moves which group: bodies with contacts are the floor engine's, those without and those that fly not."""
 
 from collections.abc import Mapping
-from typing import Literal
 
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.scenario.scenario import Scenario
-
-EngineName = Literal["discs", "pymunk", "kinematic"]
+from swarmwire.world.scenario.scenario import EngineName, Scenario
 
 
 def engines_of(scenario: Scenario, bodies: Mapping[str, Body]) -> dict[str, EngineName]:

@@ -9,7 +9,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.truth import Boundary, Group, Obstacle, Static
-from swarmwire.world.engines.drive import Motors, motors_of
+from swarmwire.world.engines.motors import Motors, motors_of
 
 
 @dataclass(frozen=True, slots=True)

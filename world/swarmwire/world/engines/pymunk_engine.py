@@ -5,9 +5,9 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.world.engines.drive import push
 from swarmwire.world.engines.engine import Setting
 from swarmwire.world.engines.movable import Movables
+from swarmwire.world.engines.pymunk_drive import push
 from swarmwire.world.engines.pymunk_space import ArenaSpace
 
 

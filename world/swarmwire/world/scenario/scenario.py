@@ -19,6 +19,8 @@ from swarmwire.world.scenario.tables import Table
 
 GroupName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=40)]
 
+EngineName = Literal["discs", "pymunk", "kinematic"]
+
 
 class TimeTable(Table):
     """[time]: the base period of the run."""
@@ -30,7 +32,7 @@ class TimeTable(Table):
 class PhysicsTable(Table):
     """[physics]: how bodies move and touch."""
 
-    engine: Literal["auto", "discs", "pymunk", "kinematic"] = "auto"
+    engine: Literal["auto", EngineName] = "auto"
     """What moves bodies that have contacts: discs, or pymunk, which also moves obstacles; "auto" takes discs unless an
     obstacle is movable. Bodies without contacts, and such as fly, are kinematic; "kinematic" makes all of them so."""
     steps: int = Field(default=5, ge=1, le=1000)

@@ -4,13 +4,14 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from pydantic import ValidationError
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.scenario.checks import check
 from swarmwire.world.scenario.faults import fault
+from swarmwire.world.scenario.overrides import put
 from swarmwire.world.scenario.scenario import Scenario
 
 
@@ -25,7 +26,7 @@ def scenario_from(mapping: Mapping[str, Any], where: str, overrides: Sequence[st
     BadInput names `where`, or the override, the key and what was expected.
     """
     given = deepcopy(dict(mapping))
-    settings = [(_put(given, *_parsed(text)), text) for text in overrides]
+    settings = [(put(given, text), text) for text in overrides]
     try:
         return _checked(given, where)
     except BadInput as error:
@@ -58,39 +59,3 @@ def _read(path: Path | str, where: str) -> dict[str, Any]:
         raise BadInput(where, "", "expected TOML, which is UTF-8 text") from None
     except OSError as error:
         raise BadInput(where, "", f"expected a readable file: {error.strerror}") from None
-
-
-def _parsed(text: str) -> tuple[list[str], Any, str]:
-    path, equals, value = text.partition("=")
-    keys = [key.strip() for key in path.split(".")]
-    if not equals or not all(keys):
-        raise BadInput(f"--set {text}", "", "expected path=value, such as robots.flock.count=30")
-    try:
-        found = tomllib.loads(f"value = {value}")
-    except tomllib.TOMLDecodeError:
-        return keys, value.strip(), text
-    return keys, found["value"] if len(found) == 1 else value, text
-
-
-def _put(mapping: dict[str, Any], keys: list[str], value: Any, text: str) -> str:
-    """Set the value at a path of keys, in which a number is a place in a list; the path of what is new with it."""
-    at: Any = mapping
-    new = len(keys)  # keys that lead to what is new
-    for depth, key in enumerate(keys):
-        if isinstance(at, list):
-            items = cast("list[Any]", at)
-            if not key.isdecimal() or int(key) >= len(items):
-                expected = f"expected a place in a list of {len(items)}, counted from 0"
-                raise BadInput(f"--set {text}", ".".join(keys[: depth + 1]), expected)
-            holder, index = cast(Any, items), int(key)
-        elif isinstance(at, dict):
-            holder, index = cast(Any, at), key
-        else:
-            raise BadInput(f"--set {text}", ".".join(keys[: depth + 1]), f"{'.'.join(keys[:depth])} holds no keys")
-        if isinstance(at, dict) and key not in at:
-            new = min(new, depth + 1)
-        if depth == len(keys) - 1:
-            holder[index] = value
-        else:
-            at = holder[index] if isinstance(at, list) else holder.setdefault(index, {})
-    return ".".join(keys[:new])

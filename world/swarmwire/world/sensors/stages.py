@@ -146,7 +146,7 @@ def _wrap(flat):
 
 @njit(cache=True)
 def _wrapped(angle):
-    """The angle in (-pi, pi], with its own bits if it is there already (`world.angles.wrapped`)."""
+    """The angle in (-pi, pi], with its own bits if it is there already (`world.placement.angles.wrapped`)."""
     if -np.pi < angle <= np.pi:
         return angle
     turned = angle - FULL_TURN * np.ceil((angle - np.pi) / FULL_TURN)

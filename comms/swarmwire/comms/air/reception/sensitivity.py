@@ -3,7 +3,7 @@
 # pyright: basic, reportUnknownMemberType=false
 
 from swarmwire.comms.air.decibels import from_db
-from swarmwire.comms.air.reception.reception import Receiver, chunk_success
+from swarmwire.comms.air.reception.receiver import Receiver, chunk_success
 
 LEAST_DB, MOST_DB = -60.0, 100.0
 HALVINGS = 60

@@ -4,7 +4,7 @@
 
 from swarmwire.comms.air.propagation.path_loss import reach_m
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.reception import Receiver, receiver_of
+from swarmwire.comms.air.reception.receiver import Receiver, receiver_of
 from swarmwire.comms.air.reception.sensitivity import sensitivity_dbm
 
 # What counts as sensitivity in data sheets: share of frames that are right, and their bytes (see `sensitivity_dbm`).

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.air.reception.reception import Model, Receiver, chunk_success
+from swarmwire.comms.air.reception.receiver import Model, Receiver, chunk_success
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.borrowing import borrowing
 

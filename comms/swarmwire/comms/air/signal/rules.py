@@ -9,7 +9,7 @@ import numpy as np
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.parameters.access import METHODS
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.reception import Receiver
+from swarmwire.comms.air.reception.receiver import Receiver
 from swarmwire.comms.air.reception.sensitivity import sinr_for_db
 from swarmwire.comms.air.signal.levels import cut_off_dbm, receiver_for, sensitivity_of
 from swarmwire.comms.air.signal.links_by_sender import Levels

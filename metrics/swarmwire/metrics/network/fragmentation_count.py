@@ -15,7 +15,7 @@ from swarmwire.metrics.network.fragmentation import Fragmentation, OfFragmentati
 class Fragmentations(OfFragmentation):
     """Times that the radio graph's components rose above 1 and stayed there for at least `hold_s`.
 
-    Counted at the end of that hold; what an event is, `metrics/fragmentation.py` says. NaN without a radio.
+    Counted at the end of that hold; what an event is, `metrics/network/fragmentation.py` says. NaN without a radio.
     """
 
     name = "fragmentations"

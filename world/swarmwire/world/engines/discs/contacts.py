@@ -7,7 +7,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.borrowing import borrowing
-from swarmwire.world.engines.discs_fixed import ROBOT, gap_to_circle, gap_to_fixed
+from swarmwire.world.engines.discs.fixed import ROBOT, gap_to_circle, gap_to_fixed
 
 # Robots look ahead for what their speed may reach in a step and this share of their radius, since others may push them.
 LOOK_AHEAD = 0.05

@@ -15,7 +15,7 @@ impulses, Game Developers Conference.
 # pyright: basic, reportUnknownMemberType=false
 
 from swarmwire.comms.borrowing import borrowing
-from swarmwire.world.engines.discs_fixed import ROBOT
+from swarmwire.world.engines.discs.fixed import ROBOT
 
 SWEEPS = 10
 FRICTION = 0.7 * 0.7  # as in the pymunk engine: the product of both sides' coefficients

@@ -10,11 +10,11 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.truth import Static
-from swarmwire.world.engines.choice import EngineName
-from swarmwire.world.engines.discs import DiscsEngine
+from swarmwire.world.engines.discs.discs import DiscsEngine
 from swarmwire.world.engines.engine import Engine, Setting, setting_of
 from swarmwire.world.engines.kinematic import KinematicEngine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
+from swarmwire.world.scenario.scenario import EngineName
 
 # By the name that a scenario has for it.
 ENGINES: dict[EngineName, Callable[[Setting, FloatArray], Engine]] = {

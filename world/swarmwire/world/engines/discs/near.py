@@ -14,8 +14,8 @@ from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry.grid import build, cell_of
 from swarmwire.comms.geometry.obstacles import Obstacles
-from swarmwire.world.engines.discs_fixed import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, gap_to_fixed, gap_to_wall
-from swarmwire.world.engines.discs_obstacle_cells import ObstacleCells
+from swarmwire.world.engines.discs.fixed import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, gap_to_fixed, gap_to_wall
+from swarmwire.world.engines.discs.obstacle_cells import ObstacleCells
 
 
 def pairs_near(

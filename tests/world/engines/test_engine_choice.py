@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.physics import ENGINES
+from swarmwire.world.engines.physics import ENGINES
 from swarmwire.world.world import World
 from tests.world.samples import commanded, posed
 

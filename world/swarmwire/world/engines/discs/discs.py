@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.world.engines.discs_contacts import CONTACT, contacts_of, crowd_of
-from swarmwire.world.engines.discs_near import fixed_near, pairs_near
-from swarmwire.world.engines.discs_obstacle_cells import obstacle_cells
-from swarmwire.world.engines.discs_robots import robots_of
-from swarmwire.world.engines.discs_tick import advance, needed_margin_m
+from swarmwire.world.engines.discs.contacts import CONTACT, contacts_of, crowd_of
+from swarmwire.world.engines.discs.near import fixed_near, pairs_near
+from swarmwire.world.engines.discs.obstacle_cells import obstacle_cells
+from swarmwire.world.engines.discs.robots import robots_of
+from swarmwire.world.engines.discs.tick import advance, needed_margin_m
 from swarmwire.world.engines.engine import Setting
 
 # How far robots may move until near things are listed anew, of the widest radius; their speed may ask for more.

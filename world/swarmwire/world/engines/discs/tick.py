@@ -5,10 +5,10 @@
 import numpy as np
 
 from swarmwire.comms.borrowing import borrowing
-from swarmwire.world.engines.discs_contacts import LOOK_AHEAD, find_contacts
-from swarmwire.world.engines.discs_motion import drive, follow_targets, move
-from swarmwire.world.engines.discs_solver import separate, solve
-from swarmwire.world.engines.discs_touches import begin_tick, note_touches
+from swarmwire.world.engines.discs.contacts import LOOK_AHEAD, find_contacts
+from swarmwire.world.engines.discs.motion import drive, follow_targets, move
+from swarmwire.world.engines.discs.solver import separate, solve
+from swarmwire.world.engines.discs.touches import begin_tick, note_touches
 
 
 @borrowing(from_python=True)
