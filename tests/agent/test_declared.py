@@ -67,8 +67,10 @@ def test_a_value_of_another_type_is_refused(key: str, value: Any, expected: str)
 def test_an_unknown_parameter_is_refused_with_those_there_are() -> None:
     error = refused({"speed_mps": 1.0, "sped": 1})
     assert error.key == "sped"
-    assert error.expected == "unknown parameter; Parametrised has speed_mps, count, eager, word"
-    assert refused({"x": 1}, Stateless).expected == "unknown parameter; Stateless has none"
+    assert error.expected == (
+        "unknown parameter of Parametrised; expected one of speed_mps, count, eager, word (did you mean speed_mps?)"
+    )
+    assert refused({"x": 1}, Stateless).expected == "unknown parameter of Stateless; expected none"
     assert refused({"speed_mps": 1.0, "needs": 1}).key == "needs"
 
 

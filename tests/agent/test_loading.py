@@ -71,6 +71,7 @@ def test_a_module_that_is_not_there(text: str) -> None:
         ("\n1 / 0\n", "does not import: ZeroDivisionError: division by zero (line 3)"),
         ("open('weights.json')\n", "does not import: FileNotFoundError"),  # the agent's own file, not the agent
         ("class Yours(Agent): ...\n", "holds no such name: 'Mine'"),
+        ("class Mein(Agent): ...\n", "holds no such name: 'Mine' (did you mean Mein?)"),
         ("Mine = 3\n", "holds no Agent or VectorAgent: 'Mine'"),
         ("class Mine: ...\n", "holds no Agent or VectorAgent: 'Mine'"),
         ("class Mine(Agent): ...\n", "Mine has no step method"),

@@ -7,7 +7,7 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
 from swarmwire.world.scenario.scenario_file import load_scenario
-from tests.deploy.commands import LOSSY, swarmwire
+from tests.deploy.commands import LOSSY, called, swarmwire
 
 AGENTS = """
 import no_such_module_anywhere
@@ -131,7 +131,7 @@ WIDER = [
     ),
     (
         "events=[{at_s=1, do='kill', robots={group='flok'}}]",
-        "events.0.robots.group: expected one of flock; got 'flok'",
+        "events.0.robots.group: expected one of flock (did you mean flock?); got 'flok'",
     ),
     (
         "events=[{at_s=1, do='revive', robots={names=['flock-20']}}]",
@@ -143,7 +143,7 @@ WIDER = [
     ),
     (
         "events=[{at_s=1, do='partition', between=['flock-0', 'flock-1']}]",
-        "events.0.between.0: expected a list, got 'flock-0' (and 1 more fault)",
+        "events.0.between.0: expected a list, got 'flock-0' (also wrong: events.0.between.1)",
     ),
     (
         "events=[{at_s=1, do='partition', between=[['flock'], ['flock-1']]}]",
@@ -235,8 +235,18 @@ def test_the_check_command_refuses_them_in_the_same_words(agents, place):
 def test_an_event_of_the_radio_needs_a_radio(agents):
     text = agents.read_text()
     agents.write_text(text[: text.index("[radio]")])
-    told = refused(agents, "events=[{at_s=1, do='blackout', robots={count=1}}]")
-    assert told == f"{agents}: events.0.do: expected a scenario with a [radio] for 'blackout'"
+    events = "events=[{at_s=1, do='blackout', robots={count=1}}]"
+    told = refused(agents, events)
+    assert told == f"--set {events}: events.0.do: expected a scenario with a [radio] for 'blackout'"
+    told = refused(agents)
+    assert told.endswith("needs 'radio.range', which only a radio tells: there is no [radio]")
+
+
+def test_check_tells_of_events_that_come_too_late(monkeypatch, capsys):
+    setting = "events=[{at_s=1.9, do='kill', robots={count=1}}, {at_s=1.95, do='kill', robots={count=1}}]"
+    code, out, _ = called(monkeypatch, capsys, "check", LOSSY, "--set", setting, "--set", "duration_s=2")
+    assert code == 0
+    assert out.endswith("engine discs; too late to happen: events.1\n")
 
 
 def test_files_that_are_no_scenario_are_named(tmp_path):

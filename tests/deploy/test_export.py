@@ -97,7 +97,10 @@ def test_a_run_that_was_killed_is_exported_up_to_its_last_part(run):
         (["--fps", "5"], "--fps: expected --gif or --mp4 with it; a picture is of one moment, --png T"),
         (["--gif", "--until", "9"], "--until: expected a time that was recorded, 0 to 2.9 s; got 9"),
         (["--arena", "1"], "RUN: arena: expected 0 to 0, got 1"),
-        (["--metric", "ordr"], "--metric: ordr: was not recorded; expected one of order, min_gap"),
+        (
+            ["--metric", "ordr"],
+            "--metric: ordr: was not recorded; expected one of order, min_gap (did you mean order?)",
+        ),
         (["--mp4", "--to", "a.gif"], "a.gif: expected a file name that ends in .mp4"),
         (["--gif", "--size", "5"], "--size: expected 100 to 8000 pixels, got 5"),
     ],

@@ -32,7 +32,7 @@ from swarmwire.metrics.swarm.order import Order
 from swarmwire.world.scenario.scenario import PhysicsTable
 from swarmwire.world.scenario.scenario_file import scenario_schema
 from swarmwire.world.scenario.schema import written_form
-from tests.deploy.commands import called
+from tests.deploy.commands import LOSSY, called
 from tests.docs.pages import ROOT
 
 ACTION_OF = {next(of.default for of in fields(kind) if of.name == "do"): kind for kind in ACTIONS}
@@ -301,6 +301,8 @@ def test_a_name_may_be_short_or_that_of_ones_own_group(asked, name):
         ("fates", "swarmwire list fates"),
         ("absent.toml", "expected a readable file"),
         ("absent.py:Mine", "there is no file"),
+        ("absent.py", "expected the class in it, too: absent.py:Class"),
+        (str(LOSSY), "expected a body's sheet, got a scenario; swarmwire check and draw take one"),
         ("swarmwire.agent:Robot", "no Agent or VectorAgent"),
     ],
 )

@@ -44,5 +44,5 @@ def test_it_changes_nothing_of_the_run(scenario):
 
 
 def test_one_that_is_not_there_is_refused_before_the_run(scenario):
-    with pytest.raises(BadInput, match=r"s.toml: metrics\.0: expected a dataclass below Metric; .*:None is not there"):
+    with pytest.raises(BadInput, match=r"s.toml: metrics\.0: .* holds no such name: 'None'"):
         Simulation(scenario, overrides=['metrics=["spread.py:None"]'])

@@ -264,6 +264,7 @@ def test_a_run_that_an_agent_ended_is_repeated_up_to_there(tmp_path, mine):
     repetition = repeat(tmp_path / "run")
     assert repetition.same
     assert repetition.result.ticks == 5
+    assert "the same run, bit for bit: 5 ticks, where it ended early: failed" in called(tmp_path / "run").stdout
 
 
 def test_the_first_tick_that_came_out_differently_is_named(tmp_path, mine):

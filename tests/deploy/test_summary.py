@@ -85,7 +85,7 @@ def test_the_terminal_shows_how_it_went_and_where_to_look(tmp_path):
     for text in (
         "tick 40/40",
         "2 processes, lockstep",
-        "of those in range heard it",
+        "of these heard it",
         "order",
         "swarmwire view",
         "--gif",

@@ -8,7 +8,7 @@ from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.event_recorder import EventRecorder
 from swarmwire.metrics.viewer.recording import RerunRecording
-from tests.metrics.recorded import SetClock
+from tests.clocks import StillClock
 from tests.metrics.truths import static, truth
 from tests.metrics.viewer.test_rerun_recording import column
 
@@ -53,7 +53,7 @@ def test_what_happens_singly_has_rows_of_those_arenas_alone_in_which_somebody_ch
 
 def test_a_recording_says_what_happened_in_its_arena(tmp_path):
     of, metrics = static(2, arenas=2), Metrics()
-    recording = RerunRecording(tmp_path / "run.rrd", metrics, SetClock(), arena=1)
+    recording = RerunRecording(tmp_path / "run.rrd", metrics, StillClock(), arena=1)
     metrics.begin(of)
     recording.begin(of)
     elsewhere, here = broken(True, True, False, False), broken(False, False, True, False)

@@ -8,6 +8,7 @@ import numpy as np
 
 from swarmwire.agent.per_robot import PerRobot, PerRobotDefault
 from swarmwire.agent.vector_agent import VectorAgent
+from swarmwire.comms.one_of import one_of
 
 T = TypeVar("T")
 TYPES: dict[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}  # in words
@@ -56,7 +57,7 @@ def checked(kind: type, params: dict[str, Any], robots: int = 1) -> dict[str, An
     declared = parameters_of(kind)
     for name in params:
         if name not in declared:
-            raise BadParameter(name, f"unknown parameter; {kind.__name__} has {', '.join(declared) or 'none'}")
+            raise BadParameter(name, f"unknown parameter of {kind.__name__}; expected {one_of(declared, name)}")
     for name, parameter in declared.items():
         if name not in params and parameter.default is REQUIRED:
             raise BadParameter(name, f"is missing: expected {TYPES[parameter.type]}")

@@ -23,8 +23,7 @@ def load_agent(spec: str) -> AgentClass:
         raise NoAgent(str(error)) from error.__cause__
     place, _, name = spec.rpartition(":")
     if not isinstance(found, type) or not issubclass(found, Agent | VectorAgent):
-        what = "no such name" if found is None else "no Agent or VectorAgent"
-        raise NoAgent(f"{place} holds {what}: {name!r}")
+        raise NoAgent(f"{place} holds no Agent or VectorAgent: {name!r}")
     kind = cast(AgentClass, found)
     if getattr(kind, "__abstractmethods__", None):
         raise NoAgent(f"{name} has no step method")

@@ -6,7 +6,7 @@ allocate nothing, and their caller holds all the arrays until they return. (numb
 They are inlined into one another, so that tuples are not copied from one to the next.
 
 Only those that Python calls have a way in from there: it unpacks every array of every tuple, and for a small function
-that takes twice as long to compile as the function.
+that takes longer to compile than the function itself.
 """
 
 from collections.abc import Callable
@@ -17,9 +17,14 @@ from numba import njit
 
 def borrowing(*, from_python: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """`numba.njit` for kernels that allocate nothing; what is not called `from_python` other kernels alone can call."""
-    uncounted: dict[str, Any] = {"cache": True, "_nrt": False, "forceinline": True, "no_cfunc_wrapper": True}
-    compiled = njit(**uncounted, no_cpython_wrapper=not from_python, **options)
-    return compiled if from_python else lambda function: _for_kernels(compiled(function))
+    uncounted: dict[str, Any] = {"cache": True, "_nrt": False, "forceinline": True}
+    ways_in: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": not from_python}
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        kernel: Any = njit(**uncounted, **ways_in, **options)(function)
+        return kernel if from_python else _for_kernels(kernel)
+
+    return compiled
 
 
 def _for_kernels(kernel: Any) -> Any:

@@ -8,6 +8,7 @@ import hashlib
 import importlib
 import importlib.util
 import sys
+from difflib import get_close_matches
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from traceback import extract_tb
@@ -26,9 +27,9 @@ def resolve(spec: str, beside: Path) -> str:
 
 
 def load_named(spec: str) -> object:
-    """What "package.module:Name" or "/path/file.py:Name" is; None if there is no such name in it.
+    """What "package.module:Name" or "/path/file.py:Name" is.
 
-    NotLoaded if the text has another form, or the module or file does not import.
+    NotLoaded if the text has another form, the module or file does not import, or there is no such name in it.
     """
     place, _, name = spec.rpartition(":")
     if not place or not name.isidentifier():
@@ -40,7 +41,10 @@ def load_named(spec: str) -> object:
         module = _load_file(Path(place)) if of_file else importlib.import_module(place)
     except (Exception, SystemExit) as error:
         raise NotLoaded(f"{place} does not import: {type(error).__name__}: {error}{_hint(error, place)}") from error
-    return getattr(module, name, None)
+    if not hasattr(module, name):
+        near = "".join(f" (did you mean {other}?)" for other in get_close_matches(name, dir(module), n=1))
+        raise NotLoaded(f"{place} holds no such name: {name!r}{near}")
+    return getattr(module, name)
 
 
 def _hint(error: BaseException, place: str) -> str:

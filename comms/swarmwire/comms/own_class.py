@@ -16,8 +16,8 @@ def own_class(base: type[K], spec: str, where: str, key: str) -> type[K]:
     except NotLoaded as error:
         raise BadInput(where, key, str(error)) from error
     if not isinstance(found, type) or not issubclass(found, base) or not is_dataclass(found):
-        what = "not there" if found is None else f"{cast('object', found)!r}"
-        raise BadInput(where, key, f"expected a dataclass below {base.__name__}; {spec} is {what}")
+        got = f"{spec} is {cast('object', found)!r}"
+        raise BadInput(where, key, f"expected a dataclass below {base.__name__}; {got}")
     missing: frozenset[str] = getattr(found, "__abstractmethods__", frozenset())
     if missing:
         raise BadInput(where, key, f"{found.__name__} has no {', '.join(sorted(missing))}")

@@ -47,5 +47,6 @@ def _checked(scenario: Scenario, name: str, spec: str) -> AgentClass:
 def _untold(need: str, scenario: Scenario) -> str:
     if need == "radio.outcomes":
         return "only a radio that acknowledges tells: expected radio.access.method csma-802154 or dcf, acknowledged"
-    told = ", ".join(scenario.radio.gives.needs) if scenario.radio else ""
-    return f"the radio does not tell: [radio] gives {told or 'nothing'}"
+    if scenario.radio is None:
+        return "only a radio tells: there is no [radio]"
+    return f"the radio does not tell: [radio] gives {', '.join(scenario.radio.gives.needs) or 'nothing'}"

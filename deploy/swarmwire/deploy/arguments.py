@@ -12,7 +12,7 @@ Runners = int | str | None  # how many, "per-robot", or None for a local crew
 def choose_seeds(scenario: Scenario, seed: int | None, seeds: Sequence[int] | None) -> tuple[int, ...]:
     """The seed of each arena: those asked for, or the scenario's own; BadInput if they are no good."""
     if seed is not None and seeds is not None:
-        raise BadInput("", "seeds", "expected either one seed or several seeds")
+        raise BadInput("", "seed and seeds", "expected only one of the two")
     chosen = tuple(seeds) if seeds is not None else (scenario.seed if seed is None else seed,)
     if not chosen or len(set(chosen)) != len(chosen) or min(chosen) < 0:
         raise BadInput("", "seeds", f"expected different whole numbers of at least 0, got {list(chosen)}")

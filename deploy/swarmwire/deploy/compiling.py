@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from rich.console import Console
 
 COMPILE = "numba:compile"  # numba's event, which it does not raise for kernels that it finds compiled
-TOLD = "compiling kernels for this machine: once, for a minute or so"
+TOLD = "compiling kernels that this machine does not have yet: for a minute or so, then they are kept"
 
 
 @contextmanager

@@ -25,6 +25,7 @@ class Repetition:
     """A run that was run again."""
 
     result: Result  # of the repetition
+    ended: str | None  # how the run did, as its summary says; None: it left none
     before: tuple[str, ...] | None  # trajectory hash of each arena of the run; None: it left none, or not of this end
     compared: int  # ticks, from the first, that could be compared
     first_difference: int | None  # the first tick that came out differently
@@ -104,6 +105,7 @@ class RepeatedRun:
         why_not_all = self._why_not_all(result)
         return Repetition(
             result=result,
+            ended=summary.ended if summary else None,
             before=summary.hashes if summary and not why_not_all else None,
             compared=self._check.compared,
             first_difference=self._check.first_difference,
@@ -130,6 +132,7 @@ class RepeatedRun:
 
 @dataclass(frozen=True)
 class _Summary:
+    ended: str
     ticks: int
     hashes: tuple[str, ...]
     inputs_sha256: str | None
@@ -141,7 +144,7 @@ def _read_summary(folder: Path) -> _Summary | None:
     if found is None:
         return None
     inputs: dict[str, Any] = found.get("inputs") or {}
-    return _Summary(found["ticks"], tuple(found["trajectory_sha256"]), inputs.get("sha256"))
+    return _Summary(found["ended"], found["ticks"], tuple(found["trajectory_sha256"]), inputs.get("sha256"))
 
 
 def _inputs(folder: Path, origin: Origin, summary: _Summary | None) -> RecordedInputs | None:

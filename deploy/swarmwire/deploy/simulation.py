@@ -6,10 +6,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
-
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.antennas import Antennas
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.loading import resolve
@@ -23,6 +19,7 @@ from swarmwire.deploy.endpoint import check_socket, new_run_id
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.kept_memory import keep_memory
+from swarmwire.deploy.new_air import new_air
 from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.deploy.record.inputs import ReplayedCrew
@@ -166,7 +163,13 @@ class Simulation:
             self._watching: list[Observer] = [self.metrics, RadioTally(), EventLog(), *self._observers]
             acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows)
             acting = self._record.recorded(acting, self._from_outside)
-            self._loop = Loop(self.world, self._air(), acting, self._watching, self.scenario.events)
+            self._loop = Loop(
+                self.world,
+                new_air(self.scenario, self.world, self._traces),
+                acting,
+                self._watching,
+                self.scenario.events,
+            )
             crew.start()
             for observer in self._watching:
                 observer.begin(self.static)
@@ -243,28 +246,6 @@ class Simulation:
             stopped=self._stopped,
             lost=self._losses.append,
             say=self._record.say,
-        )
-
-    def _air(self) -> Air | None:
-        """A new air of the scenario's radio, if it has one."""
-        static, radio = self.static, self.scenario.radio
-        if radio is None:
-            return None
-        size_m, every = static.arena_size_m, static.act_every_ticks
-        radius_m = np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for group in static.groups])
-        antennas = Antennas.of_groups((table.count, table.radio) for table in self.scenario.robots.values())
-        return Air(
-            radio,
-            self.world.keys,
-            static.robots,
-            size_m,
-            self.world.obstacles,  # which follow those that are pushed
-            static.rate_hz,
-            every,
-            radius_m,
-            self._traces,
-            antennas,
-            static.boundary,
         )
 
     def _from_outside(self, tick: int) -> bool:

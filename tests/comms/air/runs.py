@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from swarmwire.comms.air.air import Air, News
+from swarmwire.comms.air.air import Air
+from swarmwire.comms.air.news import News
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.traces.link_traces import LinkTraces
 from swarmwire.comms.arrays import FloatArray, IntArray

@@ -31,6 +31,11 @@ def test_a_body_written_down_reads_back_the_same(name: str) -> None:
     assert body_from(body.as_mapping(), "copy.toml") == body
 
 
+def test_a_sheet_that_is_like_another_goes_by_its_own_name_or_its_file_s() -> None:
+    assert body_from({"like": "epuck"}, "bodies/worn.toml").name == "worn"
+    assert body_from({"like": "epuck", "name": "old"}, "bodies/worn.toml").name == "old"
+
+
 def test_an_unknown_body_is_refused_with_those_that_there_are() -> None:
     with pytest.raises(BadInput, match=r"body: expected one of epuck, .*; got 'roomba'"):
         load_body("roomba")
@@ -140,7 +145,8 @@ def changed(path: str, value: object) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("path", "value", "expected"),
     [
-        ("radius_m", None, "radius_m: is missing"),
+        ("radius_m", None, "radius_m: is missing: radius of the body"),
+        ("name", None, "name: is missing: name in scenarios"),
         ("drive", None, "drive: is missing"),
         ("drive.wheel_base_m", None, "drive.wheel_base_m: is missing"),
         (

@@ -80,7 +80,7 @@ def test_a_drive_that_cannot_be_is_refused_with_file_key_and_reason(drive: objec
     [
         ({"altitude_m": -1}, "altitude_m: expected at least 0 m, got -1.0"),
         ({"contacts": 1}, "contacts: expected true or false, got 1"),
-        ({"leds": {"angles_deg": [0]}}, "leds.height_m: is missing"),
+        ({"leds": {"angles_deg": [0]}}, "leds.height_m: is missing: height of the ring above the body's lower side"),
         ({"leds": {"angles_deg": [], "height_m": 0.1}}, "leds.angles_deg: expected at least one item"),
         ({"leds": {"angles_deg": [0], "height_m": -0.1}}, "leds.height_m: expected at least 0 m, got -0.1"),
         ({"leds": 8}, "leds: expected a table, got 8"),

@@ -209,7 +209,7 @@ def test_a_crowd_is_drawn():
     ("size", "metrics", "told"),
     [
         (10, None, "--size: expected 100 to 8000 pixels, got 10"),
-        (300, ["ordr"], "--metric: ordr: was not recorded; expected one of order, min_gap"),
+        (300, ["ordr"], "--metric: ordr: was not recorded; expected one of order, min_gap (did you mean order?)"),
         (300, ["order"] * 5, "--metric: expected 4 at most, got 5"),
     ],
 )

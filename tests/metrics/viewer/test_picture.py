@@ -7,7 +7,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.viewer.picture import NoGraphics, render_png
 from swarmwire.metrics.viewer.recording import RerunRecording
-from tests.metrics.recorded import SetClock
+from tests.clocks import StillClock
 from tests.metrics.truths import static, truth
 
 pytest.importorskip("rerun", reason="needs the extra [view]")
@@ -16,7 +16,7 @@ pytest.importorskip("rerun", reason="needs the extra [view]")
 @pytest.fixture
 def rrd(tmp_path):
     of, metrics = static(3), Metrics()
-    recording = RerunRecording(tmp_path / "run.rrd", metrics, SetClock())
+    recording = RerunRecording(tmp_path / "run.rrd", metrics, StillClock())
     for observer in (metrics, recording):
         observer.begin(of)
     for tick in range(20):

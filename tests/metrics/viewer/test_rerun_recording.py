@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.floor import Floor, Patch
@@ -11,7 +12,7 @@ from swarmwire.comms.truth import Finished, Group, Happened, Light, Obstacle
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.viewer.colors import DEAD, FATES, packed
 from swarmwire.metrics.viewer.recording import RerunRecording
-from tests.metrics.recorded import SetClock
+from tests.clocks import StillClock
 from tests.metrics.truths import edges, static, tally, truth
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
@@ -29,7 +30,7 @@ def strict():
 
 def record(path: Path, of, ticks, arena=0):
     metrics = Metrics()
-    recording = RerunRecording(path, metrics, SetClock(), arena)
+    recording = RerunRecording(path, metrics, StillClock(), arena)
     observers = (metrics, recording)
     for observer in observers:
         observer.begin(of)
@@ -236,14 +237,14 @@ def test_an_entity_is_sent_at_once_for_all_ticks_of_two_seconds_of_the_clock(tmp
             name,
             lambda *args, original=original, **more: (calls.append(args[1]), original(*args, **more)),
         )
-    of, metrics, clock = static(150), Metrics(), SetClock()
+    of, metrics, clock = static(150), Metrics(), StillClock()
     recording = RerunRecording(tmp_path / "run.rrd", metrics, clock)
     for observer in (metrics, recording):
         observer.begin(of)
     sent = []
     for seen in moving(of, 9, edges=edges((0, 1), (1, 2)), tally=tally({Fate.HEARD: 150})):
         calls.clear()
-        clock.now_s += 0.7
+        clock.time_ns += 7 * NS_PER_S // 10
         for observer in (metrics, recording):
             observer.see(seen)
         sent.append([call for call in calls if call.startswith("world/")])
@@ -351,4 +352,4 @@ def test_an_arena_that_is_not_there_is_refused(tmp_path):
 def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("swarmwire.metrics.viewer.extra.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r"run\.rrd: needs rerun-sdk: install swarmwire-metrics\[view\]"):
-        RerunRecording(tmp_path / "run.rrd", Metrics(), SetClock())
+        RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())

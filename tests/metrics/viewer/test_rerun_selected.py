@@ -12,7 +12,7 @@ from swarmwire.comms.truth import Group
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.viewer.recording import RerunRecording
 from swarmwire.metrics.viewer.selected import selected_robot
-from tests.metrics.recorded import SetClock
+from tests.clocks import StillClock
 from tests.metrics.truths import static, truth
 from tests.metrics.viewer.test_rerun_recording import column
 
@@ -26,7 +26,7 @@ LOOKS = np.deg2rad([17, 50, 90, 150, 210, 270, 310, 343])
 
 def record(path, of, ticks, **options):
     metrics = Metrics()
-    recording = RerunRecording(path, metrics, SetClock(), **options)
+    recording = RerunRecording(path, metrics, StillClock(), **options)
     for observer in (metrics, recording):
         observer.begin(of)
     for seen in ticks:

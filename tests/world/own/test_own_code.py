@@ -186,7 +186,7 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
     ("table", "said"),
     [
         (SENSE + '"none.py:X"', "senses.x.kind: there is no file"),
-        (SENSE + '"json:Nothing"', "senses.x.kind: expected a dataclass below OwnSensor; json:Nothing is not there"),
+        (SENSE + '"json:Nothing"', "senses.x.kind: json holds no such name: 'Nothing'"),
         (SENSE + '"nonsense"', 'senses.x.kind: expected "package.module:Class" or "file.py:Class", got \'nonsense\''),
         (SENSE + "3", 'senses.x.kind: expected "file.py:Class", "package.module:Class" or the name of an entry point'),
         (SENSE + f'"{CODE}:NOTHING"', "senses.x.kind: expected a dataclass below OwnSensor; .* is 1"),

@@ -29,7 +29,10 @@ def partition(*between: list[str]) -> dict[str, Any]:
 
 
 FAULTS: list[tuple[Any, str]] = [
-    (3, "events.0: expected a table, got 3"),
+    (
+        3,
+        "events.0: expected a table with do = one of blackout, fail, gain, jammer, kill, partition, ramp, revive",
+    ),
     (
         {"at_s": 1.0},
         "events.0.do: is missing; expected one of blackout, fail, gain, jammer, kill, partition, ramp, revive",
@@ -44,7 +47,7 @@ FAULTS: list[tuple[Any, str]] = [
     (event("revive", robots=FLOCK, for_s=1.0), "events.0.for_s: unknown key; expected one of at_s, do, robots"),
     (event(), "events.0.robots: is missing; expected a table"),
     (kill(), "events.0.robots: expected group, names, share or count"),
-    (kill(group="flok"), "events.0.robots.group: expected one of flock, big; got 'flok'"),
+    (kill(group="flok"), "events.0.robots.group: expected one of flock, big (did you mean flock?); got 'flok'"),
     (kill(names=["flock-12"]), f"events.0.robots.names: {NAMES} 'flock-12'"),
     (kill(names=["flock-01"]), f"events.0.robots.names: {NAMES} 'flock-01'"),
     (kill(names=["flock"]), f"events.0.robots.names: {NAMES} 'flock'"),

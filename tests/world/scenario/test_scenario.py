@@ -124,7 +124,23 @@ FAULTS: list[tuple[str, Any, str]] = [
         "red",
         "robots.flock.colour: unknown key; expected one of body, count, agent, act_every_ticks, params, radio, place",
     ),
-    ("robots.flock.place", 3, "robots.flock.place: expected a table, got 3"),
+    (
+        "robots.flock.place",
+        "random",
+        "robots.flock.place: expected a table with how = one of arena, box, disc, grid, poses, ring; got 'random'",
+    ),
+    ("robots.count", 3, "robots.count: expected a table for each group, [robots.GROUP], got 3"),
+    (
+        "radio.preset",
+        "wifi",
+        "radio.preset: expected one of ideal, disk, bernoulli, gilbert, argos-rab, infrared-epuck, ieee802154, "
+        "wifi-b-1M, wifi-a-6M, ble-1M, gz-rfcomms, subt, kilobot, acoustic (did you mean wifi-b-1M?), got 'wifi'",
+    ),
+    (
+        "physics.engine",
+        "disc",
+        "physics.engine: expected one of auto, discs, pymunk, kinematic (did you mean discs?), got 'disc'",
+    ),
     (
         "robots.flock.place",
         {},
@@ -159,7 +175,7 @@ FAULTS: list[tuple[str, Any, str]] = [
         "wind",
         [],
         "wind: unknown key; expected one of "
-        "format, name, seed, duration_s, time, physics, arena, robots, radio, events, run",
+        "format, name, seed, duration_s, time, physics, arena, robots, radio, events, metrics, run",
     ),
 ]
 
@@ -184,10 +200,12 @@ def test_an_arena_has_a_size_or_a_map() -> None:
     assert str(caught.value) == f"file.toml: arena.size_m: is missing; {expected}"
 
 
-def test_further_faults_are_counted() -> None:
+def test_the_keys_of_further_faults_are_named_up_to_six() -> None:
     mapping = {**changed("seed", -1), "format": 2, "duration_s": 0}
-    with pytest.raises(BadInput, match=r"^f: format: expected 1, got 2 \(and 2 more faults\)$"):
+    with pytest.raises(BadInput, match=r"^f: format: expected 1, got 2 \(also wrong: seed, duration_s\)$"):
         scenario_from(mapping, "f")
+    with pytest.raises(BadInput, match=r"\(also wrong: b, c, d, e, f, g, …\)$"):
+        scenario_from({**SAMPLE, **dict.fromkeys("abcdefgh", 1)}, "f")
 
 
 def test_the_radio_comes_out_as_the_contract_s_dataclass() -> None:
@@ -247,6 +265,8 @@ def test_a_file_is_read_and_overrides_are_toml_values_or_else_texts(tmp_path: Pa
 
 
 OVERRIDE_FAULTS = [
+    ("robots.flok.count=3", "--set robots.flok.count=3: robots.flok.body: is missing; expected a text"),
+    ("radio={}", "--set radio={}: radio.range_m: is missing"),
     ("robots.flock.count=many", f"--set robots.flock.count=many: robots.flock.count: {COUNT}, got 'many'"),
     ("radio.foo=1", "--set radio.foo=1: radio.foo: unknown key; expected one of range_m"),
     ("seed", "--set seed: expected path=value, such as robots.flock.count=30"),
@@ -262,6 +282,16 @@ def test_a_faulty_override_is_named(tmp_path: Path, override: str, text: str) ->
         load_scenario(path, [override])
     assert text in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_what_an_override_does_not_touch_is_the_file_s_fault(tmp_path: Path) -> None:
+    path = written(tmp_path, MINIMAL.replace("count = 2", "count = 0"))
+    with pytest.raises(BadInput, match=r"s.toml: robots.flock.count: expected"):
+        load_scenario(path, ["robots.flock.body=footbot"])
+
+
+def test_a_mark_of_byte_order_before_the_text_does_no_harm(tmp_path: Path) -> None:
+    assert load_scenario(written(tmp_path, "\ufeff" + MINIMAL)).name == "small"
 
 
 def test_unreadable_files_are_bad_input_too(tmp_path: Path) -> None:

@@ -28,8 +28,10 @@ class Around(Generic[N, S]):
 
     def vector_sum(self) -> tuple[N, N]:
         """X and y of the sum of the sensors as vectors, `value` long towards `angle_rad`: where most of it is."""
-        x, y = (np.add.reduce(self.value * axis, -1) for axis in self.sheet.direction)
-        return cast("tuple[N, N]", (float(x), float(y)) if self.value.ndim == 1 else (x, y))
+        value, (cosine, sine) = self.value, self.sheet.direction
+        if value.ndim == 1:  # once a robot and tick: a faster call than that for any axis
+            return cast("tuple[N, N]", (float(np.add.reduce(value * cosine)), float(np.add.reduce(value * sine))))
+        return cast("tuple[N, N]", (np.add.reduce(value * cosine, 1), np.add.reduce(value * sine, 1)))
 
 
 class _AtRim(Around[N, R]):

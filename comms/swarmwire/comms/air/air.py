@@ -1,7 +1,5 @@
 """The air as a state machine: packets and poses go in, time passes, and what was heard comes out. No I/O, no clock."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from swarmwire.comms.air import news
@@ -23,20 +21,8 @@ from swarmwire.comms.air.way import Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import Obstacles
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import BROADCAST, NOWHERE, Heard, Sent
-from swarmwire.comms.truth import Boundary, Departed, Finished, Tally
-
-
-@dataclass(frozen=True, slots=True)
-class News:
-    """What became final while time passed."""
-
-    heard: Heard
-    finished: Finished
-    departed: Departed
-    tally: Tally
-    outcomes: Outcomes  # of packets whose senders ask and are alive
+from swarmwire.comms.packets import BROADCAST, NOWHERE, Sent
+from swarmwire.comms.truth import Boundary, Tally
 
 
 class Air:
@@ -140,7 +126,7 @@ class Air:
         packets = self._way.accept(at_ns, tick, sent, self._others_alive, self._lives.epoch)
         self._accounts.take_up(packets)
 
-    def advance(self, until_ns: int) -> News:
+    def advance(self, until_ns: int) -> news.News:
         """Let time pass to `until_ns`, with the poses held: what goes on air before it, what is final by it.
 
         What happens at a sender's radio at `until_ns` itself belongs to the poses held next, and so to the next call.
@@ -156,7 +142,7 @@ class Air:
         links, packets, robots = self._links, self._on_air, self._robots
         rows = news.parted(links.fate, links.receiver, links.final_at_ns, until_ns)
         self._accounts.settle(links, until_ns)
-        told = News(
+        told = news.News(
             news.heard(rows.heard, links, packets, self.radio.gives.columns, robots, len(self._others_alive)),
             news.finished(rows.finished, links, packets, robots, self.radio.is_signal),
             news.departed(rows.departed, links, packets, robots),

@@ -2,6 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +12,20 @@ from swarmwire.comms.air.hearing_order import by_receiver
 from swarmwire.comms.air.links import HEARD, OUT_OF_RANGE, THE_REST, Links
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Heard
-from swarmwire.comms.truth import Departed, Finished
+from swarmwire.comms.truth import Departed, Finished, Tally
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """What became final while time passed."""
+
+    heard: Heard
+    finished: Finished
+    departed: Departed
+    tally: Tally
+    outcomes: Outcomes  # of packets whose senders ask and are alive
 
 
 class Parted(NamedTuple):

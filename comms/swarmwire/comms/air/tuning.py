@@ -6,6 +6,7 @@ from typing import Any, cast
 
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.one_of import one_of
 from swarmwire.comms.parameters import fault_of, limits_of
 
 # Numbers that stay: when a robot hands its packets over is drawn once for the run.
@@ -79,7 +80,7 @@ def _place(radio: Radio, key: str) -> tuple[object, "Field[Any]"]:
             raise BadInput("", "what", f"expected a key of [radio]; {path} holds no keys")
         found = {of.name: of for of in fields(holder)}
         if name not in found:
-            raise BadInput("", "what", f"unknown key {key}; expected one of {', '.join(found)} in {path}")
+            raise BadInput("", "what", f"unknown key {key}; expected {one_of(found, key)} in {path}")
         if depth == len(names) - 1:
             return holder, found[name]
         holder = getattr(holder, name)

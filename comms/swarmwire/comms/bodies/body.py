@@ -1,6 +1,7 @@
 """Bodies: kinds of robot, each a TOML data sheet. Those that come with swarmwire lie in `bodies/`.
 
-A sheet with `like = "epuck"` starts from that body's sheet, table by table, and says only what differs.
+A sheet with `like = "epuck"` starts from that body's sheet, table by table, and says only what differs; without a
+name of its own it goes by its file's.
 """
 
 import tomllib
@@ -20,6 +21,7 @@ from swarmwire.comms.bodies.drives import DRIVES, Drive, Holonomic, Twist, Wheel
 from swarmwire.comms.bodies.leds import Leds
 from swarmwire.comms.bodies.tables import built, mapping_of
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.one_of import one_of
 from swarmwire.comms.parameters import parameter
 from swarmwire.comms.sheets import SHEETS, Compass, Infrared, Light, Odometry, OwnSheet, Proximity, Scan, Sheet
 from swarmwire.comms.sheets.own import own_sheet, told_own_sheet
@@ -154,6 +156,7 @@ def body_from(sheet: Mapping[str, Any], where: str, beside: Path = HERE) -> Body
     like, rest = sheet.get("like"), {key: value for key, value in sheet.items() if key != "like"}
     if like is not None:
         base = _shipped(like, where, "like")
+        base["name"] = Path(where).stem  # not the other's: a record could not tell the two apart
         if _kind_of(rest, _kind_of(base)) != _kind_of(base):
             base.pop("drive", None)  # of another kind: its limits have other names
         return body_from(_like(base, rest), where, beside)
@@ -200,7 +203,7 @@ def _sense(name: str, table: object, where: str, beside: Path | None) -> Sheet:
     if name in SHEETS:
         return built(SHEETS[name], table, where, key)
     if "kind" not in mapping_of(where, key, table) or not name.isidentifier():
-        expected = f'expected one of {", ".join(SHEETS)}, or a kind = "file.py:Class" of your own'
+        expected = f'expected {one_of(SHEETS, name)}, or a kind = "file.py:Class" of your own'
         raise BadInput(where, key, f"unknown sense; {expected}")
     return told_own_sheet(table, where, key) if beside is None else own_sheet(table, where, key, beside)
 
@@ -229,7 +232,7 @@ def _drive(value: object, where: str) -> Drive:
 def _shipped(name: object, where: str, key: str) -> dict[str, Any]:
     """The sheet of a body that comes with swarmwire; BadInput names `where` and `key` if there is none."""
     if name not in body_names():
-        raise BadInput(where, key, f"expected one of {', '.join(body_names())}; got {name!r}")
+        raise BadInput(where, key, f"expected {one_of(body_names(), name)}; got {name!r}")
     return tomllib.loads(files("swarmwire.comms.bodies").joinpath(f"{name}.toml").read_text(encoding="utf-8"))
 
 

@@ -1,9 +1,7 @@
 """What events hold over robots and radios now, by the event that does."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
 from functools import reduce
-from typing import Any
 
 import numpy as np
 
@@ -15,12 +13,6 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.events.failing import Failing
 
 
-def by_event() -> Any:
-    """A field that holds something for each event, by its place in the scenario; nothing at first."""
-    return field(default_factory=dict[int, Any])
-
-
-@dataclass
 class Conditions:
     """Each event holds what it holds until it ends, so those that overlap do not undo one another.
 
@@ -28,22 +20,24 @@ class Conditions:
     partition has them in different sets; a one-way partition keeps only what the first sends from the second.
     """
 
-    rows: int  # robots of all arenas
-    kills: dict[int, BoolArray] = by_event()  # (rows,) robots held dead
-    failures: dict[int, Failing] = by_event()  # parts that do not work
-    blackouts: dict[int, BoolArray] = by_event()  # (rows,) robots whose radios are held off
-    backlogs: dict[int, int] = by_event()  # by blackout: DROP, NEWEST or ALL
-    gains: dict[int, FloatArray] = by_event()  # (2, rows) dB added to what is sent, and what is heard
-    jammers: dict[int, Jammers] = by_event()
-    slopes: dict[int, Slope] = by_event()  # in the order in which they began
-    partitions: dict[int, IntArray] = by_event()  # (rows,) each robot's set, from 1; 0: in none
-    one_way: dict[int, IntArray] = by_event()  # (rows,) the same: the second does not hear the first
+    def __init__(self, rows: int) -> None:
+        self.rows = rows  # robots of all arenas
+        # All else is by event: what stands under its place in the scenario.
+        self.kills: dict[int, BoolArray] = {}  # (rows,) robots held dead
+        self.failures: dict[int, Failing] = {}  # parts that do not work
+        self.blackouts: dict[int, BoolArray] = {}  # (rows,) robots whose radios are held off
+        self.backlogs: dict[int, int] = {}  # by blackout: DROP, NEWEST or ALL
+        self.gains: dict[int, FloatArray] = {}  # (2, rows) dB added to what robots send, and to what they hear
+        self.jammers: dict[int, Jammers] = {}
+        self.slopes: dict[int, Slope] = {}  # in the order in which they began
+        self.partitions: dict[int, IntArray] = {}  # (rows,) each robot's set, from 1; 0: in none
+        self.one_way: dict[int, IntArray] = {}  # (rows,) the same, where the second does not hear the first
 
     def let_go(self, serial: int) -> None:
-        """The event with this place in the scenario holds nothing any more."""
-        for of in fields(self):
-            if of.name != "rows":
-                getattr(self, of.name).pop(serial, None)
+        """The event at this place in the scenario holds nothing any more."""
+        for name, held in vars(self).items():
+            if name != "rows":
+                held.pop(serial, None)
 
     @property
     def alive(self) -> BoolArray:

@@ -8,6 +8,7 @@ from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.swarm import Groups, Swarm, index_of
+from swarmwire.comms.one_of import one_of
 from swarmwire.comms.parameters import parameter
 
 CHOICE = purpose("event robots")
@@ -40,7 +41,7 @@ class Selection:
         elif (self.group, self.share, self.count) == (None, None, None):
             raise BadInput("", "", "expected group, names, share or count")
         elif self.group is not None and self.group not in groups:
-            raise BadInput("", "group", f"expected one of {', '.join(groups)}; got {self.group!r}")
+            raise BadInput("", "group", f"expected {one_of(groups, self.group)}; got {self.group!r}")
 
     def rows(self, serial: int, swarm: Swarm, eligible: BoolArray) -> BoolArray:
         """The robots chosen for the event with this place in the scenario, (rows,).

@@ -36,11 +36,12 @@ def encode_truth(glimpse: Glimpse) -> bytes:
             (event.serial, float(event.at_s), event.do, event.ended, event.part, event.singly) for event in truth.events
         ],
     }
-    return frames.encode("truth", truth.tick, _arrays(truth) | {"values": glimpse.values}, values)
+    return frames.encode("truth", truth.tick, _arrays(glimpse), values)
 
 
-def _arrays(truth: Truth) -> dict[str, AnyArray]:
-    """The arrays of a tick that there are."""
+def _arrays(glimpse: Glimpse) -> dict[str, AnyArray]:
+    """The arrays that a tick has."""
+    truth = glimpse.truth
     arrays: dict[str, AnyArray] = {
         "alive": truth.alive,
         "pose": truth.pose,
@@ -49,6 +50,7 @@ def _arrays(truth: Truth) -> dict[str, AnyArray]:
         "state": truth.state,
         "leds": truth.leds,
         "contact_onsets": truth.contact_onsets,
+        "values": glimpse.values,
     }
     for name, group in truth.senses.items():
         arrays[f"sense/{name}/rows"] = group.rows

@@ -5,6 +5,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.one_of import one_of
 from swarmwire.deploy.catalogue.behaviours import behaviour
 from swarmwire.deploy.catalogue.bodies import body_of
 from swarmwire.deploy.catalogue.entry import Entry
@@ -16,7 +17,8 @@ def kind_named(name: str) -> Kind:
     """The kind of this name, singular or plural; BadInput if there is none."""
     found = next((kind for kind in KINDS if name.lower() in (kind.name, kind.one)), None)
     if found is None:
-        raise BadInput(name, "", f"expected one of {', '.join(kind.name for kind in KINDS)}")
+        kinds = one_of((kind.name for kind in KINDS), name)
+        raise BadInput(name, "", f"expected {kinds}; swarmwire describe tells about a single thing")
     return found
 
 
@@ -28,6 +30,8 @@ def find(name: str) -> Entry:
     """
     if sheet_path(name, ""):
         return body_of(Path(name))
+    if name.endswith(".py"):
+        raise BadInput(name, "", f"expected the class in it, too: {name}:Class")
     before, colon, rest = name.partition(":")
     chosen = [kind for kind in KINDS if colon and before.lower() in (kind.name, kind.one)]
     if colon and not chosen:

@@ -14,4 +14,8 @@ def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     simulation = Simulation(checked)
     static, engines = simulation.static, " and ".join(simulation.world.engines)
     groups = ", ".join(f"{group.stop - group.start} {group.body.name} ({group.name})" for group in static.groups)
-    typer.echo(f"{scenario}: good: {groups}, {checked.duration_s:g} s at {static.rate_hz} Hz, engine {engines}")
+    last_s = (simulation.ticks - 1) / static.rate_hz  # start of the last tick
+    late = [f"events.{place}" for place, event in enumerate(checked.events) if event.at_s > last_s]
+    too_late = f"; too late to happen: {', '.join(late)}" if late else ""
+    length = f"{checked.duration_s:g} s at {static.rate_hz} Hz"
+    typer.echo(f"{scenario}: good: {groups}, {length}, engine {engines}{too_late}")

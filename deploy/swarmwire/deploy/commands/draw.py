@@ -2,7 +2,7 @@
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -36,12 +36,11 @@ def draw_command(
         _draw_named_body(subject, written, size)
     else:
         written = to or Path(f"{path.stem}.png")
-        sheet = _body_sheet(path)
-        if sheet is None:
-            _draw_scenario(path, seed, overrides or [], written, size)
-        else:
+        if _is_sheet(path):
             _refuse_settings(seed, overrides)
-            _draw_sheet(sheet, path, written, size)
+            _draw_sheet(path, written, size)
+        else:
+            _draw_scenario(path, seed, overrides or [], written, size)
     typer.echo(f"written: {written}")
 
 
@@ -62,20 +61,20 @@ def _draw_named_body(name: str, to: Path, size_px: int) -> None:
     draw_body(load_body(name), to, size_px)
 
 
-def _draw_sheet(sheet: dict[str, Any], path: Path, to: Path, size_px: int) -> None:
-    from swarmwire.comms.bodies.body import body_from
+def _draw_sheet(path: Path, to: Path, size_px: int) -> None:
     from swarmwire.metrics.drawing.body_sheet import draw_body
+    from swarmwire.world.scenario.bodies import read_body
 
-    draw_body(body_from(sheet, str(path)), to, size_px)
+    draw_body(read_body(path, str(path), ""), to, size_px)
 
 
-def _body_sheet(path: Path) -> dict[str, Any] | None:
-    """What the file says, if it describes a body; None for all else, which a scenario's reader refuses if need be."""
+def _is_sheet(path: Path) -> bool:
+    """Whether the file describes a body; all else is for a scenario's reader, which refuses it if need be."""
     try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
+        found = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
-        return None
-    return found if "robots" not in found and any(key in found for key in _ONLY_IN_BODIES) else None
+        return False
+    return "robots" not in found and any(key in found for key in _ONLY_IN_BODIES)
 
 
 def _refuse_settings(seed: int | None, overrides: list[str] | None) -> None:

@@ -99,7 +99,7 @@ def _shown(simulation: "Simulation", folder: Path, view: bool, console: Console)
             simulation.watch(live)
         with leaving_when_hung_up(simulation.interrupt):
             result = finished(simulation)
-        print_result(result, console)
+        print_result(result, simulation.metrics.metrics, console)
         _say_where(result, folder, console)
         if live.pid is not None:
             console.print("the view stays open: close it, or press Ctrl-C, to end it")

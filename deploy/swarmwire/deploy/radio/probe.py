@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from swarmwire.comms.air.presets.registry import PRESETS
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.one_of import one_of
 from swarmwire.deploy.radio.around import checked_radio
 
 
 def radio_of(preset: str, settings: Sequence[str]) -> Radio:
     """The radio of a preset after settings such as "radio.loss=0.1"; BadInput if there is none, or for a bad value."""
     if preset not in PRESETS:
-        raise BadInput("radio", "", f"expected one of {', '.join(PRESETS)}; got {preset}")
+        raise BadInput("radio", "", f"expected {one_of(PRESETS, preset)}; got {preset!r}")
     radio = checked_radio({"preset": preset}, "radio", settings)
     if radio.trace is not None:
         raise BadInput("radio", "radio.trace", "expected none: links are measured between robots of a scenario")

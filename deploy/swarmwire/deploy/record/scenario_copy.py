@@ -65,7 +65,8 @@ def copy_scenario(scenario: Scenario, seeds: tuple[int, ...], folder: Path) -> t
 
 def _copied_body(sheet: Path, copies: "_Copies") -> str:
     """The path within the run folder of a body's sheet, which names the copies of its files."""
-    body: dict[str, Any] = tomllib.loads(sheet.read_text(encoding="utf-8"))
+    body: dict[str, Any] = tomllib.loads(sheet.read_text(encoding="utf-8-sig"))
+    body.setdefault("name", sheet.stem)  # the copy's may be another
     for what, tables in (("own sense", body.get("senses", {})), ("own actuator", body.get("actuators", {}))):
         for table in tables.values():
             if "kind" in table:

@@ -1,17 +1,25 @@
 """The summary as people read it in a terminal."""
 
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.deploy.result import ArenaResult, Percentiles, Result
+from swarmwire.comms.fates import Fate
+from swarmwire.deploy.result import ArenaResult, Percentiles, Result, Statistics
 
+if TYPE_CHECKING:
+    from swarmwire.metrics.metric import Metric
+
+BLOCKED = Fate.BLOCKED.name.lower()
 WHOLE = 1000  # from here on numbers are shown without decimals, nor as powers of ten
 
 
-def print_result(result: Result, console: Console) -> None:
-    """What came of a run: one table for the run, and its first arena's radio and metrics."""
-    arena = result.arenas[0]
+def print_result(result: Result, metrics: "Iterable[Metric]", console: Console) -> None:
+    """What came of a run: one table for the run, and its first arena's radio and what these metrics measured."""
+    arena, of = result.arenas[0], {metric.name: metric for metric in metrics}
     table = Table(title=Text(result.scenario), show_header=False, title_justify="left", title_style="bold")
     table.add_column(style="cyan")
     table.add_column()
@@ -28,8 +36,7 @@ def print_result(result: Result, console: Console) -> None:
     _add_radio(table, arena)
     for name, value in arena.metrics.items():
         if value.mean is not None:
-            numbers = f"final {_number(value.final)}, mean {_number(value.mean)}, min {_number(value.min)}"
-            table.add_row(name, f"{numbers}{_unit(name)}")
+            table.add_row(name, _in_words(of[name], value))
     for body, senses in result.global_senses.items():
         table.add_row("global senses", f"{body}: {', '.join(senses)}")
     counts = [f"{name} {count}" for name, count in result.counts.items() if count]
@@ -59,23 +66,23 @@ def _add_radio(table: Table, arena: ArenaResult) -> None:
     radio = arena.radio
     if radio is None:
         return
-    share = "none in range" if radio.pdr is None else f"{radio.pdr:.1%} of those in range heard it"
-    table.add_row(
-        "radio", f"{radio.sent} packets, {radio.intended} intended receivers, {radio.in_range} in range; {share}"
-    )
+    # Who has an obstacle in between is not in range, or a rock in the way would look like a bad radio.
+    where = "in range and sight" if radio.fates[BLOCKED] else "in range"
+    share = "" if radio.pdr is None else f"; {radio.pdr:.1%} of these heard it"
+    reached = f"{radio.intended} intended receivers, {radio.in_range} {where}{share}"
+    table.add_row("radio", f"{radio.sent} packets, {reached}")
     table.add_row("fates", ", ".join(f"{name} {count}" for name, count in radio.fates.items() if count))
     table.add_row(
         "latency", f"on air {_percentiles(radio.latency_air_s)}; to the agent {_percentiles(radio.latency_agent_s)}"
     )
 
 
-def _unit(metric: str) -> str:
-    """The unit of a metric that has one and is known by name."""
-    # Imported here: metrics bring scipy, which --help should not wait for.
-    from swarmwire.metrics.registry import METRICS
-
-    kind = METRICS.get(metric)
-    return f" ({kind.unit})" if kind is not None and kind.unit else ""
+def _in_words(metric: "Metric", value: Statistics) -> str:
+    """The numbers of a metric, with its unit: of one that counts the total, which stands for nothing else."""
+    unit = f" ({metric.unit})" if metric.unit else ""
+    if metric.kind == "count":
+        return f"total {_number(value.final)}{unit}"
+    return f"final {_number(value.final)}, mean {_number(value.mean)}, min {_number(value.min)}{unit}"
 
 
 def _percentiles(value: Percentiles) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.one_of import one_of
 from swarmwire.metrics.drawing.film import DELIVERY
 from swarmwire.metrics.drawing.layout import Layout
 from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Look
@@ -28,7 +29,7 @@ def choose(metrics: Mapping[str, FloatArray], wanted: Sequence[str] | None) -> l
         return [name for name in PREFERRED if name in metrics and np.isfinite(metrics[name]).any()][:USUAL_PLOTS]
     for name in wanted:
         if name not in metrics:
-            raise BadInput("--metric", name, f"was not recorded; expected one of {', '.join(metrics) or 'none'}")
+            raise BadInput("--metric", name, f"was not recorded; expected {one_of(metrics, name)}")
     if len(wanted) > MOST_PLOTS:
         raise BadInput("--metric", "", f"expected {MOST_PLOTS} at most, got {len(wanted)}")
     return list(wanted)

@@ -13,7 +13,7 @@ ROW_BYTES, ITEM_BYTES = 300, 12  # that a row takes, and each item of it, about
 
 
 class RerunRows:
-    """Rows of entities: what each shows from a tick on. A call to rerun per entity and tick costs ten times as much.
+    """Rows of entities: what each shows from a tick on. A call to rerun for each would be most of what recording costs.
 
     Attributes:
         rec: the recording that the rows go to; what does not change is logged there at once.

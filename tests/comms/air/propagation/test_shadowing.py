@@ -100,7 +100,10 @@ def test_a_link_collects_the_integral_of_the_waves_along_its_way(link: tuple[flo
     for kx, ky, phase in WAVES[:3, :, :SLOW]:
         p = np.cos(2.0 * np.pi * (kx * (ax + share * (bx - ax)) + ky * (ay + share * (by - ay)) + phase)).sum(axis=1)
         integral = 0.5 * length_m * (weights @ p) * AMPLITUDE_DB
-        found = shadowing_db(np.stack([kx, ky, phase]), AMPLITUDE_DB, *link)
+        waves = np.zeros(WAVES.shape[1:])
+        waves[2] = 0.25  # the others are 0 everywhere
+        waves[:, :SLOW] = kx, ky, phase
+        found = shadowing_db(waves, AMPLITUDE_DB, *link)
         assert found == pytest.approx(integral / np.sqrt(length_m), rel=1e-8, abs=1e-8)
 
 

@@ -44,7 +44,8 @@ def _walls(size_m: tuple[float, float], widest_m: float) -> tuple[Obstacle, ...]
 class ArenaSpace:
     """The pymunk space of one arena and the buffers through which all its bodies are read and written at once.
 
-    Robots start at `pose` (n, 3); `force` (n and loads, 3) in N, N, N m is read in every step, from where it lies.
+    Robots start at `pose` (n, 3). `force`, in N, N, N m, is read in every step from where it lies: a row per robot,
+    then per load, and one for all that stands still.
     """
 
     def __init__(

@@ -54,9 +54,11 @@ def read_body(path: Path, where: str, key: str) -> Body:
     BadInput names the sheet, or `where` and `key`, which name it, if it cannot be read.
     """
     try:
-        sheet = tomllib.loads(path.read_text(encoding="utf-8"))
+        sheet = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise BadInput(where, key, f"expected a readable file: {path}: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise BadInput(str(path), "", f"expected TOML: {error}") from None
+    if "robots" in sheet:
+        raise BadInput(str(path), "", "expected a body's sheet, got a scenario; swarmwire check and draw take one")
     return fitted(body_from(sheet, str(path), path.parent), str(path))

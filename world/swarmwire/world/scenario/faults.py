@@ -6,31 +6,35 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.one_of import one_of
 from swarmwire.world.scenario.schema import UNFIT
 from swarmwire.world.scenario.schema_words import Node, plain, words
 
+MOST_KEYS = 6  # that are named after the first fault
+
 
 def fault(error: ValidationError, schema: Node, where: str) -> BadInput:
-    """The first fault of a validation error, with the number of those that follow."""
-    found = error.errors(include_url=False)
-    key, expected = _explained(found[0], schema)
-    more = f" (and {len(found) - 1} more fault{'s' if len(found) > 2 else ''})" if len(found) > 1 else ""
-    return BadInput(where, key, expected + more)
+    """The first fault of a validation error, with the keys of those that follow."""
+    first, *others = (_explained(of, schema) for of in error.errors(include_url=False))
+    keys = list(dict.fromkeys(key for key, _ in others))
+    more = f" (also wrong: {', '.join(keys[:MOST_KEYS])}{', …' if len(keys) > MOST_KEYS else ''})" if keys else ""
+    return BadInput(where, first[0], first[1] + more)
 
 
 def _explained(error: ErrorDetails, schema: Node) -> tuple[str, str]:
     names, node, holder = _followed(error["loc"], schema)
     kind, key, got = error["type"], ".".join(names), _shown(error["input"])
     if kind == "extra_forbidden":
-        return key, f"unknown key; expected one of {', '.join(holder.get('properties', {}))}"
+        return key, f"unknown key; expected {one_of(holder.get('properties', {}), names[-1])}"
     if kind == "missing":
         return key, f"is missing; expected {words(node, schema)}"
-    if kind.startswith("union_tag"):
+    if "discriminator" in node:  # one of several tables, by their tag
         tag = node["discriminator"]["propertyName"]
-        choices = f"expected one of {', '.join(node['discriminator']['mapping'])}"
+        kinds = node["discriminator"]["mapping"]
         if not isinstance(error["input"], dict):
-            return key, f"expected a table, got {got}"
+            return key, f"expected a table with {tag} = {one_of(kinds)}; got {got}"
         given = cast("Node", error["input"])
+        choices = f"expected {one_of(kinds, given.get(tag))}"
         return f"{key}.{tag}", f"{choices}; got {_shown(given[tag])}" if tag in given else f"is missing; {choices}"
     if error["loc"][-1] == "[key]":
         return key, f"expected a name of at most 40 letters, digits and _ that starts with a letter, got {got}"
@@ -38,7 +42,10 @@ def _explained(error: ErrorDetails, schema: Node) -> tuple[str, str]:
         return f"{key}.{error.get('ctx', {})['key']}", error["msg"]
     if kind in ("place", "poses", "points"):  # worded by the scenario's own validators
         return key, error["msg"]
-    return key, f"expected {words(node, schema)}, got {got}"
+    if "patternProperties" in holder and node.get("type") == "object":
+        return key, f"expected a table for each group, [{'.'.join(names[:-1])}.GROUP], got {got}"
+    expected = one_of(map(str, node["enum"]), error["input"]) if "enum" in node else words(node, schema)
+    return key, f"expected {expected}, got {got}"
 
 
 def _followed(loc: tuple[int | str, ...], schema: Node) -> tuple[list[str], Node, Node]:

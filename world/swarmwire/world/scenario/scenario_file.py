@@ -25,14 +25,12 @@ def scenario_from(mapping: Mapping[str, Any], where: str, overrides: Sequence[st
     BadInput names `where`, or the override, the key and what was expected.
     """
     given = deepcopy(dict(mapping))
-    settings = [_parsed(text) for text in overrides]
-    for keys, value, text in settings:
-        _put(given, keys, value, text)
+    settings = [(_put(given, *_parsed(text)), text) for text in overrides]
     try:
         return _checked(given, where)
     except BadInput as error:
-        for keys, _, text in reversed(settings):
-            if error.key == ".".join(keys):  # the fault is the override's, not the scenario's
+        for key, text in reversed(settings):
+            if f"{error.key}.".startswith(f"{key}."):  # the fault is the override's, not the scenario's
                 raise BadInput(f"--set {text}", error.key, error.expected) from None
         raise
 
@@ -53,7 +51,7 @@ def _checked(given: dict[str, Any], where: str) -> Scenario:
 
 def _read(path: Path | str, where: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except tomllib.TOMLDecodeError as error:
         raise BadInput(where, "", f"expected TOML: {error}") from None
     except UnicodeDecodeError:
@@ -74,9 +72,10 @@ def _parsed(text: str) -> tuple[list[str], Any, str]:
     return keys, found["value"] if len(found) == 1 else value, text
 
 
-def _put(mapping: dict[str, Any], keys: list[str], value: Any, text: str) -> None:
-    """Set the value at a path of keys; a number is a place in a list."""
+def _put(mapping: dict[str, Any], keys: list[str], value: Any, text: str) -> str:
+    """Set the value at a path of keys, in which a number is a place in a list; the path of what is new with it."""
     at: Any = mapping
+    new = len(keys)  # keys that lead to what is new
     for depth, key in enumerate(keys):
         if isinstance(at, list):
             items = cast("list[Any]", at)
@@ -88,7 +87,10 @@ def _put(mapping: dict[str, Any], keys: list[str], value: Any, text: str) -> Non
             holder, index = cast(Any, at), key
         else:
             raise BadInput(f"--set {text}", ".".join(keys[: depth + 1]), f"{'.'.join(keys[:depth])} holds no keys")
+        if isinstance(at, dict) and key not in at:
+            new = min(new, depth + 1)
         if depth == len(keys) - 1:
             holder[index] = value
         else:
             at = holder[index] if isinstance(at, list) else holder.setdefault(index, {})
+    return ".".join(keys[:new])

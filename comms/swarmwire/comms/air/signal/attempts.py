@@ -2,6 +2,8 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+import numpy as np
+
 from swarmwire.comms.air.signal import csma, dcf, on_air, sender_queue, telling
 from swarmwire.comms.air.signal.event_queue import TIMER, cancel, schedule
 from swarmwire.comms.air.signal.tables import (
@@ -140,8 +142,8 @@ def _acknowledged(rules, state, queue, told, r, now_ns):
     """An acknowledgement ends: its sender's packet is over, if it was heard there."""
     me = state.robot[r]
     for i in range(me.first_link, me.weak_link):
-        receiver = state.link.receiver[i]
-        if receiver != me.answers_to or state.link.now[i] != HEARD:
+        receiver = np.int64(state.link[i].receiver)
+        if receiver != me.answers_to or state.link[i].now != HEARD:
             continue
         it = state.robot[receiver]
         if it.stage == AWAITING and state.packet[it.packet].to == r:

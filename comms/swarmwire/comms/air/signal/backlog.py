@@ -1,11 +1,24 @@
-"""Kept back: what a radio that is off should send waits for it, or gives way to what is newer."""
+"""Backlog: what a radio that is off should send waits for it, or gives way to what is newer."""
 
 # pyright: basic, reportUnknownMemberType=false
 
+import numpy as np
+
+from swarmwire.comms.air.disruption import ALL, NEWEST, Disruption
 from swarmwire.comms.air.signal import sender_queue
 from swarmwire.comms.air.signal.event_queue import LISTENED, SEND, TIMER, cancel
-from swarmwire.comms.air.signal.tables import BACKING_OFF, HELD, KEPT_ALL, SILENT, TURNING
+from swarmwire.comms.air.signal.tables import BACKING_OFF, HELD, KEPT_ALL, KEPT_NEWEST, SILENT, TURNING
+from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.fates import Fate
+
+
+def fate_of_sending(held: Disruption) -> IntArray:
+    """What becomes of what each robot should send, (rows,): HEARD if its radio is on."""
+    if not held.anyone_out:
+        return np.full(len(held.alive), int(Fate.HEARD))
+    off = np.select([held.backlog == ALL, held.backlog == NEWEST], [KEPT_ALL, KEPT_NEWEST], int(Fate.BLACKOUT))
+    return np.where(held.alive, np.where(held.radio_on, int(Fate.HEARD), off), int(Fate.SENDER_DEAD))
 
 
 @borrowing(from_python=True)

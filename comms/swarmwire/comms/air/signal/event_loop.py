@@ -2,6 +2,8 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+import numpy as np
+
 from swarmwire.comms.air.signal import attempts, dcf, jamming, on_air, sender_queue
 from swarmwire.comms.air.signal.event_queue import ENTER, LISTENED, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY, RECEIVING, SILENT
@@ -84,8 +86,8 @@ def cut_off(rules, state, queue, alive, radio_on, now_ns):
         if me.on_air == SILENT:
             continue
         for i in range(me.first_link, me.weak_link):
-            r = state.link.receiver[i]
-            if state.link.now[i] == RECEIVING and not (alive[r] and radio_on[r]):
-                state.link.now[i] = BLACKOUT if alive[r] else RECEIVER_DEAD
+            r = np.int64(state.link[i].receiver)
+            if state.link[i].now == RECEIVING and not (alive[r] and radio_on[r]):
+                state.link[i].now = BLACKOUT if alive[r] else RECEIVER_DEAD
                 on_air.let_go(state.reception[r])
                 dcf.sense(rules, state, queue, r, now_ns)

@@ -28,7 +28,7 @@ def outcome(rules, losses, state, s, i, log_right):
     it would have been right without interference, JAMMED if without jammers alone.
     """
     me = state.robot[s]
-    receiver = state.link.receiver[i]
+    receiver = np.int64(state.link[i].receiver)
     key, a, b = state.keys[s // rules.robots], s % rules.robots, receiver % rules.robots
     is_answer = me.on_air == ACKNOWLEDGEMENT
     if is_answer:
@@ -42,7 +42,7 @@ def outcome(rules, losses, state, s, i, log_right):
     if u >= math.exp(log_right):
         if u < math.exp(log_right + state.reception[receiver].jam_log):
             return JAMMED
-        alone = math.exp(alone_log_success(rules, state.link.power_mw[i], me.bits))
+        alone = math.exp(alone_log_success(rules, state.link[i].power_mw, me.bits))
         return COLLIDED if u < alone else TOO_WEAK
     link = s * np.int64(len(state.robot)) + receiver
     return taken_by(losses, key, rules.robots, link, a, b, sequence, attempt, is_answer, me.on_air_ns)

@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.signal.pairs import Pairs
-from swarmwire.comms.air.signal.tables import LinkPlaces, LinkTable
+from swarmwire.comms.air.signal.tables import LINK, LinkPlaces, Table
 from swarmwire.comms.arrays import ByteArray, FloatArray
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.fates import Fate
@@ -26,8 +26,8 @@ class Levels(NamedTuple):
 
 
 def links_by_sender(
-    pairs: Pairs, send_dbm: FloatArray, receive_dbi: FloatArray, fate: ByteArray, levels: Levels, kept: LinkTable
-) -> tuple[LinkTable, LinkPlaces]:
+    pairs: Pairs, send_dbm: FloatArray, receive_dbi: FloatArray, fate: ByteArray, levels: Levels, kept: Table
+) -> tuple[Table, LinkPlaces]:
     """The links of pairs, both ways, after those kept, and where they are.
 
     `send_dbm` and `receive_dbi` (rows,) hold under events, too; `fate` (2, k) are HEARD where nothing closes the link
@@ -38,18 +38,15 @@ def links_by_sender(
     both_alike, own = pairs.back_db is pairs.loss_db, np.empty((2, rows))
     _find_kinds(kind, power_mw, counts, own, pairs, both_alike, send_dbm, receive_dbi, fate, levels)
     per_robot = counts[:, WEAK] + counts[:, STRONG]
-    before, stop = len(kept.receiver), np.cumsum(per_robot) + len(kept.receiver)
+    before, stop = len(kept), np.cumsum(per_robot) + len(kept)
     first = stop - per_robot
     weak, links = first + counts[:, STRONG], before + int(per_robot.sum())
-    # One place more, for whom is left out.
-    table = LinkTable._make(np.empty(links + 1, column.dtype) for column in kept)
-    for column, earlier in zip(table, kept, strict=True):
-        column[:before] = earlier
-    table.now[before:] = HEARD
+    link = np.empty(links + 1, LINK)  # one place more, for whom is left out
+    link[:before] = kept
     next_place = np.column_stack([np.full(rows, links), weak, first])
-    _fill(table, next_place, pairs.a, pairs.b, fate[0], kind[0], power_mw[0])
-    _fill(table, next_place, pairs.b, pairs.a, fate[1], kind[1], power_mw[1])
-    return LinkTable._make(column[:links] for column in table), LinkPlaces(first, weak, stop)
+    _fill(link, next_place, pairs.a, pairs.b, fate[0], kind[0], power_mw[0])
+    _fill(link, next_place, pairs.b, pairs.a, fate[1], kind[1], power_mw[1])
+    return link[:links], LinkPlaces(first, weak, stop)
 
 
 @borrowing(from_python=True)
@@ -82,11 +79,17 @@ def _kind(mean_dbm, power_mw, is_open, levels):
 
 
 @borrowing(from_python=True)
-def _fill(table, next_place, sender, receiver, fate, kind, power_mw):
+def _fill(link, next_place, sender, receiver, fate, kind, power_mw):
     """Put in the links of one way; `next_place` (rows, 3), where each robot's next of a kind goes, moves on."""
     for i in range(len(kind)):
         s, of_kind = np.uint64(sender[i]), np.uint64(kind[i] & 3)
         at = np.uint64(next_place[s, of_kind])
         next_place[s, of_kind] += of_kind != LEFT_OUT
-        table.receiver[at], table.power_mw[at] = receiver[i], power_mw[i]
-        table.is_listed[at], table.fate[at] = kind[i] >= 4, fate[i]
+        one = link[at]
+        one.power_mw, one.receiver, one.is_listed, one.fate, one.now = (
+            power_mw[i],
+            receiver[i],
+            kind[i] >= 4,
+            fate[i],
+            HEARD,
+        )

@@ -9,7 +9,7 @@ from swarmwire.comms.air.signal.links_by_sender import Levels, links_by_sender
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.air.signal.pairs import Pairs, pairs_of
 from swarmwire.comms.air.signal.surroundings import Surroundings
-from swarmwire.comms.air.signal.tables import NO_LINKS, NOBODY, SILENT, LinkPlaces, LinkTable, Table
+from swarmwire.comms.air.signal.tables import LINK, NOBODY, SILENT, LinkPlaces, Table
 from swarmwire.comms.air.stages.stage import Medium
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.fates import Fate
@@ -19,7 +19,7 @@ class LinksHeld:
     """A table of links that frames on air keep theirs in while robots move.
 
     Attributes:
-        link: the links.
+        link: the links, a table of dtype LINK.
         places: those of each robot under the poses held.
         pairs: the pairs of robots that these links join.
         around: what links go by.
@@ -32,7 +32,7 @@ class LinksHeld:
         rows = len(medium.keys) * medium.robots
         self.pose = np.zeros((rows, 3))
         self.pairs = self.pairs_at(self.pose)
-        self.link, self.places = self._links(NO_LINKS)
+        self.link, self.places = self._links(np.empty(0, LINK))
 
     def pairs_at(self, pose: FloatArray) -> Pairs:
         """The pairs of robots that stand at `pose` (rows, 3)."""
@@ -60,15 +60,15 @@ class LinksHeld:
         first = self.places.first[sender]
         counts = self.places.weak[sender] - first
         at, link = np.repeat(np.arange(len(sender)), counts), _ranges(first, counts)
-        counts_as = self.link.is_listed[link] & (self.link.fate[link] != Fate.BLOCKED)
-        return at[counts_as], self.link.receiver[link[counts_as]]
+        counts_as = self.link["is_listed"][link] & (self.link["fate"][link] != Fate.BLOCKED)
+        return at[counts_as], self.link["receiver"][link[counts_as]].astype(np.int64)
 
-    def _links(self, kept: LinkTable) -> tuple[LinkTable, LinkPlaces]:
+    def _links(self, kept: Table) -> tuple[Table, LinkPlaces]:
         pairs, now = self.pairs, self._medium.disruption
         fate = np.stack([_fates(now, *ends, pairs.blocked) for ends in ((pairs.a, pairs.b), (pairs.b, pairs.a))])
         return links_by_sender(pairs, self.around.send_dbm, self.around.receive_dbi, fate, self._levels, kept)
 
-    def _keep_on_air(self, robot: Table, reception: Table) -> LinkTable:
+    def _keep_on_air(self, robot: Table, reception: Table) -> Table:
         """The links of frames on air, and where they are from now on."""
         on_air = np.flatnonzero(robot["on_air"] != SILENT)
         first = robot["first_link"][on_air]
@@ -80,7 +80,7 @@ class LinksHeld:
             robot[place] += moved
         locked = np.flatnonzero(reception["locked_to"] != NOBODY)
         reception["link"][locked] += moved[reception["locked_to"][locked]].astype(np.int32)
-        return LinkTable._make(column[index] for column in self.link)
+        return self.link[index]
 
 
 def _ranges(first: IntArray, counts: IntArray) -> IntArray:

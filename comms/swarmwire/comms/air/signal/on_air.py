@@ -30,64 +30,67 @@ def put_on_air(rules, state, queue, s, now_ns, airtime_ns, bits):
     me = state.robot[s]
     me.on_air_ns, me.airtime_ns, me.bits = now_ns, airtime_ns, bits
     schedule(queue, OFF_AIR, s, now_ns + airtime_ns)
-    robot, reception = state.robot, state.reception
-    receiver, power_mw, fate, now = state.link.receiver, state.link.power_mw, state.link.fate, state.link.now
+    robot, reception, link = state.robot, state.reception, state.link
     if rules.method == ALONE:
         for i in range(me.first_link, me.weak_link):
-            now[i] = RECEIVING if fate[i] == HEARD else fate[i]
+            link[i].now = RECEIVING if link[i].fate == HEARD else link[i].fate
         return
     turn_away(state, s)
     dcf.sense(rules, state, queue, s, now_ns)
     first, weak, stop = np.uint64(me.first_link), np.uint64(me.weak_link), np.uint64(me.stop_link)
     for i in range(first, weak):
-        if fate[i] != HEARD:
-            now[i] = fate[i]
+        if link[i].fate != HEARD:
+            link[i].now = link[i].fate
             continue
-        it = reception[np.uint64(receiver[i])]
+        r = np.int64(link[i].receiver)
+        it = reception[np.uint64(r)]
         count_chunk(rules, robot, it, now_ns)
-        _arrive(rules, robot, it, now, s, i, power_mw[i], now_ns)
-        dcf.sense(rules, state, queue, receiver[i], now_ns)
+        _arrive(rules, robot, it, link, s, i, now_ns)
+        dcf.sense(rules, state, queue, r, now_ns)
     for i in range(weak, stop):
-        it = reception[np.uint64(receiver[i])]
+        r = np.int64(link[i].receiver)
+        it = reception[np.uint64(r)]
         count_chunk(rules, robot, it, now_ns)
-        _add(it, power_mw[i])
-        dcf.sense(rules, state, queue, receiver[i], now_ns)
+        _add(it, link[i].power_mw)
+        dcf.sense(rules, state, queue, r, now_ns)
 
 
 @borrowing()
 def take_off_air(rules, losses, state, queue, s, now_ns):
     """The frame of robot s ends: each of its links that may be told of has a fate in `now`."""
     me = state.robot[s]
-    robot, reception = state.robot, state.reception
-    receiver, power_mw, fate, now = state.link.receiver, state.link.power_mw, state.link.fate, state.link.now
+    robot, reception, link = state.robot, state.reception, state.link
     if rules.method == ALONE:
         for i in range(me.first_link, me.weak_link):
-            if now[i] == RECEIVING:
-                now[i] = outcome(rules, losses, state, s, i, alone_log_success(rules, power_mw[i], me.bits))
+            if link[i].now == RECEIVING:
+                log_right = alone_log_success(rules, link[i].power_mw, me.bits)
+                link[i].now = outcome(rules, losses, state, s, i, log_right)
         me.on_air = SILENT
         return
     # Nothing but noise could take a frame.
     is_sure = takes_none(losses) and me.on_air == DATA
     first, weak, stop = np.uint64(me.first_link), np.uint64(me.weak_link), np.uint64(me.stop_link)
     for i in range(first, weak):
-        if fate[i] != HEARD:
+        if link[i].fate != HEARD:
             continue
-        it = reception[np.uint64(receiver[i])]
+        r = np.int64(link[i].receiver)
+        it = reception[np.uint64(r)]
         count_chunk(rules, robot, it, now_ns)
-        _remove(it, power_mw[i])
+        _remove(it, link[i].power_mw)
         if (it.locked_to == s) & (it.link == np.int64(i)):
             let_go(it)
             if is_sure and it.log_success == 0.0:
-                now[i] = HEARD
+                link[i].now = HEARD
             else:
-                now[i] = outcome(rules, losses, state, s, np.int64(i), it.log_success)
-            robot[receiver[i]].trust_from_ns = 0 if now[i] == HEARD else now_ns + rules.distrust_ns
-        dcf.sense(rules, state, queue, receiver[i], now_ns)
+                link[i].now = outcome(rules, losses, state, s, np.int64(i), it.log_success)
+            robot[r].trust_from_ns = 0 if link[i].now == HEARD else now_ns + rules.distrust_ns
+        dcf.sense(rules, state, queue, r, now_ns)
     for i in range(weak, stop):
-        it = reception[np.uint64(receiver[i])]
+        r = np.int64(link[i].receiver)
+        it = reception[np.uint64(r)]
         count_chunk(rules, robot, it, now_ns)
-        _remove(it, power_mw[i])
-        dcf.sense(rules, state, queue, receiver[i], now_ns)
+        _remove(it, link[i].power_mw)
+        dcf.sense(rules, state, queue, r, now_ns)
     me.on_air = SILENT
     reception[s].is_deaf = me.stage == TURNING
     dcf.sense(rules, state, queue, s, now_ns)
@@ -99,7 +102,7 @@ def turn_away(state, r):
     it = state.reception[r]
     it.is_deaf = 1
     if it.locked_to != NOBODY:
-        state.link.now[it.link] = COLLIDED
+        state.link[it.link].now = COLLIDED
         let_go(it)
 
 
@@ -125,15 +128,15 @@ def _remove(it, power_mw):
 
 
 @borrowing(inline="always")
-def _arrive(rules, robot, it, now, s, i, power_mw, now_ns):
+def _arrive(rules, robot, it, link, s, i, now_ns):
     """Frame s comes to a robot on link i; it locks to the frame, or takes it for noise."""
-    noise_mw = rules.noise_mw + it.jam_mw
+    power_mw, noise_mw = link[i].power_mw, rules.noise_mw + it.jam_mw
     could = (power_mw >= rules.least_mw) & (power_mw >= rules.least_sinr * rules.noise_mw)
     does = could & (power_mw >= rules.least_sinr * (noise_mw + it.power_mw)) & (it.is_deaf == 0)
-    now[i] = COLLIDED if could else TOO_WEAK
+    link[i].now = COLLIDED if could else TOO_WEAK
     if it.jam_mw > 0.0 and could and not (does or it.is_deaf) and it.locked_to == NOBODY:
         would = power_mw >= rules.least_sinr * (rules.noise_mw + it.power_mw)
-        now[i] = JAMMED if would else COLLIDED
+        link[i].now = JAMMED if would else COLLIDED
     _add(it, power_mw)
     if it.locked_to != NOBODY:
         if now_ns - robot[it.locked_to].on_air_ns > rules.take_over_ns:
@@ -142,10 +145,10 @@ def _arrive(rules, robot, it, now, s, i, power_mw, now_ns):
             drowned = it.signal_mw < rules.least_sinr * (noise_mw + max(it.power_mw - it.signal_mw, 0.0))
             does = does and (drowned or power_mw > it.signal_mw)
             if drowned or does:
-                now[it.link] = COLLIDED
+                link[it.link].now = COLLIDED
                 let_go(it)
     if does:
-        now[i] = RECEIVING
+        link[i].now = RECEIVING
         it.locked_to, it.link, it.since_ns, it.signal_mw = s, i, now_ns, power_mw
         it.log_success = it.jam_log = 0.0
 

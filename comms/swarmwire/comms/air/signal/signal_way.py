@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from swarmwire.comms.air.disruption import ALL, NEWEST, Disruption
+from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.intake import Intake
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.parameters.bursts import Bursts
@@ -25,15 +25,13 @@ from swarmwire.comms.air.signal.rules import levels_of, rules_of
 from swarmwire.comms.air.signal.send_results import learned, sent_in_vain
 from swarmwire.comms.air.signal.surroundings import Surroundings, surroundings_of
 from swarmwire.comms.air.signal.tables import (
-    KEPT_ALL,
-    KEPT_NEWEST,
     NOBODY,
     NOTHING,
-    RECEPTION,
-    ROBOT,
     SILENT,
     State,
     Table,
+    receptions_of_nothing,
+    robots_at_rest,
 )
 from swarmwire.comms.air.signal.told import Told, room_for, taken_out
 from swarmwire.comms.air.stages.stage import Medium
@@ -41,12 +39,10 @@ from swarmwire.comms.air.timing.send_times import SendTimes
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Decided, Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Sent
 
 LEAST_ROOM = 4096
-LONG_AGO_NS = -(10**15)
 
 
 class SignalWay(Way):
@@ -56,7 +52,6 @@ class SignalWay(Way):
         self._medium, self._radio, self._send_times = medium, medium.radio, send_times
         rows = len(medium.keys) * medium.robots
         self._rules = rules_of(medium.radio, medium.robots)
-        self._antennas = self._antennas_now()
         self._measured = MeasuredLinks.of(medium)
         levels = levels_of(medium.radio, self._rules)
         self._links = LinksHeld(medium, self._around(), levels, self._measured)
@@ -66,11 +61,7 @@ class SignalWay(Way):
         self._intake = Intake(rows)
         self._bursts = BurstStates(medium.radio.bursts or Bursts(), medium.keys, medium.robots)
         self._events = event_queue(rows)
-        self._robot: Table = np.zeros(rows, ROBOT)
-        self._robot["packet"] = self._robot["answers_to"] = NOBODY
-        self._reception: Table = np.zeros(rows, RECEPTION)
-        self._reception["locked_to"], self._reception["signal_mw"] = NOBODY, np.inf
-        self._robot["free_from_ns"] = LONG_AGO_NS
+        self._robot, self._reception = robots_at_rest(rows), receptions_of_nothing(rows)
         self._packets = PacketsHeld()
         self._hold, self._poses = 0, {0: np.zeros((rows, 3))}
         self._now_ns = self._told = 0
@@ -92,7 +83,6 @@ class SignalWay(Way):
             self._measured.move_to(self._now_ns)
         now = self._medium.disruption
         if not all(map(np.array_equal, self._gains, (now.send_gain_db, now.receive_gain_db))):
-            self._antennas = self._antennas_now()
             self._links.tune(self._around(), levels_of(self._radio, self._rules))
         self._links.move(pose, self._robot, self._reception)
         self._jam.move(pose, self._links.around)
@@ -108,7 +98,6 @@ class SignalWay(Way):
         self._radio, self._rules = radio, rules_of(radio, self._medium.robots)
         self._graph.tune(radio, self._rules)
         self._reports.tune(replace(self._medium, radio=radio))
-        self._antennas = self._antennas_now()
         self._links.tune(self._around(), levels_of(radio, self._rules))
         self._refresh()
 
@@ -163,15 +152,10 @@ class SignalWay(Way):
         """Pairs of robot rows a < b joined in the radio graph, sorted, (e, 2)."""
         return self._graph.edges(pose, alive)
 
-    def _antennas_now(self) -> FloatArray:
-        """What each robot radiates in dBm, and the gain in dBi with which it hears, under events too, (2, rows)."""
-        antennas, antenna, now = self._medium.antennas, self._radio.antenna_or_default, self._medium.disruption
-        self._gains = now.send_gain_db.copy(), now.receive_gain_db.copy()
-        own = np.stack([antennas.send_dbm(antenna), antennas.receive_dbi(antenna)])
-        return np.tile(own, len(self._medium.keys)) + np.stack(self._gains)
-
     def _around(self) -> Surroundings:
-        return surroundings_of(self._radio, self._medium.keys, self._medium.radius_m, *self._antennas)
+        now = self._medium.disruption
+        self._gains = now.send_gain_db.copy(), now.receive_gain_db.copy()
+        return surroundings_of(self._radio, self._medium)
 
     def _refresh(self) -> None:
         """Noise, or what it is made of, has changed, or is about to."""
@@ -190,14 +174,14 @@ class SignalWay(Way):
             self._hold,
             self._packets.table,
             order,
-            _off(held),
+            backlog.fate_of_sending(held),
             self._jam.between(self._now_ns, until_ns),
         )
         return state, start
 
     def _losses(self) -> Losses:
         if self._radio.bursts is not None:
-            self._bursts.make_room(self._now_ns, len(self._links.link.receiver))
+            self._bursts.make_room(self._now_ns, len(self._links.link))
         traced = NOT_TRACED if self._measured is None else self._measured.traced
         return losses_of(self._radio, traced, self._bursts)
 
@@ -210,14 +194,6 @@ class SignalWay(Way):
                 self._outcomes.append(learned(packets.table, packets.queued.outcome_id))
             packets.forget_done()
         return decided
-
-
-def _off(held: Disruption) -> IntArray:
-    """What becomes of what each robot should send, (rows,): HEARD if its radio is on."""
-    if not held.anyone_out:
-        return np.full(len(held.alive), int(Fate.HEARD))
-    off = np.select([held.backlog == ALL, held.backlog == NEWEST], [KEPT_ALL, KEPT_NEWEST], int(Fate.BLACKOUT))
-    return np.where(held.alive, np.where(held.radio_on, int(Fate.HEARD), off), int(Fate.SENDER_DEAD))
 
 
 def _lengths(robot: Table) -> IntArray:

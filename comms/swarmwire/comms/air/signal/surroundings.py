@@ -14,7 +14,8 @@ from swarmwire.comms.air.propagation.scattering import scatter_waves
 from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.signal.levels import cut_off_dbm
-from swarmwire.comms.arrays import FloatArray, KeyArray
+from swarmwire.comms.air.stages.stage import Medium
+from swarmwire.comms.arrays import FloatArray
 
 SHADOWS_CUT_OFF = 2.5  # deviations of shadowing by which a link may be better than its path loss
 
@@ -44,10 +45,10 @@ class Surroundings(NamedTuple):
     scatter: FloatArray  # (arenas, 5, n), as `scatter_waves` has them
 
 
-def surroundings_of(
-    radio: Radio, keys: KeyArray, radius_m: FloatArray, send_dbm: FloatArray, receive_dbi: FloatArray
-) -> Surroundings:
-    """What links go by; by robot row (rows,): radii, power and gain, and gain."""
+def surroundings_of(radio: Radio, medium: Medium) -> Surroundings:
+    """What links go by: a radio, which may have other numbers than the medium's, under events."""
+    send_dbm, receive_dbi = _antennas_of(radio, medium)
+    keys, radius_m = medium.keys, medium.radius_m
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
     curve = radio.loss_model.curve(radio.frequency_hz)
     law = fading_law(fading or Fading(), radio.frequency_hz, radio.propagation_mps or SPEED_OF_LIGHT_MPS)
@@ -76,3 +77,10 @@ def surroundings_of(
         law=law,
         scatter=np.array([scatter_waves(key, law.wave_number) for key in keys]),
     )
+
+
+def _antennas_of(radio: Radio, medium: Medium) -> tuple[FloatArray, FloatArray]:
+    """What each robot radiates in dBm, and the gain in dBi with which it hears, under events too, (rows,) each."""
+    own, antenna, now, arenas = medium.antennas, radio.antenna_or_default, medium.disruption, len(medium.keys)
+    send_dbm = np.tile(own.send_dbm(antenna), arenas) + now.send_gain_db
+    return send_dbm, np.tile(own.receive_dbi(antenna), arenas) + now.receive_gain_db

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 
 # What a robot's radio does with the packet at the head of its queue; from BACKING_OFF on there is one.
 NOTHING, PAUSING, BACKING_OFF, LISTENING, TURNING, SENDING, AWAITING, HELD = range(8)
@@ -17,6 +17,7 @@ KEPT_ALL, KEPT_NEWEST = -1, -2
 SILENT, DATA, ACKNOWLEDGEMENT = range(3)
 RECEIVING = 255  # of a link, beside the fates: the frame on air may still be heard
 NOBODY = -1
+LONG_AGO_NS = -(10**15)
 NOT_LEARNED = -1  # the result of a packet whose sender died while it was on air
 
 _I, _F = np.int64, np.float64
@@ -92,26 +93,23 @@ PACKET = np.dtype(
     ],
     align=True,
 )
+# Links by sender: to robots that may be told of a frame, and then to those that it only disturbs. In few bytes, since
+# each frame goes over its links three times, and the next frame over others.
+LINK = np.dtype(
+    [
+        ("power_mw", _F),  # at the receiver, with fading
+        ("receiver", np.int32),  # robot row
+        ("is_listed", np.bool_),  # mean power reaches the sensitivity
+        ("fate", np.uint8),  # HEARD: open; else what ends every packet here
+        ("now", np.uint8),  # of the frame on air: RECEIVING or a fate
+    ],
+    align=True,
+)
 Table = NDArray[np.void]
 
 
-class LinkTable(NamedTuple):
-    """Links by sender: to robots that may be told of a frame, and then to those that it only disturbs."""
-
-    receiver: IntArray  # (links,) robot rows
-    power_mw: FloatArray  # (links,) at the receiver, with fading
-    is_listed: BoolArray  # (links,) mean power reaches the sensitivity
-    fate: ByteArray  # (links,) HEARD: open; else what ends every packet here
-    now: ByteArray  # (links,) of the frame on air: RECEIVING or a fate
-
-
-NO_LINKS = LinkTable(
-    np.empty(0, np.int64), np.empty(0), np.empty(0, np.bool_), np.empty(0, np.uint8), np.empty(0, np.uint8)
-)
-
-
 class LinkPlaces(NamedTuple):
-    """Where in a `LinkTable` each robot's links are, (rows,) each."""
+    """Where in a table of links each robot's are, (rows,) each."""
 
     first: IntArray
     weak: IntArray  # the first that it only disturbs
@@ -135,10 +133,25 @@ class State(NamedTuple):
     keys: KeyArray
     robot: Table
     reception: Table
-    link: LinkTable
+    link: Table
     places: LinkPlaces  # under the poses held
     hold: int  # which poses these are
     packet: Table
     order: IntArray  # packets by sender, in the order of sending
     off: IntArray  # (rows,) HEARD: the radio is on; else the fate of what it should send, or KEPT_ALL or KEPT_NEWEST
     jam: Jam
+
+
+def robots_at_rest(rows: int) -> Table:
+    """A table of dtype ROBOT: nobody has a packet, and the air has been free for long."""
+    robot: Table = np.zeros(rows, ROBOT)
+    robot["packet"] = robot["answers_to"] = NOBODY
+    robot["free_from_ns"] = LONG_AGO_NS
+    return robot
+
+
+def receptions_of_nothing(rows: int) -> Table:
+    """A table of dtype RECEPTION: nothing is on air."""
+    reception: Table = np.zeros(rows, RECEPTION)
+    reception["locked_to"], reception["signal_mw"] = NOBODY, np.inf
+    return reception

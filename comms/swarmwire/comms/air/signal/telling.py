@@ -47,8 +47,8 @@ def report(rules, state, queue, told, r, now_ns):
         _tell_all(state, told, r, now_ns)
         return
     for i in range(me.first_link, me.weak_link):
-        receiver, fate, power_mw = link.receiver[i], np.int64(link.now[i]), link.power_mw[i]
-        if to != receiver or not (link.is_listed[i] or fate == HEARD):
+        receiver, fate, power_mw = np.int64(link[i].receiver), np.int64(link[i].now), link[i].power_mw
+        if to != receiver or not (link[i].is_listed or fate == HEARD):
             continue
         in_range = 0 if fate == BLOCKED else 1
         me.last_fate, me.last_in_range, me.last_mw = fate, in_range, power_mw
@@ -66,12 +66,13 @@ def _tell_all(state, told, r, now_ns):
     me, link = state.robot[r], state.link
     on_air_at_ns, at = state.packet[me.packet].on_air_at_ns, np.uint64(told.count[0])
     for i in range(np.uint64(me.first_link), np.uint64(me.weak_link)):
-        fate = link.now[i]
+        one = link[i]
+        fate = one.now
         # Written first and kept if it counts: a branch would be guessed wrong too often.
-        told.packet[at], told.receiver[at], told.fate[at] = me.packet, link.receiver[i], fate
+        told.packet[at], told.receiver[at], told.fate[at] = me.packet, one.receiver, fate
         told.in_range[at], told.final_at_ns[at], told.hold[at] = fate != BLOCKED, now_ns, me.hold
-        told.on_air_at_ns[at], told.power_mw[at] = on_air_at_ns, link.power_mw[i]
-        at += np.uint64(link.is_listed[i] | (fate == HEARD))
+        told.on_air_at_ns[at], told.power_mw[at] = on_air_at_ns, one.power_mw
+        at += np.uint64(one.is_listed | (fate == HEARD))
     told.count[0] = at
 
 

@@ -2,15 +2,18 @@
 
 To add a stage:
 
-1. Write `stages/<name>.py` with one small compiled function (formula, source and units in its docstring; arrays in, one
-   array out), a `Stage` that applies it to the links, and `stage(medium)`, which returns it, or None where this radio
-   has none. Draws are keyed by the arena's key, (sender, receiver, sequence) as indices in the arena, and a purpose of
-   its own, so that no stage shifts the draws of another.
-2. Give `Radio` a field `<name>` with the stage's parameters (a frozen dataclass, None by default): the scenario's table
-   `[radio.<name>]` follows from it. A new way to end a packet is a new `Fate`; a column that later stages read, a new
-   field of `Links`.
+1. Say what a scenario may give: a frozen dataclass in `parameters/<name>.py`, and a field `<name>` of `Radio`, None by
+   default. The scenario's table `[radio.<name>]` follows from it. One number alone is just a field of `Radio`.
+2. Write `stages/<name>.py` with the keys of [radio] that it goes by (`KEYS`), one small compiled function (formula,
+   source and units in its docstring; arrays in, one array out), a `Stage` that applies it to the links, and
+   `stage(medium)`, which returns it, or None where this radio has none. Draws are keyed by the arena's key, (sender,
+   receiver, sequence) as indices in the arena, and a purpose of its own, so that no stage shifts the draws of another.
+   A new way to end a packet is a new `Fate`; a column that later stages read, a new field of `Links`.
 3. List the module below, where it belongs: propagation, disruption (what it ends does not interfere either),
    interference, reception, bursts, trace, what the receiver learns, delay.
+
+Radios with signals pass `AFTER_RECEPTION` alone: what stands there serves both kinds of radio. What comes before is one
+with reception there: what weakens signals belongs to `signal/pairs.py`, what takes frames to `signal/losses.py`.
 """
 
 from swarmwire.comms.air.stages import (

@@ -6,11 +6,11 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.links import HEARD, Links
+from swarmwire.comms.air.stages.apart import to_sender_m
 from swarmwire.comms.air.stages.stage import Medium, Stage
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
-from swarmwire.comms.geometry.obstacles import to_nearest
 
 KEYS = ("gives.range",)
 NOISE = purpose("range noise")
@@ -52,8 +52,7 @@ def range_m(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise_
     for i in range(len(out_m)):
         s, r = sender[i], receiver[i]
         if fate[i] == HEARD:
-            dx, dy = pose[s, 0] - pose[r, 0], pose[s, 1] - pose[r, 1]
-            dx, dy = dx + to_nearest(dx, wrap_m[0]), dy + to_nearest(dy, wrap_m[1])
+            dx, dy = to_sender_m(pose, s, r, wrap_m)
             out_m[i] = np.sqrt(dx * dx + dy * dy)
             if noise_m > 0.0:
                 z = normal(keys[s // robots], s % robots, r % robots, sequence[i], NOISE)

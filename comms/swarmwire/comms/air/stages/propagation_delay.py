@@ -6,10 +6,10 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.links import HEARD, Links
+from swarmwire.comms.air.stages.apart import to_sender_m
 from swarmwire.comms.air.stages.stage import Medium, Stage
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.geometry.obstacles import to_nearest
 
 KEYS = ("propagation_mps",)
 
@@ -38,7 +38,6 @@ def travel_ns(pose, sender, receiver, fate, speed_mps, wrap_m):
     late_ns = np.zeros(len(sender), np.int64)
     for i in range(len(late_ns)):
         if fate[i] == HEARD:
-            dx, dy = pose[sender[i], 0] - pose[receiver[i], 0], pose[sender[i], 1] - pose[receiver[i], 1]
-            dx, dy = dx + to_nearest(dx, wrap_m[0]), dy + to_nearest(dy, wrap_m[1])
+            dx, dy = to_sender_m(pose, sender[i], receiver[i], wrap_m)
             late_ns[i] = np.int64(np.sqrt(dx * dx + dy * dy) / speed_mps * NS_PER_S)
     return late_ns

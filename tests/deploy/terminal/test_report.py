@@ -1,0 +1,54 @@
+"""The table that a run ends with: what its numbers say, in words."""
+
+from dataclasses import replace
+from io import StringIO
+
+import pytest
+from rich.console import Console
+
+from swarmwire.comms.fates import FATE_NAMES
+from swarmwire.deploy import Result, run
+from swarmwire.deploy.result import Statistics
+from swarmwire.deploy.terminal.report import print_result
+from swarmwire.metrics.registry import METRICS
+from tests.deploy.commands import LOSSY
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    return run(LOSSY, overrides=["duration_s=1"])
+
+
+def shown(result: Result, **changes: object) -> str:
+    """The table, of a run whose one arena is changed so."""
+    out = StringIO()
+    console = Console(file=out, width=160, color_system=None)
+    arena = replace(result.arenas[0], **changes)  # pyright: ignore[reportArgumentType]
+    print_result(replace(result, arenas=(arena,)), METRICS.values(), console)
+    return out.getvalue()
+
+
+def row(text: str, name: str) -> str:
+    return next(line for line in text.splitlines() if line.startswith(f"│ {name} ")).strip("│ ").split("│")[1].strip()
+
+
+def test_a_count_is_shown_as_its_total_and_a_level_by_its_course(result):
+    numbers = Statistics(final=3.0, mean=0.25, min=0.0, max=1.0)
+    text = shown(result, metrics={"collisions": numbers, "min_gap": numbers})
+    assert row(text, "collisions") == "total 3"
+    assert row(text, "min_gap") == "final 3, mean 0.25, min 0 (m)"
+
+
+def test_who_has_an_obstacle_in_between_does_not_count_as_in_range(result):
+    radio = result.radio
+    assert radio is not None
+    fates = dict.fromkeys(FATE_NAMES, 0) | {"heard": 60, "lost": 20, "out_of_range": 10}
+    told = replace(radio, sent=10, intended=100, in_range=80, pdr=0.75, fates=fates)
+    assert row(shown(result, radio=told), "radio").endswith("80 in range; 75.0% of these heard it")
+    told = replace(told, fates=fates | {"blocked": 10})
+    assert row(shown(result, radio=told), "radio").endswith("80 in range and sight; 75.0% of these heard it")
+
+
+def test_where_nobody_was_in_range_there_is_no_share(result):
+    told = replace(result.radio, sent=1, intended=19, in_range=0, pdr=None)
+    assert row(shown(result, radio=told), "radio") == "1 packets, 19 intended receivers, 0 in range"
