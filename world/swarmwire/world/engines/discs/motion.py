@@ -1,6 +1,6 @@
 """How motors change a robot's velocity in a step, and how it then moves. Compiled.
 
-Velocity first, then place (semi-implicit Euler). What motors can do is told in `engines.pymunk_drive`: a bounded change of
+Velocity first, then place (semi-implicit Euler). What motors can do: see `engines.pymunk_drive`, a bounded change of
 velocity towards the target. The target lies along the heading in the middle of the step to come, so that the path of a
 turning robot is made of chords of its arc.
 """
