@@ -22,6 +22,7 @@ class Timed:
         self._clock, self._metrics = WallClock(), Metrics()  # of its own, as observers are not told the run's
         self._recording = RerunRecording(rrd, self._metrics, self._clock)
         self.at_ns, self.spent_ns, self.own_ns = list[int](), list[int](), list[int]()
+        self.end_ns = 0
 
     def begin(self, static: Static) -> None:
         """Open the recording."""
@@ -40,22 +41,23 @@ class Timed:
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """Close the recording."""
-        return self._recording.end(last)
+        start_ns = self._clock.now_ns()
+        told = self._recording.end(last)
+        self.end_ns = self._clock.now_ns() - start_ns
+        return told
 
-    def costs_percent(self) -> list[float]:
-        """The recording's share of the rest of the run, for each second of it but the first."""
-        seconds = range(10, len(self.at_ns) - 10, 10)
-        spent_ns = [sum(self.spent_ns[at : at + 10]) for at in seconds]
-        own_ns = [sum(self.own_ns[at : at + 10]) for at in seconds]
-        whole_ns = [self.at_ns[at + 10] - self.at_ns[at] for at in seconds]
-        return [100.0 * s / (w - o - s) for s, o, w in zip(spent_ns, own_ns, whole_ns, strict=True)]
+    def cost_percent(self) -> float:
+        """The recording's share of the rest of the run, its end included: it sends in blocks, the last one there."""
+        in_ticks_ns = sum(self.spent_ns[:-1])
+        rest_ns = self.at_ns[-1] - self.at_ns[0] - sum(self.own_ns[:-1]) - in_ticks_ns
+        return 100.0 * (in_ticks_ns + self.end_ns) / rest_ns
 
 
 def view_cost(name: str, repeats: int, *, robots: int, ticks: int, neighbours: float) -> None:
     """What recording for the viewer adds to a run, in percent, and the size of the recording.
 
-    Both parts are timed in the same runs, second by second, so that what else the machine does falls on both; rerun's
-    own threads, which compress and write, are not in it while there is a core for them.
+    Both parts are timed in the same runs, so that what else the machine does falls on both; rerun's own threads, which
+    compress and write, are not in it while there is a core for them.
     """
     scenario = scenario_from(scenes.diffusion(robots, ticks / 10, neighbours=neighbours), name)
     run(scenario.model_copy(update={"duration_s": 2.0}))
@@ -66,7 +68,7 @@ def view_cost(name: str, repeats: int, *, robots: int, ticks: int, neighbours: f
         size_mb = rrd.stat().st_size / 1e6
     if any(result.counts.get("observer_failed_Timed") for result in results):
         raise RuntimeError("the recording failed: its cost says nothing")
-    costs = [statistics.median(observer.costs_percent()) for observer in timed]
+    costs = [observer.cost_percent() for observer in timed]
     config = {"body": "footbot", "rays": 24, "physics_steps": 5, "density_per_m2": 1.0}
     report(name, statistics.median(costs), "% of the run without", results[0], {**config, **spread(costs)})
     report(f"{name}-size", size_mb, "MB", results[0], config)
