@@ -83,8 +83,8 @@ def _keys(keys: object, *of: str) -> str:
 
 def _frame(*several: bytes) -> str:
     frame = frames.decode(several[0])
-    arrays = "".join(f"{name}: {array.dtype.str} {_shape(array.shape)}\n" for name, array in sorted(frame.arrays.items()))
-    return arrays + lines_of(joined(*(paths_of(frames.decode(data).values) for data in several)))
+    arrays = [f"{name}: {array.dtype.str} {_shape(array.shape)}\n" for name, array in frame.arrays.items()]
+    return "".join(sorted(arrays)) + lines_of(joined(*(paths_of(frames.decode(data).values) for data in several)))
 
 
 def _shape(shape: tuple[int, ...]) -> str:
