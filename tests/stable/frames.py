@@ -83,9 +83,8 @@ def _keys(keys: object, *of: str) -> str:
 
 def _frame(*several: bytes) -> str:
     frame = frames.decode(several[0])
-    arrays = sorted((name, array.dtype.str, _shape(array.shape)) for name, array in frame.arrays.items())
-    told = "".join(f"{name}: {dtype} {shape}\n" for name, dtype, shape in arrays)
-    return told + lines_of(joined(*(paths_of(frames.decode(data).values) for data in several)))
+    arrays = [f"{name}: {array.dtype.str} {_shape(array.shape)}\n" for name, array in frame.arrays.items()]
+    return "".join(sorted(arrays)) + lines_of(joined(*(paths_of(frames.decode(data).values) for data in several)))
 
 
 def _shape(shape: tuple[int, ...]) -> str:
