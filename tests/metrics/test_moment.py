@@ -12,7 +12,7 @@ def test_rows_are_folded_by_arena():
     alive = np.array([True, True, False, True, False, False])
     moment = Moment(of, truth(of, pose=pose, velocity=velocity, alive=alive))
     assert (moment.position_m[1, 2] == pose[5, :2]).all()
-    assert (moment.velocity_mps[1, 2] == velocity[5, :2]).all()
+    assert (moment.velocity[1, 2, :2] == velocity[5, :2]).all()
     assert moment.heading_rad[0, 1] == pose[1, 2]
     assert moment.robots_alive.tolist() == moment.sum_alive(np.ones((2, 3))).tolist() == [2, 1]
     assert moment.components is None

@@ -4,7 +4,7 @@ import json
 import re
 
 from tests.deploy.commands import LOSSY, swarmwire
-from tests.deploy.terminal import terminal
+from tests.deploy.pseudo_terminal import terminal
 
 LONG = ["--set", "duration_s=3600"]
 FAULTY = """

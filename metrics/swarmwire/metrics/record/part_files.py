@@ -7,7 +7,6 @@ its name is whole: a Parquet file that is cut off is unreadable.
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.metrics.record.parquet_join import join_files
 from swarmwire.metrics.whole_file import written_aside
 
 if TYPE_CHECKING:
@@ -39,13 +38,15 @@ def write_file(frame: "pl.DataFrame", path: Path) -> None:
 
 
 def join_parts(folder: Path, name: str) -> None:
-    """Make one file of the parts, which go: each is a row group of it."""
+    """Make one file of the parts, which go; where they end does not show in it. Reads them piece by piece."""
+    import polars as pl
+
     parts, whole = parts_of(folder, name), table_file(folder, name)
     if len(parts) == 1:
         parts[0].replace(whole)
     else:
         with written_aside(whole) as aside:
-            join_files(parts, aside)
+            pl.scan_parquet(parts).sink_parquet(aside, **PARQUET)
         for part in parts:
             part.unlink()
     (folder / name).rmdir()

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     import polars as pl
 
 WAITING_CHUNKS = 4  # at most, beside the one that is being written
-LEAST_PART_BYTES = 500_000  # in memory: a smaller part is written again with the rows that follow
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +34,7 @@ class TableWriter:
     def __init__(self, folder: Path, name: str, schema: Mapping[str, Any], may_drop: bool = False) -> None:
         self.rows, self.dropped = 0, 0  # rows in the files so far, and rows that never came there
         self._folder, self._name, self._schema, self._may_drop = folder, name, schema, may_drop
-        self._parts = 0  # that are large enough
-        self._small: pl.DataFrame | None = None  # the part after them
+        self._parts = 0
         self._fault: BaseException | None = None
         self._queue: Queue[Chunk | None] = Queue(WAITING_CHUNKS)
         (folder / name).mkdir()
@@ -60,7 +58,7 @@ class TableWriter:
         self._thread.join()
         self._refuse()
         try:
-            if not self.rows:
+            if not self._parts:
                 self._write_empty()
             join_parts(self._folder, self._name)
         except Exception as error:
@@ -80,11 +78,9 @@ class TableWriter:
     def _write(self, frame: "pl.DataFrame") -> None:
         if not len(frame):
             return
-        part = frame if self._small is None else self._small.vstack(frame)
-        write_file(part, part_file(self._folder, self._name, self._parts))
+        write_file(frame, part_file(self._folder, self._name, self._parts))
+        self._parts += 1
         self.rows += len(frame)
-        self._small = part if part.estimated_size() < LEAST_PART_BYTES else None
-        self._parts += self._small is None
 
     def _write_empty(self) -> None:
         import polars as pl
