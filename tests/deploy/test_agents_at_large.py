@@ -86,9 +86,10 @@ class Broken:
     """An observer with a fault."""
 
     def begin(self, static):
-        pass
+        self.ticks = []
 
     def see(self, truth):
+        self.ticks.append(truth.tick)
         if truth.tick == 2:
             raise OSError("the disk is full")
 
@@ -97,7 +98,9 @@ class Broken:
 
 
 def test_an_observer_that_fails_is_left_out_and_counted(capfd):
-    result = run(LOSSY, overrides=["duration_s=0.5"], observers=[Broken()])
+    broken = Broken()
+    result = run(LOSSY, overrides=["duration_s=0.5"], observers=[broken])
+    assert broken.ticks == [0, 1, 2]
     assert (result.ticks, result.counts["observer_failed_Broken"]) == (5, 1)
     assert "the disk is full" in capfd.readouterr().err
 
