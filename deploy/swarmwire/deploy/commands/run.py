@@ -11,11 +11,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
 from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
 from swarmwire.deploy.commands.options import Links, Overrides, Packets, Quiet, Runners, ScenarioFile, Seed
-from swarmwire.deploy.record.new_folder import default_folder
-from swarmwire.deploy.result import Result
-from swarmwire.deploy.terminal.report import print_result
 
 if TYPE_CHECKING:
+    from swarmwire.deploy.result import Result
     from swarmwire.deploy.simulation import Simulation
 
 MOST_SEEDS = 10_000
@@ -64,6 +62,7 @@ def run_command(
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.arguments import choose_seeds
     from swarmwire.deploy.compiling import compiling_told
+    from swarmwire.deploy.record.new_folder import default_folder
     from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.simulation import Simulation
     from swarmwire.world.scenario.scenario_file import load_scenario
@@ -87,10 +86,11 @@ def run_command(
         raise typer.Exit(INTERRUPTED)
 
 
-def _shown(simulation: "Simulation", folder: Path, view: bool, console: Console) -> Result:
+def _shown(simulation: "Simulation", folder: Path, view: bool, console: Console) -> "Result":
     """The result of the run, told and shown while it goes on and afterwards."""
     from swarmwire.deploy.live.live_view import LiveView
     from swarmwire.deploy.running import finished
+    from swarmwire.deploy.terminal.report import print_result
     from swarmwire.deploy.terminal.shown import progress
 
     simulation.watch(progress(simulation, console))
@@ -120,7 +120,7 @@ def _seed_list(text: str) -> list[int]:
     return list(found)
 
 
-def _say_where(result: Result, folder: Path, console: Console) -> None:
+def _say_where(result: "Result", folder: Path, console: Console) -> None:
     recorded = f" (the pictures of seed {result.arenas[0].seed})" if len(result.arenas) > 1 else ""
     program = _program()
     console.print(f"written: {folder}{recorded}", soft_wrap=True)
