@@ -11,11 +11,11 @@ TO = ROOT / "docs" / "parts.svg"
 SEAMS = ROOT / "tests" / "stable" / "seams.txt"  # which a test compares with the code
 WIDTH, GAP = 880.0, 56.0  # between one row of parts and the next
 PLACES = {  # x, y, width, height
-    "deploy": (10.0, 10.0, 860.0, 74.0),
-    "world": (10.0, 140.0, 280.0, 118.0),
-    "metrics": (300.0, 140.0, 280.0, 118.0),
-    "agent": (590.0, 140.0, 280.0, 118.0),
-    "comms": (10.0, 314.0, 860.0, 89.0),
+    "deploy": (10.0, 10.0, 860.0, 86.0),
+    "world": (10.0, 152.0, 280.0, 118.0),
+    "metrics": (300.0, 152.0, 280.0, 118.0),
+    "agent": (590.0, 152.0, 280.0, 118.0),
+    "comms": (10.0, 326.0, 860.0, 89.0),
 }
 FILLS = {"deploy": "#f1f5f9", "world": "#dbeafe", "metrics": "#fef3c7", "agent": "#dcfce7", "comms": "#fae8ff"}
 
