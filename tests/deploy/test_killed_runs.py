@@ -1,12 +1,17 @@
 """What a run leaves that was killed by SIGKILL: readable up to its last part, and true as far as it goes."""
 
+import re
+from importlib.util import find_spec
+
 import numpy as np
 import polars as pl
 import pytest
 
+from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.metrics.record.part_files import part_file, parts_of
 from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.verify.finding import State
+from swarmwire.metrics.verify.recording_check import check_recording
 from swarmwire.metrics.verify.verify import verify
 from tests.deploy.commands import swarmwire
 from tests.deploy.recorded import record_run, started
@@ -50,16 +55,39 @@ def test_what_a_killed_run_left_is_readable_and_true(tmp_path, whole, moment):
         assert len(folder.robots()) == len(ticks) * whole.static.robots
 
 
-def test_verify_tells_how_far_a_killed_run_came(tmp_path):
-    process = started(tmp_path, "duration_s=3600")
+@pytest.fixture(scope="module")
+def killed(tmp_path_factory):
+    """A long run's folder, killed amid its ticks; a tick that was over two seconds before, and the last that was."""
+    folder, clock = tmp_path_factory.mktemp("killed"), WallClock()
+    process = started(folder, "duration_s=3600", rrd=find_spec("rerun") is not None)
+    before, due_ns, seen = None, 0, list[int]()
     with process:
         assert process.stdout is not None
-        for _ in process.stdout:
-            if len(parts_of(tmp_path, "ticks")) >= 3:
+        ticks = (int(line) for line in process.stdout if line.strip().isdecimal())
+        for tick in ticks:
+            seen.append(tick)
+            if before is None and len(parts_of(folder, "ticks")) >= 3:
+                before, due_ns = tick, clock.now_ns() + 2 * NS_PER_S
+            if before is not None and clock.now_ns() >= due_ns:
                 break
         process.kill()
-    last = pl.scan_parquet(parts_of(tmp_path, "ticks")).select(pl.col("tick").max()).collect().item()
-    told = swarmwire("verify", tmp_path)
+        return folder, before, max(*seen, *ticks)
+
+
+def test_a_killed_run_leaves_its_recording_up_to_two_seconds_before(killed):
+    pytest.importorskip("rerun", reason="needs the extra [view]")
+    folder, before, last = killed
+    state, told = check_recording(folder / "run.rrd")
+    assert state is State.PARTIAL
+    reach = re.search(r"readable up to tick (\d+); it was never closed$", told)
+    assert reach, told
+    assert before <= int(reach[1]) <= last + 1  # the recorder sees a tick before it is printed
+
+
+def test_verify_tells_how_far_a_killed_run_came(killed):
+    folder, *_ = killed
+    last = pl.scan_parquet(parts_of(folder, "ticks")).select(pl.col("tick").max()).collect().item()
+    told = swarmwire("verify", folder)
     assert (told.returncode, told.stderr) == (1, "")
     assert f"up to tick {last}" in " ".join(told.stdout.split())
     closing = told.stdout.strip().splitlines()[-1]

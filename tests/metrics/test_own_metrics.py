@@ -87,6 +87,7 @@ def test_a_class_that_cannot_be_made_is_refused(kind, said):
         ("name", "two words", "a name of letters, digits and _; got 'two words'"),
         ("name", "order", "a name that is not taken; got 'order'"),
         ("name", "x_m", "a name that is not taken; got 'x_m'"),
+        ("name", "delivery", "a name that is not taken; got 'delivery'"),
         ("unit", 3, "unit as a text; got 3"),
         ("kind", "sum", "the kind level or count; got 'sum'"),
         ("bounds", (None, 1.0), r"bounds as a number, and a number or None; got \(None, 1.0\)"),

@@ -6,6 +6,7 @@ from typing import Any, get_args
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.own_class import own_class
+from swarmwire.metrics.drawing.film import DELIVERY
 from swarmwire.metrics.metric import Kind, Metric
 from swarmwire.metrics.record.tick_columns import KEYS, MOVABLE, RADIO, ROBOT_COLUMNS, SIDEWAYS
 from swarmwire.metrics.registry import METRICS
@@ -15,7 +16,7 @@ COLUMNS = {*KEYS, *ROBOT_COLUMNS, SIDEWAYS, *MOVABLE, *RADIO}  # of the table of
 
 def own_metrics(specs: Sequence[str], where: str) -> list[Metric]:
     """A metric of each class, "package.module:Class" or "/path/file.py:Class"; BadInput names `metrics.<place>`."""
-    taken, found = {*METRICS, *COLUMNS}, list[Metric]()
+    taken, found = {*METRICS, *COLUMNS, DELIVERY}, list[Metric]()
     for place, spec in enumerate(specs):
         key = f"metrics.{place}"
         kind = own_class(Metric, spec, where, key)

@@ -184,6 +184,14 @@ def test_only_metrics_that_have_values_are_plotted_unless_they_are_asked_for():
     assert len(FilmFigure(film(metrics={}), 300)._figure.axes) == 1
 
 
+def test_a_metric_of_the_users_own_is_plotted_by_its_numbers_alone():
+    axes = FilmFigure(film(metrics={"my_share": np.linspace(0.2, 0.5, 31)}), 300, ["my_share"])._figure.axes[1]
+    low, high = axes.get_ylim()
+    assert axes.get_title(loc="left") == "my share"
+    assert low <= 0.0
+    assert 0.5 < high < 0.6
+
+
 @pytest.mark.parametrize("size_m", [(1.0, 9.0), (9.0, 1.0), (40.0, 40.0)])
 def test_arenas_of_any_form_are_seen_whole(size_m):
     static = replace(two_groups(), arena_size_m=size_m, obstacles=((),), lights=((),))

@@ -10,6 +10,8 @@ from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.floor import Floor, Patch
 from swarmwire.comms.truth import Finished, Group, Happened, Light, Obstacle
 from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.verify.finding import State
+from swarmwire.metrics.verify.recording_check import check_recording
 from swarmwire.metrics.viewer.colors import DEAD, FATES, packed
 from swarmwire.metrics.viewer.recording import RerunRecording
 from tests.clocks import StillClock
@@ -265,6 +267,37 @@ def test_what_is_much_is_sent_before(tmp_path, monkeypatch):
     ]
     assert sum(rows) == 20
     assert len(rows) > 3
+
+
+def test_a_recording_is_closed_also_where_an_entity_fails_at_its_end(tmp_path, monkeypatch):
+    of, metrics = static(3), Metrics()
+    recording = RerunRecording(tmp_path / "run.rrd", metrics, StillClock())
+    for observer in (metrics, recording):
+        observer.begin(of)
+    for seen in moving(of, 4):
+        for observer in (metrics, recording):
+            observer.see(seen)
+    monkeypatch.setattr(rerun.TextLog, "columns", refuse)
+    recording._rows.add("events", rerun.TextLog.columns, text=["cannot be sent"])
+    with pytest.raises(ValueError, match="refused"):
+        recording.end(None)
+    assert check_recording(tmp_path / "run.rrd")[0] is State.WHOLE
+    assert list(column(tmp_path / "run.rrd", "/world/robots", "Points2D:positions")) == [0, 1, 2, 3]
+
+
+def test_a_recording_that_failed_while_it_began_is_closed(tmp_path, monkeypatch):
+    recording = RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
+    monkeypatch.setattr("swarmwire.metrics.viewer.recording.about", refuse)
+    with pytest.raises(ValueError, match="refused"):
+        recording.begin(static(3))
+    recording.end(None)
+    state, told = check_recording(tmp_path / "run.rrd")
+    assert state is State.PARTIAL
+    assert told.endswith(" MB, no tick in it")  # and not that it was never closed
+
+
+def refuse(*_, **__):
+    raise ValueError("refused")
 
 
 def view_names(path):

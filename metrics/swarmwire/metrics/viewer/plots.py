@@ -9,6 +9,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.fates import FATE_NAMES, Fate
 from swarmwire.comms.truth import Happened, Static, Truth
+from swarmwire.metrics.drawing.film import DELIVERY
 from swarmwire.metrics.palette import Color
 from swarmwire.metrics.viewer.colors import FATES, MARK
 from swarmwire.metrics.viewer.plotted import Plotted
@@ -54,7 +55,7 @@ class RerunPlots:
         numbers = {plot: {name: latest[name][self._arena] for name in names} for plot, names in self._names.items()}
         if self._radio:
             per_second, in_range = self._per_second(truth)
-            numbers["shares"]["delivery"] = per_second[Fate.HEARD] / in_range if in_range > 0 else np.nan
+            numbers["shares"][DELIVERY] = per_second[Fate.HEARD] / in_range if in_range > 0 else np.nan
             numbers["packets"] = self._by_name(per_second)
         for plot, value in numbers.items():
             self._series[plot].add(rows, value)

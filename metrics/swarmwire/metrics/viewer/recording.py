@@ -55,6 +55,8 @@ class RerunRecording:
         self._arena_view = RerunArena(static, self._arena, selected)
         self._plots = RerunPlots(static, self._metrics.metrics, self._arena)
         self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
+        self._rows, self._limit = RerunRows(self._rec), ChunkLimit(self._send_bytes, self._clock)
+        self._ticks = 0
         self._rec.set_log_time_enabled(False)
         self._rec.set_log_tick_enabled(False)
         self._connect(layout(static, selected))
@@ -66,8 +68,6 @@ class RerunRecording:
         self._rec.log("about", rr.TextDocument(text, media_type="text/markdown"), static=True)
         self._arena_view.begin(self._rec)
         self._plots.begin(self._rec)
-        self._rows, self._limit = RerunRows(self._rec), ChunkLimit(self._send_bytes, self._clock)
-        self._ticks = 0
 
     def see(self, truth: Truth) -> None:
         """Record one tick."""
@@ -95,8 +95,12 @@ class RerunRecording:
         self._rec.save(self._path, default_blueprint=layout)
 
     def end(self, last: Tally | None) -> dict[str, Any]:
-        """Close the file. Summary part: `record_rrd`, as of the tables; its rows are ticks."""
-        self._rows.send()
-        self._rec.flush()
-        self._rec.disconnect()
+        """Close the file, whatever fails. Summary part: `record_rrd`, as of the tables; its rows are ticks."""
+        try:
+            self._rows.send()
+        finally:
+            try:
+                self._rec.flush()
+            finally:
+                self._rec.disconnect()
         return {"record_rrd": {"rows": self._ticks, "dropped": 0}}

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from itertools import chain
+from sys import getsizeof
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray
 
 Values = AnyArray | Sequence[Any]
-ROW_BYTES, ITEM_BYTES = 300, 12  # that a row takes, and each item of it, about
+ROW_BYTES = 300  # that a row takes beside its fields, about
 
 
 class RerunRows:
@@ -38,19 +39,26 @@ class RerunRows:
         """
         values = tuple(fields.values())
         self._kept.setdefault((entity, columns, *fields), []).append((self._tick, self._time_ns, values))
-        self.kept_bytes += ROW_BYTES + ITEM_BYTES * len(values[0])
+        self.kept_bytes += ROW_BYTES + sum(map(_bytes, values))
 
     def send(self) -> None:
-        """Send what was kept."""
+        """Send what was kept. An entity that fails takes no other with it: the first error is raised at the end."""
         kept, self._kept, self.kept_bytes = self._kept, {}, 0
         index: dict[tuple[int, ...], list[Any]] = {}
+        failed: list[Exception] = []
         for (entity, columns, *names), rows in kept.items():
             ticks, times_ns, values = zip(*rows, strict=True)
             if ticks not in index:
                 index[ticks] = _index(ticks, times_ns)
-            fields = {name: _joined(of_ticks) for name, of_ticks in zip(names, zip(*values, strict=True), strict=True)}
+            by_name = zip(names, zip(*values, strict=True), strict=True)
             lengths = [len(of_tick[0]) for of_tick in values]
-            self.rec.send_columns(entity, index[ticks], columns(**fields).partition(lengths))
+            try:
+                fields = {name: _joined(of_ticks) for name, of_ticks in by_name}
+                self.rec.send_columns(entity, index[ticks], columns(**fields).partition(lengths))
+            except Exception as error:  # noqa: BLE001 - whatever it is, the others' rows are not to be lost
+                failed.append(error)
+        if failed:
+            raise failed[0]
 
 
 def _index(ticks: tuple[int, ...], times_ns: tuple[int, ...]) -> list[Any]:
@@ -58,6 +66,13 @@ def _index(ticks: tuple[int, ...], times_ns: tuple[int, ...]) -> list[Any]:
 
     times = np.array(times_ns, "timedelta64[ns]")
     return [rr.TimeColumn("tick", sequence=np.array(ticks)), rr.TimeColumn("sim_time", duration=times)]
+
+
+def _bytes(values: Values) -> int:
+    """What a field takes: an array its items, a list each of its own."""
+    if isinstance(values, np.ndarray):
+        return values.nbytes
+    return sum(item.nbytes if isinstance(item, np.ndarray) else getsizeof(item) for item in values)
 
 
 def _joined(of_ticks: Sequence[Values]) -> Values:
