@@ -11,8 +11,12 @@ TABLES_FORMAT = 2  # of static.json, which has it, and of the tables
 
 
 def refuse_other_format(written: object, known: int, path: Path) -> None:
-    """Return if what a file holds names the known format, or none; BadInput if it names another."""
+    """Return if the mapping that a file holds names the known format; BadInput if it names another, or none.
+
+    What is no mapping at all is left to who reads it: it is damaged, not of another version.
+    """
     if isinstance(written, dict):
-        found = cast("dict[str, object]", written).get("format", known)
+        found = cast("dict[str, object]", written).get("format")
         if type(found) is not int or found != known:
-            raise BadInput(str(path), "format", f"expected {known}, got {found!r}: by another version of swarmwire")
+            got = "nothing" if found is None else repr(found)
+            raise BadInput(str(path), "format", f"expected {known}, got {got}: by another version of swarmwire")
