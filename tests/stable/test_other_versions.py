@@ -64,5 +64,22 @@ def test_another_version_is_refused_in_one_line(door, tmp_path):
     assert "expected" in line
 
 
+@pytest.mark.parametrize(
+    ("name", "known", "enter"),
+    [
+        ("summary.json", SUMMARY_FORMAT, lambda folder: folder.summary),
+        ("static.json", TABLES_FORMAT, lambda folder: folder.static),
+        ("run.json", RUN_FORMAT, lambda folder: read_origin(folder.path)),
+    ],
+)
+def test_a_file_of_a_run_without_its_version_is_refused_in_one_line(name, known, enter, tmp_path):
+    missing = {key: value for key, value in recorded()[name].items() if key != "format"}
+    (tmp_path / name).write_text(json.dumps(missing))
+    with pytest.raises(BadInput) as caught:
+        enter(RunFolder(tmp_path))
+    assert str(caught.value).startswith(f"{tmp_path / name}: format: expected {known}, got nothing")
+    assert "\n" not in str(caught.value)
+
+
 def test_an_agent_that_names_this_version_is_taken(tmp_path):
     assert load_later(tmp_path, API_VERSION).api == API_VERSION
