@@ -11,12 +11,11 @@ TABLES_FORMAT = 2  # of static.json, which has it, and of the tables
 
 
 def refuse_other_format(written: object, known: int, path: Path) -> None:
-    """Return if the mapping that a file holds names the known format; BadInput if it names another, or none.
+    """Return if what a file holds names the known format, or none; BadInput if it names another.
 
-    What is no mapping at all is left to who reads it: it is damaged, not of another version.
+    Whether one must be named is up to who reads the rest of the file.
     """
     if isinstance(written, dict):
-        found = cast("dict[str, object]", written).get("format")
+        found = cast("dict[str, object]", written).get("format", known)
         if type(found) is not int or found != known:
-            got = "nothing" if found is None else repr(found)
-            raise BadInput(str(path), "format", f"expected {known}, got {got}: by another version of swarmwire")
+            raise BadInput(str(path), "format", f"expected {known}, got {found!r}: by another version of swarmwire")
