@@ -109,9 +109,8 @@ def test_a_link_collects_the_integral_of_the_waves_along_its_way(link: tuple[flo
 
 def test_each_wave_counts_once():
     """`between_db` has its waves written out: one that it left out or took twice would show as it stands alone."""
-    alone = np.zeros((WAVES.shape[2], *WAVES.shape[1:]))
-    for n, waves in enumerate(alone):
-        waves[:, n] = 0.05, 0.02, 0.1
+    count = WAVES.shape[2]
+    alone = np.array([0.05, 0.02, 0.1])[:, None] * np.eye(count)[:, None, :]  # (which, 3, waves)
     found = np.array([shadowing_db(waves, AMPLITUDE_DB, -3.0, 1.0, 2.0, 0.5) for waves in alone])
     assert found[0] != 0.0
     assert (found == found[0]).all()

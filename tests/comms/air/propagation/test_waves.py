@@ -6,7 +6,7 @@ from numba import njit
 from swarmwire.comms.air.propagation.waves import SUMS, total
 
 
-@njit
+@njit  # pyright: ignore[reportUntypedFunctionDecorator] - numba is untyped
 def total_of(s):
     return total(s)
 
