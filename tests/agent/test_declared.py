@@ -88,6 +88,14 @@ def test_a_subclass_has_the_parameters_of_its_base_and_its_own_defaults() -> Non
     assert make(Slow, {}).seen[0] == 0.1
 
 
+@pytest.mark.parametrize(("name", "hint", "value"), [("api", int, 1), ("needs", tuple[str, ...], ("compass",))])
+def test_what_a_class_says_of_itself_is_no_parameter_however_it_is_annotated(name: str, hint: Any, value: Any) -> None:
+    mine = type("Mine", (Agent,), {"__annotations__": {name: hint, "gain": float}, name: value, "gain": 0.5})
+    assert list(parameters_of(mine)) == ["gain"]
+    with pytest.raises(BadParameter, match="unknown parameter of Mine"):
+        checked(mine, {name: value})
+
+
 def test_private_attributes_are_no_parameters() -> None:
     class Quiet(Agent):
         _memory: list[int]

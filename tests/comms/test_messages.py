@@ -185,6 +185,16 @@ def test_a_number_beyond_a_whole_field_is_refused(name: str, value: float) -> No
         Everything(**fields).encode()
 
 
+@pytest.mark.parametrize(
+    ("value", "nearest"), [(1.4, 1.0), (1.6, 2.0), (-1.4, -1.0), (-1.6, -2.0), (127.4, 127.0), (-128.4, -128.0)]
+)
+def test_a_fraction_is_rounded_to_the_nearest_whole_number_in_a_whole_field(value: float, nearest: float) -> None:
+    fields = dict.fromkeys(Everything.ranges, 0.0)
+    assert Everything.decode(Everything(**fields | {"a": value}).encode()).a == nearest
+    rows = encode_rows(Everything, 2, fields | {"a": np.array([value, -7.0])})
+    assert decode_rows(Everything, rows, np.arange(2))["a"].tolist() == [nearest, -7.0]
+
+
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_what_is_no_number_does_not_fit_a_whole_field(value: float) -> None:
     with pytest.raises(OverflowError, match=r"Numbered\.number"):

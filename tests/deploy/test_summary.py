@@ -122,6 +122,9 @@ class Seeker(Agent):
         x, y = robot.light.vector_sum()
         turn = 1.0 if robot.bumper.pressed else y - 0.1 * robot.positioning.x_m
         robot.drive(linear_mps=0.05 + 0.05 * x, angular_radps=turn)
+
+class Stone(Agent):
+    def step(self, robot): ...
 """
 LIT = """
 format = 1
@@ -135,6 +138,10 @@ obstacles = [{ shape = "polygon", points = [[0, 0], [0.4, 0], [0, 0.4]], count =
 body = "epuck-gps"
 count = 10
 agent = "seeker.py:Seeker"
+[robots.stones]
+body = "kilobot"
+count = 2
+agent = "seeker.py:Stone"
 """
 
 

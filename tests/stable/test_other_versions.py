@@ -64,5 +64,24 @@ def test_another_version_is_refused_in_one_line(door, tmp_path):
     assert "expected" in line
 
 
+@pytest.mark.parametrize(
+    ("name", "expected", "enter"),
+    [
+        ("summary.json", "expected the summary of a run", lambda folder: folder.summary),
+        ("static.json", "expected the static part of a run", lambda folder: folder.static),
+        ("run.json", "expected what swarmwire writes at the start of a run", lambda folder: read_origin(folder.path)),
+    ],
+)
+def test_a_file_of_a_run_without_its_version_is_refused_in_one_line(name, expected, enter, tmp_path):
+    missing = {key: value for key, value in recorded()[name].items() if key != "format"}
+    (tmp_path / name).write_text(json.dumps(recorded()[name]))
+    assert enter(RunFolder(tmp_path))
+    (tmp_path / name).write_text(json.dumps(missing))
+    with pytest.raises(BadInput) as caught:
+        enter(RunFolder(tmp_path))
+    assert str(caught.value).startswith(f"{tmp_path / name}: {expected}")
+    assert "\n" not in str(caught.value)
+
+
 def test_an_agent_that_names_this_version_is_taken(tmp_path):
     assert load_later(tmp_path, API_VERSION).api == API_VERSION

@@ -201,7 +201,7 @@ class Keyed(Alone):
 class Wide(Breaks):
     """How many numbers it takes is a key."""
 
-    # A key of the sheet may stand in the place of the property: that is what is tested.
+    # pyright minds a key of the sheet in the place of a property: it may stand there, which is what is tested.
     width: int = parameter(1, help="how many numbers it takes")  # pyright: ignore[reportIncompatibleMethodOverride]
     params: int = parameter(1, help="a number")
     any: Any = field(default=None)

@@ -12,6 +12,7 @@ from swarmwire.comms.one_of import one_of
 
 T = TypeVar("T")
 TYPES: dict[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}  # in words
+OF_THE_CLASS = "needs", "api"  # what a class says of itself, never to be given
 REQUIRED = object()  # in place of a default
 
 
@@ -37,7 +38,7 @@ def parameters_of(kind: type) -> dict[str, Parameter]:
     """The parameters that an agent class declares, bases first; TypeError if a type is one that no scenario gives."""
     found: dict[str, Parameter] = {}
     for name, hint in get_type_hints(kind).items():
-        if name.startswith("_") or name == "needs" or get_origin(hint) is ClassVar or hint is ClassVar:
+        if name.startswith("_") or name in OF_THE_CLASS or ClassVar in (hint, get_origin(hint)):
             continue
         per_robot = get_origin(hint) is PerRobot
         if per_robot and VectorAgent not in kind.__mro__:

@@ -12,7 +12,7 @@ from swarmwire.comms.geometry.floor import Floor
 from swarmwire.comms.packets import Payloads
 from swarmwire.comms.senses import Senses
 
-NOBODY = -1  # in place of a receiver: all that the packet was meant for
+NOBODY = -1  # in place of a robot; of a receiver: all that the packet was meant for
 Boundary = Literal["walls", "open", "torus"]  # walls, nothing at all, or the opposite side
 
 

@@ -255,6 +255,14 @@ def test_a_body_like_another_does_not_take_over_senses_that_it_cannot_have() -> 
         body_from({**sheet, "senses": {"ground": {"noise": 0.1}}}, "drone.toml")
 
 
+def test_numbers_of_own_actuators_stand_one_after_another() -> None:
+    told = load_body("epuck").as_mapping()
+    widths = {"arm": 3, "bell": 0, "hand": 2, "eye": 1}
+    told["actuators"] = {name: {"kind": "a:B", "params": {}, "width": width} for name, width in widths.items()}
+    places = body_from_mapping(told, "told").actuator_places
+    assert places == {"arm": slice(0, 3), "bell": slice(3, 3), "hand": slice(3, 5), "eye": slice(5, 6)}
+
+
 def test_a_told_sheet_whose_actuator_is_too_wide_is_refused() -> None:
     told = load_body("epuck").as_mapping()
     told["actuators"] = {"arm": {"kind": "a:B", "params": {}, "width": 10_001}}

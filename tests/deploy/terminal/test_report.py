@@ -23,7 +23,7 @@ def shown(result: Result, **changes: object) -> str:
     """The table, of a run whose one arena is changed so."""
     out = StringIO()
     console = Console(file=out, width=160, color_system=None)
-    arena = replace(result.arenas[0], **changes)  # pyright: ignore[reportArgumentType]
+    arena = replace(result.arenas[0], **changes)  # pyright: ignore[reportArgumentType] - of any field
     print_result(replace(result, arenas=(arena,)), METRICS.values(), console)
     return out.getvalue()
 

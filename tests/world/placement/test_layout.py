@@ -93,6 +93,8 @@ def test_a_map_gives_the_size_and_boxes_where_it_is_dark(tmp_path: Path, name: s
     ends = {tuple(np.round([*c.min(0), *c.max(0)], 9)) for c in corners}
     assert ends == {(-2.0, 0.9, 2.0, 1.0), (-2.0, -1.0, -1.9, 0.9), (-1.5, -0.2, 1.0, 0.0)}
     assert {obstacle.height_m for obstacle in world.static.obstacles[0]} == {0.3}
+    as_dark = world_of(tmp_path, {"map": {**table, "occupied_below": float(np.float32(100) / np.float32(255))}})
+    assert len(as_dark.static.obstacles[0]) == 2  # what is no darker than this is free
     only_black = world_of(tmp_path, {"map": {**table, "occupied_below": 0.39}, "size_m": [4.0, 2.0]})
     assert len(only_black.static.obstacles[0]) == 2
 

@@ -51,6 +51,10 @@ def test_what_is_used_is_power_times_time() -> None:
     drained(of, targets, [[0, 0], [0, 0], [5, 5], [0xFF0000, 1]])
     watts = np.array([1.0 + 20.0 * 0.1, 1.0 + 20.0 * base_m, 0.0, 1.0 + 2 * 0.5])
     assert of.charge[0] == pytest.approx(1.0 - watts * 0.1 / 3600.0 / 0.01)
+    curving = batteries(with_battery(SHEET), with_battery(SHEET))
+    drained(curving, [[0.1, 0.2 / base_m, 0.0], [-0.1, 6.0 / base_m, 0.0]])  # the mean of how fast the wheels turn
+    watts = np.array([1.0 + 20.0 * 0.1, 1.0 + 20.0 * 3.0])
+    assert curving.charge[0] == pytest.approx(1.0 - watts * 0.1 / 3600.0 / 0.01)
     moving = batteries(HOLONOMIC)
     drained(moving, [[0.3, 1.0, -0.4]])
     assert moving.charge[0, 0] == pytest.approx(1.0 - 20.0 * 0.5 * 0.1 / 3600.0 / 0.01)

@@ -19,7 +19,7 @@ class Disruption:
 
     alive: BoolArray  # (rows,)
     radio_on: BoolArray  # (rows,)
-    backlog: IntArray  # (rows,) DROP, NEWEST or ALL, where a radio is off
+    backlog: IntArray  # (rows,) DROP, NEWEST or ALL: for when the radio is off
     sides: IntArray  # (partitions, rows) each robot's set in each partition, from 1; 0: in none
     one_way: IntArray  # (partitions, rows) the same, of those in which only the second does not hear the first
     send_gain_db: FloatArray  # (rows,) added to the strength of all that a robot sends
@@ -57,7 +57,7 @@ class Disruption:
         return not (self.alive.all() and self.radio_on.all())
 
     @property
-    def kept_back(self) -> IntArray:
+    def backlog_now(self) -> IntArray:
         """What waits at each radio until it is on again, (rows,): NEWEST or ALL; DROP where nothing does."""
         return np.where(self.radio_on | ~self.alive, DROP, self.backlog)
 

@@ -86,6 +86,7 @@ def read_origin(folder: Path) -> Origin:
         found = None
     try:
         refuse_other_format(found, RUN_FORMAT, path)
+        del found["format"]  # KeyError: every start of a run names one
         return _origin(found)
     except (KeyError, TypeError, ValueError):
         raise BadInput(str(path), "", "expected what swarmwire writes at the start of a run") from None

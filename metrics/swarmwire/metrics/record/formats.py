@@ -11,7 +11,10 @@ TABLES_FORMAT = 2  # of static.json, which has it, and of the tables
 
 
 def refuse_other_format(written: object, known: int, path: Path) -> None:
-    """Return if what a file holds names the known format, or none; BadInput if it names another."""
+    """Return if what a file holds names the known format, or none; BadInput if it names another.
+
+    Whether one must be named is up to who reads the rest of the file.
+    """
     if isinstance(written, dict):
         found = cast("dict[str, object]", written).get("format", known)
         if type(found) is not int or found != known:

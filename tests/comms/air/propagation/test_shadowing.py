@@ -107,6 +107,15 @@ def test_a_link_collects_the_integral_of_the_waves_along_its_way(link: tuple[flo
         assert found == pytest.approx(integral / np.sqrt(length_m), rel=1e-8, abs=1e-8)
 
 
+def test_each_wave_counts_once():
+    """`between_db` has its waves written out: one that it left out or took twice would show as it stands alone."""
+    count = WAVES.shape[2]
+    alone = np.array([0.05, 0.02, 0.1])[:, None] * np.eye(count)[:, None, :]  # (which, 3, waves)
+    found = np.array([shadowing_db(waves, AMPLITUDE_DB, -3.0, 1.0, 2.0, 0.5) for waves in alone])
+    assert found[0] != 0.0
+    assert (found == found[0]).all()
+
+
 def test_wave_numbers_are_quantiles_of_the_planes_spectrum_one_to_a_stratum():
     """F(k) = 1 - 1 / sqrt(1 + (2 pi delta k)^2) for the exponential covariance of scale delta."""
     k = np.hypot(WAVES[:50, 0], WAVES[:50, 1])

@@ -24,7 +24,7 @@ class Senders:
         self._radio, self._send_times = radio, send_times
         self._intake = Intake(rows)
         self._free_at_ns = np.zeros(rows, np.int64)
-        self._kept_back = np.full(rows, DROP)
+        self._backlog = np.full(rows, DROP)
         self.queued = Transmissions.none()
 
     def tune(self, radio: Radio) -> None:
@@ -40,7 +40,7 @@ class Senders:
         packets = self._intake.take(sent_at_ns, sent, others_alive, epoch)
         on_air_at_ns, off_air_at_ns, fate = self._access(sent_at_ns, packets.sender, packets.payloads.sizes)
         packets = packets._replace(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns, fate=fate)
-        self.queued = newest_only(self.queued.followed_by(packets), self._kept_back == NEWEST, sent_at_ns)
+        self.queued = newest_only(self.queued.followed_by(packets), self._backlog == NEWEST, sent_at_ns)
         return packets
 
     def leave(self, until_ns: int, now: Disruption) -> Transmissions:
@@ -60,13 +60,13 @@ class Senders:
 
     def switch(self, at_ns: int, now: Disruption) -> None:
         """Radios are off or on from `at_ns` on: queues are kept back, or go on air again."""
-        before, self._kept_back = self._kept_back, now.kept_back
-        held, free = self._kept_back != DROP, (before != DROP) & (self._kept_back == DROP)
+        before, self._backlog = self._backlog, now.backlog_now
+        held, free = self._backlog != DROP, (before != DROP) & (self._backlog == DROP)
         if free.any():
             self.queued, self._free_at_ns = let_go(self.queued, free, self._free_at_ns, at_ns)
         if (held & (before == DROP)).any():
             self.queued, self._free_at_ns = held_back(self.queued, held & (before == DROP), self._free_at_ns)
-        self.queued = newest_only(self.queued, self._kept_back == NEWEST, np.full(len(held), at_ns))
+        self.queued = newest_only(self.queued, self._backlog == NEWEST, np.full(len(held), at_ns))
 
     def die(self, at_ns: int, alive: BoolArray) -> Transmissions:
         """Take out all that waits at radios of robots not alive (rows,): SENDER_DEAD now, and the radios are free."""
@@ -83,7 +83,7 @@ class Senders:
     def _access(self, sent_at_ns: IntArray, sender: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray, IntArray]:
         radio = self._radio
         lasts_ns = airtime_ns(radio, sizes + radio.overhead_bytes)
-        held = self._kept_back != DROP
+        held = self._backlog != DROP
         on_air_at_ns, fate, free_at_ns = queue.enter(
             sent_at_ns,
             np.where(held, FAR_NS, self._free_at_ns),
@@ -92,7 +92,7 @@ class Senders:
             sender,
             lasts_ns,
             sizes > radio.max_payload_bytes,
-            np.where(self._kept_back == NEWEST, NO_LIMIT, radio.queue_limit),
+            np.where(self._backlog == NEWEST, NO_LIMIT, radio.queue_limit),
         )
         self._free_at_ns = np.where(held, self._free_at_ns, free_at_ns)
         return on_air_at_ns, on_air_at_ns + np.where(fate == queue.ACCEPTED, lasts_ns, 0), fate

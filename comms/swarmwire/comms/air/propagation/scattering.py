@@ -23,16 +23,13 @@ import math
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.air.propagation.waves import cosine, sine, total
+from swarmwire.comms.air.propagation.waves import SUMS, cosine, sine, total
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 
-WAVES, SUMS, GENERATOR = (
-    32,
-    16,
-    19,
-)  # GENERATOR: v's index is GENERATOR x u's: near the golden section, and without common divisor
+WAVES = 2 * SUMS  # as `scattered` adds them up
+GENERATOR = 19  # v's index is so many times u's: near the golden section of WAVES, and without common divisor
 SCALE = 1.0 / math.sqrt(WAVES)
 FADING = purpose("fading")
 TURN_U, TURN_V, PHASE, OWN = range(4)  # what draws are for

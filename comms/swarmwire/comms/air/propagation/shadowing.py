@@ -23,12 +23,12 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.parameters.propagation import Shadowing
-from swarmwire.comms.air.propagation.waves import sine, total
+from swarmwire.comms.air.propagation.waves import SUMS, sine, total
 from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.draws import purpose, uniform
 
-WAVES, SUMS = 128, 16
+WAVES = 8 * SUMS  # as `between_db` adds them up
 NEARLY_NO_TURN = np.float32(1e-30)  # so that touching robots do not divide by 0
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 SHADOWING = purpose("shadowing")
@@ -55,7 +55,7 @@ def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
 
     `waves` (3, WAVES) are those of one arena. For many links between few robots see `heights` and `between_db`.
     """
-    height = np.empty((2, waves.shape[1]))
+    height = np.empty((2, WAVES))
     heights(waves, ax, ay, height[0])
     heights(waves, bx, by, height[1])
     return between_db(waves.reshape((1, 3, -1)), 0, amplitude_db, height, 0, 1, bx - ax, by - ay, np.empty(SUMS))
@@ -78,8 +78,10 @@ def between_db(field, arena, amplitude_db, height, a, b, dx, dy, parts):
     """
     link = field, np.uint64(arena), height, np.uint64(a), np.uint64(b), dx, dy
     for n in range(SUMS):
-        even = (_mean(link, n) + _mean(link, n + 64)) + (_mean(link, n + 32) + _mean(link, n + 96))
-        odd = (_mean(link, n + 16) + _mean(link, n + 80)) + (_mean(link, n + 48) + _mean(link, n + 112))
+        even = (_mean(link, n) + _mean(link, n + 4 * SUMS)) + (_mean(link, n + 2 * SUMS) + _mean(link, n + 6 * SUMS))
+        odd = (_mean(link, n + SUMS) + _mean(link, n + 5 * SUMS)) + (
+            _mean(link, n + 3 * SUMS) + _mean(link, n + 7 * SUMS)
+        )
         parts[n] = even + odd
     return total(parts) * (amplitude_db / (2.0 * math.pi)) * math.sqrt(math.sqrt(dx * dx + dy * dy))
 

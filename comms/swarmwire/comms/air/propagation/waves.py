@@ -12,6 +12,7 @@ from numba import njit
 
 from swarmwire.comms.borrowing import borrowing
 
+SUMS = 16  # that `total` adds up: it is written out for so many
 # Taylor's series of sin(2 pi y) in y, up to y^21: for |y| <= 1/2 the next term is 1e-11.
 _A, _B, _C, _D, _E, _F, _G, _H, _I, _J, _K = (
     (-1.0) ** n * (2.0 * math.pi) ** (2 * n + 1) / math.factorial(2 * n + 1) for n in range(11)
@@ -39,7 +40,7 @@ def cosine(turns):
 
 @borrowing(error_model="numpy")
 def total(s):
-    """The sum of 16 numbers by halves, s[n] + s[n + 8] first: loops that end so leave sums of every 16th, n apart."""
+    """The sum of SUMS numbers by halves, s[n] + s[n + 8] first: loops that end so leave sums of every 16th, n apart."""
     even = ((s[0] + s[8]) + (s[4] + s[12])) + ((s[2] + s[10]) + (s[6] + s[14]))
     odd = ((s[1] + s[9]) + (s[5] + s[13])) + ((s[3] + s[11]) + (s[7] + s[15]))
     return even + odd

@@ -17,7 +17,7 @@ from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 
 STATE, LOSS = purpose("burst state"), purpose("burst loss")
-NOBODY = -1
+NO_LINK = -1  # a free place of the table
 LEAST_CAPACITY = 1024
 SCATTER = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden section: Knuth's multiplicative hashing
 
@@ -25,7 +25,7 @@ SCATTER = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden section: Knuth's multip
 class Bursting(NamedTuple):
     """Which links were good or bad, by place in a hash table, and the numbers by which they change."""
 
-    link: IntArray  # (capacity,) sender x rows + receiver, or NOBODY
+    link: IntArray  # (capacity,) sender x rows + receiver, or NO_LINK
     at_ns: IntArray  # (capacity,) when it was last used
     bad: BoolArray  # (capacity,)
     added: IntArray  # (1,) links that kernels have added
@@ -85,7 +85,7 @@ class BurstStates:
         self._kept += int(bursting.added[0])
 
     def _clear(self, capacity: int) -> None:
-        self._link = np.full(capacity, NOBODY, np.int64)
+        self._link = np.full(capacity, NO_LINK, np.int64)
         self._at_ns = np.zeros(capacity, np.int64)
         self._bad = np.zeros(capacity, np.bool_)
         self._kept = 0
@@ -95,7 +95,7 @@ class BurstStates:
         relaxation_s = 1.0 / (1.0 / self._bursts.good_s + 1.0 / self._bursts.bad_s)
         # One relaxation time more than `bad_after` needs: rounding then cannot make a difference.
         silent_ns = math.ceil((FORGOTTEN + 1.0) * relaxation_s * NS_PER_S)
-        counts = (self._link != NOBODY) & (now_ns - self._at_ns <= silent_ns)
+        counts = (self._link != NO_LINK) & (now_ns - self._at_ns <= silent_ns)
         link, at_ns, bad = self._link[counts], self._at_ns[counts], self._bad[counts]
         self._clear(max(1 << (4 * (len(link) + room) - 1).bit_length(), LEAST_CAPACITY))
         _insert(self._link, self._at_ns, self._bad, link, at_ns, bad)
@@ -108,7 +108,7 @@ def _place(links, link):
     mask = np.uint64(len(links) - 1)
     # The upper half of the product depends on all bits of the link; its lowest bits would only on the lowest.
     at = ((np.uint64(link) * SCATTER) >> np.uint64(32)) & mask
-    while links[at] != NOBODY and links[at] != link:
+    while links[at] != NO_LINK and links[at] != link:
         at = (at + np.uint64(1)) & mask
     return at
 
@@ -135,7 +135,7 @@ def takes(bursting, link, key, s, r, sequence, attempt, at_ns):
     """Whether a burst takes a packet from s to r, indices in the arena, at `at_ns`."""
     at = _place(bursting.link, link)
     silent_s = np.inf
-    if bursting.link[at] == NOBODY:
+    if bursting.link[at] == NO_LINK:
         bursting.link[at] = link
         bursting.added[0] += 1
     else:

@@ -11,7 +11,6 @@ from swarmwire.comms.air.signal.tables import (
     AWAITING,
     BACKING_OFF,
     DATA,
-    NOBODY,
     NOT_LEARNED,
     SENDING,
     SILENT,
@@ -20,6 +19,7 @@ from swarmwire.comms.air.signal.tables import (
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.outcomes import SendResult
+from swarmwire.comms.truth import NOBODY
 
 HEARD, CHANNEL_BUSY = int(Fate.HEARD), int(Fate.CHANNEL_BUSY)
 IS_ACKNOWLEDGED, FOUND_BUSY = int(SendResult.ACKNOWLEDGED), int(SendResult.CHANNEL_BUSY)

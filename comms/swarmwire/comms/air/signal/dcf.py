@@ -11,10 +11,11 @@ import numpy as np
 
 from swarmwire.comms.air.parameters.access import METHODS
 from swarmwire.comms.air.signal.event_queue import SEND, cancel, due_ns, schedule
-from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY
+from swarmwire.comms.air.signal.tables import BACKING_OFF
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
+from swarmwire.comms.truth import NOBODY
 
 DCF = METHODS.index("dcf")
 SLOTS, SLOTS_BEFORE = purpose("dcf slots"), purpose("dcf slots before sending")

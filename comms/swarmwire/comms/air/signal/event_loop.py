@@ -6,9 +6,10 @@ import numpy as np
 
 from swarmwire.comms.air.signal import attempts, dcf, jamming, on_air, sender_queue
 from swarmwire.comms.air.signal.event_queue import ENTER, LISTENED, OFF_AIR, SEND, TIMER, cancel, schedule
-from swarmwire.comms.air.signal.tables import BACKING_OFF, NOBODY, RECEIVING, SILENT
+from swarmwire.comms.air.signal.tables import BACKING_OFF, RECEIVING, SILENT
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.truth import NOBODY
 
 SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_DEAD), int(Fate.BLACKOUT)
 FEW = 64  # rows that any one event tells beyond a frame's links

@@ -10,11 +10,12 @@ from numba import njit
 from swarmwire.comms.air.decibels import from_db
 from swarmwire.comms.air.signal.log_success import NEVER, log_success
 from swarmwire.comms.air.signal.losses import taken_by
-from swarmwire.comms.air.signal.tables import ACKNOWLEDGEMENT, NOBODY
+from swarmwire.comms.air.signal.tables import ACKNOWLEDGEMENT
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.truth import NOBODY
 
 RECEPTION, ACKNOWLEDGED = purpose("reception"), purpose("reception of an acknowledgement")
 HEARD, TOO_WEAK, COLLIDED, JAMMED = int(Fate.HEARD), int(Fate.TOO_WEAK), int(Fate.COLLIDED), int(Fate.JAMMED)

@@ -9,10 +9,11 @@ from swarmwire.comms.air.signal.links_by_sender import Levels, links_by_sender
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.air.signal.pairs import Pairs, pairs_of
 from swarmwire.comms.air.signal.surroundings import Surroundings
-from swarmwire.comms.air.signal.tables import LINK, NOBODY, SILENT, LinkPlaces, Table
+from swarmwire.comms.air.signal.tables import LINK, SILENT, LinkPlaces, Table
 from swarmwire.comms.air.stages.stage import Medium
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.truth import NOBODY
 
 
 class LinksHeld:

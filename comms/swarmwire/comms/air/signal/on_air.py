@@ -15,9 +15,10 @@ from swarmwire.comms.air.signal.event_queue import OFF_AIR, schedule
 from swarmwire.comms.air.signal.frame_fate import alone_log_success, outcome
 from swarmwire.comms.air.signal.log_success import log_success
 from swarmwire.comms.air.signal.losses import takes_none
-from swarmwire.comms.air.signal.tables import DATA, NOBODY, RECEIVING, SILENT, TURNING
+from swarmwire.comms.air.signal.tables import DATA, RECEIVING, SILENT, TURNING
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.truth import NOBODY
 
 HEARD, TOO_WEAK, COLLIDED, JAMMED = int(Fate.HEARD), int(Fate.TOO_WEAK), int(Fate.COLLIDED), int(Fate.JAMMED)
 HOPELESS = -50.0  # a logarithm below that of the least draw

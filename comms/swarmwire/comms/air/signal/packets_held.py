@@ -6,13 +6,14 @@ import numpy as np
 
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.signal.send_results import result_at_first
-from swarmwire.comms.air.signal.tables import NOBODY, PACKET, Table
+from swarmwire.comms.air.signal.tables import PACKET, Table
 from swarmwire.comms.air.timing.access_timing import IEEE_802_15_4
 from swarmwire.comms.air.timing.frames import airtime_ns
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.truth import NOBODY
 
 HEADER_BYTES = 6  # of IEEE 802.15.4 before its PSDU
 

@@ -19,6 +19,7 @@ from swarmwire.comms.air.propagation.bodies_between import bodies_between
 from swarmwire.comms.air.propagation.fading import gain_of
 from swarmwire.comms.air.propagation.path_loss import loss_db
 from swarmwire.comms.air.propagation.walls import wall_loss_db
+from swarmwire.comms.air.propagation.waves import SUMS
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.air.signal.surroundings import Surroundings
 from swarmwire.comms.arrays import FloatArray, IntArray
@@ -135,10 +136,10 @@ def _join(a, b, loss, order, x, y, ahead, around, near, metres2):
 @njit(cache=True)
 def _add_shadows(loss, x, y, robots, field, amplitude_db, a, b):
     single = np.float32
-    height = np.empty((len(x), field.shape[2]), single)
+    height = np.empty((len(x), shadowing.WAVES), single)
     for r in range(len(x)):
         shadowing.heights(field[r // robots], x[r], y[r], height[r])
-    _add_between(loss, x, y, robots, field.astype(single), amplitude_db, a, b, height, np.empty(shadowing.SUMS, single))
+    _add_between(loss, x, y, robots, field.astype(single), amplitude_db, a, b, height, np.empty(SUMS, single))
 
 
 @borrowing()
@@ -182,11 +183,11 @@ def _best_dbm(send_dbm, receive_dbi, s, r):
 
 @njit(cache=True)
 def _fade(gain, x, y, robots, keys, scatter, law, a, b):
-    at, number = np.empty((len(x), 4, scatter.shape[2]), np.float32), np.empty(len(x), np.uint64)
+    at, number = np.empty((len(x), 4, scattering.WAVES), np.float32), np.empty(len(x), np.uint64)
     for r in range(len(x)):
         scattering.arriving(scatter[r // robots], x[r], y[r], at[r])
         number[r] = scattering.own_number(keys[r // robots], r % robots)
-    parts = np.empty((2, scattering.SUMS), np.float32)
+    parts = np.empty((2, SUMS), np.float32)
     _gains(gain, x, y, at, number, law, a, b, parts[0], parts[1])
 
 

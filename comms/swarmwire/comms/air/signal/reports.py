@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.comms.air.links import HEARD, Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.signal.links_held import LinksHeld
-from swarmwire.comms.air.signal.tables import NOBODY, Table
+from swarmwire.comms.air.signal.tables import Table
 from swarmwire.comms.air.signal.told import Told
 from swarmwire.comms.air.stages.chain import chain_after_reception
 from swarmwire.comms.air.stages.stage import Medium
@@ -16,6 +16,7 @@ from swarmwire.comms.air.way import Decided
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.truth import NOBODY
 
 Poses = dict[int, FloatArray]  # by hold
 

@@ -11,7 +11,6 @@ from swarmwire.comms.air.signal.tables import (
     HELD,
     KEPT_ALL,
     KEPT_NEWEST,
-    NOBODY,
     NOT_LEARNED,
     NOTHING,
     PAUSING,
@@ -21,6 +20,7 @@ from swarmwire.comms.air.signal.tables import (
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.outcomes import SendResult
+from swarmwire.comms.truth import NOBODY
 
 QUEUE_FULL, FOUND_FULL = int(Fate.QUEUE_FULL), int(SendResult.QUEUE_FULL)
 CSMA = METHODS.index("csma-802154")

@@ -25,7 +25,6 @@ from swarmwire.comms.air.signal.rules import levels_of, rules_of
 from swarmwire.comms.air.signal.send_results import learned, sent_in_vain
 from swarmwire.comms.air.signal.surroundings import Surroundings, surroundings_of
 from swarmwire.comms.air.signal.tables import (
-    NOBODY,
     NOTHING,
     SILENT,
     State,
@@ -41,6 +40,7 @@ from swarmwire.comms.air.way import Decided, Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Sent
+from swarmwire.comms.truth import NOBODY
 
 LEAST_ROOM = 4096
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.truth import NOBODY
 
 # What a robot's radio does with the packet at the head of its queue; from BACKING_OFF on there is one.
 NOTHING, PAUSING, BACKING_OFF, LISTENING, TURNING, SENDING, AWAITING, HELD = range(8)
@@ -16,7 +17,6 @@ KEPT_ALL, KEPT_NEWEST = -1, -2
 # What a robot has on air.
 SILENT, DATA, ACKNOWLEDGEMENT = range(3)
 RECEIVING = 255  # of a link, beside the fates: the frame on air may still be heard
-NOBODY = -1
 LONG_AGO_NS = -(10**15)
 NOT_LEARNED = -1  # the result of a packet whose sender died while it was on air
 

@@ -5,9 +5,10 @@
 import numpy as np
 
 from swarmwire.comms.air.signal.event_queue import ANSWER, schedule
-from swarmwire.comms.air.signal.tables import HELD, NOBODY, NOTHING
+from swarmwire.comms.air.signal.tables import HELD, NOTHING
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.truth import NOBODY
 
 HEARD, BLOCKED, BLACKOUT = int(Fate.HEARD), int(Fate.BLOCKED), int(Fate.BLACKOUT)
 

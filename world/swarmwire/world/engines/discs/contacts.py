@@ -17,7 +17,7 @@ BEFORE, NOW = 1, 2  # bits of touch: in the tick before, in this one
 CONTACT = np.dtype(
     [
         ("row", np.int64),
-        ("kind", np.int64),  # of the other thing: ROBOT, or as `discs_fixed` has it
+        ("kind", np.int64),  # of the other thing: ROBOT, or as `fixed` has it
         ("which", np.int64),  # its row, or its number among its kind
         ("touch", np.int64),  # bits; robots alone
         ("nx", np.float64),  # unit vector towards the other thing

@@ -1,6 +1,6 @@
 """An array engine for round robots: one compiled call moves those of all arenas through all steps of a tick.
 
-Rows of different arenas are never near each other, and contacts are solved in an order of their own (see `discs_near`),
+Rows of different arenas are never near each other, and contacts are solved in an order of their own (see `near`),
 so an arena moves bit for bit alike alone and beside others, and what is far away changes nothing.
 """
 

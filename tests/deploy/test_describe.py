@@ -1,4 +1,4 @@
-"""Every name that a registry holds is listed, and described with its help, units, defaults and source."""
+"""What a registry holds is described with its help, units, defaults and source."""
 
 import json
 from dataclasses import MISSING, fields, is_dataclass
@@ -10,29 +10,23 @@ from rich.console import Console
 
 from swarmwire.agent import behaviours
 from swarmwire.agent.declared import REQUIRED, parameters_of
-from swarmwire.agent.turn import OUTCOMES
-from swarmwire.comms.air.parameters.gives import Gives
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.stages.chain import ORDER
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES
 from swarmwire.comms.bodies.leds import Leds
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.registry import ACTIONS
-from swarmwire.comms.fates import FATE_NAMES
 from swarmwire.comms.parameters import limits_of
 from swarmwire.comms.sheets import SHEETS
 from swarmwire.deploy.catalogue.entry import Entry
 from swarmwire.deploy.catalogue.find import find
 from swarmwire.deploy.catalogue.kinds import KINDS
-from swarmwire.deploy.catalogue.text import print_entry, print_list
+from swarmwire.deploy.catalogue.text import print_entry
 from swarmwire.deploy.catalogue.units import unit_of
 from swarmwire.metrics.registry import METRICS
-from swarmwire.metrics.swarm.order import Order
-from swarmwire.world.scenario.scenario import PhysicsTable
 from swarmwire.world.scenario.scenario_file import scenario_schema
 from swarmwire.world.scenario.schema import written_form
-from tests.deploy.commands import LOSSY, called
+from tests.deploy.commands import called
 from tests.docs.pages import ROOT
 
 ACTION_OF = {next(of.default for of in fields(kind) if of.name == "do"): kind for kind in ACTIONS}
@@ -90,26 +84,6 @@ def assert_tells(text: str, wanted: list[tuple[str, ...]]) -> None:
         assert any(all(part in line for part in parts) for line in lines), (name, parts, lines)
 
 
-@pytest.mark.parametrize(
-    ("kind", "names"),
-    [
-        ("bodies", body_names()),
-        ("senses", [*SHEETS, *(f"radio.{of.name}" for of in fields(Gives)), OUTCOMES]),
-        ("behaviours", behaviours.__all__),
-        ("drives", list(DRIVES)),
-        ("sheets", ["name", "source", "radius_m", "height_m", "mass_kg", "altitude_m", "contacts", "leds"]),
-        ("engines", list(get_args(PhysicsTable.model_fields["engine"].annotation))),
-        ("events", list(ACTION_OF)),
-        ("metrics", list(METRICS)),
-        ("stages", [module.__name__.rpartition(".")[2] for module in ORDER]),
-        ("fates", list(FATE_NAMES)),
-    ],
-)
-def test_a_kind_is_what_its_registry_holds(kind, names):
-    entries = next(of for of in KINDS if of.name == kind).entries()
-    assert [entry.name for entry in entries] == names
-
-
 @pytest.mark.parametrize("module", ORDER, ids=lambda module: module.__name__.rpartition(".")[2])
 def test_a_stage_tells_the_keys_that_it_goes_by(module):
     entry = find(f"stage:{module.__name__.rpartition('.')[2]}")
@@ -137,12 +111,6 @@ def test_80_columns_hold_every_description_and_cut_no_name(kind):
         for table in entry.tables:
             for parameter in table.parameters:
                 assert f"\n{parameter.name} " in text
-
-
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_each_kind_finds_its_own(kind):
-    entry = kind.entries()[-1]
-    assert find(f"{kind.one}:{entry.name}") == find(f"{kind.name}:{entry.name}") == entry
 
 
 @pytest.mark.parametrize("name", body_names())
@@ -273,47 +241,6 @@ def test_a_key_tells_where_the_file_has_it(name, place):
     assert dict(find(name).facts)["in a scenario"] == place
 
 
-@pytest.mark.parametrize(
-    ("asked", "name"),
-    [
-        ("ORDER", "order"),
-        ("loss", "radio.loss"),
-        ("robots.flock.count", "robots.*.count"),
-        ("arena.obstacles.0.shape", "arena.obstacles.*.shape"),
-        ("robots.flock", "robots.*"),
-        ("events:kill", "kill"),
-    ],
-)
-def test_a_name_may_be_short_or_that_of_ones_own_group(asked, name):
-    assert find(asked).name == name
-
-
-@pytest.mark.parametrize(
-    ("asked", "expected"),
-    [
-        ("flokking", "nothing has this name; nearest: Flocking"),
-        ("radio.los", "nearest: radio.loss"),
-        ("latencys", "nearest: radio.latency_s"),
-        ("metric:kill", "nothing has this name"),
-        ("xyzzy", "nothing is near it"),
-        ("blackout", "say which: event:blackout, fate:blackout"),
-        ("size_m", "say which: arena.size_m, arena.obstacles.*.within.size_m"),
-        ("fates", "swarmwire list fates"),
-        ("absent.toml", "expected a readable file"),
-        ("absent.py:Mine", "there is no file"),
-        ("absent.py", "expected the class in it, too: absent.py:Class"),
-        (str(LOSSY), "expected a body's sheet, got a scenario; swarmwire check and draw take one"),
-        ("swarmwire.agent:Robot", "no Agent or VectorAgent"),
-    ],
-)
-def test_a_name_that_leads_nowhere_or_to_several_things_says_what_to_try(asked, expected):
-    with pytest.raises(BadInput) as refused:
-        find(asked)
-    assert str(refused.value).startswith(f"{asked}: ")
-    assert expected in str(refused.value)
-    assert "\n" not in str(refused.value)
-
-
 def test_an_agent_of_ones_own_is_described_by_its_docstring_and_comments(tmp_path, monkeypatch):
     (tmp_path / "my_agent.py").write_text(OWN)
     monkeypatch.chdir(tmp_path)
@@ -325,53 +252,7 @@ def test_an_agent_of_ones_own_is_described_by_its_docstring_and_comments(tmp_pat
     assert "one robot (Agent)" in text
 
 
-def test_a_metric_of_ones_own_is_there_once_it_is_registered(monkeypatch):
-    class Mine(Order):
-        """Order, as I see it."""
-
-        name = "mine"
-        help = "order, as I see it"
-
-    monkeypatch.setitem(METRICS, "mine", Mine)
-    assert find("mine").help == "order, as I see it"
-
-
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_a_list_is_a_plain_line_for_each_thing_where_it_is_piped(kind):
-    out = StringIO()
-    print_list(kind, Console(file=out))
-    heading, *lines = out.getvalue().splitlines()
-    assert heading.startswith(kind.one)
-    assert [line.split("  ")[0] for line in lines] == [entry.name for entry in kind.entries()]
-    assert all(line == line.rstrip() and line.isprintable() for line in lines)
-
-
-def test_the_list_command_names_kinds_and_things(monkeypatch, capsys):
-    code, out, errors = called(monkeypatch, capsys, "list")
-    assert (code, errors) == (0, "")
-    for kind in KINDS:
-        assert f"{kind.name} " in out
-    assert "min_gap             smallest distance" in called(monkeypatch, capsys, "list", "metrics")[1]
-    assert list(json.loads(called(monkeypatch, capsys, "list", "--json")[1])) == [kind.name for kind in KINDS]
-
-
 def test_the_describe_command_gives_json_to_programs(monkeypatch, capsys):
     found = json.loads(called(monkeypatch, capsys, "describe", "radio.loss", "--json")[1])
     (loss,) = found["tables"][0]["parameters"]
     assert (found["kind"], loss["value"], loss["required"]) == ("radio", 0.0, False)
-
-
-@pytest.mark.parametrize("arguments", [["list", "nothing"], ["describe", "flokking"]])
-def test_the_mistaken_get_one_line_and_exit_code_2(monkeypatch, capsys, arguments):
-    code, out, errors = called(monkeypatch, capsys, *arguments)
-    assert (code, out) == (2, "")
-    assert errors.startswith(f"error: {arguments[1]}: ")
-    assert errors.count("\n") == 1
-
-
-@pytest.mark.parametrize("name", ["list", "describe", "new"])
-def test_the_help_of_a_command_shows_how_it_is_called(monkeypatch, capsys, name):
-    code, out, _ = called(monkeypatch, capsys, name, "--help")
-    assert code == 0
-    assert "For example" in out
-    assert f" swarmwire {name} " in out
