@@ -62,9 +62,9 @@ def _heard(robots: int, packets: int) -> Heard:
 def agent_overhead(name: str, repeats: int) -> None:
     """What the framework costs a robot's step, where one robot is all and where there are many, and a packet read."""
     told = {"body": "footbot", "rays": 24, "packets_per_step": PACKETS}
-    for robots, ticks in ((1, 5000), (100, 100)):
+    for robots, ticks, at in ((1, 5000, ""), (100, 100, "-of-100")):
         overhead(WallClock(), robots, PACKETS, ticks // 10)
         found = [overhead(WallClock(), robots, PACKETS, ticks) for _ in range(repeats)]
         for part, values in (("step", [one.step_us for one in found]), ("packet", [one.packet_us for one in found])):
             line = {"robots": robots, **told, **spread(values)}
-            print_line(f"{name}-{part}", statistics.median(values), f"µs per {part}", line)
+            print_line(f"{name}-{part}{at}", statistics.median(values), f"µs per {part}", line)

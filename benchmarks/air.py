@@ -126,5 +126,6 @@ def air_cost(name: str, repeats: int) -> None:
 
 def air_scaling(name: str, repeats: int) -> None:
     """How much dearer a link is in one swarm than in another of the same density."""
-    ratio, told = scaling()
-    print_line(name, ratio, "dearest over cheapest", told)
+    found = [scaling() for _ in range(repeats)]
+    ratios = [ratio for ratio, _ in found]
+    print_line(name, statistics.median(ratios), "dearest over cheapest", {**found[0][1], **spread(ratios)})
