@@ -22,7 +22,6 @@ def recorded(request, tmp_path, monkeypatch):
     """A folder as a run leaves it that ended, or that was killed just before: parts, and no summary."""
     if request.param == "killed":
         monkeypatch.setattr(table_writer, "join_parts", lambda *_: None)
-        monkeypatch.setattr(table_writer, "LEAST_PART_BYTES", 0)
     monkeypatch.setattr(tick_recorder, "MOST_TICKS", 4)
     of, kill = static(3, arenas=2), Happened(0, 0.0, "kill", False, np.array([False, True, False] * 2))
     seen = list(wandering(of, TICKS, events=(kill,), finished=links([0, 1], [2, 0], [5, 6], 0, arena=[0, 1])))

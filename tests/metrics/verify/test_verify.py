@@ -150,7 +150,6 @@ def test_bytes_turned_over_within_a_table_are_found(tmp_path):
 def killed(folder, monkeypatch, in_chunk=3):
     """A folder as a run leaves it that was killed: parts only."""
     monkeypatch.setattr(table_writer, "join_parts", lambda *_: None)
-    monkeypatch.setattr(table_writer, "LEAST_PART_BYTES", 0)
     monkeypatch.setattr(tick_recorder, "MOST_TICKS", in_chunk)
     fill(folder)
     (folder / "summary.json").unlink()
