@@ -7,6 +7,7 @@ import pytest
 
 from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.deploy import Simulation, run
+from swarmwire.metrics.verify.verify import verify
 from tests.deploy.commands import LOSSY
 
 SHORT = ["duration_s=2"]
@@ -77,3 +78,10 @@ def test_nothing_is_made_of_a_bad_scenario(tmp_path):
     with pytest.raises(BadInput):
         Simulation(LOSSY, overrides=["robots.flock.count=-1"], out=tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+def test_the_folder_of_a_run_that_ended_before_its_first_tick_is_whole(tmp_path):
+    with Simulation(LOSSY, overrides=SHORT, out=tmp_path / "run") as simulation:
+        pass
+    assert simulation.result.ticks == 0
+    assert [finding for finding in verify(tmp_path / "run") if not finding.good] == []

@@ -12,8 +12,8 @@ FILE_HEADER_BYTES = 12  # of a .rrd: magic, version, options
 FRAME_HEADER_BYTES = 16  # kind, and the payload's length in the last 8, little-endian
 
 
-def check_recording(path: Path) -> tuple[State, str]:
-    """Read a .rrd to its end; without rerun-sdk only that it is there."""
+def check_recording(path: Path, has_ticks: bool = True) -> tuple[State, str]:
+    """Read a .rrd to its end; without rerun-sdk only that it is there. A run that `has_ticks` shows one at least."""
     megabytes = f"{path.stat().st_size / 1e6:.1f} MB"
     if find_spec("rerun") is None or find_spec("rerun_bindings") is None:
         return State.WHOLE, f"{megabytes}, not read: that needs rerun-sdk (swarmwire-metrics[view])"
@@ -24,7 +24,7 @@ def check_recording(path: Path) -> tuple[State, str]:
     reach = "no tick in it" if last is None else f"up to tick {last}"
     if not closed:
         return State.PARTIAL, f"{megabytes}, readable {reach}; it was never closed"
-    return State.WHOLE if last is not None else State.PARTIAL, f"{megabytes}, {reach}"
+    return State.PARTIAL if last is None and has_ticks else State.WHOLE, f"{megabytes}, {reach}"
 
 
 def _read_all(path: Path) -> tuple[int | None, bool]:

@@ -124,7 +124,7 @@ def _recording(folder: RunFolder, summary: dict[str, Any] | None) -> Finding:
     path = folder.path / RECORDING
     if not path.exists():
         return Finding(RECORDING, State.MISSING if summary and "rrd" in summary["record"] else State.NOT_RECORDED, "")
-    return Finding(RECORDING, *check_recording(path))
+    return Finding(RECORDING, *check_recording(path, has_ticks=summary is None or summary["ticks"] > 0))
 
 
 def _log(folder: RunFolder) -> Finding:
