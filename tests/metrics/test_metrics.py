@@ -98,11 +98,12 @@ def test_a_registered_metric_is_measured_by_name(monkeypatch):
     assert [metric.name for metric in Metrics(["turned"]).metrics] == ["turned"]
 
 
-def test_a_name_that_is_taken_is_refused():
+@pytest.mark.parametrize("taken", ["order", "delivery"])
+def test_a_name_that_is_taken_is_refused(taken):
     class Other(Turned):
-        name = "order"
+        name = taken
 
-    with pytest.raises(BadInput, match=r"metrics\.order"):
+    with pytest.raises(BadInput, match=rf"metrics\.{taken}: expected a name that is not taken"):
         register(Other)
 
 

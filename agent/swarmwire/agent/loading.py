@@ -33,7 +33,8 @@ def load_agent(spec: str) -> AgentClass:
     if type(needs) is not tuple or not all(type(need) is str for need in cast("tuple[object, ...]", needs)):
         raise NoAgent(f'{name}.needs: expected a tuple of texts such as ("proximity",), got {needs!r}')
     shared = [attribute for base in kind.__mro__ for attribute in vars(base).items() if _is_shared(*attribute)]
-    for attribute, value in shared:
+    if shared:
+        attribute, value = shared[0]
         raise NoAgent(f"{name}.{attribute}: a {type(value).__name__} that all robots would share: make it in __init__")
     try:
         parameters_of(kind)

@@ -30,7 +30,7 @@ def borrowing(*, from_python: bool = False, **options: Any) -> Callable[[Callabl
 def _for_kernels(kernel: Any) -> Any:
     """The kernel, which raises TypeError if Python calls it: numba would call what is not there, and crash."""
 
-    def keep(compiled: Any) -> None:
+    def keep(compiled: Any) -> None:  # for other kernels; numba would also list it among what Python may call
         kernel.overloads[tuple(compiled.signature.args)] = compiled
 
     def refuse(*_: Any, **__: Any) -> NoReturn:

@@ -6,10 +6,9 @@ from typing import Any, get_args
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.own_class import own_class
-from swarmwire.metrics.drawing.film import DELIVERY
 from swarmwire.metrics.metric import Kind, Metric
 from swarmwire.metrics.record.tick_columns import KEYS, MOVABLE, RADIO, ROBOT_COLUMNS, SIDEWAYS
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.registry import DELIVERY, METRICS
 
 COLUMNS = {*KEYS, *ROBOT_COLUMNS, SIDEWAYS, *MOVABLE, *RADIO}  # of the table of ticks, where each has one, too
 

@@ -9,12 +9,12 @@ from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Obstacle, Static
 from swarmwire.metrics.record.tick_columns import MOVABLE
+from swarmwire.metrics.registry import DELIVERY
 
 if TYPE_CHECKING:
     import polars as pl
 
 NO_STATE = -1
-DELIVERY = "delivery"  # over the last second
 
 
 class Recorded(Protocol):

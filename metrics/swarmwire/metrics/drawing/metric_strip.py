@@ -8,10 +8,9 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.one_of import one_of
-from swarmwire.metrics.drawing.film import DELIVERY
 from swarmwire.metrics.drawing.layout import Layout
 from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Look
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.registry import DELIVERY, METRICS
 
 MOST_PLOTS = 4
 PREFERRED = ("target_best", "target_mean", "order", "largest_component", DELIVERY, "min_gap", "collisions")

@@ -9,8 +9,8 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.fates import FATE_NAMES, Fate
 from swarmwire.comms.truth import Happened, Static, Truth
-from swarmwire.metrics.drawing.film import DELIVERY
 from swarmwire.metrics.palette import Color
+from swarmwire.metrics.registry import DELIVERY
 from swarmwire.metrics.viewer.colors import FATES, MARK
 from swarmwire.metrics.viewer.plotted import Plotted
 from swarmwire.metrics.viewer.rows import RerunRows
