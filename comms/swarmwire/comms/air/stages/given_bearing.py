@@ -5,10 +5,10 @@
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.air.links import HEARD, Links
+from swarmwire.comms.air.links import HEARD
+from swarmwire.comms.air.stages import given
 from swarmwire.comms.air.stages.apart import to_sender_m
 from swarmwire.comms.air.stages.stage import Medium, Stage
-from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 
@@ -19,34 +19,18 @@ TURN = 2.0 * np.pi
 
 def stage(medium: Medium) -> Stage | None:
     """The stage, where the radio gives the bearing."""
-    given = medium.radio.gives.bearing
-    return None if given is None else GivenBearing(medium, given.noise_rad)
+    asked = medium.radio.gives.bearing
+    return None if asked is None else GivenBearing(medium, asked.noise_rad)
 
 
-class GivenBearing(Stage):
+class GivenBearing(given.Given):
     """Where the sender was, seen from the receiver's body when the packet went on air, plus a normal error.
 
     In the receiver's frame: 0 is ahead, positive to the left; wrapped to (-pi, pi].
     """
 
     def __init__(self, medium: Medium, noise_rad: float) -> None:
-        self._noise_rad, self._keys, self._robots = noise_rad, medium.keys, medium.robots
-        self._wrap_m = medium.wrap_m
-        self._column = medium.radio.gives.columns.index("bearing_rad")
-
-    def decide(self, links: Links, pose: FloatArray) -> None:
-        """Fill the column "bearing_rad"."""
-        links.given[:, self._column] = bearing_rad(
-            self._keys,
-            self._robots,
-            self._wrap_m,
-            pose,
-            links.sender,
-            links.receiver,
-            links.sequence,
-            links.fate,
-            self._noise_rad,
-        )
+        super().__init__(medium, "bearing_rad", noise_rad, bearing_rad)
 
 
 @njit(cache=True)

@@ -5,10 +5,10 @@
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.air.links import HEARD, Links
+from swarmwire.comms.air.links import HEARD
+from swarmwire.comms.air.stages import given
 from swarmwire.comms.air.stages.apart import to_sender_m
 from swarmwire.comms.air.stages.stage import Medium, Stage
-from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 
@@ -18,31 +18,15 @@ NOISE = purpose("range noise")
 
 def stage(medium: Medium) -> Stage | None:
     """The stage, where the radio gives the range."""
-    given = medium.radio.gives.range
-    return None if given is None else GivenRange(medium, given.noise_m)
+    asked = medium.radio.gives.range
+    return None if asked is None else GivenRange(medium, asked.noise_m)
 
 
-class GivenRange(Stage):
+class GivenRange(given.Given):
     """The distance between the centres when the packet went on air, plus a normal error; never below 0."""
 
     def __init__(self, medium: Medium, noise_m: float) -> None:
-        self._noise_m, self._keys, self._robots = noise_m, medium.keys, medium.robots
-        self._wrap_m = medium.wrap_m
-        self._column = medium.radio.gives.columns.index("range_m")
-
-    def decide(self, links: Links, pose: FloatArray) -> None:
-        """Fill the column "range_m"."""
-        links.given[:, self._column] = range_m(
-            self._keys,
-            self._robots,
-            self._wrap_m,
-            pose,
-            links.sender,
-            links.receiver,
-            links.sequence,
-            links.fate,
-            self._noise_m,
-        )
+        super().__init__(medium, "range_m", noise_m, range_m)
 
 
 @njit(cache=True)
