@@ -32,7 +32,7 @@ from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.own_metrics import own_metrics
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.registry import standard
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.crews.remote_crew import RemoteCrew
@@ -93,7 +93,7 @@ class Simulation:
         self.agents = agent_specs(self.scenario)
         self.world = self._new_world(seed, seeds)
         measures = [resolve(spec, Path(self.scenario.source).parent) for spec in self.scenario.metrics]
-        self.metrics = Metrics([*METRICS, *own_metrics(measures, self.scenario.source)])
+        self.metrics = Metrics([*standard(), *own_metrics(measures, self.scenario.source)])
         self.code = tuple(dict.fromkeys([*self.agents.values(), *own_code(self.world.static), *measures]))
         self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else _ticks(self.scenario)

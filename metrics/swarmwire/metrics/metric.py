@@ -8,7 +8,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.moment import Moment
 
-Kind = Literal["level", "count"]
+Kind = Literal["level", "count", "time"]
 Measure = Callable[[Moment], FloatArray | float]  # to (arenas,), or one number for all; NaN: nothing to measure
 
 
@@ -16,7 +16,8 @@ class Metric(ABC):
     """One number per arena and tick.
 
     A `level` is a state that can be read off at any tick (order). A `count` is what happened within the tick
-    (contacts), which adds up over the run.
+    (contacts), which adds up over the run. A `time` is when something happened, in s from the start of the run: NaN
+    until it has, the same from then on; a run that ends before is right-censored.
     A subclass is a frozen dataclass whose fields, made by `comms.parameters.parameter`, are its parameters. What it
     must remember from tick to tick lives in the function that `begin` returns, so one metric serves many runs.
     """
@@ -25,6 +26,7 @@ class Metric(ABC):
     help: ClassVar[str]  # one line: formula and unit
     unit: ClassVar[str] = ""
     kind: ClassVar[Kind] = "level"
+    standard: ClassVar[bool] = False  # measured in every run; others where a scenario lists them
     bounds: ClassVar[tuple[float, float | None]]  # least and largest value of a tick; None: no largest
 
     @abstractmethod

@@ -53,13 +53,18 @@ def register(kind: type[Metric]) -> type[Metric]:
     return kind
 
 
+def standard() -> list[str]:
+    """The names of those that are measured in every run."""
+    return [name for name, kind in METRICS.items() if kind.standard]
+
+
 def chosen(metrics: Sequence[str | Metric] | None) -> list[Metric]:
-    """The metrics asked for, by name (with its default parameters) or as they are; None: all that are registered.
+    """The metrics asked for, by name (with its default parameters) or as they are; None: the standard ones.
 
     BadInput if a name is unknown or comes twice.
     """
     found: dict[str, Metric] = {}
-    for item in METRICS if metrics is None else metrics:
+    for item in standard() if metrics is None else metrics:
         if isinstance(item, str) and item not in METRICS:
             raise BadInput("", "metrics", f"expected some of {', '.join(METRICS)}; got {item!r}")
         metric = METRICS[item]() if isinstance(item, str) else item

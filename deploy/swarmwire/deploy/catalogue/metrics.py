@@ -9,7 +9,11 @@ from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.registry import METRICS
 
-KINDS = {"level": "level: a state at each tick", "count": "count: what happened within a tick, added up over the run"}
+KINDS = {
+    "level": "level: a state at each tick",
+    "count": "count: what happened within a tick, added up over the run",
+    "time": "time: when something happened, in s from the start of the run; none if it did not",
+}
 
 
 def metrics() -> list[Entry]:

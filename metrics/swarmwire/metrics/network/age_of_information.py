@@ -38,6 +38,7 @@ class AgeOfInformation(Metric):
         "that are out of reach now age on"
     )
     unit = "s"
+    standard = True
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:

@@ -25,6 +25,7 @@ class Airtime(Metric):
 
     name = "airtime"
     help = "share of the time that a robot's radio has packets on air, mean over robots alive"
+    standard = True
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:

@@ -19,6 +19,7 @@ class ComponentCount(Metric):
 
     name = "components"
     help = "connected components of the radio graph over robots alive"
+    standard = True
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:

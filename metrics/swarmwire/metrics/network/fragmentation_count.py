@@ -21,6 +21,7 @@ class Fragmentations(OfFragmentation):
     name = "fragmentations"
     help = "times that the radio graph fell apart for at least hold_s"
     kind = "count"
+    standard = True
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:

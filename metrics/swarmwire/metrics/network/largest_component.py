@@ -19,6 +19,7 @@ class LargestComponent(Metric):
 
     name = "largest_component"
     help = "share of the robots alive that are in the radio graph's largest component"
+    standard = True
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:

@@ -46,6 +46,7 @@ class RejoinMedian(_Rejoin):
 
     name = "rejoin_median"
     help = "median time to re-join over the fragmentations re-joined so far, in s"
+    standard = True
 
     def statistic(self, lengths_s: list[float]) -> float:
         """The middle one, or the mean of the two in the middle."""
@@ -58,6 +59,7 @@ class RejoinWorst(_Rejoin):
 
     name = "rejoin_worst"
     help = "longest time to re-join over the fragmentations re-joined so far, in s"
+    standard = True
 
     def statistic(self, lengths_s: list[float]) -> float:
         """The longest."""

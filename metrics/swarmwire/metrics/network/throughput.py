@@ -28,6 +28,7 @@ class Throughput(Metric):
     name = "throughput"
     help = "payload heard by all robots together, a broadcast once for each, in bit/s"
     unit = "bit/s"
+    standard = True
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:

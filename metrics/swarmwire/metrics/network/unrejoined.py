@@ -20,6 +20,7 @@ class Unrejoined(OfFragmentation):
 
     name = "unrejoined"
     help = "share of the fragmentations so far that have not re-joined"
+    standard = True
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:

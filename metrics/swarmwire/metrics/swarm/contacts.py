@@ -17,6 +17,7 @@ class Collisions(Metric):
     name = "collisions"
     help = "contacts between two robots that began, a lasting one once"
     kind = "count"
+    standard = True
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
@@ -31,6 +32,7 @@ class WallContacts(Metric):
     name = "wall_contacts"
     help = "contacts of a robot with a wall or an obstacle that began, a lasting one once"
     kind = "count"
+    standard = True
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:

@@ -26,6 +26,7 @@ class MinGap(Metric):
     name = "min_gap"
     help = "smallest distance between the surfaces of two robots alive, neither of them wholly above the other, in m"
     unit = "m"
+    standard = True
     bounds = (-np.inf, None)
 
     def begin(self, static: Static) -> Measure:

@@ -24,6 +24,7 @@ class Order(Metric):
 
     name = "order"
     help = "order of headings: |sum of unit headings| / robots alive"
+    standard = True
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:

@@ -22,6 +22,7 @@ class OrderVelocity(Metric):
 
     name = "order_velocity"
     help = "order of velocities: |sum of velocities| / sum of speeds, over robots alive"
+    standard = True
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:

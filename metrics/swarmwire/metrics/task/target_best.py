@@ -21,6 +21,7 @@ class TargetBest(Metric):
     name = "target_best"
     help = "distance of the nearest robot alive to a light, in m"
     unit = "m"
+    standard = True
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:

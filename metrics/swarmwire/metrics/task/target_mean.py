@@ -21,6 +21,7 @@ class TargetMean(Metric):
     name = "target_mean"
     help = "mean distance of the robots alive to the light nearest to each, in m"
     unit = "m"
+    standard = True
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:

@@ -1,0 +1,1 @@
+"""A campaign's folder: what was varied, and what came of each run."""

@@ -1,0 +1,1 @@
+"""Reports of campaigns and of single runs: one self-contained page, with figures as SVG."""
