@@ -39,7 +39,8 @@ from swarmwire.world.states import States
 class World:
     """Arenas side by side, one per seed; robot row r is robot r % robots of arena r // robots.
 
-    Each tick: `sense`, then `move`. The arrays below but `alive` and `running` are replaced in each tick, never written to after.
+    Each tick: `sense`, then `move`. The arrays below but `alive` and `running` are replaced in each tick, never written
+    to after. An arena may `leave`: what stays of it counts no more.
 
     Attributes:
         static: what does not change.
