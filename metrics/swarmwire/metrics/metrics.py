@@ -28,7 +28,7 @@ class Metrics:
     """
 
     def __init__(self, metrics: Sequence[str | Metric] | None = None) -> None:
-        """Measure these, by name or as they are, or all that are registered; BadInput for an unknown name."""
+        """Measure these, by name or as they are, or the standard ones; BadInput for an unknown name."""
         self.metrics = chosen(metrics)
 
     def begin(self, static: Static) -> None:
