@@ -6,6 +6,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.network.age_of_information import AgeOfInformation
 from swarmwire.metrics.network.airtime import Airtime
+from swarmwire.metrics.network.algebraic_connectivity import AlgebraicConnectivity
+from swarmwire.metrics.network.articulation import Articulation
 from swarmwire.metrics.network.components import ComponentCount
 from swarmwire.metrics.network.fragmentation_count import Fragmentations
 from swarmwire.metrics.network.largest_component import LargestComponent
@@ -41,6 +43,8 @@ METRICS: dict[str, type[Metric]] = {
         MinGap,
         TargetBest,
         TargetMean,
+        AlgebraicConnectivity,
+        Articulation,
     )
 }
 
