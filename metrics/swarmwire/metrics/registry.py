@@ -18,6 +18,9 @@ from swarmwire.metrics.swarm.contacts import Collisions, WallContacts
 from swarmwire.metrics.swarm.min_gap import MinGap
 from swarmwire.metrics.swarm.order import Order
 from swarmwire.metrics.swarm.order_velocity import OrderVelocity
+from swarmwire.metrics.task.coverage import Coverage
+from swarmwire.metrics.task.coverage_time import CoverageTime
+from swarmwire.metrics.task.find_time import FindTime
 from swarmwire.metrics.task.target_best import TargetBest
 from swarmwire.metrics.task.target_mean import TargetMean
 
@@ -45,6 +48,9 @@ METRICS: dict[str, type[Metric]] = {
         TargetMean,
         AlgebraicConnectivity,
         Articulation,
+        FindTime,
+        Coverage,
+        CoverageTime,
     )
 }
 

@@ -52,6 +52,8 @@ def _connectivity(moment: Moment) -> FloatArray | float:
     value: FloatArray = np.where(moment.robots_alive > 1, 0.0, np.nan)
     whole = np.flatnonzero((moment.robots_alive > 1) & (found.pieces == 1))
     robots = moment.static.robots
+    edges = edges[moment.truth.alive[edges].all(axis=1)]
+    edges = edges[np.argsort(edges[:, 0], kind="stable")]
     starts = np.searchsorted(edges[:, 0], whole * robots).tolist()
     ends = np.searchsorted(edges[:, 0], (whole + 1) * robots).tolist()
     for arena, start, end in zip(whole.tolist(), starts, ends, strict=True):
@@ -87,7 +89,8 @@ def _dense(edges, nodes):
     laplacian = np.zeros((nodes, nodes))
     for e in range(len(edges)):
         a, b = edges[e, 0], edges[e, 1]
-        laplacian[a, b] = laplacian[b, a] = -1.0
+        laplacian[a, b] -= 1.0
+        laplacian[b, a] -= 1.0
         laplacian[a, a] += 1.0
         laplacian[b, b] += 1.0
     return laplacian
