@@ -10,7 +10,10 @@ from swarmwire.metrics.network.algebraic_connectivity import AlgebraicConnectivi
 from swarmwire.metrics.network.articulation import Articulation
 from swarmwire.metrics.network.components import ComponentCount
 from swarmwire.metrics.network.fragmentation_count import Fragmentations
+from swarmwire.metrics.network.fragmented import Fragmented
 from swarmwire.metrics.network.largest_component import LargestComponent
+from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
+from swarmwire.metrics.network.pdr import PacketDeliveryRatio
 from swarmwire.metrics.network.rejoin import RejoinMedian, RejoinWorst
 from swarmwire.metrics.network.throughput import Throughput
 from swarmwire.metrics.network.unrejoined import Unrejoined
@@ -48,6 +51,10 @@ METRICS: dict[str, type[Metric]] = {
         TargetMean,
         AlgebraicConnectivity,
         Articulation,
+        Fragmented,
+        PacketDeliveryRatio,
+        LatencyOnAir,
+        LatencyToAgent,
         FindTime,
         Coverage,
         CoverageTime,
