@@ -3,7 +3,8 @@
 Of all ways to divide the ordered points into a lower and an upper part, the one with the least sum of squares around
 two means (Hinkley, Biometrika 57, 1970, for normal noise). There is a change only if that explains the runs better
 than one mean by the information criterion BIC = n ln(RSS / n) + k ln n, in which the step has two parameters more: its
-second level and its place. Of responses that do not change, it finds a step in about 4 % (20 runs at each of 10 points).
+second level and its place. Of responses that do not change it finds a step in 0.4 % with 20 runs at each of 10 points,
+in 4 % with 5. What changes gradually has a step, too: it stands where two levels tell most.
 """
 
 import math

@@ -28,7 +28,7 @@ def point_sums(table: FloatArray) -> PointSums:
 
 def resampled_sums(table: FloatArray) -> PointSums:
     """The same of resamples of the seeds: a seed brings its runs of all points, or none."""
-    return _weighted(table, drawn(table.shape[1]))
+    return _weighted(table, drawn(table.shape[1]).astype(np.float64))
 
 
 def _weighted(table: FloatArray, weight: FloatArray, row: int | slice = slice(None)) -> PointSums:
