@@ -53,12 +53,13 @@ class ArenaResult:
     ticks: int  # that it took part in
     sim_time_s: float
     trajectory_sha256: str
+    counts: dict[str, int]  # of the run's, those that belong to it, by name; only what is not 0
     radio: RadioResult | None
     metrics: dict[str, Statistics]
 
     def end(self) -> dict[str, Any]:
-        """How it ended, as the summary says it."""
-        return {"ended": self.ended, "ticks": self.ticks, "sim_time_s": self.sim_time_s}
+        """When and how it ended, as the summary says it, and what was not as it should be."""
+        return {"ended": self.ended, "ticks": self.ticks, "sim_time_s": self.sim_time_s, "counts": self.counts}
 
 
 @dataclass(frozen=True)
@@ -173,13 +174,14 @@ def arena_result(
     ticks: int,
     sim_time_s: float,
     sha256: str,
+    counts: dict[str, int],
     radio: dict[str, Any] | None,
     metrics: dict[str, Any],
 ) -> ArenaResult:
     """The parts of the observers' summaries that belong to one arena, typed."""
     of_radio = None if radio is None else _radio_result(**radio)
     of_metrics = {name: Statistics(**value) for name, value in metrics.items()}
-    return ArenaResult(seed, ended, ticks, sim_time_s, sha256, of_radio, of_metrics)
+    return ArenaResult(seed, ended, ticks, sim_time_s, sha256, counts, of_radio, of_metrics)
 
 
 def _radio_result(latency_air_s: dict[str, Any], latency_agent_s: dict[str, Any], **counts: Any) -> RadioResult:
