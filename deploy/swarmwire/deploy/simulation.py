@@ -8,7 +8,7 @@ from typing import Any, Self
 
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted
-from swarmwire.comms.protocols import Crew, Observer
+from swarmwire.comms.protocols import Crew, Judge, Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.arguments import Runners, choose_seeds, real_time_factor, runner_count
@@ -110,6 +110,7 @@ class Simulation:
         self._observers: list[Guarded] = []
         for observer in (TooLarge(self._record.say), *self._recorders(what), *observers):
             self.watch(observer)
+        self._judge: Judge | None = None
         self._losses: list[Loss] = []
         self._crews = self._new_crews(socket)
         self._crew: Crew | None = None
@@ -167,6 +168,7 @@ class Simulation:
                 acting,
                 self._watching,
                 self.scenario.events,
+                self._judge,
             )
             crew.start()
             for observer in self._watching:
@@ -180,7 +182,7 @@ class Simulation:
         return self._entered().step()
 
     def run(self, ticks: int | None = None) -> None:
-        """Run up to tick `ticks`, or to the scenario's end, or until an interrupt."""
+        """Run up to tick `ticks`, or to the scenario's end, until all arenas have stopped, or until an interrupt."""
         loop = self._entered()
         with suppress(Interrupted):  # asked for while it waited for runners: the summary says how far it came
             until = self.ticks if ticks is None else ticks
@@ -203,6 +205,8 @@ class Simulation:
                 error=error,
                 runners=self.runners,
                 ticks=loop.ticks_done,
+                arena_ticks=loop.arena_ticks.tolist(),
+                stopped=(~self.world.running).tolist(),
                 hashes=loop.hexdigests(),
                 wall_s=to_s(ended_ns - self._started_ns - self.controls.paused_ns),
                 start_s=to_s(self._started_ns - self._called_ns),
@@ -265,6 +269,8 @@ class Simulation:
             return "interrupted"
         if error is not None:
             return "failed"
+        if not self.world.running.any():
+            return "stopped"
         if self.tick >= self.ticks:
             return "duration"
         return "interrupted" if self._stopped() else "left"

@@ -80,7 +80,9 @@ class Published:
             self._open = opening.pop_all()
 
     def see(self, truth: Truth) -> None:
-        """Publish a tick if it is time to and somebody looks on."""
+        """Publish a tick if it is time to and somebody looks on; none once the arena has left."""
+        if not truth.running[self._arena]:
+            return
         if self._watched:
             self._since.add(truth)
         now_ns = self._clock.now_ns()
