@@ -1,4 +1,4 @@
-"""A campaign: what is run, at which points, with which seeds; `campaign.json`, which is written before the first run."""
+"""A campaign: what is run, at which points, with which seeds, as `campaign.json` says before the first run."""
 
 import json
 from collections.abc import Mapping
@@ -85,8 +85,8 @@ def read_campaign(folder: Path) -> Campaign:
 
 
 def _campaign(found: dict[str, Any]) -> Campaign:
-    tuples = {name: tuple(found[name]) for name in ("seeds", "points", "overrides", "record_seeds")}
-    objects = {
+    tuples: dict[str, Any] = {name: tuple(found[name]) for name in ("seeds", "points", "overrides", "record_seeds")}
+    objects: dict[str, Any] = {
         "files": tuple(CopiedFile(**file) for file in found["files"]),
         "outcomes": tuple(Outcome(**outcome) for outcome in found["outcomes"]),
         "point_overrides": tuple(tuple(texts) for texts in found["point_overrides"]),

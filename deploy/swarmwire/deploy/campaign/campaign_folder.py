@@ -23,7 +23,7 @@ from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, Campaign
 from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.series_files import join_series, series_part, sort_out_series
 from swarmwire.deploy.campaign.storage import storing
-from swarmwire.deploy.campaign.task import PieceResult
+from swarmwire.deploy.campaign.task import PieceResult, Row
 from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.metrics.record.part_files import PARQUET
 from swarmwire.metrics.whole_file import written_aside
@@ -84,7 +84,7 @@ class CampaignFolder:
     def keep(self, result: PieceResult) -> None:
         """Write the rows and the series of a finished piece."""
         points = self.campaign.points
-        rows = [{**row, **points[row["point"]]} for row in result.rows]
+        rows: list[Row] = [{**row, **points[row["point"]]} for row in result.rows]
         with storing(self.path):
             if result.series is not None:
                 first = next(row["run"] for row in rows if row["ended"] != FAILED)

@@ -67,7 +67,7 @@ class Columns:
 
 def _type_of(values: Sequence[Any]) -> str:
     """Of a varied path's column: texts hold what has no column type, as JSON."""
-    kinds = {type(value) for value in values}
+    kinds: set[type] = {type(value) for value in values}
     if kinds == {bool}:
         return "truth"
     if kinds <= {int, float}:

@@ -12,9 +12,7 @@ WAIT_S = 0.1  # at most, until somebody's wish to stop is seen
 Keep = Callable[[Task, PieceResult], None]
 
 
-def execute(
-    tasks: Iterable[Task], executor: Executor, keep: Keep, stopped: Callable[[], bool] = lambda: False
-) -> bool:
+def execute(tasks: Iterable[Task], executor: Executor, keep: Keep, stopped: Callable[[], bool] = lambda: False) -> bool:
     """Have all tasks done, `keep` each as it is finished, in whatever order; False if `stopped()` before the end.
 
     What `keep` and the executor raise is passed on. The executor is left open.

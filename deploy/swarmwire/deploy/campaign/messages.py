@@ -9,7 +9,7 @@ LENGTH_BYTES = 4
 
 def send(stream: BinaryIO, message: dict[str, Any]) -> None:
     """Write a message, all of it; OSError if nobody reads any more."""
-    body = cast("bytes", msgpack.packb(message))
+    body = msgpack.packb(message)
     stream.write(len(body).to_bytes(LENGTH_BYTES, "little") + body)
     stream.flush()
 

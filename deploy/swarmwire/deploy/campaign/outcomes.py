@@ -1,4 +1,4 @@
-"""What can be asked of a campaign's runs: columns of `summary.parquet` that hold a number, or a time until something."""
+"""What can be asked of a campaign's runs: columns of `summary.parquet` that hold a number, or a time."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -33,7 +33,9 @@ class Outcome:
 
     column: str
     unit: str
-    kind: Literal["number", "time"]  # a time is right-censored at `sim_time_s` where it is null and the run did not fail
+    kind: Literal[
+        "number", "time"
+    ]  # a time is right-censored at `sim_time_s` where it is null and the run did not fail
     help: str
 
 

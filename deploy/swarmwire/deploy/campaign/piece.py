@@ -1,4 +1,4 @@
-"""A task, run: its seeds as arenas of one world, and, where something raises, in halves until those that fail are alone.
+"""A task, run: its seeds as arenas of one world; where something raises, in halves until those that fail are alone.
 
 So one bad seed costs its neighbours nothing but time. A run that failed did so alone, whatever it was packed with:
 its row does not depend on the packing.

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, cast
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, Campaign
@@ -49,10 +49,11 @@ def check_same(plan: Plan, campaign: Campaign, folder: Path) -> None:
     for name in SAME:
         if _said(wanted, name) != _said(campaign, name):
             what = "another scenario" if name == "files" else f"other {name}"
-            raise BadInput(f"--resume {folder}", name, f"the campaign in the folder has {what}; alone, --resume goes on")
+            expected = f"the campaign in the folder has {what}; --resume alone goes on with it"
+            raise BadInput(f"--resume {folder}", name, expected)
 
 
 def _said(campaign: Campaign, name: str) -> Any:
     """What a campaign says of this, as JSON would keep it: lists and tuples are the same."""
     found: Any = getattr(campaign, name)
-    return list(found) if isinstance(found, tuple) else found
+    return list(cast("tuple[Any, ...]", found)) if isinstance(found, tuple) else found

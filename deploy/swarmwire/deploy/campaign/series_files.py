@@ -17,7 +17,9 @@ def sort_out_series(folder: Path, done: Collection[int]) -> None:
     import polars as pl
 
     parts, files = _parts(folder), list(folder.glob("worker-*.parquet"))
-    joined = {run for file in files for run in pl.read_parquet(file, columns=["run"])["run"].unique()} if parts else {}
+    if not parts:
+        return
+    joined: set[int] = {run for file in files for run in pl.read_parquet(file, columns=["run"])["run"].unique()}
     for part in parts:
         run = int(part.stem.partition("-")[2])
         if run not in done or run in joined:

@@ -1,4 +1,4 @@
-"""Run a campaign, or what is missing of it: a design of scenarios and many seeds, as a folder with a table of all runs."""
+"""Run a campaign, or what is missing of it: many seeds at each point of a design, kept as a table of all runs."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import closing

@@ -47,7 +47,7 @@ def task_message(task: Task) -> dict[str, Any]:
 
 def task_from(message: Mapping[str, Any]) -> Task:
     """The task of such a mapping."""
-    tuples = {name: tuple(message[name]) for name in ("overrides", "runs", "seeds")}
+    tuples: dict[str, Any] = {name: tuple(message[name]) for name in ("overrides", "runs", "seeds")}
     return Task(**{**message, **tuples})
 
 

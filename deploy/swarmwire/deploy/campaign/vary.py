@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, cast
@@ -100,12 +101,10 @@ def _range_from(table: Mapping[str, Any], said: str) -> Range:
 
 def _list_of(text: str) -> list[Any]:
     """TOML values between commas; what is none is a text."""
-    try:
+    with suppress(tomllib.TOMLDecodeError):  # not all of them are TOML
         found = tomllib.loads(f"value = [{text}]")
         if len(found) == 1:
             return cast("list[Any]", found["value"])
-    except tomllib.TOMLDecodeError:
-        pass  # not all of them are TOML
     return [_value(part.strip()) for part in text.split(",") if part.strip()]
 
 

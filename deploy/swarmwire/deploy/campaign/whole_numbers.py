@@ -40,11 +40,11 @@ def _node_at(keys: list[str], mapping: object, schema: Node) -> Node:
         node = _chosen(plain(node, schema), at, schema)
         if key.isdecimal():
             places: list[Node] = node.get("prefixItems", [])
-            node = places[int(key)] if int(key) < len(places) else node.get("items") or {}
+            node = places[int(key)] if int(key) < len(places) else node.get("items") or Node()
         else:
             named: Node = node.get("properties", {})
             patterned: Node = node.get("patternProperties", {})
-            node = named.get(key) or next(iter(patterned.values()), {})
+            node = named.get(key) or next(iter(patterned.values()), Node())
         at = _item(at, key)
     return plain(node, schema)
 
