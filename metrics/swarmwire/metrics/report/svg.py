@@ -1,4 +1,4 @@
-"""Figures as text that stands in a page or a file alike: equal figures are equal texts, and no two share a name within."""
+"""Figures as text for a page or a file: equal figures are equal texts, and no two share a name within."""
 
 import io
 import re
