@@ -8,7 +8,14 @@ from swarmwire.metrics.campaign.statistic import find_outcome
 from swarmwire.metrics.report.campaign.samples import Samples
 
 MOST = 8
-PREFERRED = ("stop_time_s", "target_best.final", "target_mean.final", "order.final", "largest_component.final", "radio.pdr")
+PREFERRED = (
+    "stop_time_s",
+    "target_best.final",
+    "target_mean.final",
+    "order.final",
+    "largest_component.final",
+    "radio.pdr",
+)
 
 
 @dataclass(frozen=True)
@@ -17,7 +24,8 @@ class ChosenOutcomes:
 
     shown: tuple[Outcome, ...]
     others: tuple[Outcome, ...]  # that vary, too
-    constant: tuple[Outcome, ...]  # one value in all runs, or none in any
+    constant: tuple[Outcome, ...]  # one value in all runs
+    never: tuple[Outcome, ...]  # no value in any
 
 
 def choose_outcomes(samples: Samples, names: Sequence[str]) -> ChosenOutcomes:
@@ -27,16 +35,17 @@ def choose_outcomes(samples: Samples, names: Sequence[str]) -> ChosenOutcomes:
     """
     known = samples.folder.outcomes
     asked = tuple(dict.fromkeys(find_outcome(name, known) for name in names))
-    constant = tuple(outcome for outcome in known if outcome not in asked and not _varies(samples, outcome))
-    vary = [outcome for outcome in known if outcome not in constant]
+    never = tuple(outcome for outcome in known if outcome not in asked and not samples.all(outcome).observed.any())
+    there = [outcome for outcome in known if outcome not in never]
+    constant = tuple(outcome for outcome in there if outcome not in asked and not _varies(samples, outcome))
+    vary = [outcome for outcome in there if outcome not in constant]
     shown = asked or tuple(sorted(filter(_is_usual, vary), key=_rank)[:MOST]) or tuple(vary[:MOST])
-    return ChosenOutcomes(shown, tuple(outcome for outcome in vary if outcome not in shown), constant)
+    return ChosenOutcomes(shown, tuple(outcome for outcome in vary if outcome not in shown), constant, never)
 
 
 def _varies(samples: Samples, outcome: Outcome) -> bool:
     sample = samples.all(outcome)
-    observed = sample.value[sample.observed]
-    return len(observed) > 0 and bool(observed.min() < observed.max() or len(observed) < len(sample))
+    return bool(sample.value.min() < sample.value.max() or not sample.observed.all())
 
 
 def _is_usual(outcome: Outcome) -> bool:

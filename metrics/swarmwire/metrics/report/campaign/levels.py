@@ -1,6 +1,7 @@
 """The values of one parameter, in order, as groups of design points that share one."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TypeGuard
 
 import numpy as np
@@ -47,7 +48,7 @@ def _of_numbers(path: str, values: FloatArray) -> Levels:
         return Levels(path, tuple(f"{value:.6g}" for value in distinct), distinct, of_point)
     edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, _BINS + 1)))
     of_point = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
-    labels = tuple(f"{low:.3g}–{high:.3g}" for low, high in zip(edges[:-1], edges[1:], strict=True))
+    labels = tuple(f"{low:.3g}–{high:.3g}" for low, high in pairwise(edges.tolist()))
     means = np.array([values[of_point == level].mean() for level in range(len(labels))])
     return Levels(path, labels, means, of_point, together=True)
 

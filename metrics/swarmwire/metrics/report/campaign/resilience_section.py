@@ -7,7 +7,7 @@ from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.report.campaign.figure_name import figure_name
 from swarmwire.metrics.report.campaign.levels import Levels, levels_of
 from swarmwire.metrics.report.campaign.samples import Samples
-from swarmwire.metrics.report.campaign.words import listed, outcome_title
+from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence
 from swarmwire.metrics.report.figures.resilience_curve import FittedShape, resilience_curve
 from swarmwire.metrics.report.section import Figure, Section, Table
 from swarmwire.metrics.report.svg import as_svg
@@ -47,9 +47,9 @@ def resilience_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Secti
         return None
     grows = f" Not falling, and so without a curve: {listed(list(dict.fromkeys(growing)))}." if growing else ""
     text = (
-        "What is left of an outcome, relative to its mean with nothing lost, with 95 % intervals of the means. A time counts "
-        "by its reciprocal, how much is done in a time, and as 0 where it never came. A line and an exponential are fitted to "
-        f"all runs; the red one has the lower AIC.{grows}"
+        "What is left of an outcome, relative to its mean with nothing lost, with 95 % intervals of the means. A "
+        "time counts by its reciprocal, how much is done in a time, and as 0 where it never came. A line and an "
+        f"exponential are fitted to all runs; the red one has the lower AIC.{grows}"
     )
     header = ("outcome", "over", "shape", "at 0", "slope at 0", "95 % interval", "R²", "AIC", "")
     return Section("Resilience", (text, *figures, Table(header, tuple(rows), "Fits of what is left")))
@@ -98,7 +98,7 @@ def _figure(outcome: Outcome, levels: Levels, left: FloatArray, fits: Degradatio
         verdict = f"{fits.better.form} by AIC, {abs(fits.linear.aic - fits.exponential.aic):.1f} lower"
     else:
         verdict = "AIC does not tell the two shapes apart"
-    caption = f"{outcome_title(outcome).capitalize()} over `{levels.path}`: {verdict}."
+    caption = f"{sentence(outcome_title(outcome))} over `{levels.path}`: {verdict}."
     return Figure(name, as_svg(drawn, name), caption)
 
 

@@ -1,10 +1,13 @@
-"""Numbers as people read them: as many decimals for all of one outcome as its greatest needs for three digits."""
+"""Numbers as people read them: all of one outcome with as many decimals as their spread deserves."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import median
 
-_DIGITS = 3
+_DIGITS = 3  # of a number whose spread is not known
+_DIGITS_OF_SPREAD = 2
+_MOST_DIGITS = 5
 _MOST_DECIMALS = 6
 _PLAIN_UP_TO = 1e7
 
@@ -16,7 +19,7 @@ class Rounding:
     decimals: int | None  # None: with an exponent
 
     def text(self, value: float) -> str:
-        """The number, with a true minus; `–` for none."""
+        """The number, with a true minus; a dash for none."""
         if not math.isfinite(value):
             return "–"
         if self.decimals is None:
@@ -25,11 +28,21 @@ class Rounding:
         return rounded.lstrip("−") if not rounded.strip("−0.,") else rounded  # no minus before nothing
 
 
-def rounding_of(values: Iterable[float]) -> Rounding:
-    """The rounding for these values; what is not finite says nothing."""
-    known = [abs(value) for value in values if math.isfinite(value)]
-    greatest = max(known, default=0.0)
-    if all(value == int(value) for value in known):
-        return Rounding(0 if greatest < _PLAIN_UP_TO else None)
-    decimals = max(0, _DIGITS - 1 - math.floor(math.log10(greatest)))
-    return Rounding(decimals if decimals <= _MOST_DECIMALS and greatest < _PLAIN_UP_TO else None)
+def rounding_of(values: Sequence[float], spreads: Sequence[float] = ()) -> Rounding:
+    """The rounding for these values, whose spreads tell what is worth writing; what is not finite says nothing."""
+    known = [abs(value) for value in values if math.isfinite(value) and value]
+    if not known:
+        return Rounding(0)
+    greatest, widths = max(known), [spread for spread in spreads if math.isfinite(spread) and spread > 0.0]
+    if greatest >= _PLAIN_UP_TO:
+        return Rounding(None)
+    if all(value.is_integer() for value in map(float, known)):
+        return Rounding(0)
+    wanted = _decimals(median(widths), _DIGITS_OF_SPREAD) if widths else _decimals(median(known), _DIGITS)
+    decimals = max(0, min(wanted, _decimals(greatest, _MOST_DIGITS)))
+    return Rounding(decimals if decimals <= _MOST_DECIMALS else None)
+
+
+def _decimals(value: float, digits: int) -> int:
+    """How many decimals show so many digits of it."""
+    return digits - 1 - math.floor(math.log10(value))

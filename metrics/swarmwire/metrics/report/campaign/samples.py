@@ -1,11 +1,11 @@
 """Samples of a campaign and what they come to, of one design point or of several together, worked out once."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
@@ -44,14 +44,11 @@ class Samples:
 
         A time that was cut off counts as the time until then.
         """
-        seeds = self.folder.about.seeds
-        place = {seed: column for column, seed in enumerate(seeds)}
-        table = np.full((len(rows), max(map(len, rows), default=0) * len(seeds)), np.nan)
-        for row, points in enumerate(rows):
-            for turn, point in enumerate(points):
-                sample = self.sample(outcome, (point,))
-                table[row, [turn * len(seeds) + place[seed] for seed in sample.seed.tolist()]] = sample.value
-        return table
+        return self._table(rows, lambda point: self._of_point(outcome.column, point).value, outcome)
+
+    def reached(self, outcome: Outcome, rows: Sequence[tuple[int, ...]]) -> BoolArray:
+        """Of the same shape: whether the value was observed, not cut off."""
+        return self._table(rows, lambda point: self._of_point(outcome.column, point).observed, outcome) == 1.0
 
     def summary(self, outcome: Outcome, points: tuple[int, ...]) -> Summary:
         """What these runs come to."""
@@ -73,6 +70,18 @@ class Samples:
         sample = self.all(outcome)
         cut_off = sample.value[~sample.observed]
         return float(cut_off.max()) if len(cut_off) else None
+
+    def _table(
+        self, rows: Sequence[tuple[int, ...]], of_point: Callable[[int], AnyArray], outcome: Outcome
+    ) -> FloatArray:
+        seeds = self.folder.about.seeds
+        place = {seed: column for column, seed in enumerate(seeds)}
+        table = np.full((len(rows), max(map(len, rows), default=0) * len(seeds)), np.nan)
+        for row, points in enumerate(rows):
+            for turn, point in enumerate(points):
+                seed = self._of_point(outcome.column, point).seed.tolist()
+                table[row, [turn * len(seeds) + place[each] for each in seed]] = of_point(point)
+        return table
 
     def _new_summary(self, outcome: Outcome, points: tuple[int, ...]) -> Summary:
         return summary(self.sample(outcome, points))

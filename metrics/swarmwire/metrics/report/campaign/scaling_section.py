@@ -29,10 +29,10 @@ def scaling_section(samples: Samples, times: tuple[Outcome, ...]) -> Section | N
     if not parts:
         return None
     text = (
-        "Speed-up X is the mean time of the smallest swarm over that of N robots, a run that was cut off counting with the "
-        "time until then; efficiency is X per robot, 1 where each does as much as one of the smallest swarm (dashed). The "
-        "serial fraction of Karp and Flatt is the share of the work that does not gain from more robots: 0 at best, 1 if "
-        "they gain nothing, more if they are in one another's way."
+        "Speed-up X is the mean time of the smallest swarm over that of N robots, a run that was cut off counting "
+        "with the time until then; efficiency is X per robot, 1 where each does as much as one of the smallest "
+        "swarm (dashed). The serial fraction of Karp and Flatt is the share of the work that does not gain from "
+        "more robots: 0 at best, 1 if they gain nothing, more if they are in one another's way."
     )
     return Section("Scaling", (text, *parts))
 
@@ -48,7 +48,9 @@ def _parts(samples: Samples, outcome: Outcome, levels: Levels) -> list[Figure | 
     for what, value, level in kinds:
         name = figure_name(what, outcome.column, levels.path)
         drawn = scaling_curve(levels.number, value, what, level)
-        figures.append(Figure(name, as_svg(drawn, name), f"{what.capitalize()} of {outcome_title(outcome)}, `{levels.path}`."))
+        figures.append(
+            Figure(name, as_svg(drawn, name), f"{what.capitalize()} of {outcome_title(outcome)}, `{levels.path}`.")
+        )
     return [*figures, _table(outcome, levels, means.tolist(), found)]
 
 

@@ -1,7 +1,7 @@
 """The section of tables: what each outcome came to at each design point."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from swarmwire.metrics.campaign.outcome import Outcome
@@ -9,12 +9,12 @@ from swarmwire.metrics.report.campaign.chosen_outcomes import ChosenOutcomes
 from swarmwire.metrics.report.campaign.levels import levels_of
 from swarmwire.metrics.report.campaign.rounding import Rounding, rounding_of
 from swarmwire.metrics.report.campaign.samples import Samples
-from swarmwire.metrics.report.campaign.words import listed, outcome_title, value_text
+from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence, value_text
 from swarmwire.metrics.report.section import Section, Table
 from swarmwire.metrics.statistics.summary import Summary
 
 MOST_POINTS = 60  # beyond which tables are by the values of each parameter
-_MOST_OPEN_ROWS = 20  # of a table that is not folded
+_MOST_OPEN_ROWS = 20  # of tables after the first that are not folded
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,15 @@ def summary_section(samples: Samples, chosen: ChosenOutcomes) -> Section:
     parts: list[str | Table] = []
     if len(samples.folder.points) > MOST_POINTS:
         parts.append(
-            f"There are {len(samples.folder.points):,} design points, so the tables are by the values of each parameter, "
-            "over all values of the others. `summary.parquet` has every run."
+            f"There are {len(samples.folder.points):,} design points, so the tables are by the values of each "
+            "parameter, over all values of the others. `summary.parquet` has every run."
         )
-    parts += [_table(samples, outcome, columns, groups) for outcome in chosen.shown]
-    if chosen.constant:
-        names = [f"`{outcome.column}`" for outcome in chosen.constant]
-        parts.append(f"The same in all runs, or never there, and therefore left out: {listed(names)}.")
+    for place, outcome in enumerate(chosen.shown):
+        folded = place > 0 and len(groups) > _MOST_OPEN_ROWS
+        parts.append(_table(samples, outcome, columns, groups, folded=folded))
+    for what, outcomes in (("The same in all runs", chosen.constant), ("Never there in any run", chosen.never)):
+        if outcomes:
+            parts.append(f"{what}, and so left out: {listed([f'`{outcome.column}`' for outcome in outcomes])}.")
     if chosen.others:
         parts.append(_other_table(samples, chosen.others, columns, groups))
     return Section("Summary", tuple(parts))
@@ -55,13 +57,13 @@ def _groups(samples: Samples) -> tuple[tuple[str, ...], list[_Group]]:
     rows: list[_Group] = []
     for path in parameters:
         levels = levels_of(path, points)
-        rows += [
-            _Group((path, label), tuple(levels.points(level))) for level, label in enumerate(levels.labels)
-        ]
+        rows += [_Group((path, label), tuple(levels.points(level))) for level, label in enumerate(levels.labels)]
     return ("parameter", "value"), rows
 
 
-def _table(samples: Samples, outcome: Outcome, columns: tuple[str, ...], groups: list[_Group]) -> Table:
+def _table(
+    samples: Samples, outcome: Outcome, columns: tuple[str, ...], groups: list[_Group], *, folded: bool
+) -> Table:
     summaries = [samples.summary(outcome, group.points) for group in groups]
     rounding = _rounding(summaries)
     some_undefined = any(found.undefined for found in summaries)
@@ -78,8 +80,8 @@ def _table(samples: Samples, outcome: Outcome, columns: tuple[str, ...], groups:
         )
         for group, found in zip(groups, summaries, strict=True)
     ]
-    what = f"{outcome_title(outcome).capitalize()} (`{outcome.column}`): {outcome.help.rstrip('.')}."
-    return Table(tuple(header), tuple(rows), what, folded=len(rows) > _MOST_OPEN_ROWS)
+    what = f"{sentence(outcome_title(outcome))} (`{outcome.column}`): {outcome.help.rstrip('.')}."
+    return Table(tuple(header), tuple(rows), what, folded=folded)
 
 
 def _other_table(
@@ -107,7 +109,11 @@ def _figures(found: Summary, outcome: Outcome, rounding: Rounding) -> tuple[str,
 
     low, high = found.q50_interval
     interval = "–" if not censored and not math.isfinite(low) else f"{text(low)} to {text(high)}"
-    return text(found.q50), _span(text(found.q25), text(found.q75)), _span(text(low), text(high)) if censored else interval
+    return (
+        text(found.q50),
+        _span(text(found.q25), text(found.q75)),
+        _span(text(low), text(high)) if censored else interval,
+    )
 
 
 def _span(low: str, high: str) -> str:
@@ -118,5 +124,8 @@ def _share(found: Summary) -> str:
     return f"{100.0 * found.censored:.0f} %" if math.isfinite(found.censored) else "–"
 
 
-def _rounding(summaries: Iterable[Summary]) -> Rounding:
-    return rounding_of(value for found in summaries for value in (found.q25, found.q50, found.q75, found.limit))
+def _rounding(summaries: Sequence[Summary]) -> Rounding:
+    return rounding_of(
+        [value for found in summaries for value in (found.q25, found.q50, found.q75)],
+        [found.q75 - found.q25 for found in summaries],
+    )

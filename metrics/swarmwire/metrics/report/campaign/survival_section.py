@@ -1,12 +1,10 @@
 """The section of survival curves: how long things take, with the runs in which they never came."""
 
-import numpy as np
-
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.report.campaign.figure_name import figure_name
 from swarmwire.metrics.report.campaign.levels import Levels, levels_of
 from swarmwire.metrics.report.campaign.samples import Samples
-from swarmwire.metrics.report.campaign.words import outcome_title
+from swarmwire.metrics.report.campaign.words import outcome_title, sentence
 from swarmwire.metrics.report.figures.survival_curves import SurvivalCurve, survival_curves
 from swarmwire.metrics.report.section import Figure, Section
 from swarmwire.metrics.report.svg import as_svg
@@ -25,8 +23,8 @@ def survival_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Section
     if not figures:
         return None
     text = (
-        "The share of runs in which it has not happened yet, by Kaplan and Meier's estimate. A curve falls with each run in "
-        "which it happens; a tick on it is a run that ended before."
+        "The share of runs in which it has not happened yet, by Kaplan and Meier's estimate. A curve falls with "
+        "each run in which it happens; a tick on it is a run that ended before."
     )
     return Section("Survival", (text, *figures))
 
@@ -37,14 +35,15 @@ def _figure(samples: Samples, outcome: Outcome, levels: Levels | None) -> Figure
         name = figure_name("survival", outcome.column)
         everything = tuple(range(len(samples.folder.points)))
         curves = [_curve(samples, outcome, "all runs", everything)]
-        return Figure(name, as_svg(survival_curves(curves, "share still waiting", title, ""), name), f"{title}.")
+        return Figure(name, as_svg(survival_curves(curves, "share still waiting", title), name), f"{title}.")
     name = figure_name("survival", outcome.column, levels.path)
-    shown = np.unique(np.linspace(0, len(levels) - 1, min(MOST_CURVES, len(levels))).round().astype(int)).tolist()
+    last, count = len(levels) - 1, min(MOST_CURVES, len(levels))
+    shown = [round(last * turn / (count - 1)) for turn in range(count)]
     curves = [_curve(samples, outcome, levels.labels[level], tuple(levels.points(level))) for level in shown]
-    drawn = survival_curves(curves, "share still waiting", title, levels.path)
+    drawn = survival_curves(curves, f"share still waiting, by {levels.path}", title)
     some = f", {len(shown)} of its {len(levels)} values" if len(shown) < len(levels) else ""
     pooled = ", over all values of the others" if len(samples.folder.parameters) > 1 else ""
-    return Figure(name, as_svg(drawn, name), f"{title.capitalize()} by `{levels.path}`{some}{pooled}.")
+    return Figure(name, as_svg(drawn, name), f"{sentence(title)} by `{levels.path}`{some}{pooled}.")
 
 
 def _curve(samples: Samples, outcome: Outcome, label: str, points: tuple[int, ...]) -> SurvivalCurve:

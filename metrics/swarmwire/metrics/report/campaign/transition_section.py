@@ -12,7 +12,7 @@ from swarmwire.metrics.report.campaign.levels import Levels, levels_of
 from swarmwire.metrics.report.campaign.rounding import rounding_of
 from swarmwire.metrics.report.campaign.samples import Samples
 from swarmwire.metrics.report.campaign.slices import Slice, slices_beside
-from swarmwire.metrics.report.campaign.words import outcome_title
+from swarmwire.metrics.report.campaign.words import outcome_title, sentence
 from swarmwire.metrics.report.figures.heat_map import heat_map
 from swarmwire.metrics.report.figures.response_curve import Jump, Response, response_curve
 from swarmwire.metrics.report.section import Figure, Section, Table
@@ -38,23 +38,24 @@ def transition_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Secti
             figures.append(_response(samples, outcome, numbers[0], rows))
         for x, y in combinations(numbers, 2):
             figures += _maps(samples, outcome, x, y, rows)
-    return Section("Transitions", (_how_to_read(len(numbers)), *figures, *_table(rows)))
+    return Section("Transitions", (_how_to_read(len(numbers)), *figures, _table(rows)))
 
 
 def _how_to_read(numbers: int) -> str:
     change = (
-        "where a step of two levels explains the runs best, if it does so better than no step at all. A time that was cut "
-        "off counts as the time until then."
+        "where a step of two levels explains the runs best, if it does so better than no step at all. A time that "
+        "was cut off counts as the time until then."
     )
     if numbers == 1:
         return (
-            "The line is the median; the darker band its 95 % interval, the lighter one from quartile to quartile; a triangle "
-            f"is a median beyond the time limit. The upright line is the change point, with its 95 % interval: {change}"
+            "The line is the median; the darker band its 95 % interval, the lighter one from quartile to quartile; "
+            "a triangle is a median beyond the time limit. The upright line is the change point, with its 95 % "
+            f"interval: {change}"
         )
     others = " Numbers that a map does not show are at their middle value." if numbers > 2 else ""
     return (
-        f"Each cell is the median of its runs. The red mark in a row is its change point: {change} The thin line is its 95 % "
-        f"interval; a cell with > has its median beyond the time limit.{others}"
+        f"Each cell is the median of its runs. The red mark in a row is its change point: {change} The thin line is "
+        f"its 95 % interval; a cell with > has its median beyond the time limit.{others}"
     )
 
 
@@ -68,7 +69,7 @@ def _response(samples: Samples, outcome: Outcome, x: Levels, rows: list[_Row]) -
         responses.append(_medians(samples, outcome, x, cells, each.label, change))
     name = figure_name("response", outcome.column, x.path)
     figure = response_curve(responses, outcome_title(outcome), x.path, samples.limit(outcome))
-    return Figure(name, as_svg(figure, name), f"{outcome_title(outcome).capitalize()} over `{x.path}`.")
+    return Figure(name, as_svg(figure, name), f"{sentence(outcome_title(outcome))} over `{x.path}`.")
 
 
 def _maps(samples: Samples, outcome: Outcome, x: Levels, y: Levels, rows: list[_Row]) -> list[Figure]:
@@ -86,13 +87,19 @@ def _maps(samples: Samples, outcome: Outcome, x: Levels, y: Levels, rows: list[_
 
 
 def _map(
-    outcome: Outcome, x: Levels, y: Levels, medians: FloatArray, changes: list[ChangePoint | None], of: Slice, number: int
+    outcome: Outcome,
+    x: Levels,
+    y: Levels,
+    medians: FloatArray,
+    changes: list[ChangePoint | None],
+    of: Slice,
+    number: int,
 ) -> Figure:
     name = figure_name("map", outcome.column, x.path, y.path, *([str(number)] if number else []))
     jumps = [None if change is None else _jump(change, x, np.arange(len(x), dtype=np.float64)) for change in changes]
     figure = heat_map(medians, x.labels, y.labels, f"median {outcome_title(outcome)}", x.path, y.path, jumps)
     at = f", at {of.label}" if of.label else ""
-    return Figure(name, as_svg(figure, name), f"{outcome_title(outcome).capitalize()} over `{x.path}` and `{y.path}`{at}.")
+    return Figure(name, as_svg(figure, name), f"{sentence(outcome_title(outcome))} over `{x.path}` and `{y.path}`{at}.")
 
 
 def _change(samples: Samples, outcome: Outcome, x: Levels, cells: Sequence[tuple[int, ...]]) -> ChangePoint | None:
@@ -115,7 +122,8 @@ def _medians(
     assert x.number is not None
     found = [samples.summary(outcome, cell) for cell in cells]
     quartiles = np.array([samples.quartiles(outcome, cell) for cell in cells])
-    low, high = np.array([each.q50_interval for each in found]).T
+    low: FloatArray = np.array([each.q50_interval.low for each in found])
+    high: FloatArray = np.array([each.q50_interval.high for each in found])
     if outcome.kind == "time":
         low = np.where(np.isnan(low) & np.isposinf(high), np.inf, low)
     jump = None if change is None else _jump(change, x, x.number)
@@ -138,8 +146,20 @@ def _words(outcome: Outcome, x: Levels, where: str, change: ChangePoint | None) 
     )
 
 
-def _table(rows: list[_Row]) -> list[Table]:
-    columns = ("outcome", "along", "at", "change point", "95 % interval", "mean below", "mean above", "95 % of the step")
-    if not any(row[2] for row in rows):
-        columns, rows = (columns[:2] + columns[3:]), [row[:2] + row[3:] for row in rows]
-    return [Table(columns, tuple(rows), "Change points", folded=len(rows) > _MOST_OPEN_ROWS)]
+def _table(rows: list[_Row]) -> Table:
+    """The change points in words; what is the same in all rows stands in the caption or nowhere."""
+    columns = (
+        "outcome",
+        "along",
+        "at",
+        "change point",
+        "95 % interval",
+        "mean below",
+        "mean above",
+        "95 % of the step",
+    )
+    along = {row[1] for row in rows}
+    caption = f"Change points along `{along.pop()}`" if len(along) == 1 else "Change points"
+    kept = [place for place in range(len(columns)) if place not in (1, 2) or len({row[place] for row in rows}) > 1]
+    told = tuple(tuple(row[place] for place in kept) for row in rows)
+    return Table(tuple(columns[place] for place in kept), told, caption, folded=len(rows) > _MOST_OPEN_ROWS)

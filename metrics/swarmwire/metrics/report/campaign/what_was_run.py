@@ -1,8 +1,8 @@
 """The section that says what was run, how to run it again, and what failed."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
-from swarmwire.metrics.campaign.about import About
+from swarmwire.metrics.campaign.about import About, Value
 from swarmwire.metrics.campaign.campaign_folder import FAILED, CampaignFolder
 from swarmwire.metrics.report.campaign.words import counted, listed, value_text
 from swarmwire.metrics.report.section import Listing, Section, Table
@@ -32,12 +32,14 @@ def what_was_run(folder: CampaignFolder) -> Section:
     name = folder.path.resolve().name
     example = failed[0] if failed else folder.about.runs // 2
     parts: list[str | Listing | Table] = [Table(("", ""), tuple(rows), "")]
-    parts.append(f"The campaign was started by the first of these lines; the second repeats run {example}, bit for bit.")
+    parts.append(
+        f"The campaign was started by the first of these lines; the second repeats run {example}, bit for bit."
+    )
     parts.append(Listing(f"{about.command}\nswarmwire repeat {name} --run {example}"))
     if not folder.finished:
         parts.append(
-            f"{counted(len(folder.missing), 'run')} of {about.runs:,} had not ended when this report was made, and what "
-            "follows is about the others. The first of these lines with `--resume` runs only what is missing."
+            f"{counted(len(folder.missing), 'run')} of {about.runs:,} had not ended when this report was made, and "
+            "what follows is about the others. The first of these lines with `--resume` runs only what is missing."
         )
     return Section("What was run", (*parts, *_failures(folder)))
 
@@ -50,10 +52,10 @@ def _design(about: About) -> str:
     )
 
 
-def _values(wanted: object) -> str:
+def _values(wanted: Sequence[Value] | Mapping[str, Value]) -> str:
     if isinstance(wanted, Mapping):
         return f"from {value_text(wanted['from'])} to {value_text(wanted['to'])}"
-    values = list(map(value_text, wanted)) if isinstance(wanted, list) else []
+    values = list(map(value_text, wanted))
     if len(values) <= _MOST_VALUES:
         return ", ".join(values)
     return f"{', '.join(values[:3])}, … {values[-1]} ({len(values):,} values)"
@@ -62,7 +64,7 @@ def _values(wanted: object) -> str:
 def _seeds(seeds: tuple[int, ...]) -> str:
     if len(seeds) > 2 and list(seeds) == list(range(seeds[0], seeds[0] + len(seeds))):
         return f"{seeds[0]} to {seeds[-1]}"
-    return _values(list(seeds))
+    return _values(seeds)
 
 
 def _runs(folder: CampaignFolder, failed: int) -> str:
@@ -72,7 +74,9 @@ def _runs(folder: CampaignFolder, failed: int) -> str:
 
 def _machines(folder: CampaignFolder) -> list[str]:
     """The CPUs that it began on and that runs were made on."""
-    found: Iterable[str] = folder.runs["machine_cpu"].drop_nulls().unique().sort() if "machine_cpu" in folder.runs else ()
+    found: Iterable[str] = (
+        folder.runs["machine_cpu"].drop_nulls().unique().sort() if "machine_cpu" in folder.runs else ()
+    )
     return list(dict.fromkeys([folder.about.cpu, *found]))
 
 
@@ -86,7 +90,9 @@ def _failures(folder: CampaignFolder) -> list[str | Table]:
     groups = (
         failed.with_columns(pl.col("error").fill_null("no error was told").str.strip_chars())
         .group_by("error")
-        .agg(pl.len().alias("count"), pl.col("run").min().alias("first"), pl.col("point").unique().sort().alias("points"))
+        .agg(
+            pl.len().alias("count"), pl.col("run").min().alias("first"), pl.col("point").unique().sort().alias("points")
+        )
         .sort("count", "first", descending=[True, False])
     )
     rows = [

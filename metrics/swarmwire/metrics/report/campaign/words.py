@@ -3,7 +3,12 @@
 from swarmwire.metrics.campaign.about import Point, Value
 from swarmwire.metrics.campaign.outcome import Outcome
 
-_ENDINGS = {"final": "at the end", "mean": "mean over the run", "min": "least in the run", "max": "greatest in the run"}
+_ENDINGS = {
+    "final": " at the end",
+    "mean": ", mean over the run",
+    "min": ", least in the run",
+    "max": ", greatest in the run",
+}
 _KNOWN = {
     "radio.pdr": "delivery ratio (PDR)",
     "stop_time_s": "time until it stopped in s",
@@ -23,7 +28,12 @@ def outcome_title(outcome: Outcome) -> str:
     name = name.removesuffix(f"_{outcome.unit}") if outcome.unit else name
     words = name.replace("_", " ")
     unit = f" in {outcome.unit}" if outcome.unit else ""
-    return f"{words}{unit}, {_ENDINGS[ending]}" if ending else f"{words}{unit}"
+    return f"{words}{unit}{_ENDINGS[ending]}" if ending else f"{words}{unit}"
+
+
+def sentence(text: str) -> str:
+    """The text with its first letter large."""
+    return text[:1].upper() + text[1:]
 
 
 def value_text(value: Value) -> str:

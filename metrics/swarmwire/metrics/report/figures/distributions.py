@@ -12,7 +12,8 @@ from swarmwire.metrics.report.figures.category_axis import room_below_in, set_ca
 from swarmwire.metrics.report.figures.column_axes import LETTERS_PT, column_axes
 from swarmwire.metrics.report.figures.log_axis import fits_log, set_log
 
-MOST_POINTS = 40  # of a group, beyond which its shape is drawn
+MOST_POINTS = 40  # of a group, beyond which shapes are drawn
+_FEWEST_IN_SHAPE = 10
 _HALF_WIDTH = 0.36  # of a group, in groups
 _BOX_HALF_WIDTH = 0.11
 _GRID = 64  # values at which a density is taken
@@ -35,8 +36,9 @@ def distributions(groups: Sequence[Group], title: str, x_label: str, limit: floa
     figure, axes = column_axes(title, x_label, foot_in=room_below_in(labels))
     everything = np.concatenate([group.values for group in groups] or [np.empty(0)])
     log = fits_log(everything if limit is None else np.append(everything, limit))
+    shapes = max(map(_runs, groups), default=0) > MOST_POINTS
     for place, group in enumerate(groups):
-        if len(group.values) > MOST_POINTS:
+        if shapes and len(group.values) >= _FEWEST_IN_SHAPE:
             _draw_shape(axes, place, group.values, log)
         else:
             _draw_points(axes, place, group.values)
@@ -47,6 +49,10 @@ def distributions(groups: Sequence[Group], title: str, x_label: str, limit: floa
         set_log(axes.yaxis)
     set_categories(axes, labels)
     return figure
+
+
+def _runs(group: Group) -> float:
+    return len(group.values) / (1.0 - group.censored) if group.censored < 1.0 else 0.0
 
 
 def _draw_points(axes: Any, place: int, values: FloatArray) -> None:

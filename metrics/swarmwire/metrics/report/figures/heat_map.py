@@ -48,7 +48,9 @@ def heat_map(
     axes.pcolormesh(*edges, shown, cmap=colors, norm=norm, edgecolors="white", linewidth=0.4)
     if len(x_labels) <= _MOST_WRITTEN:
         _write_values(axes, values, norm)
-    _draw_jumps(axes, jumps)
+    else:
+        _mark_beyond(axes, values)
+    _draw_jumps(axes, jumps, 0.0 if len(x_labels) > _MOST_WRITTEN else 0.38)
     set_categories(axes, x_labels)
     axes.set_xlim(-0.5, len(x_labels) - 0.5)
     every = max(1, -(-rows // 12))
@@ -68,13 +70,19 @@ def _write_values(axes: Any, values: FloatArray, norm: Any) -> None:
         axes.text(column, row, f"{value:.3g}" if np.isfinite(value) else ">", color=INK if light else "white", **middle)
 
 
-def _draw_jumps(axes: Any, jumps: Sequence[Jump | None]) -> None:
+def _mark_beyond(axes: Any, values: FloatArray) -> None:
+    for row, column in np.argwhere(np.isposinf(values)).tolist():
+        axes.text(column, row, ">", color=INK, ha="center", va="center", fontsize=LETTERS_PT)
+
+
+def _draw_jumps(axes: Any, jumps: Sequence[Jump | None], above: float) -> None:
+    """Each in its row, with its interval so much above the row's middle, where it hides no number."""
     outlined: Look = {"zorder": 5, "solid_capstyle": "butt"}
     for row, jump in enumerate(jumps):
         if jump is None:
             continue
-        axes.plot([jump.low, jump.high], [row + 0.32] * 2, color="white", lw=3.0, **outlined)
-        axes.plot([jump.low, jump.high], [row + 0.32] * 2, color=INK, lw=1.0, **outlined)
+        axes.plot([jump.low, jump.high], [row + above] * 2, color="white", lw=2.6, **outlined)
+        axes.plot([jump.low, jump.high], [row + above] * 2, color=INK, lw=1.0, **outlined)
         axes.plot([jump.at] * 2, [row - 0.5, row + 0.5], color="white", lw=3.4, **outlined)
         axes.plot([jump.at] * 2, [row - 0.5, row + 0.5], color="#d9381e", lw=1.8, zorder=6, solid_capstyle="butt")
 

@@ -31,13 +31,13 @@ def resilience_curve(
     """The figure of values (k,) with their intervals, over shares (k,) that were lost."""
     figure, axes = column_axes(title, x_label)
     axes.axhline(1.0, color=SOFT, lw=0.7, ls=":", zorder=1)
-    lines: Look = {"color": CURVE, "lw": 1.0, "zorder": 3}
+    lines: Look = {"color": CURVE, "lw": 1.0, "zorder": 3, "clip_on": False}
     axes.vlines(share, low, high, **lines)
-    axes.plot(share, value, "o", color=CURVE, ms=3.6, zorder=4)
+    axes.plot(share, value, "o", color=CURVE, ms=3.6, zorder=4, clip_on=False)
     for shape in shapes:
         look: Look = {"color": ACCENT, "lw": 1.4} if shape.better else {"color": INK, "lw": 0.9, "ls": (0, (4, 2))}
         axes.plot(shape.share, shape.value, label=shape.label, zorder=2, **look)
     axes.set_ylim(min(0.0, float(low.min())), None)
-    axes.set_xlim(0.0, None)
+    axes.set_xlim(-0.03 * float(share[-1]), None)
     plain_legend(axes, loc="best")
     return figure
