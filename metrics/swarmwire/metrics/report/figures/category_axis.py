@@ -6,6 +6,7 @@ from typing import Any
 from swarmwire.metrics.report.figures.column_axes import FOOT_IN
 
 _LETTERS = 44  # that fit below a column's figure side by side
+_FEWEST = 5  # groups for which there is room, so that two do not look like barrels
 _LONGEST = 14
 _MOST_TURNED = 18
 
@@ -19,7 +20,8 @@ def room_below_in(labels: Sequence[str]) -> float:
 
 def set_categories(axes: Any, labels: Sequence[str]) -> None:
     """Label the groups, which stand at 0, 1, 2 and so on."""
-    axes.set_xlim(-0.6, len(labels) - 0.4)
+    aside = 0.6 + 0.5 * max(0, _FEWEST - len(labels))
+    axes.set_xlim(-aside, len(labels) - 1 + aside)
     if not _turned(labels):
         every = -(-_letters(labels) // _LETTERS)
         axes.set_xticks(range(0, len(labels), every), labels[::every])
