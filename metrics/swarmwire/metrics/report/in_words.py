@@ -23,3 +23,11 @@ def share(value: float | None) -> str:
 def count(value: int, one: str, many: str = "") -> str:
     """A count with what is counted, `one` of it or `many` (`one` with an s)."""
     return f"{value:,} {one if value == 1 else many or f'{one}s'}"
+
+
+def short(value: float, _place: int = 0) -> str:
+    """A number beside an axis: thousands as k, millions as M, so that there is room for it (a formatter of ticks)."""
+    for power, letter in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if abs(value) >= power:
+            return f"{value / power:g}{letter}".replace("-", "−")
+    return f"{value:.6g}".replace("-", "−")

@@ -5,10 +5,9 @@ from pathlib import Path
 from swarmwire.metrics.report.in_words import count, number
 from swarmwire.metrics.report.run_data import RunData, read_run
 from swarmwire.metrics.report.run_sections.measured import measured
-from swarmwire.metrics.report.run_sections.over_time import over_time
+from swarmwire.metrics.report.run_sections.what_happened import what_happened
 from swarmwire.metrics.report.run_sections.radio import radio
 from swarmwire.metrics.report.run_sections.what_was_run import groups, scenario_text, what_was_run
-from swarmwire.metrics.report.run_sections.where import where
 from swarmwire.metrics.report.section import Report
 
 
@@ -20,7 +19,7 @@ def run_report(folder: Path) -> Report:
     read, or without matplotlib.
     """
     run = read_run(folder)
-    sections = (what_was_run(run), over_time(run), *where(run), radio(run), measured(run), *scenario_text(run))
+    sections = (what_was_run(run), what_happened(run), radio(run), measured(run), *scenario_text(run))
     return Report(run.static.name, sections, _about(run))
 
 

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 from swarmwire.metrics.drawing.delivery_over_distance import draw_intended, draw_ratio
 from swarmwire.metrics.drawing.plain_axes import plain_axes
+from swarmwire.metrics.report.in_words import short
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 
 if TYPE_CHECKING:
@@ -19,13 +20,6 @@ def delivery_by_distance(table: "pl.DataFrame", range_m: float | None) -> Any:
     lower = plain_axes(figure, (0.11, 0.14, 0.86, 0.2), "receivers that packets were meant for")
     draw_ratio(upper, table, range_m)
     draw_intended(lower, table)
-    lower.yaxis.set_major_formatter(_short)
+    upper.tick_params(labelbottom=False)
+    lower.yaxis.set_major_formatter(short)
     return figure
-
-
-def _short(value: float, _: int) -> str:
-    """Thousands as k, so that there is room for them."""
-    for power, letter in ((1e6, "M"), (1e3, "k")):
-        if abs(value) >= power:
-            return f"{value / power:g}{letter}"
-    return f"{value:g}"

@@ -7,6 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.looks import CURVE, INK, SMALL_PT, SOFT
 from swarmwire.metrics.drawing.plain_axes import plain_axes
+from swarmwire.metrics.report.in_words import short
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 
 _BINS = 25
@@ -21,6 +22,7 @@ def link_histogram(pdr: FloatArray) -> Any:
     axes.axvline(float(np.median(pdr)), color=INK, lw=0.8, ls=(0, (4, 2)))
     axes.set_xlim(0.0, 1.0)
     axes.locator_params(axis="y", nbins=4, integer=True)
+    axes.yaxis.set_major_formatter(short)
     axes.set_xlabel("share heard of the packets in range", fontsize=SMALL_PT, color=SOFT, labelpad=2)
     axes.set_ylabel("links (sender to receiver)", fontsize=SMALL_PT, color=SOFT, labelpad=2)
     return figure

@@ -8,6 +8,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.looks import CURVE, SMALL_PT, SOFT
 from swarmwire.metrics.drawing.metric_axes import is_count, limits
 from swarmwire.metrics.drawing.plain_axes import plain_axes
+from swarmwire.metrics.report.in_words import short
 from swarmwire.metrics.report.lanes import Lane
 from swarmwire.metrics.report.run_figures.event_lanes import EVENT, LANE_IN, draw_lanes
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
@@ -62,6 +63,7 @@ def draw_curve(axes: Any, time_s: FloatArray, curve: Curve) -> None:
     axes.plot(time_s[kept], curve.value[kept], color=CURVE, lw=1.0, drawstyle=steps)
     axes.set_ylim(*limits(curve.name, curve.value))
     axes.locator_params(axis="y", nbins=3, integer=curve.whole or is_count(curve.name))
+    axes.yaxis.set_major_formatter(short)
 
 
 def _mark(axes: Any, lanes: Sequence[Lane], end_s: float) -> None:

@@ -23,7 +23,7 @@ from swarmwire.metrics.report.run_figures.paths import Paths
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 
 TIME_PARTS = 6
-_EDGE_IN, _FOOT_IN, _ROW_IN, _MOST_HIGH_IN = 0.08, 0.3, 0.19, 4.4
+_EDGE_IN, _FOOT_IN, _SCALE_IN, _ROW_IN, _MOST_HIGH_IN = 0.08, 0.24, 0.16, 0.19, 4.4
 _CROWD = 200  # robots, from which on lines are thinner
 _DRAWN_ROBOTS = 1000  # more discs than these are drawn as pixels
 
@@ -45,7 +45,7 @@ def trajectories(
     by_time = len(static.groups) == 1
     entries = _entries(static, arena, bool(alive.all()))
     columns = columns_in(entries, COLUMN_IN - 2 * _EDGE_IN)
-    layout = _lay_out(static.arena_size_m, -(-len(entries) // columns))
+    layout = _lay_out(static.arena_size_m, -(-len(entries) // columns), _FOOT_IN + (_SCALE_IN if by_time else 0.0))
     figure = blank_figure(layout.width_in, layout.height_in)
     add_legend(figure, entries, layout.left, layout.below_top(0.06), columns)
     axes = add_arena_axes(figure, layout, static.arena_size_m)
@@ -64,19 +64,19 @@ def trajectories(
     swarm.show(pose, alive)
     for artist in swarm.artists if static.robots > _DRAWN_ROBOTS else ():
         artist.set_rasterized(True)
-    draw_scale_bar(axes, static.arena_size_m, "" if by_time else swarm.enlargement)
+    draw_scale_bar(axes, static.arena_size_m, swarm.enlargement)
     return figure
 
 
-def _lay_out(size_m: tuple[float, float], legend_rows: int) -> Layout:
+def _lay_out(size_m: tuple[float, float], legend_rows: int, foot_in: float) -> Layout:
     pad_m = 2.0 * PAD * max(size_m)
     across_m, up_m = size_m[0] + pad_m, size_m[1] + pad_m
     in_per_m = min((COLUMN_IN - 2 * _EDGE_IN) / across_m, _MOST_HIGH_IN / up_m)
     wide_in, high_in = across_m * in_per_m, up_m * in_per_m
     head_in = legend_rows * _ROW_IN + 0.08
-    height_in = head_in + high_in + _FOOT_IN
+    height_in = head_in + high_in + foot_in
     left_in = (COLUMN_IN - wide_in) / 2
-    place = left_in / COLUMN_IN, _FOOT_IN / height_in, wide_in / COLUMN_IN, high_in / height_in
+    place = left_in / COLUMN_IN, foot_in / height_in, wide_in / COLUMN_IN, high_in / height_in
     return Layout(COLUMN_IN, height_in, place, None, beside=False)
 
 
@@ -110,10 +110,10 @@ def _draw_starts(axes: Any, paths: Paths, crowd: bool) -> None:
 
 
 def _draw_time_scale(figure: Any, layout: Layout, end_s: float) -> None:
-    """Which colour is which time, below the arena at the right."""
-    width_in, high_in = 1.0, 0.06
-    right_in = layout.width_in - _EDGE_IN - 0.4
-    box = (right_in - width_in) / layout.width_in, 0.12 / layout.height_in
+    """Which colour is which time, at the foot."""
+    width_in, high_in = 1.6, 0.06
+    right_in = layout.width_in - _EDGE_IN - 0.45
+    box = (right_in - width_in) / layout.width_in, 0.08 / layout.height_in
     axes = figure.add_axes((*box, width_in / layout.width_in, high_in / layout.height_in))
     axes.set_axis_off()
     axes.set(xlim=(0, TIME_PARTS), ylim=(0, 1))

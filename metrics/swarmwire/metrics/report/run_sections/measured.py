@@ -27,11 +27,11 @@ def measured(run: RunData) -> Section:
     )
     none = [f"`{name}`" for name, found in values.items() if all(found[key] is None for key in STATISTICS)]
     of = ", first arena" if run.static.arenas > 1 else ""
-    far = "" if run.summary else ", over the ticks recorded"
+    far = "" if run.summary else " that were recorded"
     table = Table(
         ("metric", *STATISTICS, "unit", "what"),
         rows,
-        f"Metrics over the ticks{of}{far}. Of one that adds up, final is the total and the others are per tick.",
+        f"Metrics over the ticks{far}{of}. Of one that adds up, final is the total and the others are per tick.",
     )
     undefined = [f"Never had a value in this run: {', '.join(none)}."] if none else []
     return Section("Metrics", (table, *undefined, *_arenas(run)))
@@ -76,9 +76,8 @@ def _arenas(run: RunData) -> list[str | Table]:
         for name, known in finals.items()
         if len(known)
     )
-    head = ("metric", "arenas with a value", "least", "quartile", "median", "quartile", "greatest")
+    head = ("metric", "arenas with a value", "least", "lower quartile", "median", "upper quartile", "greatest")
     return [
-        f"Figures show the first of {arenas} arenas, seed {run.static.seeds[0]}; the tables below are of all.",
         Table(head, across, "Final values across the arenas."),
         Table(("seed", *_ARENA_HEAD), tuple(map(_arena_row(run), range(arenas))), "All arenas.", folded=arenas > 12),
     ]
@@ -94,7 +93,7 @@ def _arena_row(run: RunData) -> Any:
     def row(arena: int) -> tuple[str, ...]:
         radio = run.of_arena("radio", arena)
         told = (f"{radio['sent']:,}", share(radio["pdr"])) if radio else ("–", "–")
-        return (str(run.static.seeds[arena]), *told, hashes[arena])
+        return (str(run.static.seeds[arena]), *told, f"{hashes[arena][:16]}…")
 
     return row
 

@@ -1,5 +1,7 @@
 """What the radio did: delivery over distance, latencies, links, and what became of packets."""
 
+from typing import Any
+
 from swarmwire.metrics.report.in_words import share
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_sections.distances import distances
@@ -16,7 +18,7 @@ def radio(run: RunData) -> Section:
     if not run.has_radio:
         return Section(TITLE, ("The robots have no radio.",))
     found = run.of_arena("radio")
-    said = [_account(found)] if found else []
+    said = [_account(found, run.static.arenas)] if found else []
     drawn = [distances(run), latencies(run), links(run)]
     figures = [part for part in drawn if isinstance(part, Figure)]
     missing = [part for part in drawn if isinstance(part, str)]
@@ -27,7 +29,8 @@ def radio(run: RunData) -> Section:
     return Section(TITLE, (*said, *figures, *missing, *fates(run)))
 
 
-def _account(radio: dict[str, object]) -> str:
+def _account(radio: dict[str, Any], arenas: int) -> str:
     sent, intended, in_range, pdr = (radio.get(key) for key in ("sent", "intended", "in_range", "pdr"))
     heard = f"; {share(pdr)} of these heard it" if isinstance(pdr, float) else ""
-    return f"{sent:,} packets were sent, meant for {intended:,} receivers, of which {in_range:,} were in range{heard}."
+    where = "In the first arena " if arenas > 1 else ""
+    return f"{where}{sent:,} packets were sent, meant for {intended:,} receivers, of which {in_range:,} were in range{heard}."

@@ -22,7 +22,7 @@ def what_was_run(run: RunData) -> Section:
     """The section: a table of facts, what was not as it should be, and the command that repeats the run."""
     facts = [*_scenario(run), *_course(run), *_machine(run)]
     again = (
-        "The folder alone is enough to run it again, bit for bit:"
+        "The folder alone is enough to run it again; on this CPU and with these versions bit for bit:"
         if run.started
         else "Without its `run.json` the run cannot be repeated."
     )
@@ -31,6 +31,7 @@ def what_was_run(run: RunData) -> Section:
         (
             Table(("", ""), tuple(facts), "The run at a glance."),
             *_not_as_it_should_be(run),
+            *_hash(run),
             again,
             *([Listing(f"swarmwire repeat {run.folder.path}")] if run.started else []),
         ),
@@ -89,7 +90,6 @@ def _course(run: RunData) -> list[tuple[str, str]]:
         ("ended", _ended(summary)),
         ("simulated", f"{number(summary['sim_time_s'])} s, {count(summary['ticks'], 'tick')} at {run.static.rate_hz} Hz"),
         ("took", _took(summary)),
-        *_hashes(run, summary["trajectory_sha256"]),
     ]
 
 
@@ -112,10 +112,13 @@ def _took(summary: dict[str, Any]) -> str:
     return f"{number(wall_s)} s, {number(factor)} × real time" if wall_s is not None else "–"
 
 
-def _hashes(run: RunData, hashes: list[str]) -> list[tuple[str, str]]:
-    if len(hashes) == 1:
-        return [("trajectory", hashes[0])]
-    return [("trajectories", f"{hashes[0][:16]}… (seed {run.static.seeds[0]}), and those of the other arenas below")]
+def _hash(run: RunData) -> list[str]:
+    """By what a repetition is compared: in a paragraph, since a cell so wide would be cut off on a phone."""
+    if run.summary is None:
+        return []
+    of = "Trajectory" if run.static.arenas == 1 else "Trajectory of the first arena"
+    same = "equal exactly where two runs moved and heard the same"
+    return [f"{of}: `{run.summary['trajectory_sha256'][0]}`; {same}."]
 
 
 def _machine(run: RunData) -> list[tuple[str, str]]:
@@ -129,12 +132,15 @@ def _machine(run: RunData) -> list[tuple[str, str]]:
 
 def _not_as_it_should_be(run: RunData) -> list[str]:
     """Paragraphs about what a reader should know before believing anything."""
-    summary = run.summary
+    summary, arenas = run.summary, run.static.arenas
+    said: list[str] = []
+    if arenas > 1:
+        said.append(f"Figures are of the first of {arenas} arenas, seed {run.static.seeds[0]}; what is told of others says so.")
     if summary is None:
-        return []
+        return said
     counts = {name: value for name, value in summary.get("counts", {}).items() if value}
-    told = [", ".join(f"`{name}` {value:,}" for name, value in counts.items())] if counts else []
-    said = [f"Not as it should be: {told[0]}."] if told else []
+    if counts:
+        said.append(f"Not as it should be: {', '.join(f'`{name}` {value:,}' for name, value in counts.items())}.")
     lost = summary.get("lost_runners") or []
     if lost:
         said.append(f"Lost runners: {'; '.join(map(str, lost))}.")

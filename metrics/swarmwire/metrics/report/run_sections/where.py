@@ -4,12 +4,12 @@ from swarmwire.metrics.report.in_words import count, number
 from swarmwire.metrics.report.run_data import ARENA, RunData
 from swarmwire.metrics.report.run_figures.paths import Paths, paths_of
 from swarmwire.metrics.report.run_figures.trajectories import trajectories
-from swarmwire.metrics.report.section import Figure, Section
+from swarmwire.metrics.report.section import Figure
 from swarmwire.metrics.report.svg import as_svg
 
 
-def where(run: RunData) -> list[Section]:
-    """The section, if there is a tick."""
+def where(run: RunData) -> list[Figure]:
+    """The figure, if there is a tick."""
     if isinstance(run.film, str):
         return []
     film, static = run.film, run.static
@@ -19,8 +19,8 @@ def where(run: RunData) -> list[Section]:
     figure = trajectories(static, ARENA, paths, film.pose[-1], film.alive[-1], movable, end_s)
     colored = "by group" if len(static.groups) > 1 else "by time, from light to dark"
     caption = f"Ways of the robots, coloured {colored}; small circles are starts, discs where they were at {number(end_s)} s."
-    drawn = Figure("trajectories", as_svg(figure, "trajectories"), caption + _left_out(paths, len(film.time_s), static.robots))
-    return [Section("Where the robots went", (drawn,))]
+    left_out = _left_out(paths, len(film.time_s), static.robots)
+    return [Figure("trajectories", as_svg(figure, "trajectories"), caption + left_out)]
 
 
 def _left_out(paths: Paths, ticks: int, robots: int) -> str:

@@ -1,4 +1,4 @@
-"""What happened when: metrics and events over time."""
+"""What happened: metrics and events over time, and where the robots went."""
 
 from typing import Any
 
@@ -12,38 +12,50 @@ from swarmwire.metrics.report.lanes import Lane
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_figures.small_panels import MOST_PANELS, small_panels
 from swarmwire.metrics.report.run_figures.timeline import Curve, timeline
+from swarmwire.metrics.report.run_sections.where import where
 from swarmwire.metrics.report.section import Figure, Section, Table
 from swarmwire.metrics.report.svg import as_svg
 
 MAIN = ("order", "components", DELIVERY)  # in the panels of the timeline, as far as they have a value
-TASK = ("target_best", "target_mean")  # standard, but without a value in most runs
+SECOND = (  # small, where they have a value that changes
+    "target_best",
+    "target_mean",
+    "largest_component",
+    "age_of_information",
+    "throughput",
+    "collisions",
+    "wall_contacts",
+    "min_gap",
+)
 _WHOLE = ("components",)
 _MOST_LANES = 8
 _MOST_EVENTS = 200
 _TITLES = {DELIVERY: "delivery: heard / in range, last second"}
 
 
-def over_time(run: RunData) -> Section:
-    """The section: the timeline, and small panels of the metrics that the scenario names."""
+def what_happened(run: RunData) -> Section:
+    """The section: the timeline, the ways of the robots, and small panels of the metrics that the scenario names."""
     if isinstance(run.film, str):
-        return Section("Over time", (f"No tick can be shown: {run.film}",))
+        return Section("What happened", (f"No tick can be shown: {run.film}",))
     film = run.film
     parts: list[Any] = []
     main = curves(film, MAIN)
     if main:
         figure = timeline(film.time_s, main, run.lanes[:_MOST_LANES])
         parts.append(Figure("timeline", as_svg(figure, "timeline"), _caption(main, run.lanes)))
-    others = curves(film, chosen(film))
+    parts += where(run)
+    others = curves(film, second(film))
     if others:
         figure = small_panels(film.time_s, others)
         parts.append(Figure("metrics", as_svg(figure, "metrics"), _rest("The other metrics", len(others))))
-    return Section("Over time", (*parts, *_events(run)))
+    return Section("What happened", (*parts, *_events(run)))
 
 
-def chosen(film: Film) -> list[str]:
-    """The metrics that were measured since the scenario names them, and those of a task that have a value."""
+def second(film: Film) -> list[str]:
+    """The metrics for small panels: those that are measured since the scenario names them, then some of the standard."""
     listed = [name for name in film.metrics if name not in METRICS or not METRICS[name].standard]
-    return [name for name in (*TASK, *listed) if name in film.metrics and name not in MAIN]
+    changing = [name for name in SECOND if name in film.metrics and np.unique(film.metrics[name]).size > 1]
+    return [name for name in (*listed, *changing) if name not in MAIN]
 
 
 def curves(film: Film, names: tuple[str, ...] | list[str]) -> list[Curve]:
