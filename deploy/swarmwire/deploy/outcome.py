@@ -22,6 +22,8 @@ def outcome(
     error: BaseException | None,
     runners: int,
     ticks: int,
+    arena_ticks: Sequence[int],
+    stopped: Sequence[bool],
     hashes: Sequence[str],
     wall_s: float,
     start_s: float,
@@ -33,9 +35,14 @@ def outcome(
     realtime: RealTimeReport | None,
     folder: Path | None,
 ) -> Result:
-    """The result; `parts` are the observers' parts of the summary, `hashes` the trajectory hash of each arena."""
+    """The result; `parts` are the observers' parts of the summary.
+
+    `arena_ticks`, `stopped` (it was over before the run was) and `hashes` (of the trajectory) are those of each arena.
+    """
     radios: list[Any] = parts.get("radio", [None] * static.arenas)
-    arenas = zip(static.seeds, hashes, radios, parts["metrics"], strict=True)
+    ends = ["stopped" if over else ended for over in stopped]
+    times_s = [to_s(tick_start_ns(done, static.rate_hz)) for done in arena_ticks]
+    arenas = zip(static.seeds, ends, arena_ticks, times_s, hashes, radios, parts["metrics"], strict=True)
     record = record_summary(parts)
     return Result(
         scenario=static.name,

@@ -110,9 +110,9 @@ class CampaignFolder:
         observed = np.isfinite(value)
         failed = int(np.count_nonzero(here)) - int(np.count_nonzero(well))
         if outcome.kind == "time":
-            return Sample(np.where(observed, value, self._numbers(SIM_TIME)[well]), observed, seed, failed)
+            return Sample(np.where(observed, value, self._numbers(SIM_TIME)[well]), observed, seed, "time", failed)
         undefined = int(np.count_nonzero(~observed))
-        return Sample(value[observed], observed[observed], seed[observed], failed, undefined)
+        return Sample(value[observed], observed[observed], seed[observed], "number", failed, undefined)
 
     def _column(self, name: str) -> AnyArray:
         return self.runs[name].to_numpy()

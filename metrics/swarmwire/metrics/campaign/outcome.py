@@ -1,9 +1,10 @@
 """Outcomes of a campaign: columns of its table that say what came of each run."""
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
-Kind = Literal["number", "time"]
+from swarmwire.metrics.statistics.sample import Kind
+
 KINDS: tuple[str, ...] = get_args(Kind)
 
 

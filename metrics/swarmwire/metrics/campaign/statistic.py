@@ -42,7 +42,7 @@ def find_statistic(name: str, outcomes: Iterable[Outcome], where: str = "--outco
     """
     known = {outcome.column: outcome for outcome in outcomes}
     column, _, last = name.rpartition(".")
-    stat = {str(stat): stat for stat in STATS}.get(last)
+    stat: Stat | None = STATS[STATS.index(last)] if last in STATS else None
     if name in known or stat is None or not column:
         return Statistic(find_outcome(name, known.values(), where), USUAL)
     found = find_outcome(column, known.values(), where)
