@@ -9,8 +9,8 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.one_of import one_of
 from swarmwire.metrics.drawing.layout import Layout
-from swarmwire.metrics.drawing.metric_axes import is_count, limits, titled
 from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Look
+from swarmwire.metrics.drawing.metric_axes import is_count, limits, titled
 from swarmwire.metrics.registry import DELIVERY
 
 MOST_PLOTS = 4

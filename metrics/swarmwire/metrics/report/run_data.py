@@ -4,7 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
@@ -38,10 +38,14 @@ class RunData:
         """Whether the robots have one."""
         return self.static.range_m is not None
 
+    def record(self, name: str) -> dict[str, Any]:
+        """What the summary says of a table that was recorded; empty without one."""
+        return {} if self.summary is None else dict(self.summary["record"].get(name) or {})
+
     def of_arena(self, part: str, arena: int = ARENA) -> Any:
         """What the summary says of an arena: its `radio` or `metrics`; None without a summary."""
-        found = None if self.summary is None else self.summary.get(part)
-        return found[arena] if isinstance(found, list) else found
+        found: Any = None if self.summary is None else self.summary.get(part)
+        return cast("list[Any]", found)[arena] if isinstance(found, list) else found
 
     def table(self, name: str, arena: int | None = ARENA) -> "pl.DataFrame | str":
         """`events`, `radio_distances` or `radio_links`, or why it cannot be had: not recorded, or damaged."""
@@ -68,7 +72,9 @@ class RunData:
             own = pl.scan_parquet(files).filter((pl.col("arena") == ARENA) & pl.col("receiver").is_not_null())
             return own.select(*columns).drop_nulls().collect()
         except (OSError, pl.exceptions.PolarsError) as error:
-            return f"{self.folder.where('packets')} cannot be read ({str(error).splitlines()[0]}); see `swarmwire verify`."
+            return (
+                f"{self.folder.where('packets')} cannot be read ({str(error).splitlines()[0]}); see `swarmwire verify`."
+            )
 
 
 def read_run(path: Path) -> RunData:
@@ -91,7 +97,7 @@ def _started(path: Path) -> dict[str, Any]:
         found: object = json.loads((path / RUN_JSON).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    return dict(found) if isinstance(found, dict) else {}  # pyright: ignore
+    return cast("dict[str, Any]", found) if isinstance(found, dict) else {}
 
 
 def _text(path: Path) -> str:

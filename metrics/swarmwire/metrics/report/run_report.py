@@ -5,8 +5,8 @@ from pathlib import Path
 from swarmwire.metrics.report.in_words import count, number
 from swarmwire.metrics.report.run_data import RunData, read_run
 from swarmwire.metrics.report.run_sections.measured import measured
-from swarmwire.metrics.report.run_sections.what_happened import what_happened
 from swarmwire.metrics.report.run_sections.radio import radio
+from swarmwire.metrics.report.run_sections.what_happened import what_happened
 from swarmwire.metrics.report.run_sections.what_was_run import groups, scenario_text, what_was_run
 from swarmwire.metrics.report.section import Report
 

@@ -1,5 +1,7 @@
 """Curves with fewer points than they have, in which every peak can still be seen."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
@@ -16,7 +18,7 @@ def thinned(value: FloatArray, most: int = MOST_POINTS) -> IntArray:
         return np.arange(len(value))
     kept: set[int] = {0, len(value) - 1}
     bounds = np.linspace(0, len(value), most // 2 + 1).astype(int).tolist()
-    for first, after in zip(bounds[:-1], bounds[1:], strict=True):
+    for first, after in pairwise(bounds):
         stretch = value[first:after]
         known = np.flatnonzero(np.isfinite(stretch))
         if not len(known):

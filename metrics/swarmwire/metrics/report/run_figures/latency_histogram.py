@@ -22,24 +22,28 @@ def latency_histogram(air_s: FloatArray, agent_s: FloatArray) -> Any:
     """The figure of latencies on air (k,) and to the agent (k,), one at least."""
     figure = blank_figure(COLUMN_IN, _HEIGHT_IN)
     edges_ms = _edges(1e3 * np.concatenate([air_s, agent_s]))
-    told = (("on air", air_s, CURVE), ("to the agent", agent_s, LINK))
-    for row, (name, latency_s, color) in enumerate(told):
-        late_ms = percentiles(1e3 * latency_s)
-        figures = ", ".join(f"p{p:g} {number(ms)}" for p, ms in zip(PERCENTS, late_ms, strict=True))
-        axes = plain_axes(figure, (0.11, 0.575 - 0.435 * row, 0.86, 0.325), f"{name}: {figures} ms")
-        shares = np.histogram(np.clip(1e3 * latency_s, edges_ms[0], edges_ms[-1]), edges_ms)[0] / max(1, len(latency_s))
-        axes.stairs(100.0 * shares, edges_ms, fill=True, color=color, alpha=0.75)
-        if edges_ms[0] > 0.0 and edges_ms[-1] > _WIDE * edges_ms[0]:
-            axes.set_xscale("log")
-            axes.xaxis.set_major_formatter("{x:g}")
-        axes.set_xlim(edges_ms[0], edges_ms[-1])
-        for ms, dashes in zip(late_ms, _DASHES, strict=True):
-            axes.axvline(ms, color=INK, lw=0.8, ls=dashes)
-        axes.locator_params(axis="y", nbins=3)
-        axes.set_ylabel("% of receivers", fontsize=SMALL_PT, color=SOFT, labelpad=1)
-        axes.tick_params(labelbottom=row == 1)
-    axes.set_xlabel("from sending in ms", fontsize=SMALL_PT, color=SOFT, labelpad=2)
+    _draw(figure, 0.575, "on air", 1e3 * air_s, edges_ms, CURVE).tick_params(labelbottom=False)
+    lower = _draw(figure, 0.14, "to the agent", 1e3 * agent_s, edges_ms, LINK)
+    lower.set_xlabel("from sending in ms", fontsize=SMALL_PT, color=SOFT, labelpad=2)
     return figure
+
+
+def _draw(figure: Any, foot: float, name: str, latency_ms: FloatArray, edges_ms: FloatArray, color: str) -> Any:
+    late_ms = percentiles(latency_ms)
+    told = ", ".join(f"p{p:g} {number(ms)}" for p, ms in zip(PERCENTS, late_ms, strict=True))
+    axes = plain_axes(figure, (0.11, foot, 0.86, 0.325), f"{name}: {told} ms")
+    counts = np.histogram(np.clip(latency_ms, edges_ms[0], edges_ms[-1]), edges_ms)[0]
+    axes.stairs(100.0 * counts / len(latency_ms), edges_ms, fill=True, color=color, alpha=0.75)
+    if edges_ms[0] > 0.0:
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter("")
+    axes.set_xlim(edges_ms[0], edges_ms[-1])
+    for ms, dashes in zip(late_ms, _DASHES, strict=True):
+        axes.axvline(ms, color=INK, lw=0.8, ls=dashes)
+    axes.locator_params(axis="y", nbins=3)
+    axes.set_ylabel("% of receivers", fontsize=SMALL_PT, color=SOFT, labelpad=1)
+    return axes
 
 
 def percentiles(latency: FloatArray) -> list[float]:
@@ -48,7 +52,7 @@ def percentiles(latency: FloatArray) -> list[float]:
 
 
 def _edges(latency_ms: FloatArray) -> FloatArray:
-    """Edges of the bins: of equal widths, or of equal ratios if latencies differ by much."""
+    """Edges of the bins: of equal widths from 0 on, or of equal ratios if latencies differ by much."""
     low, high = float(latency_ms.min()), float(np.percentile(latency_ms, _LATEST))
     if low > 0.0 and high > _WIDE * low:
         return np.geomspace(low, high, _BINS + 1)

@@ -47,12 +47,14 @@ def link_matrix(static: Static, pdr: FloatArray) -> Any:
 
 
 def _names(static: Static) -> tuple[dict[float, str], bool]:
-    """Names by place, of robots or if these are many of groups, at their middle; and whether they must stand upright."""
+    """Names by place, of robots or if these are many of groups, at their middle; and whether they stand upright."""
     if static.robots <= MOST_NAMED:
         names: dict[float, str] = dict(enumerate(static.robot_names))
     else:
         names = {0.5 * (group.start + group.stop - 1): group.name for group in static.groups}
-    names = {place: name if len(name) <= MOST_LETTERS else f"{name[: MOST_LETTERS - 1]}…" for place, name in names.items()}
+    names = {
+        place: name if len(name) <= MOST_LETTERS else f"{name[: MOST_LETTERS - 1]}…" for place, name in names.items()
+    }
     return names, sum(len(name) + 1 for name in names.values()) > _LETTERS_ACROSS
 
 

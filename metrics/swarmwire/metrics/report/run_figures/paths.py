@@ -23,7 +23,7 @@ class Paths:
     lap: IntArray  # (k, m, 2) how often the seam of a torus was crossed, along and across; 0 without one
 
     def line(self, columns: IntArray, first: int, last: int) -> tuple[FloatArray, FloatArray]:
-        """x and y of the ways of these columns from one place in `ticks` to another, NaN wherever the pen is lifted."""
+        """The ways, x and y, of these columns from one place in `ticks` to another, NaN where the pen is lifted."""
         place, lap = self.place_m[first : last + 1, columns], self.lap[first : last + 1, columns]
         jump = (np.diff(lap, axis=0) != 0).any(axis=-1)  # (k - 1, m)
         drawn = np.full((2 * len(place), len(columns), 2), np.nan)

@@ -20,7 +20,7 @@ def distances(run: RunData) -> Figure | str:
         "Delivery ratio over distance: of all robots that packets on air were meant for, however far, the share that "
         "heard. Bars are 95 % intervals (Wilson), receivers taken as independent."
     )
-    every = ((run.summary or {}).get("record", {}).get("radio_distances") or {}).get("every", 1)
+    every = run.record("radio_distances").get("every", 1)
     if every > 1:
         caption += f" One of {every} packets was counted."
     figure = delivery_by_distance(shown, run.static.range_m)

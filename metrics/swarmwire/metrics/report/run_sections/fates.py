@@ -29,7 +29,7 @@ def _fates(arenas: list[dict[str, Any]]) -> Table:
         if packets
     )
     of = f" in {len(arenas)} arenas together" if len(arenas) > 1 else ""
-    caption = f"Fates of packets{of}: each packet has one for each receiver that it was meant for. They add up to {intended:,}."
+    caption = f"Fates of packets{of}, one for each receiver that a packet was meant for; they add up to {intended:,}."
     return Table(("fate", "receivers", "share", "meaning"), rows, caption)
 
 
@@ -39,7 +39,9 @@ def _latencies(radio: dict[str, Any], arenas: int) -> Table:
         (name, *(_ms(radio[key][percent]) for percent in percents)) for key, name in _LATENCIES.items() if key in radio
     )
     of = ", of the first arena" if arenas > 1 else ""
-    return Table(("latency", *(f"{percent} in ms" for percent in percents)), rows, f"Latencies of all packets heard{of}.")
+    return Table(
+        ("latency", *(f"{percent} in ms" for percent in percents)), rows, f"Latencies of all packets heard{of}."
+    )
 
 
 def _ms(value_s: float | None) -> str:

@@ -1,8 +1,6 @@
 """How late packets were."""
 
-import numpy as np
-
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.fates import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static
@@ -27,15 +25,17 @@ def latencies(run: RunData) -> Figure | str:
     final = final_ns.to_numpy()
     acts = acts_at_ns(final, receiver.to_numpy(), run.static)
     figure = latency_histogram((final - sent) / NS_PER_S, (acts - sent) / NS_PER_S)
-    caption = "Latency of packets that were heard: from sending to hearing, and to the first tick at which the receiver acts. "
-    caption += "Lines are p50, p90 (dashed) and p99 (dotted)."
-    recorded = ((run.summary or {}).get("record", {}).get("packets") or {}).get("share", 1.0)
+    caption = (
+        "Latency of packets that were heard: from sending to hearing, and to the first tick at which the receiver acts. "
+        "Lines are p50, p90 (dashed) and p99 (dotted)."
+    )
+    recorded = run.record("packets").get("share", 1.0)
     if recorded < 1.0:
         caption += f" A share of {recorded:g} of the packets was recorded."
     return Figure("latency", as_svg(figure, "latency"), caption)
 
 
-def acts_at_ns(final_at_ns: IntArray, receiver: IntArray, static: Static) -> FloatArray:
+def acts_at_ns(final_at_ns: IntArray, receiver: IntArray, static: Static) -> IntArray:
     """When the receivers (k,) could act on what they heard at these times (k,), in ns: at the next tick of theirs."""
     tick = -(-final_at_ns * static.rate_hz // NS_PER_S)
     every = static.act_every_ticks[receiver]

@@ -52,7 +52,7 @@ def _counted(run: RunData) -> "pl.DataFrame | str":
         return table
     packets = run.packets(("sender", "receiver", "fate"))
     if isinstance(packets, str):
-        return f"neither `radio_links` nor `packets` was recorded." if "recorded" in packets else packets
+        return "neither `radio_links` nor `packets` was recorded." if "recorded" in packets else packets
     return packets.group_by("sender", "receiver", "fate").agg(pl.len().alias("packets"))
 
 

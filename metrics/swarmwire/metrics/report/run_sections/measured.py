@@ -1,5 +1,6 @@
 """What the metrics came to, as tables."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -83,17 +84,21 @@ def _arenas(run: RunData) -> list[str | Table]:
     ]
 
 
-_ARENA_HEAD = ("packets sent", "delivery", "trajectory")
+_ARENA_HEAD = ("ended", "time in s", "packets sent", "delivery", "trajectory")
 
 
-def _arena_row(run: RunData) -> Any:
+def _arena_row(run: RunData) -> Callable[[int], tuple[str, ...]]:
+    """A row of the table of arenas, by its place."""
     assert run.summary is not None
     hashes: list[str] = run.summary["trajectory_sha256"]
+    ends: list[dict[str, Any]] = run.summary.get("by_arena") or []
 
     def row(arena: int) -> tuple[str, ...]:
         radio = run.of_arena("radio", arena)
         told = (f"{radio['sent']:,}", share(radio["pdr"])) if radio else ("–", "–")
-        return (str(run.static.seeds[arena]), *told, f"{hashes[arena][:16]}…")
+        end = ends[arena] if arena < len(ends) else run.summary or {}
+        ended = (str(end.get("ended", "–")), number(end.get("sim_time_s")))
+        return (str(run.static.seeds[arena]), *ended, *told, f"{hashes[arena][:16]}…")
 
     return row
 

@@ -33,4 +33,5 @@ def _account(radio: dict[str, Any], arenas: int) -> str:
     sent, intended, in_range, pdr = (radio.get(key) for key in ("sent", "intended", "in_range", "pdr"))
     heard = f"; {share(pdr)} of these heard it" if isinstance(pdr, float) else ""
     where = "In the first arena " if arenas > 1 else ""
-    return f"{where}{sent:,} packets were sent, meant for {intended:,} receivers, of which {in_range:,} were in range{heard}."
+    reached = f"meant for {intended:,} receivers, of which {in_range:,} were in range{heard}"
+    return f"{where}{sent:,} packets were sent, {reached}."

@@ -52,7 +52,7 @@ def what_happened(run: RunData) -> Section:
 
 
 def second(film: Film) -> list[str]:
-    """The metrics for small panels: those that are measured since the scenario names them, then some of the standard."""
+    """The metrics for small panels: those that the scenario names, then some of the standard."""
     listed = [name for name in film.metrics if name not in METRICS or not METRICS[name].standard]
     changing = [name for name in SECOND if name in film.metrics and np.unique(film.metrics[name]).size > 1]
     return [name for name in (*listed, *changing) if name not in MAIN]
@@ -99,5 +99,3 @@ def _events(run: RunData) -> list[str | Table]:
 
 def _names(robots: list[str]) -> str:
     return ", ".join(robots[:8]) + (f" and {len(robots) - 8} more" if len(robots) > 8 else "") if robots else "–"
-
-

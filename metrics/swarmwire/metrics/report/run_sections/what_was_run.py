@@ -88,22 +88,20 @@ def _course(run: RunData) -> list[tuple[str, str]]:
         ("engine", str(summary.get("engine", "–"))),
         ("mode", f"{summary.get('mode', '–')}, {crew}"),
         ("ended", _ended(summary)),
-        ("simulated", f"{number(summary['sim_time_s'])} s, {count(summary['ticks'], 'tick')} at {run.static.rate_hz} Hz"),
+        (
+            "simulated",
+            f"{number(summary['sim_time_s'])} s, {count(summary['ticks'], 'tick')} at {run.static.rate_hz} Hz",
+        ),
         ("took", _took(summary)),
     ]
 
 
 def _ended(summary: dict[str, Any]) -> str:
-    how = _ENDED.get(summary["ended"], summary["ended"])
-    stops = summary.get("stopped_by")
-    if isinstance(stops, str):
-        how += f": {stops}"
-    elif isinstance(stops, list):
-        stopped = sum(1 for stop in stops if stop is not None)
-        how += f"; {stopped} of {len(stops)} arenas stopped before the end" if stopped else ""
-    when = summary.get("stop_time_s")
-    if isinstance(when, int | float):
-        how += f", at {number(when)} s"
+    how = str(_ENDED.get(summary["ended"], summary["ended"]))
+    arenas: list[dict[str, Any]] = summary.get("by_arena") or []
+    stopped = sum(arena.get("ended") == "stopped" for arena in arenas)
+    if len(arenas) > 1 and stopped:
+        how += f"; {stopped} of {len(arenas)} arenas stopped before"
     return f"{how}: {summary['error']}" if summary.get("error") else how
 
 
@@ -123,11 +121,10 @@ def _hash(run: RunData) -> list[str]:
 
 def _machine(run: RunData) -> list[tuple[str, str]]:
     known = run.summary or run.started
-    versions = known.get("versions")
+    versions: dict[str, str] = known.get("versions") or {}
     rows = [("CPU", str(known["cpu"]))] if "cpu" in known else []
-    if isinstance(versions, dict):
-        rows.append(("versions", ", ".join(f"{name} {version}" for name, version in versions.items())))  # pyright: ignore
-    return rows
+    told = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return [*rows, ("versions", told)] if told else rows
 
 
 def _not_as_it_should_be(run: RunData) -> list[str]:
@@ -135,20 +132,22 @@ def _not_as_it_should_be(run: RunData) -> list[str]:
     summary, arenas = run.summary, run.static.arenas
     said: list[str] = []
     if arenas > 1:
-        said.append(f"Figures are of the first of {arenas} arenas, seed {run.static.seeds[0]}; what is told of others says so.")
+        said.append(
+            f"Figures are of the first of {arenas} arenas, seed {run.static.seeds[0]}; what is told of others says so."
+        )
     if summary is None:
         return said
     counts = {name: value for name, value in summary.get("counts", {}).items() if value}
     if counts:
         said.append(f"Not as it should be: {', '.join(f'`{name}` {value:,}' for name, value in counts.items())}.")
-    lost = summary.get("lost_runners") or []
+    lost: list[Any] = summary.get("lost_runners") or []
     if lost:
         said.append(f"Lost runners: {'; '.join(map(str, lost))}.")
     dropped = {name: part["dropped"] for name, part in summary["record"].items() if part.get("dropped")}
     if dropped:
         rows = ", ".join(f"{value:,} of `{name}`" for name, value in dropped.items())
         said.append(f"Rows that were dropped for want of time, which figures below lack: {rows}.")
-    senses = summary.get("global_senses") or {}
+    senses: dict[str, list[str]] = summary.get("global_senses") or {}
     if senses:
         bodies = "; ".join(f"{body}: {', '.join(names)}" for body, names in senses.items())
         said.append(f"Bodies that know more than their surroundings: {bodies}.")

@@ -18,7 +18,9 @@ def where(run: RunData) -> list[Figure]:
     end_s = float(film.time_s[-1])
     figure = trajectories(static, ARENA, paths, film.pose[-1], film.alive[-1], movable, end_s)
     colored = "by group" if len(static.groups) > 1 else "by time, from light to dark"
-    caption = f"Ways of the robots, coloured {colored}; small circles are starts, discs where they were at {number(end_s)} s."
+    caption = (
+        f"Ways of the robots, coloured {colored}; small circles are starts, discs where they were at {number(end_s)} s."
+    )
     left_out = _left_out(paths, len(film.time_s), static.robots)
     return [Figure("trajectories", as_svg(figure, "trajectories"), caption + left_out)]
 
