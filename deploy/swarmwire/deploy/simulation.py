@@ -8,7 +8,6 @@ from typing import Any, Self
 
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted
-from swarmwire.comms.loading import resolve
 from swarmwire.comms.protocols import Crew, Judge, Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.agents import agent_specs, check_agents
@@ -19,6 +18,7 @@ from swarmwire.deploy.endpoint import check_socket, new_run_id
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.kept_memory import keep_memory
+from swarmwire.deploy.measuring import measuring
 from swarmwire.deploy.new_air import new_air
 from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
@@ -31,8 +31,6 @@ from swarmwire.deploy.too_large import TooLarge
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
-from swarmwire.metrics.own_metrics import own_metrics
-from swarmwire.metrics.registry import standard
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.crews.remote_crew import RemoteCrew
@@ -92,9 +90,9 @@ class Simulation:
         factor = real_time_factor(realtime)
         self.agents = agent_specs(self.scenario)
         self.world = self._new_world(seed, seeds)
-        measures = [resolve(spec, Path(self.scenario.source).parent) for spec in self.scenario.metrics]
-        self.metrics = Metrics([*standard(), *own_metrics(measures, self.scenario.source)])
-        self.code = tuple(dict.fromkeys([*self.agents.values(), *own_code(self.world.static), *measures]))
+        measures = measuring(self.scenario)
+        self.metrics = Metrics(measures.metrics)
+        self.code = tuple(dict.fromkeys([*self.agents.values(), *own_code(self.world.static), *measures.code]))
         self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else _ticks(self.scenario)
         self.inputs = replay.inputs if replay else None

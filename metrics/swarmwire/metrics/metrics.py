@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.errors import OwnCodeFailed
+from swarmwire.comms.errors import BadInput, OwnCodeFailed
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -28,11 +28,11 @@ class Metrics:
     """
 
     def __init__(self, metrics: Sequence[str | Metric] | None = None) -> None:
-        """Measure these, by name or as they are, or all that are registered; BadInput for an unknown name."""
+        """Measure these, by name or as they are, or the standard ones; BadInput for an unknown name."""
         self.metrics = chosen(metrics)
 
     def begin(self, static: Static) -> None:
-        """Start afresh."""
+        """Start afresh; BadInput if a metric's parameters do not go with the run, OwnCodeFailed if it raises."""
         shape = (len(self.metrics), static.arenas)
         self._static = static
         self._measures: list[Measure] = [self._begun(metric) for metric in self.metrics]
@@ -58,6 +58,8 @@ class Metrics:
     def _begun(self, metric: Metric) -> Measure:
         try:
             return metric.begin(self._static)
+        except BadInput:  # parameters that do not go with this run
+            raise
         except (Exception, SystemExit) as error:
             raise _failed(metric) from error
 
