@@ -52,13 +52,16 @@ class ArenaResult:
     ended: str  # "stopped", if it was over before the run was; else as the run
     ticks: int  # that it took part in
     sim_time_s: float
+    stop_time_s: float | None  # since when what ended it had held; None: nothing came to hold (censored at sim_time_s)
+    stopped_by: str | None  # what ended it, in words: "order at least 0.9 for 5 s"
     trajectory_sha256: str
     radio: RadioResult | None
     metrics: dict[str, Statistics]
 
     def end(self) -> dict[str, Any]:
         """How it ended, as the summary says it."""
-        return {"ended": self.ended, "ticks": self.ticks, "sim_time_s": self.sim_time_s}
+        names = ("ended", "ticks", "sim_time_s", "stop_time_s", "stopped_by")
+        return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,7 @@ class Result:
     cpu: str
     versions: dict[str, str]
     modules: dict[str, str]  # sha256 of the installed code: swarmwire's parts and packages of agents
+    stop: tuple[str, ...] = ()  # what ends an arena, in words: "order at least 0.9 for 5 s"
     files: tuple[CopiedFile, ...] = ()  # in the run folder, from which the run can be repeated
     inputs: InputsRecord | None = None  # what came from outside, if anything did
     lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
@@ -145,6 +149,7 @@ class Result:
             "wall_time_s": self.wall_time_s,
             "start_time_s": self.start_time_s,
             "realtime_factor": self.realtime_factor,
+            "stop": list(self.stop),
             "by_arena": [arena.end() for arena in self.arenas],
             "trajectory_sha256": self.trajectory_sha256,
             "radio": radios[0] if one else radios,
@@ -172,6 +177,7 @@ def arena_result(
     ended: str,
     ticks: int,
     sim_time_s: float,
+    stop: dict[str, Any],
     sha256: str,
     radio: dict[str, Any] | None,
     metrics: dict[str, Any],
@@ -179,7 +185,9 @@ def arena_result(
     """The parts of the observers' summaries that belong to one arena, typed."""
     of_radio = None if radio is None else _radio_result(**radio)
     of_metrics = {name: Statistics(**value) for name, value in metrics.items()}
-    return ArenaResult(seed, ended, ticks, sim_time_s, sha256, of_radio, of_metrics)
+    return ArenaResult(
+        seed, ended, ticks, sim_time_s, **stop, trajectory_sha256=sha256, radio=of_radio, metrics=of_metrics
+    )
 
 
 def _radio_result(latency_air_s: dict[str, Any], latency_agent_s: dict[str, Any], **counts: Any) -> RadioResult:
