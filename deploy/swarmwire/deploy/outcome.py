@@ -30,6 +30,7 @@ def outcome(
     wall_s: float,
     start_s: float,
     counts: Mapping[str, int],
+    arena_counts: Sequence[dict[str, int]],
     origin: Origin,
     inputs: InputsRecord | None,
     losses: Sequence[Loss],
@@ -39,13 +40,15 @@ def outcome(
 ) -> Result:
     """The result; `parts` are the observers' parts of the summary.
 
-    `arena_ticks`, `stopped` (it was over before the run was) and `hashes` (of the trajectory) are those of each arena.
+    `arena_ticks`, `stopped` (it was over before the run was), `hashes` (of the trajectory) and `arena_counts` are those
+    of each arena.
     """
     radios: list[Any] = parts.get("radio", [None] * static.arenas)
     ends = ["stopped" if over else ended for over in stopped]
     times_s = [to_s(tick_start_ns(done, static.rate_hz)) for done in arena_ticks]
     stops: list[Any] = parts.get("stops", [NO_STOP] * static.arenas)
-    arenas = zip(static.seeds, ends, arena_ticks, times_s, stops, hashes, radios, parts["metrics"], strict=True)
+    columns = static.seeds, ends, arena_ticks, times_s, hashes, arena_counts, radios, parts["metrics"], stops
+    arenas = zip(*columns, strict=True)
     record = record_summary(parts)
     return Result(
         scenario=static.name,

@@ -52,15 +52,16 @@ class ArenaResult:
     ended: str  # "stopped", if it was over before the run was; else as the run
     ticks: int  # that it took part in
     sim_time_s: float
-    stop_time_s: float | None  # since when what ended it had held; None: nothing came to hold (censored at sim_time_s)
-    stopped_by: str | None  # what ended it, in words: "order at least 0.9 for 5 s"
     trajectory_sha256: str
+    counts: dict[str, int]  # of the run's, those that belong to it, by name; only what is not 0
     radio: RadioResult | None
     metrics: dict[str, Statistics]
+    stop_time_s: float | None  # since when what ended it had held; None: nothing came to hold (censored at sim_time_s)
+    stopped_by: str | None  # what ended it, in words: "order at least 0.9 for 5 s"
 
     def end(self) -> dict[str, Any]:
-        """How it ended, as the summary says it."""
-        names = ("ended", "ticks", "sim_time_s", "stop_time_s", "stopped_by")
+        """When, how and why it ended, as the summary says it, and what was not as it should be."""
+        names = ("ended", "ticks", "sim_time_s", "stop_time_s", "stopped_by", "counts")
         return {name: getattr(self, name) for name in names}
 
 
@@ -177,17 +178,16 @@ def arena_result(
     ended: str,
     ticks: int,
     sim_time_s: float,
-    stop: dict[str, Any],
     sha256: str,
+    counts: dict[str, int],
     radio: dict[str, Any] | None,
     metrics: dict[str, Any],
+    stop: dict[str, Any],
 ) -> ArenaResult:
     """The parts of the observers' summaries that belong to one arena, typed."""
     of_radio = None if radio is None else _radio_result(**radio)
     of_metrics = {name: Statistics(**value) for name, value in metrics.items()}
-    return ArenaResult(
-        seed, ended, ticks, sim_time_s, **stop, trajectory_sha256=sha256, radio=of_radio, metrics=of_metrics
-    )
+    return ArenaResult(seed, ended, ticks, sim_time_s, sha256, counts, of_radio, of_metrics, **stop)
 
 
 def _radio_result(latency_air_s: dict[str, Any], latency_agent_s: dict[str, Any], **counts: Any) -> RadioResult:

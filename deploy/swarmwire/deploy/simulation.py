@@ -215,6 +215,7 @@ class Simulation:
                 wall_s=to_s(ended_ns - self._started_ns - self.controls.paused_ns),
                 start_s=to_s(self._started_ns - self._called_ns),
                 counts={**loop.counts(), **failed},
+                arena_counts=loop.arena_counts(),
                 origin=self._origin,
                 inputs=self._record.inputs(),
                 losses=self._losses,
