@@ -6,9 +6,14 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.network.age_of_information import AgeOfInformation
 from swarmwire.metrics.network.airtime import Airtime
+from swarmwire.metrics.network.algebraic_connectivity import AlgebraicConnectivity
+from swarmwire.metrics.network.articulation import Articulation
 from swarmwire.metrics.network.components import ComponentCount
 from swarmwire.metrics.network.fragmentation_count import Fragmentations
+from swarmwire.metrics.network.fragmented import Fragmented
 from swarmwire.metrics.network.largest_component import LargestComponent
+from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
+from swarmwire.metrics.network.pdr import PacketDeliveryRatio
 from swarmwire.metrics.network.rejoin import RejoinMedian, RejoinWorst
 from swarmwire.metrics.network.throughput import Throughput
 from swarmwire.metrics.network.unrejoined import Unrejoined
@@ -28,6 +33,9 @@ from swarmwire.metrics.swarm.order_velocity import OrderVelocity
 from swarmwire.metrics.swarm.oscillation import Oscillation
 from swarmwire.metrics.swarm.path_efficiency import PathEfficiency
 from swarmwire.metrics.swarm.rotation import Rotation
+from swarmwire.metrics.task.coverage import Coverage
+from swarmwire.metrics.task.coverage_time import CoverageTime
+from swarmwire.metrics.task.find_time import FindTime
 from swarmwire.metrics.task.target_best import TargetBest
 from swarmwire.metrics.task.target_mean import TargetMean
 
@@ -65,6 +73,15 @@ METRICS: dict[str, type[Metric]] = {
         Deadlocked,
         Oscillation,
         PathEfficiency,
+        AlgebraicConnectivity,
+        Articulation,
+        Fragmented,
+        PacketDeliveryRatio,
+        LatencyOnAir,
+        LatencyToAgent,
+        FindTime,
+        Coverage,
+        CoverageTime,
     )
 }
 
