@@ -7,10 +7,10 @@ from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.own_class import own_class
 from swarmwire.metrics.metric import Kind, Metric
-from swarmwire.metrics.record.tick_columns import KEYS, MOVABLE, RADIO, ROBOT_COLUMNS, SIDEWAYS
+from swarmwire.metrics.record.tick_columns import KEYS, MOVABLE, RADIO, ROBOT_COLUMNS, SIDEWAYS, VALUE
 from swarmwire.metrics.registry import DELIVERY, METRICS
 
-COLUMNS = {*KEYS, *ROBOT_COLUMNS, SIDEWAYS, *MOVABLE, *RADIO}  # of the table of ticks, where each has one, too
+COLUMNS = {*KEYS, *ROBOT_COLUMNS, SIDEWAYS, VALUE, *MOVABLE, *RADIO}  # of the table of ticks, where each has one, too
 
 
 def own_metrics(specs: Sequence[str], where: str) -> list[Metric]:

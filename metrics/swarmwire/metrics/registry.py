@@ -21,6 +21,8 @@ from swarmwire.metrics.swarm.contacts import Collisions, WallContacts
 from swarmwire.metrics.swarm.min_gap import MinGap
 from swarmwire.metrics.swarm.order import Order
 from swarmwire.metrics.swarm.order_velocity import OrderVelocity
+from swarmwire.metrics.task.consensus_bias import ConsensusBias
+from swarmwire.metrics.task.consensus_error import ConsensusError
 from swarmwire.metrics.task.coverage import Coverage
 from swarmwire.metrics.task.coverage_time import CoverageTime
 from swarmwire.metrics.task.find_time import FindTime
@@ -58,6 +60,8 @@ METRICS: dict[str, type[Metric]] = {
         FindTime,
         Coverage,
         CoverageTime,
+        ConsensusError,
+        ConsensusBias,
     )
 }
 
