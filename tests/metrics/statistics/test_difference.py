@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.metrics.statistics.difference import difference
@@ -37,6 +37,7 @@ def test_what_seeds_share_does_not_blur_a_difference():
     assert (apart.pairs, apart.test) == (0, "Mann-Whitney")
 
 
+@settings(max_examples=25)
 @given(number_samples, number_samples)
 def test_turning_the_two_turns_the_sign(one, other):
     there, back = difference(one, other), difference(other, one)
