@@ -7,6 +7,7 @@ import typer
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.commands.check import check_command
+from swarmwire.deploy.commands.compare import compare_command
 from swarmwire.deploy.commands.describe import describe_command
 from swarmwire.deploy.commands.draw import draw_command
 from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
@@ -42,6 +43,7 @@ app.command("list")(list_command)
 app.command("describe")(describe_command)
 app.command("new")(new_command)
 app.command("verify")(verify_command)
+app.command("compare")(compare_command)
 app.add_typer(radio_app, name="radio")
 
 

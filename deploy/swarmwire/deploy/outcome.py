@@ -22,10 +22,13 @@ def outcome(
     error: BaseException | None,
     runners: int,
     ticks: int,
+    arena_ticks: Sequence[int],
+    stopped: Sequence[bool],
     hashes: Sequence[str],
     wall_s: float,
     start_s: float,
     counts: Mapping[str, int],
+    arena_counts: Sequence[dict[str, int]],
     origin: Origin,
     inputs: InputsRecord | None,
     losses: Sequence[Loss],
@@ -33,9 +36,16 @@ def outcome(
     realtime: RealTimeReport | None,
     folder: Path | None,
 ) -> Result:
-    """The result; `parts` are the observers' parts of the summary, `hashes` the trajectory hash of each arena."""
+    """The result; `parts` are the observers' parts of the summary.
+
+    `arena_ticks`, `stopped` (it was over before the run was), `hashes` (of the trajectory) and `arena_counts` are those
+    of each arena.
+    """
     radios: list[Any] = parts.get("radio", [None] * static.arenas)
-    arenas = zip(static.seeds, hashes, radios, parts["metrics"], strict=True)
+    ends = ["stopped" if over else ended for over in stopped]
+    times_s = [to_s(tick_start_ns(done, static.rate_hz)) for done in arena_ticks]
+    columns = static.seeds, ends, arena_ticks, times_s, hashes, arena_counts, radios, parts["metrics"]
+    arenas = zip(*columns, strict=True)
     record = record_summary(parts)
     return Result(
         scenario=static.name,

@@ -49,9 +49,17 @@ class ArenaResult:
     """What came of one arena."""
 
     seed: int
+    ended: str  # "stopped", if it was over before the run was; else as the run
+    ticks: int  # that it took part in
+    sim_time_s: float
     trajectory_sha256: str
+    counts: dict[str, int]  # of the run's, those that belong to it, by name; only what is not 0
     radio: RadioResult | None
     metrics: dict[str, Statistics]
+
+    def end(self) -> dict[str, Any]:
+        """When and how it ended, as the summary says it, and what was not as it should be."""
+        return {"ended": self.ended, "ticks": self.ticks, "sim_time_s": self.sim_time_s, "counts": self.counts}
 
 
 @dataclass(frozen=True)
@@ -76,8 +84,8 @@ class Result:
     engine: str  # that moved the bodies: "discs", "pymunk", "kinematic", or two of them joined by " and "
     runners: int  # 0: all agents in the world's process
     mode: str  # "local" | "lockstep" | "realtime"
-    ended: str  # "duration" | "interrupted" | "left" (by whoever stepped it) | "failed"
-    ticks: int
+    ended: str  # "duration" | "stopped" (all arenas) | "interrupted" | "left" (by whoever stepped it) | "failed"
+    ticks: int  # of the arena that ran longest
     sim_time_s: float
     wall_time_s: float  # of the loop
     start_time_s: float  # from the call to the first tick
@@ -138,6 +146,7 @@ class Result:
             "wall_time_s": self.wall_time_s,
             "start_time_s": self.start_time_s,
             "realtime_factor": self.realtime_factor,
+            "by_arena": [arena.end() for arena in self.arenas],
             "trajectory_sha256": self.trajectory_sha256,
             "radio": radios[0] if one else radios,
             "metrics": metrics[0] if one else metrics,
@@ -159,10 +168,20 @@ class Result:
         write_whole(path, json.dumps(self.summary(), indent=2) + "\n")
 
 
-def arena_result(seed: int, sha256: str, radio: dict[str, Any] | None, metrics: dict[str, Any]) -> ArenaResult:
+def arena_result(
+    seed: int,
+    ended: str,
+    ticks: int,
+    sim_time_s: float,
+    sha256: str,
+    counts: dict[str, int],
+    radio: dict[str, Any] | None,
+    metrics: dict[str, Any],
+) -> ArenaResult:
     """The parts of the observers' summaries that belong to one arena, typed."""
+    of_radio = None if radio is None else _radio_result(**radio)
     of_metrics = {name: Statistics(**value) for name, value in metrics.items()}
-    return ArenaResult(seed, sha256, None if radio is None else _radio_result(**radio), of_metrics)
+    return ArenaResult(seed, ended, ticks, sim_time_s, sha256, counts, of_radio, of_metrics)
 
 
 def _radio_result(latency_air_s: dict[str, Any], latency_agent_s: dict[str, Any], **counts: Any) -> RadioResult:

@@ -6,16 +6,36 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.network.age_of_information import AgeOfInformation
 from swarmwire.metrics.network.airtime import Airtime
+from swarmwire.metrics.network.algebraic_connectivity import AlgebraicConnectivity
+from swarmwire.metrics.network.articulation import Articulation
 from swarmwire.metrics.network.components import ComponentCount
 from swarmwire.metrics.network.fragmentation_count import Fragmentations
+from swarmwire.metrics.network.fragmented import Fragmented
 from swarmwire.metrics.network.largest_component import LargestComponent
+from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
+from swarmwire.metrics.network.pdr import PacketDeliveryRatio
 from swarmwire.metrics.network.rejoin import RejoinMedian, RejoinWorst
 from swarmwire.metrics.network.throughput import Throughput
 from swarmwire.metrics.network.unrejoined import Unrejoined
+from swarmwire.metrics.swarm.aggregation import Aggregation
+from swarmwire.metrics.swarm.aggregation_hop import AggregationHop
+from swarmwire.metrics.swarm.aggregation_time import AggregationTime
+from swarmwire.metrics.swarm.cohesion import Cohesion
+from swarmwire.metrics.swarm.collision_rate import CollisionRate
 from swarmwire.metrics.swarm.contacts import Collisions, WallContacts
+from swarmwire.metrics.swarm.deadlocked import Deadlocked
+from swarmwire.metrics.swarm.dispersion import Dispersion
 from swarmwire.metrics.swarm.min_gap import MinGap
+from swarmwire.metrics.swarm.nearest_neighbour import NearestNeighbour
 from swarmwire.metrics.swarm.order import Order
+from swarmwire.metrics.swarm.order_local import OrderLocal
 from swarmwire.metrics.swarm.order_velocity import OrderVelocity
+from swarmwire.metrics.swarm.oscillation import Oscillation
+from swarmwire.metrics.swarm.path_efficiency import PathEfficiency
+from swarmwire.metrics.swarm.rotation import Rotation
+from swarmwire.metrics.task.coverage import Coverage
+from swarmwire.metrics.task.coverage_time import CoverageTime
+from swarmwire.metrics.task.find_time import FindTime
 from swarmwire.metrics.task.target_best import TargetBest
 from swarmwire.metrics.task.target_mean import TargetMean
 
@@ -41,6 +61,27 @@ METRICS: dict[str, type[Metric]] = {
         MinGap,
         TargetBest,
         TargetMean,
+        OrderLocal,
+        Rotation,
+        Cohesion,
+        Dispersion,
+        NearestNeighbour,
+        Aggregation,
+        AggregationHop,
+        AggregationTime,
+        CollisionRate,
+        Deadlocked,
+        Oscillation,
+        PathEfficiency,
+        AlgebraicConnectivity,
+        Articulation,
+        Fragmented,
+        PacketDeliveryRatio,
+        LatencyOnAir,
+        LatencyToAgent,
+        FindTime,
+        Coverage,
+        CoverageTime,
     )
 }
 

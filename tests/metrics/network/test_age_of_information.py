@@ -130,3 +130,22 @@ def test_an_arena_has_the_same_ages_alone_and_among_others():
         columns["arena"] = np.repeat(np.arange(3), len(one.finished.arena))
         thrice.append(truth(among, one.tick, alive=np.tile(one.alive, 3), finished=type(one.finished)(**columns)))
     np.testing.assert_array_equal(ages(among, thrice), np.tile(ages(alone, seen), (1, 3)))
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.3, 0.6])
+def test_of_independent_losses_it_is_what_the_renewals_say(lost):
+    """Mean d + T (1 + p) / (2 (1 - p)): of 40,000 periods it deviates by a hundredth at most."""
+    rng, arenas, periods, delay_ms, period_ms = np.random.default_rng(3), 100, 400, 50, 300
+    of, found = static(2, arenas=arenas), []
+    metrics = Metrics([NAME])
+    metrics.begin(of)
+    for tick in range(1, 3 * periods):
+        arrived = np.flatnonzero(rng.random(arenas) >= lost) if tick % 3 == 1 else np.arange(0)
+        none = np.zeros(len(arrived), np.int64)
+        told = heard(none, none + 1, none + (tick - 1) * 100, arena=arrived)
+        metrics.see(truth(of, tick, finished=told))
+        found.append(metrics.latest[NAME])
+    mean_s = np.mean(found[100:])
+    # Known from the tick after: seen at 0.1, 0.2, … s of age, whose mean is that of 0.05 s of delay.
+    expected_s = (delay_ms + period_ms * (1 + lost) / (2 * (1 - lost))) / 1000
+    assert mean_s == pytest.approx(expected_s, rel=0.02)

@@ -114,5 +114,5 @@ def _verdict(repetition: "Repetition") -> str:
         return "a different run" + ("" if at is None else f" from tick {at} on")
     if why_not_all:
         return f"the same, bit for bit, in the {repetition.compared} ticks that can be compared: {why_not_all}"
-    early = "" if repetition.ended == "duration" else f", where it ended early: {repetition.ended}"
+    early = "" if repetition.ended in ("duration", "stopped") else f", where it ended early: {repetition.ended}"
     return f"the same run, bit for bit: {repetition.result.ticks} ticks{early}"

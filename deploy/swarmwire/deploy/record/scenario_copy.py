@@ -63,7 +63,7 @@ def copied_mapping(scenario: Scenario, copies: "Copies") -> dict[str, Any]:
         if body is not None:
             group["body"] = _copied_body(body, copies)
     if "metrics" in mapping:
-        mapping["metrics"] = [copies.class_of(spec, near, "metric") for spec in mapping["metrics"]]
+        mapping["metrics"] = [copies.metric(item, near) for item in mapping["metrics"]]
     trace = trace_path(scenario)
     if trace is not None:
         mapping["radio"]["trace"]["file"] = copies.add(trace, "trace")
@@ -120,6 +120,12 @@ class Copies:
         """The spec of a class, whose file, if it is of one as seen from `beside`, is copied and named instead."""
         path, _, name = resolve(spec, beside).rpartition(":")
         return f"{self.add(Path(path), what)}:{name}" if path.endswith(".py") else spec
+
+    def metric(self, item: str | dict[str, Any], beside: Path) -> str | dict[str, Any]:
+        """A metric that a scenario lists, by name, class or table; the file of a class as for `class_of`."""
+        if isinstance(item, str):
+            return self.class_of(item, beside, "metric")
+        return {**item, "metric": self.class_of(item["metric"], beside, "metric")}
 
     def _free(self, original: Path) -> str:
         taken, place, number = set(self._places.values()), f"{FILES}/{original.name}", 1

@@ -1,19 +1,16 @@
 """The radio's account of a run: what became of every packet, the delivery ratio, and how late packets were."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.fates import FATE_NAMES, Fate
 from swarmwire.comms.truth import Finished, Static, Tally, Truth
 from swarmwire.metrics.log_histogram import LogHistogram
+from swarmwire.metrics.network.latencies import Latencies
 from swarmwire.metrics.plain import plain
 
-HEARD = int(Fate.HEARD)
 PERCENTS = (50.0, 90.0, 99.0)
 
 
@@ -30,7 +27,7 @@ class RadioTally:
         """Start afresh."""
         arenas = static.arenas
         self._has_radio = False
-        self._rate_hz, self._act_every_ticks = static.rate_hz, static.act_every_ticks
+        self._latencies = Latencies(static)
         self._sent = np.zeros(arenas, np.int64)
         self._intended = np.zeros(arenas, np.int64)
         self._in_range = np.zeros(arenas, np.int64)
@@ -59,10 +56,7 @@ class RadioTally:
         self._fates += tally.fates
 
     def _time(self, finished: Finished, tick: int) -> None:
-        acts_at_ns = -(-tick // self._act_every_ticks) * self._act_every_ticks * NS_PER_S // self._rate_hz
-        ended = finished.fate, finished.receiver, finished.sent_at_ns, finished.final_at_ns
-        heard, air_ns, agent_ns = _latencies_ns(*ended, acts_at_ns)
-        arena = finished.arena.take(heard)
+        arena, air_ns, agent_ns = self._latencies.of(finished, tick)
         self._air.add(arena, air_ns)
         self._agent.add(arena, agent_ns)
 
@@ -83,16 +77,3 @@ class RadioTally:
 def _percentiles_s(histogram: LogHistogram, arena: int) -> dict[str, float | None]:
     found_ns = histogram.percentiles_ns(arena, PERCENTS)
     return {f"p{percent:g}": plain(ns / NS_PER_S) for percent, ns in zip(PERCENTS, found_ns, strict=True)}
-
-
-@njit(cache=True)
-def _latencies_ns(fate, receiver, sent_at_ns, final_at_ns, acts_at_ns):
-    """Of the links that were heard, their rows, and how long until they were, and until their receivers act, (k,)."""
-    heard, air_ns, agent_ns = np.empty_like(fate), np.empty_like(fate), np.empty_like(fate)
-    found = 0
-    for row in range(len(fate)):
-        if fate[row] == HEARD:
-            heard[found], air_ns[found] = row, final_at_ns[row] - sent_at_ns[row]
-            agent_ns[found] = acts_at_ns[receiver[row]] - sent_at_ns[row]
-            found += 1
-    return heard[:found], air_ns[:found], agent_ns[:found]

@@ -1,0 +1,43 @@
+"""Find time: when the first robot found the target, the nearest light."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.clock import to_s
+from swarmwire.comms.parameters import parameter
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.task.light_distance import light_distance
+
+
+@dataclass(frozen=True)
+class FindTime(Metric):
+    """First time in s at which `target_best` <= `within_m`: a robot alive has its centre so near to a light.
+
+    0 if one stands there at the start. It stays, whatever becomes of the robot. NaN until then, and without lights.
+    """
+
+    name = "find_time_s"
+    help = "first time that the centre of a robot alive is within within_m of a light, in s"
+    unit = "s"
+    kind = "time"
+    bounds = (0.0, None)
+
+    within_m: float = parameter(0.5, help="who is no further from a light has found it", unit="m", at_least=0.0)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure, which keeps when it happened."""
+        distance_m = light_distance(static)
+        found_s: FloatArray = np.full(static.arenas, np.nan)
+
+        def measure(moment: Moment) -> FloatArray:
+            open_ = np.isnan(found_s)
+            if distance_m is not None and open_.any():
+                there = np.any(distance_m(moment) <= self.within_m, axis=1, where=moment.alive)
+                found_s[open_ & there] = to_s(moment.truth.time_ns)
+            return found_s
+
+        return measure
