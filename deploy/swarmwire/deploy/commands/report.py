@@ -16,7 +16,7 @@ def report_command(
     outcome: Annotated[
         list[str] | None,
         typer.Option(
-            help="Of a campaign: a column of outcomes, or a metric for its last value. Repeatable. Default: up to eight.",
+            help="Of a campaign: a column, or a metric for its last value. Repeatable. Default: eight at most.",
             metavar="NAME",
         ),
     ] = None,
