@@ -74,10 +74,14 @@ def _mark(cells, width_m, height_m, torus, position_m, alive, sensing_m, seen):
             below, above = _span(y, sensing_m, height_m, ny, torus)
             for j in range(below, above + 1):
                 up = (j + 0.5) * high_m - 0.5 * height_m - y
+                row = cells[arena, j % ny]
                 for i in range(left, right + 1):
+                    at = i % nx if torus else i
+                    if row[at] != FREE:  # as most are
+                        continue
                     along = (i + 0.5) * wide_m - 0.5 * width_m - x
-                    if along * along + up * up <= sensing_m * sensing_m and cells[arena, j % ny, i % nx] == FREE:
-                        cells[arena, j % ny, i % nx] = SEEN
+                    if along * along + up * up <= sensing_m * sensing_m:
+                        row[at] = SEEN
                         seen[arena] += 1
 
 
