@@ -52,8 +52,8 @@ class Timed:
 def metrics_share(name: str, repeats: int, *, of: str) -> None:
     """Time spent on metrics over that of the whole run, in percent, for a case of `robot_steps`.
 
-    Both sets are timed within the same runs, so that what else the machine does falls on all. The radio graph, which the
-    loop makes for whoever looks on, counts as the run's.
+    Both sets are timed within the same runs, so that what else the machine does falls on all. The radio graph, which
+    the loop makes for whoever looks on, counts as the run's.
     """
     case = CASES[of]
     scenario = scenario_from({**case.scene(None), "standard_metrics": False}, name)

@@ -31,7 +31,7 @@ def links(run: RunData) -> Figure | str:
         return "Delivery by link: nobody was in range of anybody."
     pdr = np.divide(heard, in_range, out=np.full(heard.shape, np.nan), where=in_range > 0)
     if run.static.robots <= MOST_SQUARES:
-        caption = "Delivery ratio of each link: heard, of the packets for which the receiver was in range and sight."
+        caption = "Delivery ratio of each link: heard, of the packets on air while the receiver was in range and sight."
         return Figure(NAME, as_svg(link_matrix(run.static, pdr), NAME), caption)
     told = pdr[in_range >= LEAST_PACKETS]
     if not len(told):
@@ -52,7 +52,8 @@ def _counted(run: RunData) -> "pl.DataFrame | str":
         return table
     packets = run.packets(("sender", "receiver", "fate"))
     if isinstance(packets, str):
-        return "neither `radio_links` nor `packets` was recorded." if "recorded" in packets else packets
+        recorded = [name for name in ("radio_links", "packets") if run.folder.files(name)]
+        return f"{table} {packets}" if recorded else "neither `radio_links` nor `packets` was recorded."
     return packets.group_by("sender", "receiver", "fate").agg(pl.len().alias("packets"))
 
 
