@@ -6,12 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.deploy import Result, Simulation
 from swarmwire.deploy.result import ArenaResult
-from swarmwire.world.scenario.scenario_file import load_scenario
 
 TICKS = 24
 OVER = {1: 6, 2: 17, 3: 11, 4: 1}  # by seed, the ticks of its arena; of others all

@@ -8,7 +8,7 @@ from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Happened
 from swarmwire.metrics.record import recorders, table_writer, tick_recorder
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.registry import standard
 from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.verify.table_faults import table_fault
 from tests.metrics.recorded import links, record, wandering
@@ -72,7 +72,7 @@ def test_speeds_to_the_left_are_recorded_of_robots_that_can_move_so(tmp_path):
 def test_metrics_have_a_row_per_tick_and_no_lists(recorded):
     folder, _, _ = recorded
     table = folder.metrics(1)
-    assert table.columns == ["tick", "time_s", *METRICS, "sent", "heard", "in_range"]
+    assert table.columns == ["tick", "time_s", *standard(), "sent", "heard", "in_range"]
     assert table["order"].to_list() == folder.ticks(1)["order"].to_list()
 
 

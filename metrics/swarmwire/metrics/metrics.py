@@ -23,8 +23,8 @@ class Metrics:
 
     mean, min and max are over ticks: of a level its value at each, of a count what each added, so a count's mean is
     per tick (times the tick rate: per second). final is the level at the start of the last tick, the count's total over
-    the run. An arena that leaves is measured up to its last tick. Ticks without a value (no robot alive) are left out; what never had one, as the radio graph's without a
-    radio, is null. Memory does not grow with the run.
+    the run. An arena that leaves is measured up to its last tick. Ticks without a value (no robot alive) are left out;
+    what never had one, as the radio graph's without a radio, is null. Memory does not grow with the run.
     """
 
     def __init__(self, metrics: Sequence[str | Metric] | None = None) -> None:

@@ -36,8 +36,7 @@ from swarmwire.metrics.swarm.rotation import Rotation
 from swarmwire.metrics.task.coverage import Coverage
 from swarmwire.metrics.task.coverage_time import CoverageTime
 from swarmwire.metrics.task.find_time import FindTime
-from swarmwire.metrics.task.target_best import TargetBest
-from swarmwire.metrics.task.target_mean import TargetMean
+from swarmwire.metrics.task.target_distance import TargetBest, TargetMean
 
 DELIVERY = "delivery"  # drawn beside the metrics, of packets in the last second: no metric may have its name
 

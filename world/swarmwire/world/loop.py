@@ -1,6 +1,5 @@
 """The loop: one tick, written once. What differs between modes is only the crew."""
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -18,6 +17,8 @@ from swarmwire.world.events import Events
 from swarmwire.world.mailbox import Mailbox
 from swarmwire.world.trajectory_hash import TrajectoryHash
 from swarmwire.world.world import World
+
+ALWAYS_TOLD = ("clipped_commands", "nan_commands")
 
 
 class Loop:
@@ -46,7 +47,7 @@ class Loop:
         self._judge = judge
         self._events = Events(events, world.static, world.keys, air.radio if air else None)
         self._mailbox = Mailbox(world.static)
-        self._lost: Counter[str] = Counter()  # packets that never came to the air, by why
+        self._to_nobody, self._without_radio = np.zeros_like(self.arena_ticks), np.zeros_like(self.arena_ticks)
         self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
         self._stranded: Tally | None = None  # in arenas that left: no observer has seen that they did
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
@@ -83,7 +84,7 @@ class Loop:
             self.air.hold(pose, alive)
             self.air.send(start_ns, tick, self._addressable(actions.sent))
         elif len(actions.sent):
-            self._lost["packets_without_radio"] += len(actions.sent)
+            np.add.at(self._without_radio, actions.sent.sender // world.static.robots, 1)
         onsets = world.move(actions)
         command = world.command
         self._hash.add(pose, velocity, command, heard, running)
@@ -133,8 +134,20 @@ class Loop:
         return self._hash.hexdigests()
 
     def counts(self) -> dict[str, int]:
-        """Faults on the way between agents and world so far, by name."""
-        return {**self.crew.counts(), **self.world.counts(), **self._lost}
+        """Faults on the way between agents and world so far, by name; what is always told also where there is none."""
+        told = {name: int(counted.sum()) for name, counted in self._counted().items()}
+        return {**self.crew.counts(), **{name: count for name, count in told.items() if count or name in ALWAYS_TOLD}}
+
+    def arena_counts(self) -> list[dict[str, int]]:
+        """Those of them that belong to an arena, of each: by name, where there is any."""
+        counted = {name: counts.tolist() for name, counts in self._counted().items()}
+        arenas = range(self.world.static.arenas)
+        return [{name: counts[arena] for name, counts in counted.items() if counts[arena]} for arena in arenas]
+
+    def _counted(self) -> dict[str, IntArray]:
+        """Faults by name, (arenas,) each."""
+        packets = {"packets_to_nobody": self._to_nobody, "packets_without_radio": self._without_radio}
+        return {**self.world.counts(), **packets}
 
     def _leave(self, over: BoolArray) -> None:
         """These arenas (arenas,) take no part in the ticks to come."""
@@ -151,5 +164,5 @@ class Loop:
         nobody = (sent.to >= robots) | (sent.to == sent.sender % robots)
         if not nobody.any():
             return sent
-        self._lost["packets_to_nobody"] += int(nobody.sum())
+        np.add.at(self._to_nobody, sent.sender[nobody] // robots, 1)
         return replace(sent, to=np.where(nobody, NOWHERE, sent.to))

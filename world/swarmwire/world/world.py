@@ -39,7 +39,8 @@ from swarmwire.world.states import States
 class World:
     """Arenas side by side, one per seed; robot row r is robot r % robots of arena r // robots.
 
-    Each tick: `sense`, then `move`. The arrays below but `alive` and `running` are replaced in each tick, never written to after.
+    Each tick: `sense`, then `move`. The arrays below but `alive` and `running` are replaced in each tick, never written
+    to after. An arena may `leave`: what stays of it counts no more.
 
     Attributes:
         static: what does not change.
@@ -84,7 +85,7 @@ class World:
         self._own = OwnActuators(groups, self.scene)
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
-        self.states = States(len(self.alive))
+        self.states = States(self.static.arenas, self.static.robots)
         self._show()
 
     @property
@@ -165,10 +166,9 @@ class World:
         """Commands within the drives' limits, (rows, 3): forward m/s, left turn rad/s, to the left m/s."""
         return self.actuators.command
 
-    def counts(self) -> dict[str, int]:
-        """What actuators could not follow since the start, by name; states too many."""
-        states = {"states_over_limit": self.states.dropped} if self.states.dropped else {}
-        own = {"actuators_not_there": self._own.not_there} if self._own.not_there else {}
+    def counts(self) -> dict[str, IntArray]:
+        """What actuators could not follow since the start, and states too many: by name, (arenas,) each."""
+        own, states = {"actuators_not_there": self._own.not_there}, {"states_over_limit": self.states.dropped}
         return {**self.actuators.counts(), **own, **states}
 
     def _show(self) -> None:
@@ -247,9 +247,7 @@ def _sensors(
                 raise BadInput(scenario.source, f"robots.{group.name}.agent", expected)
             sheet = group.body.senses[need]
             truth = _truth(need, sheet, scene, group)
-            made[group.name][need] = Staged(
-                need, truth, sheet, scene.keys, group, scene.tick_s, scene.running
-            )
+            made[group.name][need] = Staged(need, truth, sheet, scene.keys, group, scene.tick_s, scene.running)
     return made
 
 

@@ -51,7 +51,7 @@ def row_of(cells, y):
 
 @borrowing(from_python=True)
 def sort(cells, state, running):
-    """Put robots at x, y = state[arena, robot, :2] of arenas that are `running` into their cells, rising within each."""
+    """Put robots at x, y = state[arena, robot, :2] into their cells, rising; only of arenas that are `running`."""
     start, item = cells.start, cells.item
     start[:] = 0
     for arena in range(state.shape[0]):

@@ -28,9 +28,7 @@ class Grid(NamedTuple):
     order: IntArray  # robot rows, rising within a cell
 
 
-def build(
-    x, y, arenas: int, size_m: tuple[float, float], reach_m: float, running: BoolArray | None = None
-) -> Grid:
+def build(x, y, arenas: int, size_m: tuple[float, float], reach_m: float, running: BoolArray | None = None) -> Grid:
     """The grid of robots at x, y (rows,), in which all within `reach_m` of a robot lie in the 3 x 3 cells around it.
 
     Where `running` (arenas,) is False, the cells of the arena are empty; None: no arena is left out.

@@ -23,7 +23,7 @@ ROBOT_COLUMNS = (*POSE, *VELOCITY, *COMMAND, "alive", "state")  # lists with an 
 MOVABLE = ("movable_x_m", "movable_y_m", "movable_heading_rad")  # lists with a number per movable obstacle, if any
 RADIO = ("sent", "heard", "in_range")  # packets; receivers; receivers: since the tick before
 KEYS = ("tick", "time_s", "arena", "seed")
-BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 2
+BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 4
 
 
 def robot_columns(static: Static) -> tuple[str, ...]:
@@ -74,7 +74,7 @@ class TickColumns:
         self._command: AnyArray = np.empty((*of_robots, len(COMMAND) + 1), np.float32)
         self._movable: AnyArray = np.empty((*shape, static.movable, len(MOVABLE)), np.float32)
         self._alive: AnyArray = np.empty(of_robots, np.bool_)
-        self._state: AnyArray = np.empty(of_robots, np.uint16)
+        self._state: AnyArray = np.empty(of_robots, np.uint32)
         self._states: tuple[str, ...] = ("",)
         self._measured: AnyArray = np.empty((ticks, len(metrics), static.arenas), np.float64)
         self._radio: AnyArray = np.full((ticks, len(RADIO), static.arenas), np.nan)  # which it stays without a radio

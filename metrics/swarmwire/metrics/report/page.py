@@ -27,7 +27,7 @@ def page(report: Report) -> str:
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["code"] = _with_code
+    environment.filters.update(code=_with_code, breakable=_breakable)
     sections = [
         {"title": section.title, "anchor": f"part-{number}", "blocks": list(_blocks(section))}
         for number, section in enumerate(report.sections, 1)
@@ -75,3 +75,10 @@ def _with_code(text: str) -> Any:
     return Markup("").join(
         Markup("<code>{}</code>").format(piece) if index % 2 else escape(piece) for index, piece in enumerate(pieces)
     )
+
+
+def _breakable(text: str) -> Any:
+    """A name, escaped, that may go on in the next line after a dot."""
+    from markupsafe import Markup, escape
+
+    return Markup(".<wbr>").join(map(escape, text.split(".")))

@@ -16,6 +16,7 @@ _METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
 _STYLE = re.compile(r"\s*<defs>\s*<style[^>]*>[^<]*</style>\s*</defs>", re.DOTALL)
 _NAMED = re.compile(r'\sid="([^"]*)"')
 _DRAWN = re.compile(r'(?<= )(?:d|x|y)="[^"]*"')
+_SPACE = re.compile(r"\n\s*|\s*<!--.*?-->")
 _LONG = re.compile(r"(\d\.\d\d)\d+")
 _USED = re.compile(r'(?:xlink:href="#|url\(#)([^")]*)')
 
@@ -41,7 +42,7 @@ def as_svg(figure: Any, name: str) -> str:
     text = text.replace("<svg ", '<svg stroke-linejoin="round" stroke-linecap="butt" ', 1)
     # A hundredth of a point is less than a printer shows.
     text = _DRAWN.sub(lambda found: _LONG.sub(r"\1", found[0]), text)
-    return _with_own_ids(text, name).strip()
+    return _with_own_ids(_SPACE.sub("\n", text), name).strip()
 
 
 def _with_own_ids(text: str, name: str) -> str:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.metrics.statistics.gehan import surely_less
 from swarmwire.metrics.statistics.sample import Sample
 
 
@@ -15,15 +16,9 @@ def cliffs_delta(first: Sample, second: Sample) -> float:
     (Gehan, Biometrika 52, 1965): so it errs towards 0.
     """
     pairs = len(first) * len(second)
-    return (_greater(first, second) - _greater(second, first)) / pairs if pairs else math.nan
-
-
-def _greater(one: Sample, other: Sample) -> int:
-    """Pairs in which `one` is surely greater: a time that was censored is so at another's equal time, too."""
-    known = np.sort(other.value[other.observed])
-    watched = np.searchsorted(known, one.value[one.observed], side="left")
-    censored = np.searchsorted(known, one.value[~one.observed], side="right")
-    return int(watched.sum() + censored.sum())
+    if not pairs:
+        return math.nan
+    return float(surely_less(first, second).sum() - surely_less(second, first).sum()) / pairs
 
 
 def hedges_g(first: FloatArray, second: FloatArray) -> float:

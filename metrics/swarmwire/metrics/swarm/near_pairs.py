@@ -50,7 +50,7 @@ def _near_pairs(pose, alive, reach_m, order, strips, wrap_m):
                 far_m, rows, place = reach + farthest_m, arena * robots, a - low
                 last = place + own if wrap_m[0] > 0.0 else own
                 k = _scan(strips, a, low, own, place + 1, last, far_m, half_m, reach_m, wrap_m, rows, pairs, k)
-                while first < other and along_m(strips, a, start[above], other, first, wrap_m[0]) <= -far_m:
+                while first < other and along_m(strips, a, start[above], other, first, wrap_m[0]) <= -2.0 * farthest_m:
                     first += 1
                 last = first + other if wrap_m[0] > 0.0 else other
                 k = _scan(strips, a, start[above], other, first, last, far_m, np.inf, reach_m, wrap_m, rows, pairs, k)

@@ -73,12 +73,9 @@ def _nearest_square(strips, a, s, nearest, wrap_m):
     """The least of `nearest` and the squared distances from place a to the others of strip s: either way along x."""
     low, size = strips.start[s], strips.start[s + 1] - strips.start[s]
     here = _first_from(strips.x, low, low + size, strips.x[a]) - low
-    round_m = wrap_m[0] > 0.0
-    for step in (1, -1):
-        v, last = (
-            (here, here + size if round_m else size) if step > 0 else (here - 1, here - 1 - size if round_m else -1)
-        )
-        while v != last:
+    right, left = (here + size, here - 1 - size) if wrap_m[0] > 0.0 else (size, -1)
+    for begin, end, step in ((here, right, 1), (here - 1, left, -1)):
+        for v in range(begin, end, step):
             along, b = along_m(strips, a, low, size, v, wrap_m[0]), place_at(low, size, v)
             if along * along >= nearest:
                 break
@@ -86,7 +83,6 @@ def _nearest_square(strips, a, s, nearest, wrap_m):
                 across = strips.y[b] - strips.y[a]
                 across += to_nearest(across, wrap_m[1])
                 nearest = min(nearest, along * along + across * across)
-            v += step
     return nearest
 
 

@@ -64,9 +64,7 @@ class Stages:
         errs = field.noise.size or field.noise.relative or outlier or drop_out or field.step
         self._idle = unbounded and not errs
 
-    def apply(
-        self, value: FloatArray, keys: KeyArray, start: int, tick: int, running: BoolArray | None = None
-    ) -> None:
+    def apply(self, value: FloatArray, keys: KeyArray, start: int, tick: int, running: BoolArray | None = None) -> None:
         """Put the truth `value` (arenas, n) or (arenas, n, width) through the stages, in place.
 
         Only in arenas that are `running` (arenas,); None: in all.

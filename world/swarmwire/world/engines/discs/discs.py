@@ -78,8 +78,8 @@ class DiscsEngine:
             self._set_margin(1.5 * needed_m)
         robots, state, margin_m = self._robots, self.state.reshape(arenas * per_arena, 6), self._margin_m
         pairs = pairs_near(robots, state, self._running, setting.size_m, self._widest_m, margin_m)
-        walled = setting.boundary == "walls"
-        things = fixed_near(robots, state, self._running, setting.size_m, walled, setting.obstacles, self._cells, margin_m)
+        around = setting.size_m, setting.boundary == "walls", setting.obstacles
+        things = fixed_near(robots, state, self._running, *around, self._cells, margin_m)
         old, self._contacts = self._contacts, np.zeros(len(pairs) + len(things), CONTACT)
         contacts_of(self._contacts, robots, pairs, things, old)
         self._met = np.zeros(len(self._contacts), np.int64)
