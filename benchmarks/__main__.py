@@ -17,6 +17,7 @@ from benchmarks.first_compile import first_compile
 from benchmarks.metrics_share import metrics_share
 from benchmarks.processes import processes
 from benchmarks.record_cost import record_cost
+from benchmarks.report_cost import report_cost
 from benchmarks.robot_steps import CASES, D1, robot_steps, start
 from benchmarks.view_cost import view_cost
 
@@ -36,6 +37,7 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     "air-scaling": air_scaling,
     "processes-100": partial(processes, robots=100, ticks=300),
     **dict.fromkeys(COMPILES, first_compile),
+    "report-10000": partial(report_cost, seeds=200),
 }
 
 

@@ -61,4 +61,6 @@ TARGETS = {
     "compile-world": most(30, "a machine's first run without a radio: what it takes longer than the next"),
     "compile-disk": most(30, "with a disk radio"),
     "compile-signals": most(30, "with a radio of signals"),
+    "report-10000": most(30, "`swarmwire report` of 50 points x 200 seeds with 10 outcomes, from the call to its end"),
+    "report-10000-memory": most(1000, "the most memory that it held"),
 }
