@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
@@ -22,7 +23,7 @@ def run_folder(folder: Path, of, ticks, ended="duration", summary=True, **option
 
 
 def _observed(of, seen):
-    parts = {"radio": None}
+    parts: dict[str, Any] = {"radio": None}
     for observer in (Metrics(), RadioTally(), EventLog()):
         observer.begin(of)
         for one in seen:

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.fates import FATE_NAMES, Fate
-from swarmwire.metrics.report.in_words import count, share
+from swarmwire.metrics.report.in_words import counted, share
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_figures.link_histogram import link_histogram
 from swarmwire.metrics.report.run_figures.link_matrix import link_matrix
@@ -37,8 +37,8 @@ def links(run: RunData) -> Figure | str:
     if not len(told):
         return f"Delivery by link: no link had {LEAST_PACKETS} packets in range."
     caption = (
-        f"Delivery ratios of the {count(len(told), 'link')} with at least {LEAST_PACKETS} packets in range; the dashed "
-        f"line is their median, {share(float(np.median(told)))}."
+        f"Delivery ratios of the {counted(len(told), 'link')} with at least {LEAST_PACKETS} packets in range; "
+        f"the dashed line is their median, {share(float(np.median(told)))}."
     )
     return Figure(NAME, as_svg(link_histogram(told), NAME), caption)
 
