@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, FloatArray
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.about import About, Point, read_about
 from swarmwire.metrics.campaign.formats import ABOUT, PARTS, SUMMARY
@@ -105,7 +105,7 @@ class CampaignFolder:
         if not 0 <= point < len(self.points):
             raise BadInput(str(self.path), "point", f"expected 0 to {len(self.points) - 1}, got {point}")
         here = self._column("point") == point
-        well = here & (self._column("ended") != FAILED)
+        well = here & self._ended_well
         value, seed = self._numbers(outcome.column)[well], self._column("seed")[well].astype(np.int64)
         observed = np.isfinite(value)
         failed = int(np.count_nonzero(here)) - int(np.count_nonzero(well))
@@ -113,6 +113,13 @@ class CampaignFolder:
             return Sample(np.where(observed, value, self._numbers(SIM_TIME)[well]), observed, seed, "time", failed)
         undefined = int(np.count_nonzero(~observed))
         return Sample(value[observed], observed[observed], seed[observed], "number", failed, undefined)
+
+    @cached_property
+    def _ended_well(self) -> BoolArray:
+        """Of each run (runs,) whether it did; comparing texts takes longer than a sample."""
+        import polars as pl
+
+        return self.runs.select(pl.col("ended") != FAILED).to_series().to_numpy()
 
     def _column(self, name: str) -> AnyArray:
         return self.runs[name].to_numpy()
