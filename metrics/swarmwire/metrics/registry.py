@@ -33,6 +33,8 @@ from swarmwire.metrics.swarm.order_velocity import OrderVelocity
 from swarmwire.metrics.swarm.oscillation import Oscillation
 from swarmwire.metrics.swarm.path_efficiency import PathEfficiency
 from swarmwire.metrics.swarm.rotation import Rotation
+from swarmwire.metrics.task.consensus_bias import ConsensusBias
+from swarmwire.metrics.task.consensus_error import ConsensusError
 from swarmwire.metrics.task.coverage import Coverage
 from swarmwire.metrics.task.coverage_time import CoverageTime
 from swarmwire.metrics.task.find_time import FindTime
@@ -81,6 +83,8 @@ METRICS: dict[str, type[Metric]] = {
         FindTime,
         Coverage,
         CoverageTime,
+        ConsensusError,
+        ConsensusBias,
     )
 }
 
