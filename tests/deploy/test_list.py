@@ -22,6 +22,7 @@ from swarmwire.deploy.catalogue.text import print_list
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.scenario.scenario import PhysicsTable
 from tests.deploy.commands import called
+from tests.metrics.packages import install
 
 EVENTS = [next(of.default for of in fields(kind) if of.name == "do") for kind in ACTIONS]
 
@@ -61,8 +62,27 @@ def test_the_list_command_names_kinds_and_things(monkeypatch, capsys):
     assert (code, errors) == (0, "")
     for kind in KINDS:
         assert f"{kind.name} " in out
-    assert "min_gap             smallest distance" in called(monkeypatch, capsys, "list", "metrics")[1]
+    [line] = [of for of in called(monkeypatch, capsys, "list", "metrics")[1].splitlines() if of.startswith("min_gap ")]
+    assert line.split()[:3] == ["min_gap", "standard", "smallest"]
     assert list(json.loads(called(monkeypatch, capsys, "list", "--json")[1])) == [kind.name for kind in KINDS]
+
+
+def test_a_metric_that_a_package_brings_is_listed_and_described_also_if_it_does_not_import(
+    tmp_path, monkeypatch, capsys
+):
+    install(tmp_path, "sky_metrics", {"east": "East"})
+    install(tmp_path, "fog_metrics", {"west": "East"}, code="raise ValueError('fog')")
+    monkeypatch.syspath_prepend(tmp_path)
+    lines = called(monkeypatch, capsys, "list", "metrics")[1].splitlines()
+    told = {line.split()[0]: " ".join(line.split()[1:]) for line in lines}
+    assert told["east"] == "plug-in mean x of the robots alive, in m"
+    assert told["west"] == "plug-in cannot be measured: fog_metrics does not import: ValueError: fog"
+    _, text, _ = called(monkeypatch, capsys, "describe", "east")
+    assert 'metrics = ["east"], or [stop] names it' in text
+    assert 'metrics = [{ metric = "east", from_m = 0.0 }]' in text
+    assert "sky_metrics, as sky_metrics:East" in text
+    assert "at least -9 and at most 9" in text
+    assert called(monkeypatch, capsys, "describe", "west")[0] == 0
 
 
 def test_a_kind_that_there_is_not_gets_one_line_and_exit_code_2(monkeypatch, capsys):

@@ -5,7 +5,9 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
 from tests.docs.pages import files_of
+from tests.metrics.packages import CODE, install
 
+FROM_ZERO = "metrics.1.from_m=0.0"
 SCENARIO = """
 format = 1
 name = "spread"
@@ -37,6 +39,40 @@ def test_it_is_in_summary_and_table_and_in_a_repetition_from_the_run_folder_alon
     assert again.same
     assert again.changes == ()
     assert RunFolder(tmp_path / "again").metrics()["spread"].equals(ticks["spread"])
+
+
+def test_its_parameters_are_kept_with_the_run(tmp_path, scenario):
+    (tmp_path / "spread.py").write_text(CODE)
+    listed = 'metrics=["order", { metric = "spread.py:East", from_m = 1.0 }]'
+    result = run(scenario, overrides=[listed, "metrics.1.from_m=2.0"], out=tmp_path / "run")
+    (tmp_path / "spread.py").unlink()
+    again = repeat(tmp_path / "run")
+    assert again.changes == ()
+    assert again.result.metrics["east"] == result.metrics["east"]
+    east, two_metres_on = (run(tmp_path / "run" / "scenario.toml", overrides=over) for over in ([], [FROM_ZERO]))
+    assert two_metres_on.metrics["east"].final == pytest.approx(east.metrics["east"].final + 2.0)
+
+
+def test_a_package_brings_one_by_name_and_its_code_is_told_with_the_run(tmp_path, scenario, monkeypatch):
+    install(tmp_path / "site", "wind_metrics", {"east": "East"})
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    result = run(scenario, overrides=['metrics=["east"]'], out=tmp_path / "run")
+    assert "wind_metrics" in result.modules
+    assert RunFolder(tmp_path / "run").metrics()["east"][-1] == result.metrics["east"].final
+    assert repeat(tmp_path / "run").changes == ()
+    (tmp_path / "site" / "wind_metrics.py").write_text(CODE + "# a word more\n")
+    assert repeat(tmp_path / "run").changes == ("module wind_metrics has changed since",)
+
+
+@pytest.mark.parametrize("names", [[], ["order"]])
+def test_without_the_standard_ones_a_run_has_those_that_are_listed(tmp_path, scenario, names):
+    settings = [f"metrics={names}", "standard_metrics=false"]
+    result = run(scenario, overrides=settings, out=tmp_path / "run")
+    assert list(result.metrics) == names
+    assert RunFolder(tmp_path / "run").metrics().columns == ["tick", "time_s", *names, "sent", "heard", "in_range"]
+    assert result.record["ticks"]["rows"] == 10
+    assert not [name for name in result.counts if name.startswith("observer_failed")]
+    assert result.trajectory_sha256 == run(scenario).trajectory_sha256
 
 
 def test_it_changes_nothing_of_the_run(scenario):

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput, OwnCodeFailed
-from swarmwire.comms.parameters import parameter
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.own_metrics import own_metrics
+from swarmwire.metrics.own_metrics import own_kind
 from tests.metrics.truths import static, truth
 
 
@@ -24,13 +23,6 @@ class Good(Metric):
 
     def begin(self, static: Any) -> Any:
         return lambda moment: float(moment.truth.tick)
-
-
-@dataclass(frozen=True)
-class Asking(Good):
-    """Has a parameter without default, which a scenario cannot give."""
-
-    at: float = parameter(help="what for")
 
 
 class Plain(Metric):
@@ -63,8 +55,7 @@ def spec(kind: type) -> str:
 
 
 def test_a_good_one_is_measured():
-    [metric] = own_metrics([spec(Good)], "s.toml")
-    assert _measure(metric).latest["mine"].tolist() == [7.0]
+    assert _measure(own_kind(spec(Good), "s.toml", "metrics.0")()).latest["mine"].tolist() == [7.0]
 
 
 @pytest.mark.parametrize(
@@ -72,13 +63,12 @@ def test_a_good_one_is_measured():
     [
         (Plain, "expected a dataclass below Metric; .*:Plain is <class"),
         (Endless, "Endless has no begin"),
-        (Asking, "is missing"),
         (str, ".* holds no such name: 'str'"),
     ],
 )
-def test_a_class_that_cannot_be_made_is_refused(kind, said):
-    with pytest.raises(BadInput, match=rf"^s.toml: metrics\.0.*: {said}"):
-        own_metrics([spec(kind)], "s.toml")
+def test_a_class_that_is_no_metric_is_refused(kind, said):
+    with pytest.raises(BadInput, match=rf"^s.toml: metrics\.0: {said}"):
+        own_kind(spec(kind), "s.toml", "metrics.0")
 
 
 @pytest.mark.parametrize(
@@ -89,19 +79,14 @@ def test_a_class_that_cannot_be_made_is_refused(kind, said):
         ("name", "x_m", "a name that is not taken; got 'x_m'"),
         ("name", "delivery", "a name that is not taken; got 'delivery'"),
         ("unit", 3, "unit as a text; got 3"),
-        ("kind", "sum", "the kind level or count; got 'sum'"),
+        ("kind", "sum", "the kind level or count or time; got 'sum'"),
         ("bounds", (None, 1.0), r"bounds as a number, and a number or None; got \(None, 1.0\)"),
     ],
 )
 def test_an_attribute_that_is_wrong_is_refused(monkeypatch, name, value, said):
     monkeypatch.setattr(Good, name, value)
     with pytest.raises(BadInput, match=rf"^s.toml: metrics\.0: Good: expected {said}"):
-        own_metrics([spec(Good)], "s.toml")
-
-
-def test_the_second_of_one_name_is_refused():
-    with pytest.raises(BadInput, match=r"metrics\.1: Wide: expected a name that is not taken; got 'mine'"):
-        own_metrics([spec(Good), spec(Wide)], "s.toml")
+        own_kind(spec(Good), "s.toml", "metrics.0")
 
 
 @pytest.mark.parametrize(("kind", "said"), [(BeginsBadly, "no start"), (Wide, "could not broadcast")])

@@ -39,6 +39,7 @@ def truth(of: Static, tick: int = 0, **given: Any) -> Truth:
     fields: dict[str, Any] = {
         "tick": tick,
         "time_ns": tick * 100_000_000,
+        "running": np.ones(of.arenas, np.bool_),
         "alive": np.ones(rows, np.bool_),
         "pose": np.zeros((rows, 3)),
         "velocity": np.zeros((rows, 3)),

@@ -136,6 +136,7 @@ def _glimpse() -> Glimpse:
     truth = Truth(
         tick=1,
         time_ns=1,
+        running=np.ones(ARENAS, np.bool_),
         alive=flags,
         pose=_floats(rows, 3),
         velocity=_floats(rows, 3),

@@ -144,6 +144,7 @@ def sample(seed: int, boundary: Boundary, each: int = 12) -> Sample:
         touched=np.zeros((2, 3 * each)),
         target=np.zeros((2, 3 * each, 3)),
         alive=random.random((2, 3 * each)) < 0.8,
+        running=np.ones(2, np.bool_),
         charge=np.ones((2, 3 * each)),
         leds=leds,
         led_places_m=led_places_m(groups, most),

@@ -37,6 +37,7 @@ def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: 
         touched=np.zeros((1, robots)),
         target=np.zeros((1, robots, 3)),
         alive=np.array([more.get("alive", [True] * robots)]),
+        running=np.ones(1, np.bool_),
         charge=np.ones((1, robots)),
         leds=np.full((1, robots, body.led_count), more.get("colour", 0)),
         led_places_m=led_places_m((Group("a", body, 0, robots),), body.led_count),

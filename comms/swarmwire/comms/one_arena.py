@@ -28,6 +28,7 @@ def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
         edges = edges[(edges[:, 0] >= rows.start) & (edges[:, 0] < rows.stop)] - rows.start
     return replace(
         truth,
+        running=truth.running[arena : arena + 1],
         alive=truth.alive[rows],
         pose=truth.pose[rows],
         velocity=truth.velocity[rows],

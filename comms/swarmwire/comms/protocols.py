@@ -1,7 +1,8 @@
-"""The two seams of the loop: a crew decides for the robots, observers look on."""
+"""The seams of the loop: a crew decides for the robots, observers look on, a judge says which arenas are over."""
 
 from typing import Any, Protocol
 
+from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
@@ -41,4 +42,12 @@ class Observer(Protocol):
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """The run is over; `last` counts what was in flight. Returns this observer's part of the summary."""
+        ...
+
+
+class Judge(Protocol):
+    """Says when an arena has come to its end before the run has. It judges by what observers saw, as one of them."""
+
+    def over(self) -> BoolArray | None:
+        """Which arenas are over after the tick that observers saw last, (arenas,); None: none is."""
         ...

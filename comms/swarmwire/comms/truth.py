@@ -187,6 +187,10 @@ class Tally:
             self.fates + other.fates,
         )
 
+    def of(self, arenas: BoolArray) -> "Tally":
+        """What was counted in these arenas (arenas,), and nothing in the others."""
+        return Tally(self.sent * arenas, self.intended * arenas, self.in_range * arenas, self.fates * arenas[:, None])
+
 
 @dataclass(frozen=True, slots=True)
 class Happened:
@@ -208,10 +212,15 @@ class Happened:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """One tick: the state at its start, what the robots did in it, and what came of the radio up to its start."""
+    """One tick: the state at its start, what the robots did in it, and what came of the radio up to its start.
+
+    Of an arena that has left the world nothing counts any more: nobody is alive there, nothing moves, is heard or
+    happens, and its rows stay as they were.
+    """
 
     tick: int
     time_ns: int
+    running: BoolArray  # (arenas,) those that have not left
     alive: BoolArray  # (rows,)
     pose: FloatArray  # (rows, 3) x, y in m, heading in rad, arena frame
     velocity: FloatArray  # (rows, 3) m/s, m/s, rad/s, arena frame

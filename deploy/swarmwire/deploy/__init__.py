@@ -1,9 +1,13 @@
-"""Where things run: `run` a scenario from Python, step a `Simulation`, or `repeat` a run; so does the command line."""
+"""Where things run, from Python as from the command line.
+
+`run` a scenario, step a `Simulation`, `repeat` a run; `sweep` a campaign of many runs, and `resume` it.
+"""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from swarmwire.deploy.campaign.sweeping import Sweep, resume, sweep
     from swarmwire.deploy.record.recording import Recording
     from swarmwire.deploy.repetition import Repetition, repeat
     from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
@@ -21,8 +25,11 @@ __all__ = [
     "RunFolder",
     "Simulation",
     "Statistics",
+    "Sweep",
     "repeat",
+    "resume",
     "run",
+    "sweep",
 ]
 
 _PLACES = {
@@ -30,8 +37,11 @@ _PLACES = {
     "Repetition": "swarmwire.deploy.repetition",
     "RunFolder": "swarmwire.metrics.run_folder",
     "Simulation": "swarmwire.deploy.simulation",
+    "Sweep": "swarmwire.deploy.campaign.sweeping",
     "repeat": "swarmwire.deploy.repetition",
+    "resume": "swarmwire.deploy.campaign.sweeping",
     "run": "swarmwire.deploy.running",
+    "sweep": "swarmwire.deploy.campaign.sweeping",
 }  # all else is part of a result
 
 

@@ -7,6 +7,7 @@ import typer
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.commands.check import check_command
+from swarmwire.deploy.commands.compare import compare_command
 from swarmwire.deploy.commands.describe import describe_command
 from swarmwire.deploy.commands.draw import draw_command
 from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
@@ -18,6 +19,7 @@ from swarmwire.deploy.commands.repeat import repeat_command
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
+from swarmwire.deploy.commands.sweep import sweep_command
 from swarmwire.deploy.commands.verify import verify_command
 from swarmwire.deploy.commands.view import view_command
 
@@ -29,6 +31,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 app.command("run")(run_command)
+app.command("sweep")(sweep_command)
 app.command("repeat")(repeat_command)
 app.command("check")(check_command)
 app.command("draw")(draw_command)
@@ -40,6 +43,7 @@ app.command("list")(list_command)
 app.command("describe")(describe_command)
 app.command("new")(new_command)
 app.command("verify")(verify_command)
+app.command("compare")(compare_command)
 app.add_typer(radio_app, name="radio")
 
 

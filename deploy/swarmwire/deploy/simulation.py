@@ -8,8 +8,7 @@ from typing import Any, Self
 
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted
-from swarmwire.comms.loading import resolve
-from swarmwire.comms.protocols import Crew, Observer
+from swarmwire.comms.protocols import Crew, Judge, Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.arguments import Runners, choose_seeds, real_time_factor, runner_count
@@ -19,6 +18,7 @@ from swarmwire.deploy.endpoint import check_socket, new_run_id
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.kept_memory import keep_memory
+from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.deploy.new_air import new_air
 from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
@@ -29,10 +29,9 @@ from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.too_large import TooLarge
 from swarmwire.metrics.event_log import EventLog
+from swarmwire.metrics.judge import Judge as StopJudge
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
-from swarmwire.metrics.own_metrics import own_metrics
-from swarmwire.metrics.registry import standard
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.crews.remote_crew import RemoteCrew
@@ -92,9 +91,12 @@ class Simulation:
         factor = real_time_factor(realtime)
         self.agents = agent_specs(self.scenario)
         self.world = self._new_world(seed, seeds)
-        measures = [resolve(spec, Path(self.scenario.source).parent) for spec in self.scenario.metrics]
-        self.metrics = Metrics([*standard(), *own_metrics(measures, self.scenario.source)])
-        self.code = tuple(dict.fromkeys([*self.agents.values(), *own_code(self.world.static), *measures]))
+        measures = measuring(self.scenario)
+        self.metrics = Metrics(measures.metrics)
+        stops = conditions(self.scenario)
+        self._stop = StopJudge(self.metrics, stops) if stops else None
+        self._judge: Judge | None = self._stop
+        self.code = tuple(dict.fromkeys([*self.agents.values(), *own_code(self.world.static), *measures.code]))
         self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else _ticks(self.scenario)
         self.inputs = replay.inputs if replay else None
@@ -160,7 +162,8 @@ class Simulation:
         with ExitStack() as stack:
             stack.push(self._record.failed_to_start)
             crew = self._crew = stack.enter_context(self._crews.crew())
-            self._watching: list[Observer] = [self.metrics, RadioTally(), EventLog(), *self._observers]
+            judging = [self._stop] if self._stop else []
+            self._watching: list[Observer] = [self.metrics, *judging, RadioTally(), EventLog(), *self._observers]
             acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows)
             acting = self._record.recorded(acting, self._from_outside)
             self._loop = Loop(
@@ -169,6 +172,7 @@ class Simulation:
                 acting,
                 self._watching,
                 self.scenario.events,
+                self._judge,
             )
             crew.start()
             for observer in self._watching:
@@ -182,7 +186,7 @@ class Simulation:
         return self._entered().step()
 
     def run(self, ticks: int | None = None) -> None:
-        """Run up to tick `ticks`, or to the scenario's end, or until an interrupt."""
+        """Run up to tick `ticks`, or to the scenario's end, until all arenas have stopped, or until an interrupt."""
         loop = self._entered()
         with suppress(Interrupted):  # asked for while it waited for runners: the summary says how far it came
             until = self.ticks if ticks is None else ticks
@@ -205,10 +209,13 @@ class Simulation:
                 error=error,
                 runners=self.runners,
                 ticks=loop.ticks_done,
+                arena_ticks=loop.arena_ticks.tolist(),
+                stopped=(~self.world.running).tolist(),
                 hashes=loop.hexdigests(),
                 wall_s=to_s(ended_ns - self._started_ns - self.controls.paused_ns),
                 start_s=to_s(self._started_ns - self._called_ns),
                 counts={**loop.counts(), **failed},
+                arena_counts=loop.arena_counts(),
                 origin=self._origin,
                 inputs=self._record.inputs(),
                 losses=self._losses,
@@ -267,6 +274,8 @@ class Simulation:
             return "interrupted"
         if error is not None:
             return "failed"
+        if not self.world.running.any():
+            return "stopped"
         if self.tick >= self.ticks:
             return "duration"
         return "interrupted" if self._stopped() else "left"

@@ -10,9 +10,9 @@ from swarmwire.metrics.registry import METRICS
 
 
 def metric_table() -> str:
-    """Every metric: what it is, its unit, whether it is read off or adds up, and its bounds."""
-    head = ("metric", "what", "unit", "kind", "bounds of a tick")
-    return table(head, [(code(name), sentence(m.help), m.unit, m.kind, _bounds(m)) for name, m in METRICS.items()])
+    """Every metric: what it is, its unit, whether it is read off or adds up, its bounds, whether it is standard."""
+    head = ("metric", "what", "unit", "kind", "bounds of a tick", "standard")
+    return table(head, [_row(kind) for kind in METRICS.values()])
 
 
 def metric_details() -> str:
@@ -23,6 +23,11 @@ def metric_details() -> str:
         rows = parameter_rows(kind)
         parts += [table(HEAD, rows)] if rows else []
     return "\n".join(parts)
+
+
+def _row(kind: type[Metric]) -> tuple[str, ...]:
+    standard = "yes" if kind.standard else NOTHING
+    return code(kind.name), sentence(kind.help), kind.unit, kind.kind, _bounds(kind), standard
 
 
 def _bounds(kind: type[Metric]) -> str:

@@ -21,8 +21,8 @@ def variants_of(value: dict[str, Any]) -> list[Variant]:
     if "discriminator" in value:
         tag = value["discriminator"]["propertyName"]
         return [(tag, name, _name(ref)) for name, ref in value["discriminator"]["mapping"].items()]
-    if "anyOf" in value:
-        return [variant for item in value["anyOf"] for variant in variants_of(item)]
+    if "anyOf" in value or "oneOf" in value:
+        return [variant for item in value.get("anyOf", value.get("oneOf", [])) for variant in variants_of(item)]
     for key in ("items", "additionalProperties"):
         if isinstance(value.get(key), dict):
             return variants_of(value[key])

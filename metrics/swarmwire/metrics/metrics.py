@@ -23,12 +23,12 @@ class Metrics:
 
     mean, min and max are over ticks: of a level its value at each, of a count what each added, so a count's mean is
     per tick (times the tick rate: per second). final is the level at the start of the last tick, the count's total over
-    the run. Ticks without a value (no robot alive) are left out; what never had one, as the radio graph's without a
-    radio, is null. Memory does not grow with the run.
+    the run. An arena that leaves is measured up to its last tick. Ticks without a value (no robot alive) are left out;
+    what never had one, as the radio graph's without a radio, is null. Memory does not grow with the run.
     """
 
     def __init__(self, metrics: Sequence[str | Metric] | None = None) -> None:
-        """Measure these, by name or as they are, or all that are registered; BadInput for an unknown name."""
+        """Measure these, by name or as they are, or the standard ones; BadInput for an unknown name."""
         self.metrics = chosen(metrics)
 
     def begin(self, static: Static) -> None:
@@ -52,7 +52,7 @@ class Metrics:
                 value[row] = measure(moment)
             except (Exception, SystemExit) as error:
                 raise _failed(metric) from error
-        _add(value, self._counts, self._seen, self._sum, self._min, self._max)
+        _add(value, self._latest, truth.running, self._counts, self._seen, self._sum, self._min, self._max)
         self._latest = value
 
     def _begun(self, metric: Metric) -> Measure:
@@ -65,7 +65,7 @@ class Metrics:
 
     @property
     def latest(self) -> dict[str, FloatArray]:
-        """By name, per arena: each level in the tick last seen, each count's total so far; NaN where undefined."""
+        """By name, per arena: each level in its last tick, each count's total so far; NaN where undefined."""
         return {metric.name: self._latest[row] for row, metric in enumerate(self.metrics)}
 
     @property
@@ -93,10 +93,16 @@ def _failed(metric: Metric) -> OwnCodeFailed:
 
 
 @njit(cache=True)
-def _add(value, counts, seen, total, least, most):
-    """Add the values of a tick, (metrics, arenas), to the statistics; those of counts become their totals so far."""
+def _add(value, latest, running, counts, seen, total, least, most):
+    """Add the values of a tick, (metrics, arenas), to the statistics; those of counts become their totals so far.
+
+    In arenas that are not `running` (arenas,) nothing is added, and the values are the latest.
+    """
     for m in range(value.shape[0]):
         for arena in range(value.shape[1]):
+            if not running[arena]:
+                value[m, arena] = latest[m, arena]
+                continue
             one = value[m, arena]
             if not np.isnan(one):
                 seen[m, arena] += 1

@@ -43,7 +43,7 @@ class Moment:
         self.per_robot_alive: FloatArray
         self.robots_alive, self.per_robot_alive, everyone = _count(self.alive)
         edges = truth.edges
-        self.components = None if edges is None else Components(*_components(edges, self.alive))
+        self.components = None if edges is None else Components(*components_of(edges, self.alive))
         self._counted = True if everyone else self.alive  # a mask costs numpy as much as the sum
 
     @property
@@ -88,8 +88,11 @@ def _count(alive):
 
 
 @njit(cache=True)
-def _components(edges, alive):
-    """Union-find: how many components each arena has that hold a robot alive, and the most of them that one holds."""
+def components_of(edges: IntArray, alive: BoolArray) -> tuple[IntArray, IntArray]:
+    """How many components each arena has that hold a robot alive, and the most of them that one holds, (arenas,) each.
+
+    Union-find over the `edges` (e, 2) between robot rows; `alive` is (arenas, robots).
+    """
     arenas, robots = alive.shape
     parent, size = np.arange(arenas * robots), np.zeros(arenas * robots, np.int64)
     for e in range(len(edges)):

@@ -1,9 +1,7 @@
-"""Metrics of the user's own at the door: the classes that a scenario names, fit to be measured beside the others."""
+"""Metrics of the user's own at the door: a class that a scenario or a package names, fit to be measured."""
 
-from collections.abc import Sequence
 from typing import Any, get_args
 
-from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.own_class import own_class
 from swarmwire.metrics.metric import Kind, Metric
@@ -13,26 +11,21 @@ from swarmwire.metrics.registry import DELIVERY, METRICS
 COLUMNS = {*KEYS, *ROBOT_COLUMNS, SIDEWAYS, VALUE, *MOVABLE, *RADIO}  # of the table of ticks, where each has one, too
 
 
-def own_metrics(specs: Sequence[str], where: str) -> list[Metric]:
-    """A metric of each class, "package.module:Class" or "/path/file.py:Class"; BadInput names `metrics.<place>`."""
-    taken, found = {*METRICS, *COLUMNS, DELIVERY}, list[Metric]()
-    for place, spec in enumerate(specs):
-        key = f"metrics.{place}"
-        kind = own_class(Metric, spec, where, key)
-        fault = _fault(kind, taken)
-        if fault:
-            raise BadInput(where, key, f"{kind.__name__}: {fault}")
-        found.append(built(kind, {}, where, key))
-        taken.add(kind.name)
-    return found
+def own_kind(spec: str, where: str, key: str) -> type[Metric]:
+    """The metric's class that "package.module:Class" or "/path/file.py:Class" names; else BadInput at `key`."""
+    kind = own_class(Metric, spec, where, key)
+    fault = _fault(kind)
+    if fault:
+        raise BadInput(where, key, f"{kind.__name__}: {fault}")
+    return kind
 
 
-def _fault(kind: type[Metric], taken: set[str]) -> str | None:
+def _fault(kind: type[Metric]) -> str | None:
     """What was expected of the class, whose attributes no type checker looked at; None if all is well."""
     of: dict[str, Any] = {name: getattr(kind, name, None) for name in ("name", "help", "unit", "kind", "bounds")}
     if not isinstance(of["name"], str) or not of["name"].isidentifier():
         return f"expected a name of letters, digits and _; got {of['name']!r}"
-    if of["name"] in taken:
+    if of["name"] in {*METRICS, *COLUMNS, DELIVERY}:
         return f"expected a name that is not taken; got {of['name']!r}"
     for text in ("help", "unit"):
         if not isinstance(of[text], str):

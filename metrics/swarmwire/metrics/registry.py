@@ -17,17 +17,28 @@ from swarmwire.metrics.network.pdr import PacketDeliveryRatio
 from swarmwire.metrics.network.rejoin import RejoinMedian, RejoinWorst
 from swarmwire.metrics.network.throughput import Throughput
 from swarmwire.metrics.network.unrejoined import Unrejoined
+from swarmwire.metrics.swarm.aggregation import Aggregation
+from swarmwire.metrics.swarm.aggregation_hop import AggregationHop
+from swarmwire.metrics.swarm.aggregation_time import AggregationTime
+from swarmwire.metrics.swarm.cohesion import Cohesion
+from swarmwire.metrics.swarm.collision_rate import CollisionRate
 from swarmwire.metrics.swarm.contacts import Collisions, WallContacts
+from swarmwire.metrics.swarm.deadlocked import Deadlocked
+from swarmwire.metrics.swarm.dispersion import Dispersion
 from swarmwire.metrics.swarm.min_gap import MinGap
+from swarmwire.metrics.swarm.nearest_neighbour import NearestNeighbour
 from swarmwire.metrics.swarm.order import Order
+from swarmwire.metrics.swarm.order_local import OrderLocal
 from swarmwire.metrics.swarm.order_velocity import OrderVelocity
+from swarmwire.metrics.swarm.oscillation import Oscillation
+from swarmwire.metrics.swarm.path_efficiency import PathEfficiency
+from swarmwire.metrics.swarm.rotation import Rotation
 from swarmwire.metrics.task.consensus_bias import ConsensusBias
 from swarmwire.metrics.task.consensus_error import ConsensusError
 from swarmwire.metrics.task.coverage import Coverage
 from swarmwire.metrics.task.coverage_time import CoverageTime
 from swarmwire.metrics.task.find_time import FindTime
-from swarmwire.metrics.task.target_best import TargetBest
-from swarmwire.metrics.task.target_mean import TargetMean
+from swarmwire.metrics.task.target_distance import TargetBest, TargetMean
 
 DELIVERY = "delivery"  # drawn beside the metrics, of packets in the last second: no metric may have its name
 
@@ -51,6 +62,18 @@ METRICS: dict[str, type[Metric]] = {
         MinGap,
         TargetBest,
         TargetMean,
+        OrderLocal,
+        Rotation,
+        Cohesion,
+        Dispersion,
+        NearestNeighbour,
+        Aggregation,
+        AggregationHop,
+        AggregationTime,
+        CollisionRate,
+        Deadlocked,
+        Oscillation,
+        PathEfficiency,
         AlgebraicConnectivity,
         Articulation,
         Fragmented,

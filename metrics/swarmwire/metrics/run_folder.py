@@ -218,5 +218,8 @@ def _is_summary(found: object) -> TypeGuard[dict[str, Any]]:
     kinds |= {"record": dict, "arenas": int, "trajectory_sha256": list, "format": int}
     if not all(isinstance(summary.get(key), kind) for key, kind in kinds.items()):
         return False
-    hashes: list[Any] = summary["trajectory_sha256"]
-    return summary["ticks"] >= 0 and len(hashes) == summary["arenas"] and all(isinstance(item, str) for item in hashes)
+    arenas, hashes, ends = (summary.get(key, []) for key in ("arenas", "trajectory_sha256", "by_arena"))
+    if summary["ticks"] < 0 or len(hashes) != arenas or not all(isinstance(item, str) for item in hashes):
+        return False
+    # Older ones do not tell how each arena ended.
+    return not ends or (len(ends) == arenas and all(isinstance(end.get("ticks"), int) for end in ends))

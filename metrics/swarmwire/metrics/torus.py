@@ -6,6 +6,11 @@ from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static
 
 
+def sides_m(static: Static) -> tuple[float, float]:
+    """The sides over which a torus goes on, 0 where an arena ends, as the kernel `to_nearest` takes them."""
+    return static.arena_size_m if static.boundary == "torus" else (0.0, 0.0)
+
+
 def shortest(away_m: FloatArray, static: Static) -> FloatArray:
     """Displacements (…, 2) in m between places of an arena, on a torus those the shortest way; not finite ones stay."""
     if static.boundary != "torus":

@@ -34,7 +34,7 @@ def test_every_robot_is_in_the_one_cell_of_its_place_and_arena(seed: int, arenas
     state = np.random.default_rng(seed).uniform(-3.0, 3.0, (arenas, robots, 6))
     cells = cells_over((4.0, 3.0), 0.7, arenas, arenas * robots)
     for _ in range(2):  # sorting again starts afresh
-        sort(cells, state)
+        sort(cells, state, np.ones(len(state), np.bool_))
     held = {
         (a, j, i): cells.item[cells.start[c] : cells.start[c + 1]].tolist()
         for c, (a, j, i) in enumerate(np.ndindex(arenas, cells.ny, cells.nx))

@@ -94,6 +94,7 @@ def glimpses(draw: st.DrawFn) -> Glimpse:
     truth = Truth(
         tick=draw(st.integers(0, 2**40)),
         time_ns=draw(st.integers(0, 2**62)),
+        running=np.ones(STATIC.arenas, np.bool_),
         alive=draw(flags),
         pose=draw(floats(ROWS, 3)),
         velocity=draw(floats(ROWS, 3)),
@@ -151,6 +152,7 @@ def quiet(**given: Any) -> Glimpse:
     truth = Truth(
         tick=1,
         time_ns=0,
+        running=np.ones(STATIC.arenas, np.bool_),
         alive=np.ones(ROWS, np.bool_),
         pose=np.zeros((ROWS, 3)),
         velocity=np.zeros((ROWS, 3)),

@@ -8,7 +8,9 @@ from swarmwire.metrics.drawing.body_sheet import draw_body
 from swarmwire.metrics.drawing.mp4 import write_mp4
 
 
-@pytest.mark.parametrize(("module", "name"), [("matplotlib", "matplotlib"), ("imageio_ffmpeg", "imageio-ffmpeg")])
+@pytest.mark.parametrize(
+    ("module", "name"), [("matplotlib", "matplotlib"), ("imageio_ffmpeg", "imageio-ffmpeg"), ("jinja2", "jinja2")]
+)
 def test_who_lacks_the_extra_is_told_how_to_get_it(tmp_path, monkeypatch, module, name):
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(BadInput) as error:

@@ -54,14 +54,14 @@ def test_a_twist_drive_turns_and_drives_at_both_limits_at_once(monkeypatch: pyte
     assert world.command.tolist() == [[0.1, 2.0, 0.0]]
     assert np.hypot(*world.velocity[0, :2]) == pytest.approx(0.1, rel=0.02)
     assert world.velocity[0, 2] == pytest.approx(2.0, rel=1e-3)
-    assert world.counts()["clipped_commands"] == 20
+    assert world.counts()["clipped_commands"].tolist() == [20]
 
 
 def test_a_body_with_wheels_that_is_asked_to_go_sideways_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
     world = driven(monkeypatch, TWIST, [0.0, 0.0, 0.0])
     pose = after(world, 1.0, 0.0, 0.0, 0.3)
     np.testing.assert_allclose(pose, 0.0, atol=1e-9)
-    assert world.counts()["clipped_commands"] == 10
+    assert world.counts()["clipped_commands"].tolist() == [10]
 
 
 def test_noise_of_the_wheels_bends_the_way_and_repeats(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -54,7 +54,7 @@ def test_the_dead_go_dark_and_switch_nothing() -> None:
 def test_an_led_that_a_robot_does_not_have_is_counted() -> None:
     leds = ShownLeds(GROUPS, 2)
     leds.take(changes((0, 8, 5), (0, 7, 6), (2, 12, 7), (2, 2**40, 7)), EVERYBODY)
-    assert leds.not_there == 2
+    assert leds.not_there.tolist() == [2, 0]
     assert np.count_nonzero(leds.rgb) == 2
 
 
@@ -65,7 +65,7 @@ def test_bodies_without_leds_need_no_room() -> None:
     assert dark.told.shape == (6, 0)
     dark.take(changes((0, 0, 5)), EVERYBODY)
     dark.darken(EVERYBODY)
-    assert dark.not_there == 1
+    assert dark.not_there.tolist() == [1, 0]
 
 
 def test_the_world_takes_them_from_actions_and_darkens_the_dead() -> None:
@@ -78,4 +78,4 @@ def test_the_world_takes_them_from_actions_and_darkens_the_dead() -> None:
     assert not world.actuators.leds.told[1].any()
     world.live(np.array([True, True]))
     assert np.count_nonzero(world.actuators.leds.told) == 1
-    assert world.counts()["leds_not_there"] == 1
+    assert world.counts()["leds_not_there"].tolist() == [1]

@@ -133,7 +133,7 @@ def test_commands_are_scaled_to_the_wheels_limit_along_the_same_curve(linear: fl
     applied = world.command[0]
     assert abs(applied[0]) + 0.5 * abs(applied[1]) * drive.wheel_base_m <= drive.max_wheel_mps * (1 + 1e-8)
     assert applied[0] * angular == pytest.approx(applied[1] * linear)
-    assert world.counts()["clipped_commands"] == (wheel > drive.max_wheel_mps * (1 + 1e-9))
+    assert world.counts()["clipped_commands"].tolist() == [wheel > drive.max_wheel_mps * (1 + 1e-9)]
     if wheel <= drive.max_wheel_mps:
         assert applied.tolist() == [linear, angular, 0.0]
 
@@ -141,7 +141,7 @@ def test_commands_are_scaled_to_the_wheels_limit_along_the_same_curve(linear: fl
 def test_the_full_speed_of_the_sheet_is_not_clipped() -> None:
     world = World(posed([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), [1], {})
     world.move(commanded(world, [EPUCK.max_linear_mps, 0.0], [0.0, -EPUCK.max_angular_radps]))
-    assert world.counts() == {"clipped_commands": 0, "nan_commands": 0}
+    assert not any(counts.any() for counts in world.counts().values())
 
 
 @pytest.mark.parametrize("steps", [3, 10])

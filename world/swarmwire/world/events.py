@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.arrays import BoolArray, KeyArray
+from swarmwire.comms.arrays import KeyArray
 from swarmwire.comms.clock import to_ns, to_s
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.event import Event
@@ -41,14 +41,14 @@ class Events:
         """Let happen what is due by the start of a tick, in ns; world and air go on under what holds after that."""
         happened: list[Happened] = []
         if world.batteries.any:  # first, so that who is revived in this tick is not found empty
-            happened.extend(self._run_down(start_ns, world.batteries.empty))
+            happened.extend(self._run_down(start_ns, world))
         if self._evolving or (self._coming and self._coming[0][0] <= start_ns):
             self._swarm = replace(self._swarm, pose=world.pose)
         while self._coming and self._coming[0][0] <= start_ns:
             _, begins, serial = self._coming.popleft()
-            happened.extend(self._happen(serial, begins))
+            happened.extend(self._happen(serial, begins, world))
         for serial in self._evolving:
-            happened.extend(self._go_on(serial, start_ns))
+            happened.extend(self._go_on(serial, start_ns, world))
         if happened:
             world.live(self._conditions.alive)
             world.fail(self._conditions.failed_parts)
@@ -63,26 +63,28 @@ class Events:
             air.tune(radio)
             self._tuned = radio
 
-    def _happen(self, serial: int, begins: bool) -> list[Happened]:
+    def _happen(self, serial: int, begins: bool, world: World) -> list[Happened]:
         event, conditions = self._events[serial], self._conditions
         if event.evolves:
             self._evolving.append(serial)
         changed = event.begin(serial, self._swarm, conditions) if begins else event.end(serial, conditions)
+        changed = changed & world.rows_running
         if event.evolves and not changed.any():  # what it does is yet to come
             return []
         return [Happened(serial, event.at_s, event.do, not begins, changed, event.failing_part)]
 
-    def _run_down(self, start_ns: int, empty: BoolArray) -> list[Happened]:
-        """Robots (rows,) whose battery is empty are dead, from the first tick on that begins so."""
+    def _run_down(self, start_ns: int, world: World) -> list[Happened]:
+        """Robots whose battery is empty are dead, from the first tick on that begins so."""
+        empty = world.batteries.empty
         known = self._conditions.kills.get(RUN_DOWN, np.zeros_like(empty))
-        fell = empty & ~known
+        fell = empty & ~known & world.rows_running
         if not fell.any():
             return []
         self._conditions.kills[RUN_DOWN] = known | fell
         return [Happened(RUN_DOWN, to_s(start_ns), "run_down", False, fell, singly=True)]
 
-    def _go_on(self, serial: int, start_ns: int) -> list[Happened]:
-        event = self._events[serial]
-        began, ended = event.go_on(serial, start_ns, self._swarm, self._conditions)
+    def _go_on(self, serial: int, start_ns: int, world: World) -> list[Happened]:
+        event, here = self._events[serial], world.rows_running
+        began, ended = (rows & here for rows in event.go_on(serial, start_ns, self._swarm, self._conditions))
         at_s, part, told = to_s(start_ns), event.failing_part, ((began, False), (ended, True))
         return [Happened(serial, at_s, event.do, over, rows, part, True) for rows, over in told if rows.any()]

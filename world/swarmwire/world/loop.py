@@ -1,53 +1,72 @@
 """The loop: one tick, written once. What differs between modes is only the crew."""
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from swarmwire.comms.air.air import Air
+from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.outcomes import NO_OUTCOMES
 from swarmwire.comms.packets import NOWHERE, Heard, Sent
-from swarmwire.comms.protocols import Crew, Observer
+from swarmwire.comms.protocols import Crew, Judge, Observer
 from swarmwire.comms.truth import Tally, Truth
 from swarmwire.world.events import Events
 from swarmwire.world.mailbox import Mailbox
 from swarmwire.world.trajectory_hash import TrajectoryHash
 from swarmwire.world.world import World
 
+ALWAYS_TOLD = ("clipped_commands", "nan_commands")
+
 
 class Loop:
-    """Drives world, air and crew through `ticks` ticks and shows each to the observers."""
+    """Drives world, air and crew through `ticks` ticks and shows each to the observers.
+
+    An arena that its judge finds over leaves the world: what it came to is what it would have come to alone.
+
+    Attributes:
+        ticks_done: ticks so far.
+        arena_ticks: (arenas,) ticks that each arena took part in.
+    """
 
     def __init__(
-        self, world: World, air: Air | None, crew: Crew, observers: Sequence[Observer], events: Sequence[Event] = ()
+        self,
+        world: World,
+        air: Air | None,
+        crew: Crew,
+        observers: Sequence[Observer],
+        events: Sequence[Event] = (),
+        judge: Judge | None = None,
     ) -> None:
+        """`judge` is asked after each tick, once observers saw it; without one no arena is over before the run is."""
         self.world, self.air, self.crew, self.observers = world, air, crew, observers
         self.ticks_done = 0
+        self.arena_ticks: IntArray = np.zeros(world.static.arenas, np.int64)
+        self._judge = judge
         self._events = Events(events, world.static, world.keys, air.radio if air else None)
         self._mailbox = Mailbox(world.static)
-        self._lost: Counter[str] = Counter()  # packets that never came to the air, by why
+        self._to_nobody, self._without_radio = np.zeros_like(self.arena_ticks), np.zeros_like(self.arena_ticks)
         self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
+        self._stranded: Tally | None = None  # in arenas that left: no observer has seen that they did
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
 
     def run(
         self, ticks: int, stopped: Callable[[], bool] = lambda: False, hold: Callable[[int], None] = lambda _: None
     ) -> None:
-        """Run up to tick `ticks`, or until `stopped()`; the crew must have been started.
+        """Run up to tick `ticks`, until all arenas are over, or until `stopped()`; the crew must have been started.
 
         `hold` returns when the tick that it is given may begin; it changes when a tick begins, never what is in it.
         """
-        while self.ticks_done < ticks:
+        while self.ticks_done < ticks and self.world.running.any():
             hold(self.ticks_done)
             if stopped():
                 return
             self.step()
 
     def step(self) -> Truth:
-        """One tick, in the order of the design: events, air, senses, crew, air, physics, observers."""
+        """One tick, in the order of the design: events, air, senses, crew, air, physics, observers, judge."""
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
         events = self._events.apply(start_ns, world, self.air)
@@ -60,20 +79,22 @@ class Loop:
         actions = self.crew.act(tick, senses, packets, outcomes)
 
         pose, velocity, movable, alive = world.pose, world.velocity, world.movable, world.alive.copy()
+        running = world.running.copy()
         if self.air:
             self.air.hold(pose, alive)
             self.air.send(start_ns, tick, self._addressable(actions.sent))
         elif len(actions.sent):
-            self._lost["packets_without_radio"] += len(actions.sent)
+            np.add.at(self._without_radio, actions.sent.sender // world.static.robots, 1)
         onsets = world.move(actions)
         command = world.command
-        self._hash.add(pose, velocity, command, heard)
+        self._hash.add(pose, velocity, command, heard, running)
         edges = self.air.edges(pose, alive) if self.air else None
         tally, finished = (news.tally, news.finished) if news else (None, None)
         self._open = None
         truth = Truth(
             tick=tick,
             time_ns=start_ns,
+            running=running,
             alive=alive,
             pose=pose,
             velocity=velocity,
@@ -94,6 +115,10 @@ class Loop:
         for observer in self.observers:
             observer.see(truth)
         self.ticks_done += 1
+        self.arena_ticks += running
+        over = self._judge.over() if self._judge else None
+        if over is not None:
+            self._leave(over & running)
         return truth
 
     def end(self) -> Tally | None:
@@ -101,15 +126,38 @@ class Loop:
         if self.air is None:
             return None
         last = self.air.end()
-        return last if self._open is None else last + self._open
+        for more in (self._stranded, self._open):
+            last = last if more is None else last + more
+        return last
 
     def hexdigests(self) -> list[str]:
         """`trajectory_sha256` of each arena so far."""
         return self._hash.hexdigests()
 
     def counts(self) -> dict[str, int]:
-        """Faults on the way between agents and world so far, by name."""
-        return {**self.crew.counts(), **self.world.counts(), **self._lost}
+        """Faults on the way between agents and world so far, by name; what is always told also where there is none."""
+        told = {name: int(counted.sum()) for name, counted in self._counted().items()}
+        return {**self.crew.counts(), **{name: count for name, count in told.items() if count or name in ALWAYS_TOLD}}
+
+    def arena_counts(self) -> list[dict[str, int]]:
+        """Those of them that belong to an arena, of each: by name, where there is any."""
+        counted = {name: counts.tolist() for name, counts in self._counted().items()}
+        arenas = range(self.world.static.arenas)
+        return [{name: counts[arena] for name, counts in counted.items() if counts[arena]} for arena in arenas]
+
+    def _counted(self) -> dict[str, IntArray]:
+        """Faults by name, (arenas,) each."""
+        packets = {"packets_to_nobody": self._to_nobody, "packets_without_radio": self._without_radio}
+        return {**self.world.counts(), **packets}
+
+    def _leave(self, over: BoolArray) -> None:
+        """These arenas (arenas,) take no part in the ticks to come."""
+        if not over.any():
+            return
+        self.world.leave(over)
+        if self.air:
+            stranded = self.air.leave(over)
+            self._stranded = stranded if self._stranded is None else self._stranded + stranded
 
     def _addressable(self, sent: Sent) -> Sent:
         """Packets for a robot that is not there, or for the sender itself, are counted and go NOWHERE."""
@@ -117,5 +165,5 @@ class Loop:
         nobody = (sent.to >= robots) | (sent.to == sent.sender % robots)
         if not nobody.any():
             return sent
-        self._lost["packets_to_nobody"] += int(nobody.sum())
+        np.add.at(self._to_nobody, sent.sender[nobody] // robots, 1)
         return replace(sent, to=np.where(nobody, NOWHERE, sent.to))

@@ -7,6 +7,8 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.notes import MOST_STATES, Notes
 
+ONE_TOO_MANY = -1
+
 
 class States:
     """The state of each robot row. `code` is replaced when it changes, never written to.
@@ -14,13 +16,15 @@ class States:
     Attributes:
         code: (rows,) a place in `names`; 0: the agent has named nothing.
         names: the states, in the order in which they were first named, in a tick that of the robots; first comes "".
-        dropped: how often a state was named that was one too many.
+        dropped: (arenas,) how often a state was named that was one too many in its arena.
     """
 
-    def __init__(self, rows: int) -> None:
-        self.code: IntArray = np.zeros(rows, np.int64)
+    def __init__(self, arenas: int, robots: int) -> None:
+        self.code: IntArray = np.zeros(arenas * robots, np.int64)
         self.names: tuple[str, ...] = ("",)
-        self.dropped = 0
+        self.dropped: IntArray = np.zeros(arenas, np.int64)
+        self._robots = robots
+        self._named: BoolArray = np.ones((arenas, 1), np.bool_)  # (arenas, names) which each arena knows
 
     def take(self, notes: Notes, alive: BoolArray) -> None:
         """Take down what robots named in a tick; only those `alive` (rows,) name anything."""
@@ -28,10 +32,11 @@ class States:
             return
         order = np.argsort(notes.rows)
         order = order[alive[notes.rows[order]]]
-        rows, local = notes.rows[order], notes.code[order]
-        place = self._places(local, notes.names)[local]
-        kept = place >= 0
-        self.dropped += int(np.count_nonzero(~kept))
+        rows = notes.rows[order]
+        arena = rows // self._robots
+        place = self._places(arena, notes.code[order], notes.names)
+        kept = place != ONE_TOO_MANY
+        np.add.at(self.dropped, arena[~kept], 1)
         self.code = self.code.copy()
         self.code[rows[kept]] = place[kept]
 
@@ -40,14 +45,23 @@ class States:
         if rows.any():
             self.code = np.where(rows, 0, self.code)
 
-    def _places(self, local: IntArray, names: tuple[str, ...]) -> IntArray:
-        """The place of each of these names here, (names,), new ones in the order of first use; -1: one too many."""
+    def _places(self, arena: IntArray, local: IntArray, names: tuple[str, ...]) -> IntArray:
+        """The place here of names[local], (k,), as named in these arenas (k,), new ones in the order of first use."""
         known = {name: place for place, name in enumerate(self.names)}
-        places = np.full(len(names), -1)
-        used, first = np.unique(local, return_index=True)
-        for code in cast("list[int]", used[np.argsort(first)].tolist()):
-            if len(known) <= MOST_STATES:
-                known.setdefault(names[code], len(known))
-            places[code] = known.get(names[code], -1)
-        self.names = tuple(known)
-        return places
+        place: IntArray = np.array([known.get(name, -1) for name in names], np.int64)[local]
+        for at in cast("list[int]", np.flatnonzero((place < 0) | ~self._named[arena, place]).tolist()):
+            place[at] = self._place(int(arena[at]), names[int(local[at])])
+        return place
+
+    def _place(self, arena: int, name: str) -> int:
+        """The place of a state that is named in an arena, be it for the first time."""
+        is_new = name not in self.names
+        if not is_new and self._named[arena, self.names.index(name)]:
+            return self.names.index(name)
+        if self._named[arena].sum() > MOST_STATES:  # each arena has its own limit: beside others it is as alone
+            return ONE_TOO_MANY
+        if is_new:
+            self.names = (*self.names, name)
+            self._named = np.pad(self._named, ((0, 0), (0, 1)))
+        self._named[arena, self.names.index(name)] = True
+        return self.names.index(name)

@@ -7,7 +7,7 @@ import hashlib
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.arrays import AnyArray, FloatArray
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray
 from swarmwire.comms.packets import Heard
 
 
@@ -19,19 +19,25 @@ class TrajectoryHash:
         self._hashes = [hashlib.sha256() for _ in range(arenas)]
         self._first_row = [arena * robots for arena in range(arenas + 1)]
 
-    def add(self, pose: FloatArray, velocity: FloatArray, command: FloatArray, heard: Heard) -> None:
-        """One tick; tables are (rows, 3), a row per robot of all arenas, `heard` is sorted by receiver."""
-        self._add(np.concatenate([pose, velocity, command], axis=1), self._first_row)
+    def add(
+        self, pose: FloatArray, velocity: FloatArray, command: FloatArray, heard: Heard, running: BoolArray
+    ) -> None:
+        """One tick of the arenas that are `running` (arenas,); in the others nothing is heard.
+
+        Tables are (rows, 3), a row per robot of all arenas, `heard` is sorted by receiver.
+        """
+        open_ = np.flatnonzero(running).tolist()
+        self._add(np.concatenate([pose, velocity, command], axis=1), self._first_row, open_)
         if len(heard):
             first = np.searchsorted(heard.receiver, self._first_row)
             packets = _packets(heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, first, self._robots)
-            self._add(packets, first.tolist())
+            self._add(packets, first.tolist(), open_)
 
-    def _add(self, table: AnyArray, first: list[int]) -> None:
-        """The rows first[a] to first[a + 1] - 1 of a table go into the hash of arena a."""
+    def _add(self, table: AnyArray, first: list[int], arenas: list[int]) -> None:
+        """The rows first[a] to first[a + 1] - 1 of a table go into the hash of each arena a of these."""
         row_bytes, view = table.shape[1] * table.itemsize, table.data.cast("B")
-        for digest, start, stop in zip(self._hashes, first[:-1], first[1:], strict=True):
-            digest.update(view[start * row_bytes : stop * row_bytes])
+        for arena in arenas:
+            self._hashes[arena].update(view[first[arena] * row_bytes : first[arena + 1] * row_bytes])
 
     def hexdigests(self) -> list[str]:
         """The hash of each arena so far."""

@@ -40,7 +40,8 @@ from swarmwire.world.told_values import ToldValues
 class World:
     """Arenas side by side, one per seed; robot row r is robot r % robots of arena r // robots.
 
-    Each tick: `sense`, then `move`. The arrays below but `alive` are replaced in each tick, never written to after.
+    Each tick: `sense`, then `move`. The arrays below but `alive` and `running` are replaced in each tick, never written
+    to after. An arena may `leave`: what stays of it counts no more.
 
     Attributes:
         static: what does not change.
@@ -49,7 +50,9 @@ class World:
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
         movable: (arenas, movable obstacles, 3) x, y in m, heading in rad; None: there are none.
         actuators: motors and LEDs: what they were asked for, and what they do.
-        alive: (rows,); written in place, by `live`.
+        alive: (rows,); written in place, by `live`. In an arena that left nobody is.
+        running: (arenas,) those that have not left; written in place, by `leave`.
+        rows_running: (rows,) the same for each robot; replaced by `leave`.
         batteries: of all robots; `charge` may be written to.
         scene: what sensors look at, always the present.
         sensors: those that agents need, by group and sense; `Staged.failed` may be set.
@@ -76,12 +79,14 @@ class World:
         tick_s = 1.0 / scenario.time.rate_hz
         self.batteries = Batteries(groups, self.static.arenas, tick_s)
         self.alive: BoolArray = np.ones(self.static.arenas * self.static.robots, np.bool_)
+        self.running: BoolArray = np.ones(self.static.arenas, np.bool_)
+        self.rows_running: BoolArray = np.ones_like(self.alive)
         self.scene = self._scene_of(tick_s)
         self.sensors = _sensors(scenario, self.scene, groups, needs)
         self._own = OwnActuators(groups, self.scene)
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
-        self.states = States(len(self.alive))
+        self.states = States(self.static.arenas, self.static.robots)
         self.values = ToldValues()
         self._show()
 
@@ -92,6 +97,7 @@ class World:
 
     def live(self, alive: BoolArray) -> None:
         """These robots (rows,) are alive from now on; the others brake, and resist whatever pushes them."""
+        alive = alive & self.rows_running
         revived = alive & ~self.alive  # they start afresh
         self.states.forget(revived)
         self.values.forget(revived)
@@ -99,6 +105,13 @@ class World:
         self.alive[:] = alive
         self.actuators.stop(~alive)
         self._brake()
+
+    def leave(self, over: BoolArray) -> None:
+        """Nobody in these arenas (arenas,) senses, acts, moves or is alive any more, whatever happens."""
+        self.running &= ~over
+        self.rows_running = np.repeat(self.running, self.static.robots)
+        self._physics.leave(over)
+        self.live(self.alive)
 
     def fail(self, failed: Mapping[str, BoolArray]) -> None:
         """From now on these parts of robots (rows,) do not work, by name: motors, wheels, senses; all others do."""
@@ -157,10 +170,9 @@ class World:
         """Commands within the drives' limits, (rows, 3): forward m/s, left turn rad/s, to the left m/s."""
         return self.actuators.command
 
-    def counts(self) -> dict[str, int]:
-        """What actuators could not follow since the start, by name; states too many."""
-        states = {"states_over_limit": self.states.dropped} if self.states.dropped else {}
-        own = {"actuators_not_there": self._own.not_there} if self._own.not_there else {}
+    def counts(self) -> dict[str, IntArray]:
+        """What actuators could not follow since the start, and states too many: by name, (arenas,) each."""
+        own, states = {"actuators_not_there": self._own.not_there}, {"states_over_limit": self.states.dropped}
         return {**self.actuators.counts(), **own, **states}
 
     def _show(self) -> None:
@@ -190,6 +202,7 @@ class World:
             touched=physics.touched,
             target=self.actuators.target,
             alive=self.alive.reshape(static.arenas, static.robots),  # the same memory
+            running=self.running,
             charge=self.batteries.charge,
             leds=self.actuators.leds.rgb,
             led_places_m=led_places_m(static.groups, self.actuators.leds.rgb.shape[2]),
@@ -238,7 +251,7 @@ def _sensors(
                 raise BadInput(scenario.source, f"robots.{group.name}.agent", expected)
             sheet = group.body.senses[need]
             truth = _truth(need, sheet, scene, group)
-            made[group.name][need] = Staged(need, truth, sheet, scene.keys, group, scene.tick_s)
+            made[group.name][need] = Staged(need, truth, sheet, scene.keys, group, scene.tick_s, scene.running)
     return made
 
 

@@ -7,6 +7,7 @@ from numba import njit
 
 from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.transmissions import Transmissions
+from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.truth import Tally
 
@@ -40,11 +41,16 @@ class Accounts:
         np.add.at(self._fates[:, Fate.IN_FLIGHT], links.sender // self._robots, links.receivers)
         np.add.at(self._fates[:, Fate.IN_FLIGHT], queued.sender // self._robots, queued.intended)
 
-    def close(self) -> Tally:
-        """What was counted since the last report."""
+    def close(self, arenas: BoolArray | None = None) -> Tally:
+        """What was counted since the last report; of these arenas (arenas,) alone if they are given."""
         tally = Tally(self._sent, self._intended, self._in_range, self._fates)
         self._open()
-        return tally
+        if arenas is None:
+            return tally
+        others = tally.of(~arenas)
+        self._sent, self._intended = others.sent, others.intended
+        self._in_range, self._fates = others.in_range, others.fates
+        return tally.of(arenas)
 
     def _open(self) -> None:
         self._sent, self._intended, self._in_range = (np.zeros(self._arenas, np.int64) for _ in range(3))

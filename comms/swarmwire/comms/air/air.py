@@ -75,12 +75,15 @@ class Air:
         self._held, self._coming = Disruption.none(rows), Disruption.none(rows)
         radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
         own = antennas or Antennas.alike(robots)
-        medium = Medium(radio, keys, robots, obstacles, size_m, radii_m, self._held, own, traces, boundary == "torus")
+        self._running: BoolArray = np.ones(len(keys), np.bool_)
+        fixed = keys, robots, obstacles, size_m, radii_m
+        medium = Medium(radio, *fixed, self._held, own, self._running, traces, boundary == "torus")
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
         self._way: Way = SignalWay(medium, send_times) if radio.is_signal else DiskWay(medium, send_times)
         self._accounts = Accounts(len(keys), robots)
         self._lives = Lives(rows)
+        self._gone: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that left
         self._others_alive = np.zeros(rows, np.int64)
         self._now_ns = 0
         self._on_air = Transmissions.none()  # packets of `_links`
@@ -91,9 +94,10 @@ class Air:
 
         Nobody may write to `pose` after.
         """
+        alive = alive | self._gone  # nobody sends to them: they need not be kept from hearing
         self._lives.now(alive)
         self._held.become(self._coming)
-        self._held.alive = alive.copy()
+        self._held.alive = alive
         if self._coming_radio is not self.radio:
             self.radio = self._coming_radio
             self._way.tune(self._now_ns, self.radio)
@@ -147,16 +151,29 @@ class Air:
             news.finished(rows.finished, links, packets, robots, self.radio.is_signal),
             news.departed(rows.departed, links, packets, robots),
             self._accounts.close(),
-            self._way.outcomes(self._coming.alive),
+            self._way.outcomes(self._coming.alive & ~self._gone),
         )
         self._keep(rows.open)
         return told
 
     def end(self) -> Tally:
         """The run is over: what is queued or on its way ends as IN_FLIGHT."""
-        self._accounts.strand(self._links, self._way.drain())
+        self._accounts.strand(self._links, self._of_here(self._way.drain()))
         self._keep(np.empty(0, np.int64))
         return self._accounts.close()
+
+    def leave(self, over: BoolArray) -> Tally:
+        """The run is over in these arenas (arenas,); what `end` would have counted there.
+
+        What is left at their radios still comes to its end, but nobody is told.
+        """
+        going, queued = np.repeat(over, self._robots), self._of_here(self._way.queued)
+        lost = going[self._links.sender]
+        self._accounts.strand(self._links.select(np.flatnonzero(lost)), queued.parted(going[queued.sender])[0])
+        self._keep(np.flatnonzero(~lost))
+        self._gone |= going
+        self._running &= ~over
+        return self._accounts.close(over)
 
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
         """The radio graph over robots that stand at `pose`: pairs of robot rows a < b, sorted, (e, 2).
@@ -180,14 +197,20 @@ class Air:
         links.fate[open_ & ~now.radio_on[links.receiver] & (links.final_at_ns > now_ns)] = Fate.BLACKOUT
         links.fate[open_ & ~now.alive[links.receiver]] = Fate.RECEIVER_DEAD
 
+    def _of_here(self, packets: Transmissions) -> Transmissions:
+        """Those of the packets that were not sent in an arena that left."""
+        return packets.parted(self._gone[packets.sender])[1]
+
     def _take(self, packets: Transmissions, links: Links) -> None:
-        """Keep links until they are final, and their packets."""
+        """Keep links until they are final, and their packets; of arenas that left, none."""
         if packets:
             coming, rows = len(self._links.packet), len(self._others_alive)
             self._links = self._links.followed_by(links._replace(packet=links.packet + len(self._on_air.sender)))
             self._on_air = self._on_air.followed_by(packets)
             if self.radio.delays is not None and self.radio.delays.keep_order:
                 wait_for_earlier(self._links, coming, rows)
+            if self._gone[packets.sender].any():
+                self._keep(np.flatnonzero(~self._gone[self._links.sender]))
 
     def _keep(self, index: IntArray) -> None:
         """Keep these links and their packets only."""

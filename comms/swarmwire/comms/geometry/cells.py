@@ -50,17 +50,21 @@ def row_of(cells, y):
 
 
 @borrowing(from_python=True)
-def sort(cells, state):
-    """Put robots at x, y = state[arena, robot, :2] into their cells, rising within each."""
+def sort(cells, state, running):
+    """Put robots at x, y = state[arena, robot, :2] into their cells, rising; only of arenas that are `running`."""
     start, item = cells.start, cells.item
     start[:] = 0
     for arena in range(state.shape[0]):
+        if not running[arena]:
+            continue
         for i in range(state.shape[1]):
             row, column = row_of(cells, state[arena, i, 1]), column_of(cells, state[arena, i, 0])
             start[(arena * cells.ny + row) * cells.nx + column] += 1
     for c in range(1, len(start)):
         start[c] += start[c - 1]
     for arena in range(state.shape[0] - 1, -1, -1):
+        if not running[arena]:
+            continue
         for i in range(state.shape[1] - 1, -1, -1):
             row, column = row_of(cells, state[arena, i, 1]), column_of(cells, state[arena, i, 0])
             c = (arena * cells.ny + row) * cells.nx + column

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.arrays import BoolArray, IntArray
 
 MOST_CELLS_PER_SIDE = 512  # in each arena
 
@@ -25,15 +25,19 @@ class Grid(NamedTuple):
     left_m: float
     bottom_m: float
     start: IntArray  # (arenas * ny * nx + 1,)
-    order: IntArray  # (rows,) robot rows, rising within a cell
+    order: IntArray  # robot rows, rising within a cell
 
 
-def build(x, y, arenas: int, size_m: tuple[float, float], reach_m: float) -> Grid:
-    """The grid of robots at x, y (rows,), in which all within `reach_m` of a robot lie in the 3 x 3 cells around it."""
+def build(x, y, arenas: int, size_m: tuple[float, float], reach_m: float, running: BoolArray | None = None) -> Grid:
+    """The grid of robots at x, y (rows,), in which all within `reach_m` of a robot lie in the 3 x 3 cells around it.
+
+    Where `running` (arenas,) is False, the cells of the arena are empty; None: no arena is left out.
+    """
     cell_m = max(reach_m, max(size_m) / MOST_CELLS_PER_SIDE)
     nx, ny = max(int(np.ceil(size_m[0] / cell_m)), 1), max(int(np.ceil(size_m[1] / cell_m)), 1)
     left_m, bottom_m = -0.5 * size_m[0], -0.5 * size_m[1]
-    start, order = _sort(x, y, arenas, cell_m, nx, ny, left_m, bottom_m)
+    present = np.ones(arenas, np.bool_) if running is None else running
+    start, order = _sort(x, y, present, cell_m, nx, ny, left_m, bottom_m)
     return Grid(cell_m, nx, ny, left_m, bottom_m, start, order)
 
 
@@ -44,20 +48,22 @@ def cell_of(at_m, origin_m, cell_m, cells):
 
 
 @njit(cache=True)
-def _sort(x, y, arenas, cell_m, nx, ny, left_m, bottom_m):
-    rows = len(x)
+def _sort(x, y, present, cell_m, nx, ny, left_m, bottom_m):
+    rows, arenas = len(x), len(present)
     robots = rows // arenas
     cell = np.empty(rows, np.int64)
     start = np.zeros(arenas * nx * ny + 1, np.int64)
-    for row in range(rows):
-        i, j = cell_of(x[row], left_m, cell_m, nx), cell_of(y[row], bottom_m, cell_m, ny)
-        cell[row] = ((row // robots) * ny + j) * nx + i
-        start[cell[row] + 1] += 1
+    for arena in range(arenas):
+        for row in range(arena * robots, (arena + present[arena]) * robots):
+            i, j = cell_of(x[row], left_m, cell_m, nx), cell_of(y[row], bottom_m, cell_m, ny)
+            cell[row] = (arena * ny + j) * nx + i
+            start[cell[row] + 1] += 1
     for c in range(len(start) - 1):
         start[c + 1] += start[c]
     filled = start[:-1].copy()
-    order = np.empty(rows, np.int64)
-    for row in range(rows):
-        order[filled[cell[row]]] = row
-        filled[cell[row]] += 1
+    order = np.empty(start[-1], np.int64)
+    for arena in range(arenas):
+        for row in range(arena * robots, (arena + present[arena]) * robots):
+            order[filled[cell[row]]] = row
+            filled[cell[row]] += 1
     return start, order

@@ -85,6 +85,7 @@ def decode_truth(frame: Frame, scene: Scene) -> Glimpse:
     truth = Truth(
         tick=_least(frame.tick, 0, "tick"),
         time_ns=_least(frame.values.get("time_ns"), 0, "time_ns"),
+        running=np.ones(static.arenas, np.bool_),  # none is published of an arena that left
         alive=checked_array(frame, "alive", "|b1", (n,)),
         pose=checked_array(frame, "pose", "<f8", (n, 3)),
         velocity=checked_array(frame, "velocity", "<f8", (n, 3)),

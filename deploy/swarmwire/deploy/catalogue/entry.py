@@ -34,4 +34,5 @@ class Entry:
     help: str  # one line
     facts: tuple[tuple[str, str], ...] = ()  # title and text: its unit, its source, how a scenario names it, …
     tables: tuple[ParameterTable, ...] = ()
+    mark: str = ""  # a word that lists show beside the name: "standard"
     text: str = ""  # paragraphs with an empty line between two

@@ -35,7 +35,7 @@ KINDS = (
     Kind("senses", "sense", "what an agent may read of its robot and of packets, if its needs name it", senses),
     Kind("behaviours", "behaviour", "agents that come with swarmwire, with their parameters", behaviours),
     Kind("events", "event", "what may happen to robots and radios on the way", events),
-    Kind("metrics", "metric", "what is measured of every run", metrics),
+    Kind("metrics", "metric", "what can be measured of a run; the standard ones are in every run", metrics),
     Kind("radio", "radio", "keys of a scenario's radio", radio_keys),
     Kind("presets", "preset", "kinds of radio that a scenario may name", presets),
     Kind("stages", "stage", "what a packet passes on its way to a receiver, in order", radio_stages),

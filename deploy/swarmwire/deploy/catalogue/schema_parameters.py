@@ -8,7 +8,7 @@ from swarmwire.deploy.catalogue.docs import first_line
 from swarmwire.deploy.catalogue.entry import Parameter
 from swarmwire.deploy.catalogue.units import unit_of
 from swarmwire.world.scenario.schema import table_of
-from swarmwire.world.scenario.schema_words import Node, plain, words
+from swarmwire.world.scenario.schema_words import Node, forms, plain, words
 
 
 def parameters_of_dataclass(kind: type[Any]) -> tuple[Parameter, ...]:
@@ -35,6 +35,9 @@ def _below(node: Node, schema: Node, path: str) -> Iterator[Parameter]:
         for table in node["patternProperties"].values():
             yield _parameter(f"{path}.*", table, schema, required=False)
             yield from _below(plain(table, schema), schema, f"{path}.*")
+    elif forms(node):  # the same keys in a list of tables as in one
+        tables = [form for form in forms(node) if plain(form, schema).get("type") == "object"]
+        yield from _below(plain(tables[0], schema), schema, path)
     elif "items" in node:
         yield from _below(plain(node["items"], schema), schema, f"{path}.*")
     else:

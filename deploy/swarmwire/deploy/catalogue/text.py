@@ -22,7 +22,11 @@ def print_kinds(console: Console) -> None:
 
 def print_list(kind: Kind, console: Console) -> None:
     """All things of a kind, a line each."""
-    _print_rows(console, (kind.one, kind.help), [(entry.name, entry.help) for entry in kind.entries()])
+    entries = kind.entries()
+    if any(entry.mark for entry in entries):
+        _print_rows(console, (kind.one, "", kind.help), [(entry.name, entry.mark, entry.help) for entry in entries])
+    else:
+        _print_rows(console, (kind.one, kind.help), [(entry.name, entry.help) for entry in entries])
 
 
 def print_entry(entry: Entry, console: Console) -> None:

@@ -1,6 +1,5 @@
 """`swarmwire run`."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +10,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
 from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
 from swarmwire.deploy.commands.options import Links, Overrides, Packets, Quiet, Runners, ScenarioFile, Seed
+from swarmwire.deploy.commands.program import program
 
 if TYPE_CHECKING:
     from swarmwire.deploy.result import Result
@@ -122,15 +122,6 @@ def _seed_list(text: str) -> list[int]:
 
 def _say_where(result: "Result", folder: Path, console: Console) -> None:
     recorded = f" (the pictures of seed {result.arenas[0].seed})" if len(result.arenas) > 1 else ""
-    program = _program()
     console.print(f"written: {folder}{recorded}", soft_wrap=True)
-    console.print(f"look at it: {program} view {folder}", soft_wrap=True)
-    console.print(f"as a film: {program} export {folder} --gif", soft_wrap=True)
-
-
-def _program() -> Path:
-    """This program as people can type it here: it need not be on their path, as with `uv run`."""
-    program = Path(sys.argv[0])
-    if program.name != "swarmwire":  # python -m
-        return Path("swarmwire")
-    return program.relative_to(Path.cwd()) if program.is_relative_to(Path.cwd()) else program
+    console.print(f"look at it: {program()} view {folder}", soft_wrap=True)
+    console.print(f"as a film: {program()} export {folder} --gif", soft_wrap=True)

@@ -62,6 +62,7 @@ class Published:
         if not 0 <= self._arena < static.arenas:
             raise BadInput("live view", "arena", f"expected 0 to {static.arenas - 1}")
         self._selected = selected_robot(static, self._selected, "live view")
+        self._arenas = static.arenas
         self._sampling = Sampling(static, self._arena, self._selected)
         self._since, self._rate = Since(), Rate(FRAMES_PER_S)
         self._watched = False
@@ -79,7 +80,9 @@ class Published:
             self._open = opening.pop_all()
 
     def see(self, truth: Truth) -> None:
-        """Publish a tick if it is time to and somebody looks on."""
+        """Publish a tick if it is time to and somebody looks on; none once the arena has left."""
+        if not truth.running[self._arena]:
+            return
         if self._watched:
             self._since.add(truth)
         now_ns = self._clock.now_ns()
@@ -108,7 +111,8 @@ class Published:
     def _put(self, now_ns: int) -> None:
         """Hand what has not been shown to the sender; at the end it may be busy for a while."""
         latest = self._metrics.latest
-        values = np.array([latest[metric.name] for metric in self._metrics.metrics])
+        measured = self._metrics.metrics
+        values = np.array([latest[of.name] for of in measured]).reshape(len(measured), self._arenas)
         try:
             self._frames.put(self._sampling.glimpse(*self._since.take(), values, now_ns), timeout=LEAVE_S)
         except queue.Full:

@@ -38,11 +38,24 @@ class CopiedFile:
     what: str  # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "own sense" | "own actuator" | "metric"
 
 
-def copy_scenario(scenario: Scenario, seeds: tuple[int, ...], folder: Path) -> tuple[CopiedFile, ...]:
-    """Write `scenario.toml` and `files/` into the run folder; with several seeds the scenario says the first."""
-    mapping = mapping_of(scenario)
+def copy_scenario(
+    scenario: Scenario, seeds: tuple[int, ...], folder: Path, copies: "Copies | None" = None
+) -> tuple[CopiedFile, ...]:
+    """Write `scenario.toml` and `files/` into the run folder; with several seeds the scenario says the first.
+
+    `copies` are those that the folder has already.
+    """
+    copies = copies or Copies(folder)
+    mapping = copied_mapping(scenario, copies)
     mapping["seed"] = seeds[0]
-    copies = _Copies(folder)
+    text = f"{_header(scenario)}\n{tomli_w.dumps(mapping)}".encode()
+    (folder / SCENARIO).write_bytes(text)
+    return (CopiedFile(SCENARIO, _sha256(text), "scenario"), *copies.made)
+
+
+def copied_mapping(scenario: Scenario, copies: "Copies") -> dict[str, Any]:
+    """The scenario as a mapping that names copies instead of the files of people, which are copied if need be."""
+    mapping = mapping_of(scenario)
     near = Path(scenario.source).parent
     for group in mapping["robots"].values():
         group["agent"] = copies.class_of(group["agent"], near, "agent")
@@ -50,7 +63,7 @@ def copy_scenario(scenario: Scenario, seeds: tuple[int, ...], folder: Path) -> t
         if body is not None:
             group["body"] = _copied_body(body, copies)
     if "metrics" in mapping:
-        mapping["metrics"] = [copies.class_of(spec, near, "metric") for spec in mapping["metrics"]]
+        mapping["metrics"] = [copies.metric(item, near) for item in mapping["metrics"]]
     trace = trace_path(scenario)
     if trace is not None:
         mapping["radio"]["trace"]["file"] = copies.add(trace, "trace")
@@ -58,12 +71,10 @@ def copy_scenario(scenario: Scenario, seeds: tuple[int, ...], folder: Path) -> t
         table = mapping["arena"].get(what, {})
         if "image" in table:
             table["image"] = copies.add(beside(scenario.source, table["image"]).resolve(), what)
-    text = f"{_header(scenario)}\n{tomli_w.dumps(mapping)}".encode()
-    (folder / SCENARIO).write_bytes(text)
-    return (CopiedFile(SCENARIO, _sha256(text), "scenario"), *copies.made)
+    return mapping
 
 
-def _copied_body(sheet: Path, copies: "_Copies") -> str:
+def _copied_body(sheet: Path, copies: "Copies") -> str:
     """The path within the run folder of a body's sheet, which names the copies of its files."""
     body: dict[str, Any] = tomllib.loads(sheet.read_text(encoding="utf-8-sig"))
     body.setdefault("name", sheet.stem)  # the copy's may be another
@@ -86,7 +97,7 @@ def changed_files(files: tuple[CopiedFile, ...], folder: Path) -> list[str]:
     return lines
 
 
-class _Copies:
+class Copies:
     """The files of one run folder: each original once, two of one name under different names."""
 
     def __init__(self, folder: Path) -> None:
@@ -109,6 +120,12 @@ class _Copies:
         """The spec of a class, whose file, if it is of one as seen from `beside`, is copied and named instead."""
         path, _, name = resolve(spec, beside).rpartition(":")
         return f"{self.add(Path(path), what)}:{name}" if path.endswith(".py") else spec
+
+    def metric(self, item: str | dict[str, Any], beside: Path) -> str | dict[str, Any]:
+        """A metric that a scenario lists, by name, class or table; the file of a class as for `class_of`."""
+        if isinstance(item, str):
+            return self.class_of(item, beside, "metric")
+        return {**item, "metric": self.class_of(item["metric"], beside, "metric")}
 
     def _free(self, original: Path) -> str:
         taken, place, number = set(self._places.values()), f"{FILES}/{original.name}", 1

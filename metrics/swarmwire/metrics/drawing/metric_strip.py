@@ -10,7 +10,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.one_of import one_of
 from swarmwire.metrics.drawing.layout import Layout
 from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Look
-from swarmwire.metrics.registry import DELIVERY, METRICS
+from swarmwire.metrics.drawing.metric_axes import is_count, limits, titled
+from swarmwire.metrics.registry import DELIVERY
 
 MOST_PLOTS = 4
 PREFERRED = ("target_best", "target_mean", "order", "largest_component", DELIVERY, "min_gap", "collisions")
@@ -62,12 +63,12 @@ class MetricStrip:
 class _Plot:
     def __init__(self, axes: Any, name: str, time_s: FloatArray, value: FloatArray, every: int, last: bool) -> None:
         self._time_s, self._value, self._every = time_s, value, every
-        self._whole = _is_count(name)
+        self._whole = is_count(name)
         axes.set_facecolor("none")
         axes.spines[["top", "right", "left"]].set_visible(False)
         axes.spines["bottom"].set(color=FAINT, linewidth=0.7)
         axes.set_xlim(float(time_s[0]), max(float(time_s[-1]), float(time_s[0]) + 1e-9))
-        axes.set_ylim(*_limits(name, value))
+        axes.set_ylim(*limits(name, value))
         axes.grid(axis="y", color=GRID, linewidth=0.6)
         axes.set_axisbelow(True)
         axes.tick_params(labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
@@ -77,7 +78,7 @@ class _Plot:
             axes.set_xlabel("time in s", fontsize=SMALL_PT, color=SOFT, labelpad=1)
         else:
             axes.tick_params(labelbottom=False)
-        axes.set_title(_titled(name), loc="left", fontsize=TEXT_PT, color=SOFT, pad=4)
+        axes.set_title(titled(name), loc="left", fontsize=TEXT_PT, color=SOFT, pad=4)
         axes.plot(time_s[::every], value[::every], color=FAINT, lw=1.0, zorder=2)
         [self._past] = axes.plot([], [], color=CURVE, lw=1.4, zorder=3)
         [self._cursor] = axes.plot([], [], color=SOFT, lw=0.7, alpha=0.7, zorder=2.5)
@@ -102,27 +103,6 @@ class _Plot:
         self._cursor.set_data([now_s, now_s], [self._low, self._high])
         self._dot.set_data([now_s], [value])
         self._number.set_text("–" if not np.isfinite(value) else f"{value:.0f}" if self._whole else f"{value:.2f}")
-
-
-def _is_count(name: str) -> bool:
-    return name in METRICS and METRICS[name].kind == "count"
-
-
-def _limits(name: str, value: FloatArray) -> tuple[float, float]:
-    """0 to 1 for shares, else from 0 or the least value to the greatest, with some air."""
-    if name == DELIVERY or (name in METRICS and METRICS[name].bounds == (0.0, 1.0)):
-        return -0.03, 1.05
-    known = value[np.isfinite(value)]
-    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
-    low = min(low, 0.0)
-    span = max(high - low, 1.0 if _is_count(name) else 1e-6)
-    return low - 0.03 * span, high + 0.08 * span
-
-
-def _titled(name: str) -> str:
-    unit = METRICS[name].unit if name in METRICS else ""
-    words = name.replace("_", " ")
-    return f"{words} ({unit})" if unit else words
 
 
 def _places(layout: Layout, plots: int) -> list[tuple[tuple[float, float, float, float], bool]]:

@@ -18,8 +18,8 @@ class EventRecorder:
 
     Columns: at_s (of the scenario; of what happens singly, the tick's start), tick and time_s (in which it took
     effect), do, part (that fails, else empty), ended (whether it was undone then), arena, robots (the names of those
-    it changed there). Of what happens singly, arenas in which nobody changed have no row. Summary part:
-    `record_events`: rows written and dropped.
+    it changed there). Arenas that have left have no row; nor, of what happens singly, have those in which nobody
+    changed. Summary part: `record_events`: rows written and dropped.
     """
 
     def __init__(self, folder: Path, may_drop: bool = False) -> None:
@@ -47,7 +47,7 @@ class EventRecorder:
             }
             for event in truth.events
             for arena, robots in enumerate(names(event, self._static))
-            if robots or not event.singly
+            if truth.running[arena] and (robots or not event.singly)
         ]
         self._writer.put(Chunk(len(rows), partial(_frame, rows)))
 

@@ -33,11 +33,12 @@ class RobotTotals(TotalsRecorder):
 
     def start(self, static: Static) -> None:
         """Nothing is counted so far."""
-        self._static, self._ticks, self._counts = static, 0, RobotCounts(static)
+        self._static, self._counts = static, RobotCounts(static)
+        self._ticks = np.zeros(static.arenas, np.int64)  # of each arena
 
     def add(self, truth: Truth) -> None:
         """Add what a tick brought."""
-        self._ticks += 1
+        self._ticks += truth.running
         if truth.departed is not None and truth.finished is not None:
             self._counts.see(truth.departed, truth.finished)
 
@@ -46,7 +47,7 @@ class RobotTotals(TotalsRecorder):
         import polars as pl
 
         static, counts = self._static, self._counts
-        time_s = self._ticks / static.rate_hz
+        time_s = np.repeat(self._ticks, static.robots) / static.rate_hz
         as_sender = counts.as_sender.copy()
         as_sender[:, Fate.IN_FLIGHT] = counts.in_flight
         columns: dict[str, Any] = {

@@ -24,7 +24,7 @@ VALUE = "value"  # a list with a number per robot, float64; only once a robot ha
 MOVABLE = ("movable_x_m", "movable_y_m", "movable_heading_rad")  # lists with a number per movable obstacle, if any
 RADIO = ("sent", "heard", "in_range")  # packets; receivers; receivers: since the tick before
 KEYS = ("tick", "time_s", "arena", "seed")
-BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 2
+BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 4
 
 
 def robot_columns(static: Static) -> tuple[str, ...]:
@@ -67,6 +67,7 @@ class TickColumns:
         of_robots = (*shape, static.robots)
         self.ticks = 0  # filled
         self._static, self._metrics = static, metrics
+        self._running: AnyArray = np.empty(shape, np.bool_)
         self._tick: AnyArray = np.empty(ticks, np.int64)
         self._time_s: AnyArray = np.empty(ticks, np.float64)
         # As the truth has them, which copies fastest; the thread that writes puts them in columns.
@@ -75,7 +76,7 @@ class TickColumns:
         self._command: AnyArray = np.empty((*of_robots, len(COMMAND) + 1), np.float32)
         self._movable: AnyArray = np.empty((*shape, static.movable, len(MOVABLE)), np.float32)
         self._alive: AnyArray = np.empty(of_robots, np.bool_)
-        self._state: AnyArray = np.empty(of_robots, np.uint16)
+        self._state: AnyArray = np.empty(of_robots, np.uint32)
         self._states: tuple[str, ...] = ("",)
         self._value: FloatArray | None = None  # made once it is needed, of_robots; NaN: none told
         self._measured: AnyArray = np.empty((ticks, len(metrics), static.arenas), np.float64)
@@ -84,6 +85,7 @@ class TickColumns:
     def add(self, truth: Truth, measured: FloatArray) -> None:
         """Copy a tick, with what the metrics say of it, (metrics, arenas)."""
         at, shape = self.ticks, (self._static.arenas, self._static.robots)
+        self._running[at] = truth.running
         self._tick[at], self._time_s[at] = truth.tick, to_s(truth.time_ns)
         self._pose[at] = truth.pose.reshape(*shape, -1)
         self._velocity[at] = truth.velocity.reshape(*shape, -1)
@@ -101,6 +103,11 @@ class TickColumns:
         if truth.tally is not None:
             self._radio[at] = truth.tally.sent, truth.tally.fates[:, Fate.HEARD], truth.tally.in_range
         self.ticks += 1
+
+    @property
+    def rows(self) -> int:
+        """How many are filled: one for each tick and arena that has not left."""
+        return int(self._running[: self.ticks].sum())
 
     def frame(self) -> "pl.DataFrame":
         """The rows filled so far, by tick and arena."""
@@ -129,4 +136,6 @@ class TickColumns:
             for place, name in enumerate(names):
                 numbers = np.ascontiguousarray(values[:ticks, place]).reshape(-1)
                 columns[name] = pl.Series(numbers, nan_to_null=True).cast(schema[name])
-        return pl.DataFrame(columns, schema=schema)
+        whole = pl.DataFrame(columns, schema=schema)
+        running = self._running[:ticks].reshape(-1)
+        return whole if running.all() else whole.filter(pl.Series(running))

@@ -27,6 +27,8 @@ MOST_TICKS = 4096  # in a chunk, however small the swarm
 class TickRecorder:
     """Observer that writes `ticks.parquet`, a row per tick and arena, without holding the loop up for the disk.
 
+    An arena that has left has no more rows.
+
     Its metrics' columns are what `metrics` has measured, so that must see each tick before. Summary part:
     `record_ticks`: rows written, and rows dropped for want of time (in real time only). Raises RecordFailed once the
     disk refuses.
@@ -67,7 +69,7 @@ class TickRecorder:
 
     def _hand_over(self) -> None:
         columns, self._columns = self._columns, self._new_columns()
-        self._writer.put(Chunk(columns.ticks * self._static.arenas, columns.frame))
+        self._writer.put(Chunk(columns.rows, columns.frame))
         self._limit.restart()
 
     def _new_columns(self) -> TickColumns:

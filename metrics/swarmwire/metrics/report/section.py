@@ -1,4 +1,4 @@
-"""What a report holds, before it is a page: sections of text, tables and figures."""
+"""What a report holds, before it is a page: sections of text, listings, tables and figures."""
 
 from dataclasses import dataclass
 
@@ -19,6 +19,14 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     caption: str
+    folded: bool = False  # whether the page shows the caption alone until it is asked for the rest
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Lines to be read letter by letter: commands, messages of errors."""
+
+    text: str
 
 
 @dataclass(frozen=True)
@@ -26,7 +34,7 @@ class Section:
     """A heading with what belongs under it, in order."""
 
     title: str
-    parts: tuple[str | Table | Figure, ...]  # a text is a paragraph
+    parts: tuple[str | Listing | Table | Figure, ...]  # a text is a paragraph; `so` within it is code
 
 
 @dataclass(frozen=True)
@@ -35,3 +43,9 @@ class Report:
 
     title: str
     sections: tuple[Section, ...]
+    about: str = ""  # a line below the title: what it is about, at a glance
+
+    @property
+    def figures(self) -> tuple[Figure, ...]:
+        """All figures, in order."""
+        return tuple(part for section in self.sections for part in section.parts if isinstance(part, Figure))

@@ -12,6 +12,9 @@ from swarmwire.comms.geometry.obstacles import to_nearest
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.swarm.radii import radii_m
+from swarmwire.metrics.swarm.strips import sort_by_x
+from swarmwire.metrics.torus import sides_m
 
 
 @dataclass(frozen=True)
@@ -31,12 +34,12 @@ class MinGap(Metric):
 
     def begin(self, static: Static) -> Measure:
         """A fresh measure; what it remembers only makes it quick."""
-        radius_m = np.concatenate([np.full(g.stop - g.start, g.body.radius_m) for g in static.groups])
+        radius_m = radii_m(static)
         low_m = np.concatenate([np.full(g.stop - g.start, g.body.altitude_m) for g in static.groups])
         tall_m = np.concatenate([np.full(g.stop - g.start, g.body.height_m) for g in static.groups])
         span_m = np.stack([low_m, low_m + tall_m], axis=1)
         order: IntArray | None = None
-        wrap_m = static.arena_size_m if static.boundary == "torus" else (0.0, 0.0)
+        wrap_m = sides_m(static)
 
         def measure(moment: Moment) -> FloatArray:
             nonlocal order
@@ -69,7 +72,7 @@ def smallest_gap_m(
     largest_m = radius_m.max()
     for arena in range(arenas):
         first, n = arena * robots, 0
-        _sort_by_x(order[arena], pose[first : first + robots])
+        sort_by_x(order[arena], pose[first : first + robots])
         for i in order[arena]:
             if alive[first + i]:
                 x[n], y[n], radius[n] = pose[first + i, 0], pose[first + i, 1], radius_m[i]
@@ -91,14 +94,3 @@ def smallest_gap_m(
                     best_m = np.sqrt(square) - max(radius[a], radius[b]) - min(radius[a], radius[b])
         gap_m[arena] = best_m if best_m < np.inf else np.nan
     return gap_m
-
-
-@njit(cache=True)
-def _sort_by_x(order, pose):
-    """Sort indices by x, by insertion: what is nearly in order costs next to nothing."""
-    for k in range(1, len(order)):
-        moved, place = order[k], k
-        while place > 0 and pose[order[place - 1], 0] > pose[moved, 0]:
-            order[place] = order[place - 1]
-            place -= 1
-        order[place] = moved

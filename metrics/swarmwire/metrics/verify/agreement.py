@@ -26,9 +26,11 @@ def ticks_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdict
         return None
     if len(counted) != arenas:
         return State.DIFFERS, f"{len(counted)} arenas; the summary has {arenas}"
-    if (counted["ticks"] != summary["ticks"]).any():
-        return State.DIFFERS, f"{counted['ticks'].min()} ticks; the summary has {summary['ticks']}"
-    return _finals_agree(table.filter(pl.col("tick") == summary["ticks"] - 1).sort("arena").collect(), summary)
+    for arena, (found, expected) in enumerate(zip(counted.sort("arena")["ticks"], arena_ticks(summary), strict=True)):
+        if found != expected:
+            return State.DIFFERS, f"{found} ticks; the summary has {expected} (arena {arena})"
+    last = table.filter(pl.col("tick") == pl.col("tick").max().over("arena"))
+    return _finals_agree(last.sort("arena").collect(), summary)
 
 
 def _finals_agree(last: Any, summary: Mapping[str, Any]) -> Verdict:
@@ -67,17 +69,23 @@ def events_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdic
     if summary is None:
         return None
     rows, events = scan_files(files).select(pl.len()).collect().item(), summary["events"]
-    expected = sum(_arenas_of(event, summary["arenas"]) for event in events)
+    expected = sum(_arenas_of(event, arena_ticks(summary)) for event in events)
     if rows != expected:
         return State.DIFFERS, f"{rows} rows; the summary has {len(events)} events, {expected} rows by their arenas"
     return None
 
 
-def _arenas_of(event: Mapping[str, Any], arenas: int) -> int:
-    """In how many arenas an event of the summary has a row."""
+def _arenas_of(event: Mapping[str, Any], ticks: list[int]) -> int:
+    """In how many arenas, of so many ticks, an event of the summary has a row."""
     if not event.get("singly"):  # which older summaries lack
-        return arenas
-    return 1 if arenas == 1 else sum(bool(robots) for robots in event["robots"])
+        return sum(event["tick"] < done for done in ticks)
+    return 1 if len(ticks) == 1 else sum(bool(robots) for robots in event["robots"])
+
+
+def arena_ticks(summary: Mapping[str, Any]) -> list[int]:
+    """How many ticks each arena took part in; older summaries have but those of the run."""
+    ends = summary.get("by_arena") or [summary] * summary["arenas"]
+    return [end["ticks"] for end in ends]
 
 
 def per_arena(summary: Mapping[str, Any], key: str) -> list[Any]:

@@ -70,8 +70,11 @@ class RerunRecording:
         self._plots.begin(self._rec)
 
     def see(self, truth: Truth) -> None:
-        """Record one tick."""
+        """Record one tick; none once the arena has left."""
         import rerun as rr
+
+        if not truth.running[self._arena]:
+            return
 
         rows = self._rows
         rows.begin_tick(truth.tick, truth.time_ns)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.senses import Actions
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.failures import FailedDrives
@@ -32,7 +32,8 @@ class Actuators:
         self.leds = ShownLeds(groups, arenas)
         self.failed = FailedDrives(groups, arenas)
         self._limits, self._noise = limits_of(groups), NoisyWheels(groups, keys)
-        self._ticks = self._clipped = self._not_finite = 0
+        self._ticks = 0
+        self._clipped, self._not_finite = np.zeros(arenas, np.int64), np.zeros(arenas, np.int64)
 
     def take(self, actions: Actions, alive: BoolArray) -> None:
         """Take what agents decided in a tick. Robots without a new command keep the last one.
@@ -56,7 +57,10 @@ class Actuators:
         self.command = np.where(dead[:, None], 0.0, self.command)
         self.leds.darken(dead)
 
-    def counts(self) -> dict[str, int]:
-        """Commands that drives could not follow, or that were not finite and so dropped; LEDs that are not there."""
-        leds = {"leds_not_there": self.leds.not_there} if self.leds.not_there else {}
-        return {"clipped_commands": self._clipped, "nan_commands": self._not_finite, **leds}
+    def counts(self) -> dict[str, IntArray]:
+        """Commands that drives could not follow, or that were not finite and so dropped; LEDs that are not there.
+
+        By name, (arenas,) each.
+        """
+        commands = {"clipped_commands": self._clipped, "nan_commands": self._not_finite}
+        return {**commands, "leds_not_there": self.leds.not_there}

@@ -51,7 +51,7 @@ def take_commands(
     angular_radps: FloatArray,
     lateral_mps: FloatArray,
     command: FloatArray,
-) -> tuple[int, int]:
+) -> tuple[IntArray, IntArray]:
     """Write what drives can follow of new commands into `command` (rows, 3), which holds the last ones.
 
     Two wheels shrink both speeds by one factor, so that the curve stays the same; a twist drive cuts each speed to its
@@ -69,23 +69,24 @@ def take_commands(
         command: (all rows, 3) forward m/s, left turn rad/s, to the left m/s.
 
     Returns:
-        How many commands were too fast, and how many were not finite and so dropped.
+        How many commands were too fast, and how many were not finite and so dropped, (arenas,) each.
     """
     robots = len(limits.kind)
-    clipped = not_finite = 0
+    arenas = len(command) // robots
+    clipped, not_finite = np.zeros(arenas, np.int64), np.zeros(arenas, np.int64)
     for k in range(len(rows)):
         if not drive[k]:
             continue
+        row = rows[k]
         linear, angular, lateral = linear_mps[k], angular_radps[k], lateral_mps[k]
         if not (np.isfinite(linear) and np.isfinite(angular) and np.isfinite(lateral)):
-            not_finite += 1
+            not_finite[row // robots] += 1
             continue
-        row = rows[k]
         if not alive[row]:
             continue
         i = row % robots
         linear, angular, lateral, too_fast = _within(limits, i, linear, angular, lateral)
-        clipped += too_fast
+        clipped[row // robots] += too_fast
         command[row, 0], command[row, 1], command[row, 2] = linear, angular, lateral
     return clipped, not_finite
 

@@ -19,7 +19,7 @@ class OwnActuators:
     """The actuators of the user's own; `any` tells whether there are some.
 
     Attributes:
-        not_there: numbers set for places that the robots' bodies do not have.
+        not_there: (arenas,) numbers set for places that the robots' bodies do not have.
     """
 
     def __init__(self, groups: Sequence[Group], scene: Scene) -> None:
@@ -38,13 +38,14 @@ class OwnActuators:
         places = [sum(sheet.width for sheet in group.body.actuators.values()) for group in groups]
         self._places = np.tile(np.repeat(places, [group.stop - group.start for group in groups]), arenas)
         self._index: IntArray = np.tile(np.arange(robots, dtype=np.int64), arenas)
-        self._ticks = self.not_there = 0
+        self.not_there: IntArray = np.zeros(arenas, np.int64)
+        self._robots, self._ticks = robots, 0
 
     def act(self, actuations: Actuations, alive: BoolArray) -> None:
         """Let those of robots `alive` (rows,) act in a tick; OwnCodeFailed if one raises or leaves inf or nan."""
         rows, place = actuations.rows, actuations.place
         there = place < self._places[rows]
-        self.not_there += int(np.count_nonzero(~there))
+        np.add.at(self.not_there, rows[~there] // self._robots, 1)
         there &= alive[rows]
         asked = np.full((len(alive), self._places.max(initial=0)), np.nan)
         asked[rows[there], place[there]] = actuations.value[there]

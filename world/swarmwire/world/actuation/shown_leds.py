@@ -15,7 +15,7 @@ class ShownLeds:
     Attributes:
         rgb: (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0: dark or not there; written in place.
         told: (rows, most LEDs of a robot) the same for observers: replaced when something changes, never written to.
-        not_there: changes of LEDs that their robots do not have.
+        not_there: (arenas,) changes of LEDs that their robots do not have.
     """
 
     def __init__(self, groups: Sequence[Group], arenas: int) -> None:
@@ -23,14 +23,14 @@ class ShownLeds:
         self.rgb: IntArray = np.zeros((arenas, len(self._count), self._count.max(initial=0)), np.int64)
         self._row = self.rgb.reshape(arenas * len(self._count), self.rgb.shape[2])
         self.told = self._row.copy()
-        self.not_there = 0
+        self.not_there: IntArray = np.zeros(arenas, np.int64)
 
     def take(self, changes: LedChanges, alive: BoolArray) -> None:
         """Switch what agents of robots `alive` (rows,) switched in a tick."""
         if not len(changes):
             return
         there = changes.which < self._count[changes.rows % len(self._count)]
-        self.not_there += int(np.count_nonzero(~there))
+        np.add.at(self.not_there, changes.rows[~there] // len(self._count), 1)
         there &= alive[changes.rows]
         self._row[changes.rows[there], changes.which[there]] = changes.rgb[there]
         self.told = self._row.copy()

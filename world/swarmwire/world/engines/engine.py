@@ -70,3 +70,7 @@ class Engine(Protocol):
             touches in this tick and did not in the one before; all walls and obstacles count as one thing.
         """
         ...
+
+    def leave(self, over: BoolArray) -> None:
+        """Nothing in these arenas (arenas,) moves or touches any more: their rows stay as they are."""
+        ...

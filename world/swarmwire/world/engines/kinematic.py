@@ -40,6 +40,7 @@ class KinematicEngine:
         self._tick_s, self._wheel_base_m = setting.tick_s, setting.motors.wheel_base_m
         self._disc = setting.radius_m, setting.bottom_m, setting.top_m
         self._hindrances = Hindrances(setting)
+        self._running: BoolArray = np.ones(arenas, np.bool_)
         self._held: BoolArray = np.zeros((arenas, n), np.bool_)
         self._touching = np.empty(0, np.int64)
 
@@ -49,17 +50,24 @@ class KinematicEngine:
         bodies = self._wheel_base_m, radius_m, bottom_m
         way_m = self._tick_s * float(np.hypot(target[:, :, 0], target[:, :, 2]).max())
         around = self._hindrances.within(float(radius_m.max()) + way_m)
-        _move(around, *bodies, target, self._tick_s, self.state, self.travel_m, self._held)
-        before, self._touching = self._touching, overlaps(self.state, *self._disc, self._held, around)
+        _move(around, *bodies, target, self._tick_s, self._running, self.state, self.travel_m, self._held)
+        now = overlaps(self.state, *self._disc, self._held, self._running, around)
+        before, self._touching = self._touching, now
         onsets = np.zeros((len(target), 2), np.int64)
         count_began(self._touching, before, target.shape[1] + 1, onsets)
         mark(self._touching, self.touched)
         return onsets
 
+    def leave(self, over: BoolArray) -> None:
+        """Nothing in these arenas (arenas,) moves or touches any more."""
+        self._running &= ~over
+
 
 @borrowing(from_python=True)
-def _move(around, wheel_base_m, radius_m, bottom_m, target, tick_s, state, travel_m, held):
+def _move(around, wheel_base_m, radius_m, bottom_m, target, tick_s, running, state, travel_m, held):
     for arena in range(target.shape[0]):
+        if not running[arena]:
+            continue
         for i in range(target.shape[1]):
             forward, turn, left = target[arena, i, 0], target[arena, i, 1], target[arena, i, 2]
             size = radius_m[i], bottom_m[i]

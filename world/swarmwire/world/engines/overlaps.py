@@ -10,7 +10,7 @@ from swarmwire.world.engines.held_back import shortest
 
 
 @njit(cache=True)
-def overlaps(state, radius_m, bottom_m, top_m, held, around):
+def overlaps(state, radius_m, bottom_m, top_m, held, running, around):
     """Rising codes, as `count_began` has them, of robots that overlap, and of those that are held back.
 
     Args:
@@ -19,6 +19,7 @@ def overlaps(state, radius_m, bottom_m, top_m, held, around):
         bottom_m: (n,) height of the lower side; robots above one another do not overlap.
         top_m: (n,) of the upper side.
         held: (arenas, n) held back by something fixed.
+        running: (arenas,) others are left out.
         around: the arena's extents, and whether it wraps.
     """
     arenas, n = held.shape
@@ -30,6 +31,8 @@ def overlaps(state, radius_m, bottom_m, top_m, held, around):
     head, follow = np.empty((ny, nx), np.int64), np.empty(n, np.int64)
     codes, found = np.empty(arenas * n, np.int64), 0
     for arena in range(arenas):
+        if not running[arena]:
+            continue
         head[:] = -1
         for i in range(n):
             x, y = state[arena, i, 0], state[arena, i, 1]

@@ -77,6 +77,11 @@ class Physics:
         self._gather()
         return onsets
 
+    def leave(self, over: BoolArray) -> None:
+        """Nothing in these arenas (arenas,) moves any more."""
+        for engine in self._engines:
+            engine.leave(over)
+
     def _gather(self) -> None:
         for engine, index in zip(self._engines, self._robots, strict=True):
             self.state[:, index] = engine.state

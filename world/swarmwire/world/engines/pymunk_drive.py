@@ -11,7 +11,7 @@ differs only in that it may be asked for a speed across the body.
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.world.engines.motors import Motors
 
 
@@ -21,6 +21,7 @@ def push(
     target: FloatArray,
     state: FloatArray,
     dt_s: float,
+    running: BoolArray,
     force: FloatArray,
     travel_m: FloatArray,
     unhindered: FloatArray,
@@ -40,12 +41,15 @@ def push(
         target: (arenas, robots, 3) forward m/s, left turn rad/s, to the left m/s.
         state: (arenas, robots, 6) x, y in m, heading in rad, velocity in m/s, m/s, rad/s, arena frame.
         dt_s: length of a physics step.
+        running: (arenas,) rows of others stay as they are.
         force: (arenas, robots or more, 3) set: N, N, N m, arena frame; rows beyond the robots stay as they are.
         travel_m: (arenas, robots, 2) left and right wheel, added to.
         unhindered: (arenas, robots) turn rate that the last torque would have given without contacts, set.
     """
     arenas, robots = state.shape[:2]
     for arena in range(arenas):
+        if not running[arena]:
+            continue
         for i in range(robots):
             heading, vx, vy, turn = state[arena, i, 2], state[arena, i, 3], state[arena, i, 4], state[arena, i, 5]
             middle = heading + 0.5 * dt_s * turn

@@ -34,6 +34,8 @@ class PymunkEngine:
             ArenaSpace(setting, setting.standing[arena], self._movables.loads[arena], pose[arena], self._force[arena])
             for arena in range(arenas)
         ]
+        self._running: BoolArray = np.ones(arenas, np.bool_)
+        self._moving = list(range(arenas))  # the same as places
         self._read()
 
     def tick(self, target: FloatArray) -> IntArray:
@@ -41,17 +43,23 @@ class PymunkEngine:
         for _ in range(self._steps):
             # A turn that contacts gave to a robot that is braked is slowed down, but not made up for.
             np.copyto(self._unhindered, self.state[:, :, 5], where=self.braked)
-            push(self._motors, target, self.state, self._step_s, self._force, self.travel_m, self._unhindered)
-            for space in self._spaces:
-                space.step(self._step_s)
+            moved = self._force, self.travel_m, self._unhindered
+            push(self._motors, target, self.state, self._step_s, self._running, *moved)
+            for arena in self._moving:
+                self._spaces[arena].step(self._step_s)
             self._read()
         if self.movable.size:
             self._movables.move(self._load_state)
         onsets = np.zeros((len(self._spaces), 2), np.int64)
-        for arena, space in enumerate(self._spaces):
-            space.count_onsets(onsets[arena : arena + 1], self.touched[arena : arena + 1])
+        for arena in self._moving:
+            self._spaces[arena].count_onsets(onsets[arena : arena + 1], self.touched[arena : arena + 1])
         return onsets
 
+    def leave(self, over: BoolArray) -> None:
+        """The spaces of these arenas (arenas,) are not stepped any more."""
+        self._running &= ~over
+        self._moving = np.flatnonzero(self._running).tolist()
+
     def _read(self) -> None:
-        for space, state, loads in zip(self._spaces, self.state, self._load_state, strict=True):
-            space.read(state, loads)
+        for arena in self._moving:
+            self._spaces[arena].read(self.state[arena], self._load_state[arena])

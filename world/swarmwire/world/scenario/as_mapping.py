@@ -29,9 +29,8 @@ def same_content(one: Scenario, other: Scenario) -> bool:
 
 def _plain(value: object) -> object:
     if isinstance(value, BaseModel):
-        return _table(
-            {name: getattr(value, name) for name in type(value).model_fields if name in value.model_fields_set}
-        )
+        names = [name for name in type(value).model_fields if name in value.model_fields_set]
+        return _table({**{name: getattr(value, name) for name in names}, **(value.model_extra or {})})
     if is_dataclass(value) and not isinstance(value, type):
         return _table({of.name: getattr(value, of.name) for of in fields(value)})
     if isinstance(value, dict):

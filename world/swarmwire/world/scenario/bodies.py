@@ -1,6 +1,7 @@
 """The body of each group: one that comes with swarmwire, or a sheet of the user's own beside the scenario."""
 
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 
 from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
@@ -30,9 +31,12 @@ def sheet_path(body: str, where: str) -> Path | None:
 
 def own_code(static: Static) -> tuple[str, ...]:
     """The classes of the bodies' own senses and actuators: "package.module:Class" or "/path/file.py:Class"."""
-    sheets = [
-        sheet for group in static.groups for sheet in (*group.body.senses.values(), *group.body.actuators.values())
-    ]
+    return own_code_of(group.body for group in static.groups)
+
+
+def own_code_of(bodies: Iterable[Body]) -> tuple[str, ...]:
+    """The classes of these bodies' own senses and actuators, in the same form."""
+    sheets = [sheet for body in bodies for sheet in (*body.senses.values(), *body.actuators.values())]
     return tuple(dict.fromkeys(sheet.kind for sheet in sheets if isinstance(sheet, OwnSheet | ActuatorSheet)))
 
 

@@ -8,7 +8,7 @@ from pydantic_core import ErrorDetails
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.one_of import one_of
 from swarmwire.world.scenario.schema import UNFIT
-from swarmwire.world.scenario.schema_words import Node, plain, words
+from swarmwire.world.scenario.schema_words import Node, forms, plain, words
 
 MOST_KEYS = 6  # that are named after the first fault
 
@@ -40,7 +40,7 @@ def _explained(error: ErrorDetails, schema: Node) -> tuple[str, str]:
         return key, f"expected a name of at most 40 letters, digits and _ that starts with a letter, got {got}"
     if kind == UNFIT:
         return f"{key}.{error.get('ctx', {})['key']}", error["msg"]
-    if kind in ("place", "poses", "points"):  # worded by the scenario's own validators
+    if kind in ("place", "poses", "points", "stop"):  # worded by the scenario's own validators
         return key, error["msg"]
     if "patternProperties" in holder and node.get("type") == "object":
         return key, f"expected a table for each group, [{'.'.join(names[:-1])}.GROUP], got {got}"
@@ -56,6 +56,8 @@ def _followed(loc: tuple[int | str, ...], schema: Node) -> tuple[list[str], Node
         node = plain(node, schema)
         if "discriminator" in node:  # the part is the tag that chose the table, no key of the file
             node = {"$ref": node["discriminator"]["mapping"][part]}
+        elif forms(node):  # the part tells the form, no key of the file either
+            node = next(form for form in forms(node) if plain(form, schema).get("type") == part)
         elif node.get("type") == "object":
             holder, names = node, [*names, str(part)]
             named, patterned = _table(node, "properties"), _table(node, "patternProperties")

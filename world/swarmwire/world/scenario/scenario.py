@@ -13,6 +13,7 @@ from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.events.swarm import Groups
 from swarmwire.world.scenario.arena_tables import ArenaTable
+from swarmwire.world.scenario.metric_tables import MetricItem, StopTable, StopTables
 from swarmwire.world.scenario.place_tables import AtPoses, InArena, PlaceTable
 from swarmwire.world.scenario.schema import AsTable, OneOf
 from swarmwire.world.scenario.tables import Table
@@ -100,8 +101,12 @@ class Scenario(Table):
     """The radio; without it robots hear nothing."""
     events: tuple[Annotated[Event, OneOf("do", ACTIONS)], ...] = Field(default=(), strict=False)
     """What happens to robots and radios on the way."""
-    metrics: tuple[Annotated[str, StringConstraints(min_length=1)], ...] = Field(default=(), strict=False)
-    """Metrics of your own, measured beside those of every run: classes, as module:Class or file.py:Class."""
+    standard_metrics: bool = True
+    """Whether the standard metrics are measured; false: only those that `metrics` and `stop` name."""
+    metrics: tuple[MetricItem, ...] = Field(default=(), strict=False)
+    """More metrics, by name, or classes of your own, as module:Class or file.py:Class; or tables with parameters."""
+    stop: StopTables = ()
+    """What ends an arena before its time; of several tables any does."""
     run: RunTable = RunTable()
     """Runners."""
 
@@ -127,6 +132,12 @@ class Scenario(Table):
         """This scenario, which says that it comes from `source`, and that it was read from the mapping `given`."""
         self._source, self._given = source, given
         return self
+
+    def stops(self) -> dict[str, StopTable]:
+        """What ends an arena, by the path of its table: "stop", or "stop.0" and so on."""
+        if isinstance(self.stop, StopTable):
+            return {"stop": self.stop}
+        return {f"stop.{place}": table for place, table in enumerate(self.stop)}
 
     def groups(self) -> Groups:
         """The indices within an arena of each group's robots."""

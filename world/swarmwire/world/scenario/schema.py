@@ -49,6 +49,19 @@ class OneOf:
         return handler.generate_schema(Annotated[tables, pydantic.Field(discriminator=self.tag)])
 
 
+def form_of(value: object) -> str | None:
+    """The name that JSON schema has for the form of a value, by which one of several forms of a key is chosen."""
+    match value:
+        case str():
+            return "string"
+        case dict() | BaseModel():
+            return "object"
+        case list() | tuple():
+            return "array"
+        case _:
+            return None
+
+
 def written_form(kind: type[Any]) -> type[Any]:
     """The dataclass whose fields are the keys of `kind`'s table: `kind` itself, or what its `written_as` names.
 

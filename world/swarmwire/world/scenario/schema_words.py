@@ -32,6 +32,11 @@ def plain(node: Node, schema: Node) -> Node:
             return node
 
 
+def forms(node: Node) -> list[Node]:
+    """The nodes of a key that may be written in several forms, such as a text or a table; else none."""
+    return [] if "discriminator" in node else node.get("oneOf", [])
+
+
 def words(node: Node, schema: Node) -> str:
     """What a node of the schema expects, in words."""
     node = plain(node, schema)
@@ -41,6 +46,8 @@ def words(node: Node, schema: Node) -> str:
         return f"one of {', '.join(str(choice) for choice in node['enum'])}"
     if "anyOf" in node:
         return " or ".join(words(choice, schema) for choice in node["anyOf"])
+    if forms(node):
+        return " or ".join(words(choice, schema) for choice in forms(node))
     if "prefixItems" in node:
         inner = words(node["prefixItems"][0], schema).removeprefix("a ").replace("number", "numbers", 1)
         return f"a list of {len(node['prefixItems'])} {inner}"

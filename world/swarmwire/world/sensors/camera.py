@@ -64,8 +64,10 @@ class CameraSensor:
 @borrowing(from_python=True)
 def _watch(blobs, crowd, things, mirror, leds, places):
     """Set distance, bearing and colour (arenas, n, blobs each)."""
-    sort(crowd.cells, crowd.state)
+    sort(crowd.cells, crowd.state, crowd.running)
     for arena in range(blobs[0].shape[0]):
+        if not crowd.running[arena]:
+            continue
         for i in range(blobs[0].shape[1]):
             own = mirror.first + i
             x = nearest(0.0, crowd.state[arena, own, 0], crowd.wrap_x, crowd.per_wrap_x)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry.cells import Cells, cells_over, column_of, row_of
 from swarmwire.world.sensors.scene import Scene
@@ -18,6 +18,7 @@ class Crowd(NamedTuple):
     """What kernels know of the robots; `cells` is filled by `cells.sort`."""
 
     state: FloatArray  # (arenas, robots, 6)
+    running: BoolArray  # (arenas,) others are passed over
     radius_m: FloatArray  # (robots,)
     bottom_m: FloatArray  # (robots,)
     top_m: FloatArray  # (robots,)
@@ -39,6 +40,7 @@ def crowd_of(scene: Scene, reach_m: float) -> Crowd:
     per_wrap_x, per_wrap_y = (1.0 / wrap_x, 1.0 / wrap_y) if torus else (0.0, 0.0)
     return Crowd(
         scene.state,
+        scene.running,
         scene.radius_m,
         scene.bottom_m,
         scene.top_m,

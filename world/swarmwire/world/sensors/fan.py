@@ -88,8 +88,10 @@ class FanSight:
 @borrowing(from_python=True)
 def _look(value, crowd, alive, things, fan, active, answers):
     """Set value (arenas, n, rays) of robots that have anything near; with `answers` the response to the distance."""
-    sort(crowd.cells, crowd.state)
+    sort(crowd.cells, crowd.state, crowd.running)
     for arena in range(value.shape[0]):
+        if not crowd.running[arena]:
+            continue
         for i in range(value.shape[1]):
             own = fan.first + i
             x = nearest(0.0, crowd.state[arena, own, 0], crowd.wrap_x, crowd.per_wrap_x)

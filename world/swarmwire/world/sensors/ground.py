@@ -26,14 +26,16 @@ class GroundSensor:
         """The shade under every point of every robot of the group."""
         scene, group = self._scene, self._group
         shade = np.empty((len(scene.keys), group.stop - group.start, len(self._points)))
-        _look_down(shade, scene.state, group.start, self._points, scene.ground)
+        _look_down(shade, scene.state, scene.running, group.start, self._points, scene.ground)
         return (shade,)
 
 
 @borrowing(from_python=True)
-def _look_down(shade, state, start, points, ground):
+def _look_down(shade, state, running, start, points, ground):
     """Set shade (arenas, n, points)."""
     for arena in range(shade.shape[0]):
+        if not running[arena]:
+            continue
         for i in range(shade.shape[1]):
             x, y, heading = state[arena, start + i, 0], state[arena, start + i, 1], state[arena, start + i, 2]
             c, s = np.cos(heading), np.sin(heading)

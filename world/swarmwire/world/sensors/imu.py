@@ -45,7 +45,8 @@ class ImuSensor:
     def follow(self, tick: int) -> None:
         """Feel the tick before, and let the bias drift."""
         scene, start = self._scene, self._group.start
-        _feel(self._felt, self._before, self._bias, self._drift, scene.state, start, scene.keys, tick, scene.tick_s)
+        of, arenas = (self._felt, self._before, self._bias, self._drift), (scene.keys, scene.running)
+        _feel(*of, scene.state, start, *arenas, tick, scene.tick_s)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """What every robot felt in the tick before, with its bias."""
@@ -55,8 +56,10 @@ class ImuSensor:
 
 
 @njit(cache=True)
-def _feel(felt, before, bias, drift, state, start, keys, tick, tick_s):
+def _feel(felt, before, bias, drift, state, start, keys, running, tick, tick_s):
     for arena in range(felt.shape[0]):
+        if not running[arena]:
+            continue
         for i in range(felt.shape[1]):
             was, now = before[arena, i], state[arena, start + i]
             half_way = 0.5 * (was[0] + now[2])

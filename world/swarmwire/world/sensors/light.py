@@ -54,9 +54,11 @@ class LightSensor:
 @borrowing(from_python=True)
 def _shine(value, start, angle, crowd, widest_m, things, arena_of, lights):
     """Add what the cells of each robot (arenas, n, sensors) see of each light."""
-    sort(crowd.cells, crowd.state)
+    sort(crowd.cells, crowd.state, crowd.running)
     for k in range(len(lights)):
         arena, intensity = arena_of[k], lights[k, 2]
+        if not crowd.running[arena]:
+            continue
         for i in range(value.shape[1]):
             own = start + i
             x = nearest(0.0, crowd.state[arena, own, 0], crowd.wrap_x, crowd.per_wrap_x)

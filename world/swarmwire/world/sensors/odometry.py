@@ -36,9 +36,8 @@ class OdometrySensor:
     def follow(self, tick: int) -> None:
         """Add the travel since the last tick, with a slip of its own: how often an agent looks changes nothing."""
         scene, start = self._scene, self._group.start
-        _add_travel(
-            self._told_m, self._rolled_m, scene.travel_m, start, self._scale, scene.keys, tick, self._sheet.slip
-        )
+        of, arenas = (self._told_m, self._rolled_m, scene.travel_m), (scene.keys, scene.running)
+        _add_travel(*of, start, self._scale, *arenas, tick, self._sheet.slip)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The travel that the encoders of every robot show."""
@@ -49,9 +48,11 @@ class OdometrySensor:
 
 
 @njit(cache=True)
-def _add_travel(told, rolled, travel, start, scale, keys, tick, slip):
+def _add_travel(told, rolled, travel, start, scale, keys, running, tick, slip):
     """Add the new travel of both wheels to what was told: times the wheel's scale, times 1 + slip x a normal draw."""
     for arena in range(told.shape[0]):
+        if not running[arena]:
+            continue
         for i in range(told.shape[1]):
             for wheel in range(2):
                 now = travel[arena, start + i, wheel]

@@ -75,8 +75,10 @@ class ScanSensor:
 @borrowing(from_python=True)
 def _scan(near, crowd, things, laser):
     """Set near (arenas, n, rays)."""
-    sort(crowd.cells, crowd.state)
+    sort(crowd.cells, crowd.state, crowd.running)
     for arena in range(near.shape[0]):
+        if not crowd.running[arena]:
+            continue
         for i in range(near.shape[1]):
             own, rays = laser.first + i, near[arena, i]
             heading = crowd.state[arena, own, 2]

@@ -30,6 +30,7 @@ class Scene:
     touched: FloatArray  # (arenas, robots) 1 if it touched anything in the tick before, else 0
     target: FloatArray  # (arenas, robots, 3) what the engine was given in the tick before
     alive: BoolArray  # (arenas, robots) the dead stand where they are, dark
+    running: BoolArray  # (arenas,) whose robots read their sensors; of others nothing needs to be told
     charge: FloatArray  # (arenas, robots) of the battery, 1 full, 0 empty
     leds: IntArray  # (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0 dark
     led_places_m: FloatArray  # (robots, most LEDs of a robot, 3) x ahead, y to the left, z above the body's lower side

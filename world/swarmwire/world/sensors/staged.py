@@ -26,10 +26,22 @@ class Staged:
         failed: (arenas, n) robots whose sensor has failed; None: no robot's. Set from outside, effective at once.
     """
 
-    def __init__(self, name: str, sense: TrueSense, sheet: Sheet, keys: KeyArray, group: Group, tick_s: float) -> None:
-        """The sense `name` of a group in the arenas of these keys (arenas,)."""
+    def __init__(
+        self,
+        name: str,
+        sense: TrueSense,
+        sheet: Sheet,
+        keys: KeyArray,
+        group: Group,
+        tick_s: float,
+        running: BoolArray | None = None,
+    ) -> None:
+        """The sense `name` of a group in the arenas of these keys (arenas,).
+
+        Nobody reads it in arenas that are not `running` (arenas,), which may change; None: all always are.
+        """
         self.failed: BoolArray | None = None
-        self._sense, self._keys, self._group = sense, keys, group
+        self._sense, self._keys, self._running, self._group = sense, keys, running, group
         outlier = sheet.outlier if isinstance(sheet, RangedSheet) else 0.0
         self._stages = [Stages(name, field, outlier, sheet.drop_out) for field in sense.fields]
         self._fields = [(f"{name}.{field.name}", (-1, field.width) if field.width else -1) for field in sense.fields]
@@ -61,7 +73,7 @@ class Staged:
     def _take(self, tick: int) -> Taken:
         values = self._sense.truth(tick)
         for value, stages in zip(values, self._stages, strict=True):
-            stages.apply(value, self._keys, self._group.start, tick)
+            stages.apply(value, self._keys, self._group.start, tick, self._running)
         return values
 
     def _hold(self, tick: int) -> None:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.arrays import FloatArray, KeyArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal, uniform
 from swarmwire.world.sensors.sensor import Field
@@ -64,19 +64,30 @@ class Stages:
         errs = field.noise.size or field.noise.relative or outlier or drop_out or field.step
         self._idle = unbounded and not errs
 
-    def apply(self, value: FloatArray, keys: KeyArray, start: int, tick: int) -> None:
-        """Put the truth `value` (arenas, n) or (arenas, n, width) through the stages, in place."""
+    def apply(self, value: FloatArray, keys: KeyArray, start: int, tick: int, running: BoolArray | None = None) -> None:
+        """Put the truth `value` (arenas, n) or (arenas, n, width) through the stages, in place.
+
+        Only in arenas that are `running` (arenas,); None: in all.
+        """
         if not self._idle:
             values = value if value.ndim == 3 else value.reshape(*value.shape, 1)
-            _apply(values, keys, start, tick, self._numbers, self._purposes)
+            present = np.ones(len(keys), np.bool_) if running is None else running
+            _apply(values, keys, present, start, tick, self._numbers, self._purposes)
 
 
 @njit(cache=True)
-def _apply(values, keys, start, tick, numbers, purposes):
+def _apply(values, keys, running, start, tick, numbers, purposes):
+    for arena in range(len(values)):
+        if running[arena]:
+            _apply_to(values[arena], keys[arena], start, tick, numbers, purposes)
+
+
+@njit(cache=True)
+def _apply_to(values, key, start, tick, numbers, purposes):
     if numbers.noise > 0.0 or numbers.relative > 0.0:
-        _add_noise(values, keys, start, tick, numbers, purposes[NOISE])
+        _add_noise(values, key, start, tick, numbers, purposes[NOISE])
     if numbers.outlier > 0.0:
-        _put_outliers(values, keys, start, tick, numbers, purposes[OUTLIER], purposes[OUTLYING])
+        _put_outliers(values, key, start, tick, numbers, purposes[OUTLIER], purposes[OUTLYING])
     flat = values.reshape(values.size)
     if numbers.step > 0.0:
         _round(flat, numbers.step)
@@ -85,42 +96,39 @@ def _apply(values, keys, start, tick, numbers, purposes):
     if numbers.angle:
         _wrap(flat)
     if numbers.drop_out > 0.0:
-        _drop(values, keys, start, tick, numbers, purposes[DROP_OUT])
+        _drop(values, key, start, tick, numbers, purposes[DROP_OUT])
 
 
 @njit(cache=True)
-def _add_noise(values, keys, start, tick, numbers, what_for):
-    for arena in range(values.shape[0]):
-        for i in range(values.shape[1]):
-            for k in range(values.shape[2]):
-                value = values[arena, i, k]
-                if np.isfinite(value):
-                    size = numbers.noise + numbers.relative * abs(value)
-                    if numbers.is_normal:
-                        draw = normal(keys[arena], start + i, tick, k, what_for)
-                    else:
-                        draw = 2.0 * uniform(keys[arena], start + i, tick, k, what_for) - 1.0
-                    values[arena, i, k] = value + size * draw
+def _add_noise(values, key, start, tick, numbers, what_for):
+    for i in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            value = values[i, k]
+            if np.isfinite(value):
+                size = numbers.noise + numbers.relative * abs(value)
+                if numbers.is_normal:
+                    draw = normal(key, start + i, tick, k, what_for)
+                else:
+                    draw = 2.0 * uniform(key, start + i, tick, k, what_for) - 1.0
+                values[i, k] = value + size * draw
 
 
 @njit(cache=True)
-def _put_outliers(values, keys, start, tick, numbers, whether, where):
-    for arena in range(values.shape[0]):
-        for i in range(values.shape[1]):
-            for k in range(values.shape[2]):
-                if uniform(keys[arena], start + i, tick, k, whether) < numbers.outlier:
-                    share = uniform(keys[arena], start + i, tick, k, where)
-                    low, high = numbers.outlier_low, numbers.outlier_high
-                    values[arena, i, k] = low + share * (high - low)
+def _put_outliers(values, key, start, tick, numbers, whether, where):
+    for i in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            if uniform(key, start + i, tick, k, whether) < numbers.outlier:
+                share = uniform(key, start + i, tick, k, where)
+                low, high = numbers.outlier_low, numbers.outlier_high
+                values[i, k] = low + share * (high - low)
 
 
 @njit(cache=True)
-def _drop(values, keys, start, tick, numbers, whether):
-    for arena in range(values.shape[0]):
-        for i in range(values.shape[1]):
-            for k in range(values.shape[2]):
-                if uniform(keys[arena], start + i, tick, k, whether) < numbers.drop_out:
-                    values[arena, i, k] = numbers.blank
+def _drop(values, key, start, tick, numbers, whether):
+    for i in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            if uniform(key, start + i, tick, k, whether) < numbers.drop_out:
+                values[i, k] = numbers.blank
 
 
 @njit(cache=True)

@@ -21,7 +21,8 @@ class Channel:
     """Decides what becomes of packets at robots that stand at given poses: arrays that nobody writes to any more."""
 
     def __init__(self, medium: Medium) -> None:
-        self._radio, self._arenas, self._size_m = medium.radio, len(medium.keys), medium.size_m
+        self._radio, self._size_m = medium.radio, medium.size_m
+        self._arenas, self._running = len(medium.keys), medium.running
         self._find_reach = reach_on_torus if medium.is_torus else reach
         self._columns = len(medium.radio.gives.columns)
         self._stages = chain(medium)
@@ -87,6 +88,6 @@ class Channel:
         """Who is in range of whom; the poses of a tick serve its radio graph and the packets that go on air in it."""
         if pose is not self._known_pose:
             assert self._radio.range_m is not None  # `Air` has refused a disk without
-            self._known = self._find_reach(pose, self._arenas, self._size_m, self._radio.range_m)
+            self._known = self._find_reach(pose, self._running, self._size_m, self._radio.range_m)
             self._known_pose = pose
         return self._known

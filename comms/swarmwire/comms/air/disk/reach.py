@@ -23,11 +23,14 @@ class Reach(NamedTuple):
     other: IntArray  # robot rows
 
 
-def reach(pose: FloatArray, arenas: int, size_m: tuple[float, float], range_m: float) -> Reach:
-    """The robots within `range_m` of each other in the same arena, centre to centre, alive or not."""
+def reach(pose: FloatArray, running: BoolArray, size_m: tuple[float, float], range_m: float) -> Reach:
+    """The robots within `range_m` of each other in the same arena, centre to centre, alive or not.
+
+    In arenas that are not `running` (arenas,) nobody is.
+    """
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-    cells = grid.build(x, y, arenas, size_m, range_m * CELL_SLACK)
-    return Reach(*_within(x, y, len(x) // arenas, cells, range_m))
+    cells = grid.build(x, y, len(running), size_m, range_m * CELL_SLACK, running)
+    return Reach(*_within(x, y, len(x) // len(running), cells, range_m))
 
 
 @njit(cache=True)

@@ -6,18 +6,18 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.air.disk.reach import CELL_SLACK, Reach
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.geometry import grid
 from swarmwire.comms.geometry.obstacles import to_nearest
 
 CELLS = 5  # in a row that hold all within reach: the last cell at a seam may be cut, and then two do what one would
 
 
-def reach_on_torus(pose: FloatArray, arenas: int, size_m: tuple[float, float], range_m: float) -> Reach:
+def reach_on_torus(pose: FloatArray, running: BoolArray, size_m: tuple[float, float], range_m: float) -> Reach:
     """As `reach.reach`, where opposite sides of each arena meet."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-    cells = grid.build(x, y, arenas, size_m, range_m * CELL_SLACK)
-    return Reach(*_within(x, y, len(x) // arenas, cells, size_m, range_m))
+    cells = grid.build(x, y, len(running), size_m, range_m * CELL_SLACK, running)
+    return Reach(*_within(x, y, len(x) // len(running), cells, size_m, range_m))
 
 
 @njit(cache=True)

@@ -38,7 +38,8 @@ class LinksHeld:
     def pairs_at(self, pose: FloatArray) -> Pairs:
         """The pairs of robots that stand at `pose` (rows, 3)."""
         medium = self._medium
-        return pairs_of(pose, medium.size_m, medium.keys, medium.obstacles, self.around, self._measured)
+        arenas = medium.keys, medium.running
+        return pairs_of(pose, medium.size_m, *arenas, medium.obstacles, self.around, self._measured)
 
     def mean_dbm(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
         """The mean power of each pair from a to b, and back, (k,) each."""

@@ -22,7 +22,7 @@ from swarmwire.comms.air.propagation.walls import wall_loss_db
 from swarmwire.comms.air.propagation.waves import SUMS
 from swarmwire.comms.air.signal.measured_links import MeasuredLinks
 from swarmwire.comms.air.signal.surroundings import Surroundings
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry import grid
 from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
@@ -43,17 +43,21 @@ def pairs_of(
     pose: FloatArray,
     size_m: tuple[float, float],
     keys,
+    running: BoolArray,
     obstacles: Obstacles,
     around: Surroundings,
     measured: MeasuredLinks | None = None,
 ) -> Pairs:
-    """All pairs above the cut-off of robots that stand at `pose` (rows, 3), and those of measured strength."""
+    """All pairs above the cut-off of robots that stand at `pose` (rows, 3), and those of measured strength.
+
+    Arenas that are not `running` (arenas,) are left out.
+    """
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     robots = len(x) // len(keys)
-    cells = grid.build(x, y, len(keys), size_m, around.reach_m * CELL_SLACK)
+    cells = grid.build(x, y, len(keys), size_m, around.reach_m * CELL_SLACK, running)
     a, b, loss = _near(x, y, robots, cells, around)
     if around.shadows:
-        _add_shadows(loss, x, y, robots, around.field, around.amplitude_db, a, b)
+        _add_shadows(loss, x, y, robots, cells.order, around.field, around.amplitude_db, a, b)
     if around.walls:
         _add_walls(loss, x, y, robots, obstacles, around.crossing_db, around.inside_db_per_m, a, b)
     if around.bodies:
@@ -64,7 +68,7 @@ def pairs_of(
         a, b, loss = measured.with_unlisted(a, b, loss)
     gain, blocked = np.ones(len(a)), np.zeros(len(a), np.int64)
     if around.fades:
-        _fade(gain, x, y, robots, keys, around.scatter, around.law, a, b)
+        _fade(gain, x, y, robots, keys, cells.order, around.scatter, around.law, a, b)
     if around.line_of_sight:
         _find_blocked(blocked, x, y, robots, obstacles, a, b)
     pairs = Pairs(a, b, loss, loss, gain, blocked)
@@ -85,7 +89,7 @@ def _measured(pairs: Pairs, measured: MeasuredLinks) -> Pairs:
 @njit(cache=True)
 def _near(x, y, robots, cells, around):
     """Pairs above the cut-off by path loss alone, but for what shadowing may add, and this loss in dB."""
-    ahead = np.empty((len(x), 2, 2), np.uint64)
+    ahead = np.empty((len(cells.order), 2, 2), np.uint64)
     most = _look_ahead(ahead, x, y, robots, cells)
     a, b, loss = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
     near, metres2 = np.empty(2 * len(x), np.uint64), np.empty(2 * len(x))
@@ -102,7 +106,7 @@ def _look_ahead(ahead, x, y, robots, cells):
     ahead[place, j, 1].
     """
     most = 0
-    for at in range(len(x)):
+    for at in range(len(cells.order)):
         s = cells.order[at]
         for j in range(2):
             first, stop = strip(x[s], y[s], s // robots, cells, j)
@@ -134,10 +138,10 @@ def _join(a, b, loss, order, x, y, ahead, around, near, metres2):
 
 
 @njit(cache=True)
-def _add_shadows(loss, x, y, robots, field, amplitude_db, a, b):
+def _add_shadows(loss, x, y, robots, rows, field, amplitude_db, a, b):
     single = np.float32
     height = np.empty((len(x), shadowing.WAVES), single)
-    for r in range(len(x)):
+    for r in rows:
         shadowing.heights(field[r // robots], x[r], y[r], height[r])
     _add_between(loss, x, y, robots, field.astype(single), amplitude_db, a, b, height, np.empty(SUMS, single))
 
@@ -182,9 +186,9 @@ def _best_dbm(send_dbm, receive_dbi, s, r):
 
 
 @njit(cache=True)
-def _fade(gain, x, y, robots, keys, scatter, law, a, b):
-    at, number = np.empty((len(x), 4, scattering.WAVES), np.float32), np.empty(len(x), np.uint64)
-    for r in range(len(x)):
+def _fade(gain, x, y, robots, keys, rows, scatter, law, a, b):
+    at, number = np.zeros((len(x), 4, scattering.WAVES), np.float32), np.zeros(len(x), np.uint64)
+    for r in rows:
         scattering.arriving(scatter[r // robots], x[r], y[r], at[r])
         number[r] = scattering.own_number(keys[r // robots], r % robots)
     parts = np.empty((2, SUMS), np.float32)

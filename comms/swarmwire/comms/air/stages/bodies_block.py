@@ -25,7 +25,7 @@ class BodiesBlock(Stage):
 
     def __init__(self, medium: Medium) -> None:
         assert medium.radio.range_m is not None  # `Air` has refused a disk without
-        self._arenas, self._robots, self._size_m = len(medium.keys), medium.robots, medium.size_m
+        self._running, self._robots, self._size_m = medium.running, medium.robots, medium.size_m
         self._radius_m, self._range_m = medium.radius_m, medium.radio.range_m
 
     def decide(self, links: Links, pose: FloatArray) -> None:
@@ -40,7 +40,7 @@ class BodiesBlock(Stage):
 
     def _blocked(self, links: Links, pose: FloatArray) -> BoolArray:
         x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-        cells = grid.build(x, y, self._arenas, self._size_m, self._range_m)
+        cells = grid.build(x, y, len(self._running), self._size_m, self._range_m, self._running)
         return behind_bodies(x, y, self._radius_m, cells, self._robots, links.sender, links.receiver, links.fate)
 
 

@@ -8,7 +8,7 @@ from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.traces.link_traces import LinkTraces
-from swarmwire.comms.arrays import FloatArray, KeyArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
 from swarmwire.comms.geometry.obstacles import Obstacles
 
 
@@ -24,6 +24,7 @@ class Medium:
     radius_m: FloatArray  # (rows,) of the robots
     disruption: Disruption  # kept up to date by the air
     antennas: Antennas  # of robots
+    running: BoolArray  # (arenas,) kept up to date by the air: in others nobody sends any more
     traces: LinkTraces | None = None  # of the radio's trace, where it has one
     is_torus: bool = False  # distances are the shortest
 

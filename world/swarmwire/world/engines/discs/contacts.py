@@ -5,7 +5,7 @@
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.arrays import AnyArray, IntArray
+from swarmwire.comms.arrays import AnyArray, BoolArray, IntArray
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.world.engines.discs.fixed import ROBOT, gap_to_circle, gap_to_fixed
 
@@ -73,14 +73,17 @@ def _is_before(one, other):
 
 
 @njit(cache=True)
-def crowd_of(rows: int, contacts: AnyArray) -> tuple[IntArray, IntArray]:
-    """The rows near which something is listed in `contacts` (k,) of dtype CONTACT, and the others; both rising."""
-    crowded = np.zeros(rows, np.bool_)
+def crowd_of(moving: BoolArray, contacts: AnyArray) -> tuple[IntArray, IntArray]:
+    """The rows near which something is listed in `contacts` (k,) of dtype CONTACT, and the others; both rising.
+
+    Only rows that are `moving` (rows,), as are all that are listed.
+    """
+    crowded = np.zeros(len(moving), np.bool_)
     for k in range(len(contacts)):
         crowded[contacts[k].row] = True
         if contacts[k].kind == ROBOT:
             crowded[contacts[k].which] = True
-    return np.flatnonzero(crowded), np.flatnonzero(~crowded)
+    return np.flatnonzero(crowded), np.flatnonzero(moving & ~crowded)
 
 
 @borrowing()

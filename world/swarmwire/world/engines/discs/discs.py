@@ -33,6 +33,7 @@ class DiscsEngine:
         self.travel_m: FloatArray = np.zeros((arenas, robots, 2))
         self.touched: FloatArray = np.zeros((arenas, robots))
         self.braked: BoolArray = np.zeros((arenas, robots), np.bool_)
+        self._running: BoolArray = np.ones(arenas, np.bool_)
         self._robots = robots_of(setting, arenas)
         self._widest_m = float(setting.radius_m.max(initial=0.0))
         self._contacts = np.zeros(0, CONTACT)
@@ -58,6 +59,11 @@ class DiscsEngine:
                 return onsets
             self._list_near(fastest_mps)
 
+    def leave(self, over: BoolArray) -> None:
+        """Nothing in these arenas (arenas,) moves or touches any more: nothing there is listed."""
+        self._running &= ~over
+        self._list_near(0.0)
+
     def _set_margin(self, margin_m: float) -> None:
         self._margin_m = margin_m
         # The cell of a robot's middle lists what its rim may reach.
@@ -71,11 +77,11 @@ class DiscsEngine:
         if needed_m > self._margin_m:
             self._set_margin(1.5 * needed_m)
         robots, state, margin_m = self._robots, self.state.reshape(arenas * per_arena, 6), self._margin_m
-        pairs = pairs_near(robots, state, arenas, setting.size_m, self._widest_m, margin_m)
-        walled = setting.boundary == "walls"
-        things = fixed_near(robots, state, setting.size_m, walled, setting.obstacles, self._cells, margin_m)
+        pairs = pairs_near(robots, state, self._running, setting.size_m, self._widest_m, margin_m)
+        around = setting.size_m, setting.boundary == "walls", setting.obstacles
+        things = fixed_near(robots, state, self._running, *around, self._cells, margin_m)
         old, self._contacts = self._contacts, np.zeros(len(pairs) + len(things), CONTACT)
         contacts_of(self._contacts, robots, pairs, things, old)
         self._met = np.zeros(len(self._contacts), np.int64)
-        self._crowd, self._loners = crowd_of(len(state), self._contacts)
+        self._crowd, self._loners = crowd_of(np.repeat(self._running, per_arena), self._contacts)
         robots["listed_x_m"], robots["listed_y_m"] = state[:, 0], state[:, 1]

@@ -10,7 +10,7 @@ L. Verlet (1967), Computer "experiments" on classical fluids, Phys. Rev. 159, 98
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry.grid import build, cell_of
 from swarmwire.comms.geometry.obstacles import Obstacles
@@ -19,23 +19,28 @@ from swarmwire.world.engines.discs.obstacle_cells import ObstacleCells
 
 
 def pairs_near(
-    robots: AnyArray, state: FloatArray, arenas: int, size_m: tuple[float, float], widest_m: float, margin_m: float
+    robots: AnyArray,
+    state: FloatArray,
+    running: BoolArray,
+    size_m: tuple[float, float],
+    widest_m: float,
+    margin_m: float,
 ) -> IntArray:
     """Pairs of robots with a gap of up to twice the margin, (pairs, 2): lower row, higher row.
 
     Args:
         robots: (rows,) ROBOT records.
         state: (rows, 6) x, y in m first.
-        arenas: how many there are.
+        running: (arenas,) whose robots move; of others none is listed.
         size_m: of an arena.
         widest_m: the greatest radius.
         margin_m: the margin of each robot.
     """
-    rows = len(state)
+    rows, arenas = len(state), len(running)
     per_arena = rows // arenas
     # About a robot in each cell, if they are spread evenly.
     spacing_m = float(np.sqrt(size_m[0] * size_m[1] / max(per_arena, 1)))
-    grid = build(state[:, 0], state[:, 1], arenas, size_m, max(2.0 * (widest_m + margin_m), spacing_m))
+    grid = build(state[:, 0], state[:, 1], arenas, size_m, max(2.0 * (widest_m + margin_m), spacing_m), running)
     pairs = np.empty((2 * rows + 16, 2), np.int64)
     count = _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs)
     if count > len(pairs):
@@ -47,6 +52,7 @@ def pairs_near(
 def fixed_near(
     robots: AnyArray,
     state: FloatArray,
+    running: BoolArray,
     size_m: tuple[float, float],
     walled: bool,
     obstacles: Obstacles,
@@ -55,14 +61,15 @@ def fixed_near(
 ) -> IntArray:
     """Fixed things with a gap of up to the margin, (things, 3): row, kind, number of the circle or polygon.
 
-    An obstacle that ends where a robot begins, or lower, is none to it.
+    An obstacle that ends where a robot begins, or lower, is none to it. Of arenas that are not `running` (arenas,)
+    nothing is listed.
     """
     per_arena = len(state) // (len(obstacles.circle_start) - 1)
     things = np.empty((len(state) + 16, 3), np.int64)
-    count = _list_fixed(robots, state, per_arena, size_m, walled, obstacles, cells, margin_m, things)
+    count = _list_fixed(robots, state, running, per_arena, size_m, walled, obstacles, cells, margin_m, things)
     if count > len(things):
         things = np.empty((count, 3), np.int64)
-        _list_fixed(robots, state, per_arena, size_m, walled, obstacles, cells, margin_m, things)
+        _list_fixed(robots, state, running, per_arena, size_m, walled, obstacles, cells, margin_m, things)
     return things[:count]
 
 
@@ -102,12 +109,14 @@ def _insert(pairs, begin, count, row, other):
 
 
 @borrowing(from_python=True)
-def _list_fixed(robots, state, per_arena, size_m, walled, obstacles, cells, margin_m, things):
+def _list_fixed(robots, state, running, per_arena, size_m, walled, obstacles, cells, margin_m, things):
     """Fill `things`, and return how many there are, whether there is room for them or not."""
     half_size_m = (0.5 * size_m[0], 0.5 * size_m[1])
     width_m, height_m = size_m[0] / cells.per_side, size_m[1] / cells.per_side
     count = 0
     for row in range(len(state)):
+        if not running[row // per_arena]:
+            continue
         robot, x, y = robots[row], state[row, 0], state[row, 1]
         reach_m = robot.radius_m + margin_m
         if walled and (abs(x) + reach_m >= half_size_m[0] or abs(y) + reach_m >= half_size_m[1]):

@@ -1,0 +1,94 @@
+"""A campaign: what is run, at which points, with which seeds, as `campaign.json` says before the first run."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.campaign.columns import Columns
+from swarmwire.deploy.campaign.design import Point
+from swarmwire.deploy.campaign.outcomes import Outcome
+from swarmwire.deploy.record.scenario_copy import CopiedFile
+from swarmwire.metrics.record.formats import refuse_other_format
+from swarmwire.metrics.whole_file import write_whole
+
+CAMPAIGN_JSON = "campaign.json"
+CAMPAIGN_FORMAT = 1
+SCENARIO_FOLDER = "scenario"
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """All that a campaign is made from. Run number = point * number of seeds + place of the seed."""
+
+    name: str
+    scenario: str  # its name
+    command: str  # that began it
+    began_utc: str
+    versions: Mapping[str, str]
+    cpu: str
+    modules: Mapping[str, str]  # sha256 of the installed code, by module
+    files: tuple[CopiedFile, ...]  # in the folder of the scenario
+    design: str  # "grid" | "list" | "random" | "latin"
+    seeds: tuple[int, ...]  # the same at every point
+    vary: Mapping[str, Any]  # by path: the list of values, or {"from", "to"}
+    points: tuple[Point, ...]
+    overrides: tuple[str, ...]  # of all points, which the scenario in the folder has in it
+    point_overrides: tuple[tuple[str, ...], ...]  # of each point, for the scenario in the folder
+    duration_s: float
+    outcomes: tuple[Outcome, ...]
+    series: bool  # whether each tick's metrics are kept
+    record_seeds: tuple[int, ...]  # whose runs have run folders
+    pack: int | None  # arenas in a world at most; None: as many as make sense
+
+    @property
+    def runs(self) -> int:
+        """How many there are."""
+        return len(self.points) * len(self.seeds)
+
+    def point_of(self, run: int) -> int:
+        """The number of a run's design point."""
+        return run // len(self.seeds)
+
+    def seed_of(self, run: int) -> int:
+        """A run's seed."""
+        return self.seeds[run % len(self.seeds)]
+
+    def columns(self) -> Columns:
+        """The columns of its rows."""
+        varied = {path: [point[path] for point in self.points] for path in self.vary}
+        return Columns(varied, [outcome.column for outcome in self.outcomes])
+
+    def write(self, folder: Path) -> None:
+        """Write `campaign.json`; OSError if the disk will not."""
+        write_whole(folder / CAMPAIGN_JSON, json.dumps({"format": CAMPAIGN_FORMAT, **asdict(self)}, indent=1) + "\n")
+
+
+def read_campaign(folder: Path) -> Campaign:
+    """The campaign of this folder; BadInput if there is none."""
+    path = folder / CAMPAIGN_JSON
+    try:
+        found: Any = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        expected = f"expected a campaign's folder, with its {CAMPAIGN_JSON}: {error.strerror}"
+        raise BadInput(str(folder), "", expected) from None
+    except ValueError:  # no JSON, or no UTF-8
+        found = None
+    try:
+        refuse_other_format(found, CAMPAIGN_FORMAT, path)
+        del found["format"]  # KeyError: every campaign names one
+        return _campaign(found)
+    except (KeyError, TypeError, ValueError):
+        raise BadInput(str(path), "", "expected what swarmwire writes at the start of a campaign") from None
+
+
+def _campaign(found: dict[str, Any]) -> Campaign:
+    tuples: dict[str, Any] = {name: tuple(found[name]) for name in ("seeds", "points", "overrides", "record_seeds")}
+    objects: dict[str, Any] = {
+        "files": tuple(CopiedFile(**file) for file in found["files"]),
+        "outcomes": tuple(Outcome(**outcome) for outcome in found["outcomes"]),
+        "point_overrides": tuple(tuple(texts) for texts in found["point_overrides"]),
+    }
+    return Campaign(**{**found, **tuples, **objects})

@@ -1,0 +1,94 @@
+"""A campaign as a TOML file: which scenario, what varies, which seeds."""
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.one_of import one_of
+from swarmwire.deploy.campaign.design import GRID
+from swarmwire.deploy.campaign.plan import Asked
+from swarmwire.deploy.campaign.seed_list import seed_list
+from swarmwire.deploy.campaign.vary import vary_from
+
+FORMAT = 1
+TYPES: dict[str, tuple[type, ...]] = {
+    "format": (int,),
+    "scenario": (str,),
+    "name": (str,),
+    "seeds": (int, str, list),
+    "design": (str,),
+    "points": (int,),
+    "design_seed": (int,),
+    "vary": (dict,),
+    "overrides": (list,),
+    "pack": (int,),
+    "series": (bool,),
+    "record_seeds": (list, str),
+}
+WORDS = {int: "a whole number", str: "a text", list: "a list", dict: "a table", bool: "true or false"}
+OF_SCENARIOS = ("arena", "robots", "duration_s")  # keys that a campaign never has
+
+
+def campaign_table(path: Path) -> dict[str, Any] | None:
+    """The content of a campaign's file, its keys and types checked; None if the file describes a scenario instead.
+
+    BadInput if it cannot be read, or has a key that is unknown, missing or of another type.
+    """
+    where = str(path)
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise BadInput(where, "", f"expected a readable file: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise BadInput(where, "", f"expected TOML: {error}") from None
+    if "scenario" not in table and any(key in table for key in OF_SCENARIOS):
+        return None
+    for key, value in table.items():
+        if key not in TYPES:
+            raise BadInput(where, key, f"unknown key; expected {one_of(TYPES, key)}")
+        if type(value) not in TYPES[key]:
+            raise BadInput(where, key, f"expected {' or '.join(WORDS[of] for of in TYPES[key])}, got {value!r}")
+    for key in ("format", "scenario"):
+        if key not in table:
+            raise BadInput(where, key, f"is missing: expected {WORDS[TYPES[key][0]]}")
+    if table["format"] != FORMAT:
+        raise BadInput(where, "format", f"expected {FORMAT}, got {table['format']}")
+    return table
+
+
+def asked_in(path: Path, table: Mapping[str, Any]) -> Asked:
+    """What a campaign's file asks for; a scenario's path is as seen from the file. BadInput names the key."""
+    where = str(path)
+    if "seeds" not in table:
+        raise BadInput(where, "seeds", "is missing: expected how many, or a list")
+    vary = cast("dict[str, Any]", table.get("vary", {}))
+    overrides = cast("list[Any]", table.get("overrides", []))
+    if not all(isinstance(text, str) for text in overrides):
+        raise BadInput(where, "overrides", f"expected texts such as duration_s=60, got {overrides}")
+    recorded = table.get("record_seeds", [])
+    return Asked(
+        scenario=path.parent / table["scenario"],
+        seeds=seed_list(table["seeds"], f"{where}: seeds"),
+        varied=tuple(vary_from(key, given, f"{where}: vary.{key}") for key, given in _flat(vary).items()),
+        design=table.get("design", GRID),
+        points=table.get("points"),
+        design_seed=table.get("design_seed", 1),
+        overrides=tuple(overrides),
+        name=table.get("name"),
+        pack=table.get("pack"),
+        series=table.get("series", True),
+        record_seeds=seed_list(recorded, f"{where}: record_seeds") if recorded else (),
+    )
+
+
+def _flat(vary: Mapping[str, Any], above: str = "") -> dict[str, Any]:
+    """By path: a key without quotes, such as radio.loss, is a table within a table to TOML."""
+    flat: dict[str, Any] = {}
+    for key, value in vary.items():
+        if isinstance(value, dict) and not {"from", "to"} & set(cast("dict[str, Any]", value)):
+            flat.update(_flat(cast("dict[str, Any]", value), f"{above}{key}."))
+        else:
+            flat[f"{above}{key}"] = value
+    return flat

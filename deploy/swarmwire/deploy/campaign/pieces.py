@@ -1,0 +1,50 @@
+"""The tasks of a campaign: the runs that are missing, in packs of seeds of one design point."""
+
+from collections.abc import Collection, Iterator, Sequence
+
+from swarmwire.deploy.campaign.campaign import Campaign
+from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
+from swarmwire.deploy.campaign.task import Task
+
+USUAL_PACK = 50  # arenas in a world: more gain little, and a piece is lost as a whole where a campaign is killed
+ROUNDS = 2  # tasks for each worker at least, so that none is idle for long at the end
+
+
+def tasks_of(
+    campaign: Campaign, folder: CampaignFolder, done: Collection[int], pack: int | None, workers: int
+) -> list[Task]:
+    """A task for each pack of runs that are not `done`; those that are recorded in full are on their own."""
+    seeds, tasks = len(campaign.seeds), list[Task]()
+    size = pack or campaign.pack or usual_pack(len(campaign.points), seeds, workers)
+    for point in range(len(campaign.points)):
+        missing = [run for run in range(point * seeds, (point + 1) * seeds) if run not in done]
+        recorded = [run for run in missing if campaign.seed_of(run) in campaign.record_seeds]
+        together = [run for run in missing if campaign.seed_of(run) not in campaign.record_seeds]
+        tasks += [_task(campaign, folder, point, [run], recorded=True) for run in recorded]
+        tasks += [_task(campaign, folder, point, runs, recorded=False) for runs in _shares(together, size)]
+    return tasks
+
+
+def usual_pack(points: int, seeds: int, workers: int) -> int:
+    """How many arenas a world has where nobody says."""
+    packs = max(-(-seeds // USUAL_PACK), -(-ROUNDS * workers // points))  # of each point
+    return max(1, -(-seeds // packs))
+
+
+def _shares(runs: Sequence[int], size: int) -> Iterator[Sequence[int]]:
+    """Shares of at most this size, which differ by one run at most."""
+    count = -(-len(runs) // size)
+    for share in range(count):
+        yield runs[len(runs) * share // count : len(runs) * (share + 1) // count]
+
+
+def _task(campaign: Campaign, folder: CampaignFolder, point: int, runs: Sequence[int], *, recorded: bool) -> Task:
+    return Task(
+        scenario=str(folder.scenario),
+        overrides=campaign.point_overrides[point],
+        point=point,
+        runs=tuple(runs),
+        seeds=tuple(campaign.seed_of(run) for run in runs),
+        series=campaign.series,
+        record_to=str(folder.run_folder(runs[0])) if recorded else None,
+    )

@@ -1,0 +1,127 @@
+"""What people ask of a campaign, checked at the door: every design point, before anything runs or is written."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.loading import resolve
+from swarmwire.deploy.agents import agent_specs, check_agents
+from swarmwire.deploy.campaign.columns import FIXED
+from swarmwire.deploy.campaign.design import GRID, Point, points_of
+from swarmwire.deploy.campaign.outcomes import Outcome, outcomes_of
+from swarmwire.deploy.campaign.toml_value import toml_value
+from swarmwire.deploy.campaign.vary import Range, Vary
+from swarmwire.deploy.campaign.whole_numbers import whole_numbers
+from swarmwire.deploy.radio.link_trace_file import scenario_traces
+from swarmwire.world.scenario.as_mapping import mapping_of
+from swarmwire.world.scenario.bodies import bodies_of, own_code_of
+from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario.scenario_file import load_scenario, scenario_from
+
+MOST_RUNS = 10_000_000
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A campaign as people ask for it."""
+
+    scenario: Scenario | Path | str
+    seeds: tuple[int, ...]
+    varied: tuple[Vary, ...] = ()
+    design: str = GRID
+    points: int | None = None  # that a design draws
+    design_seed: int = 1
+    overrides: tuple[str, ...] = ()
+    name: str | None = None  # None: the scenario's
+    pack: int | None = None
+    series: bool = True
+    record_seeds: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A campaign that can be run: `asked`, and what it comes to."""
+
+    asked: Asked
+    scenario: Scenario  # with the overrides of all points
+    points: tuple[Point, ...]
+    outcomes: tuple[Outcome, ...]
+    code: tuple[str, ...]  # the specs of users' classes, of all points
+
+    def at(self, point: Point) -> Scenario:
+        """The scenario at a point."""
+        return _at(self.asked.varied, mapping_of(self.scenario), self.scenario.source, point)
+
+    def vary(self) -> Mapping[str, Any]:
+        """By path: the values in order, or between which numbers they were drawn."""
+        return {
+            vary.path: {"from": float(vary.values.first), "to": float(vary.values.last)}
+            if isinstance(vary.values, Range) and vary.values.count is None
+            else list({toml_value(point[vary.path]): point[vary.path] for point in self.points}.values())
+            for vary in self.asked.varied
+        }
+
+
+def planned(asked: Asked) -> Plan:
+    """The plan of what was asked; BadInput for the first point that cannot be run, and all that is no good."""
+    scenario = _scenario_of(asked)
+    for vary in asked.varied:
+        if vary.path in FIXED or vary.path == "format":
+            raise vary.refused(f"expected another path: {vary.path} is not varied by --vary")
+    points = points_of(asked.design, asked.varied, asked.points, asked.design_seed, whole_numbers(scenario))
+    if len(points) * len(asked.seeds) > MOST_RUNS:
+        raise BadInput("--seeds", "", f"expected at most {MOST_RUNS} runs, got {len(points) * len(asked.seeds)}")
+    strange = [seed for seed in asked.record_seeds if seed not in asked.seeds]
+    if strange:
+        raise BadInput("--record-seeds", "", f"expected seeds of the campaign, got {strange[0]}")
+    if asked.pack is not None and asked.pack < 1:
+        raise BadInput("--pack", "", f"expected at least 1, got {asked.pack}")
+    mapping = mapping_of(scenario)
+    scenarios = [_at(asked.varied, mapping, scenario.source, point) for point in points]
+    code = [spec for at, point in zip(scenarios, points, strict=True) for spec in _checked(at, asked.varied, point)]
+    return Plan(asked, scenario, tuple(points), outcomes_of(scenarios), tuple(dict.fromkeys(code)))
+
+
+def _scenario_of(asked: Asked) -> Scenario:
+    """The scenario with the overrides of all points, as checked."""
+    given = asked.scenario
+    if isinstance(given, Scenario):
+        return scenario_from(mapping_of(given), given.source, asked.overrides)
+    return load_scenario(given, asked.overrides)
+
+
+def overrides_of(point: Point) -> list[str]:
+    """The values of a point as for `--set`."""
+    return [f"{path}={toml_value(value)}" for path, value in point.items()]
+
+
+def _at(varied: Sequence[Vary], mapping: Mapping[str, Any], source: str, point: Point) -> Scenario:
+    try:
+        return scenario_from(mapping, source, overrides_of(point))
+    except BadInput as error:
+        raise _blamed(error, varied, point) from None
+
+
+def _checked(scenario: Scenario, varied: Sequence[Vary], point: Point) -> list[str]:
+    """The specs of users' classes that a point's scenario names, all of which are fit for it."""
+    try:
+        agents = agent_specs(scenario)
+        check_agents(scenario, agents)
+        scenario_traces(scenario)
+        bodies = bodies_of(scenario, scenario.source)
+    except BadInput as error:
+        raise _blamed(error, varied, point) from None
+    metrics = [resolve(spec, Path(scenario.source).parent) for spec in scenario.metrics]
+    return [*agents.values(), *own_code_of(bodies.values()), *metrics]
+
+
+def _blamed(error: BadInput, varied: Sequence[Vary], point: Point) -> BadInput:
+    """The fault of a point, told by what varies: of a value that is wrong by itself, or of all that meet there."""
+    for vary in varied:
+        if f"{error.key}.".startswith(f"{vary.path}.") or error.where.startswith(f"--set {vary.path}="):
+            return BadInput(vary.said, error.key, error.expected)
+    if not point:
+        return error
+    return BadInput(" ".join(f"--vary {text}" for text in overrides_of(point)), error.key, error.expected)

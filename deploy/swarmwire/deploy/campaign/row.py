@@ -1,0 +1,44 @@
+"""One run as a row of `summary.parquet`: what was measured of it, or why it failed."""
+
+from dataclasses import asdict
+from typing import Any
+
+from swarmwire.deploy.campaign.task import Row
+from swarmwire.deploy.result import ArenaResult, RadioResult, Result
+
+FAILED = "failed"
+STATISTICS = ("final", "mean", "min", "max")
+LATENCIES = ("latency_air_s", "latency_agent_s")
+TOTALS = ("sent", "intended", "in_range", "pdr")
+
+
+def row_of(arena: ArenaResult, result: Result) -> Row:
+    """What came of one arena, by column."""
+    row: Row = {
+        "ended": result.ended,
+        "error": None,
+        "ticks": result.ticks,
+        "sim_time_s": result.sim_time_s,
+        "trajectory_sha256": arena.trajectory_sha256,
+    }
+    for name, value in arena.metrics.items():
+        row.update({f"{name}.{statistic}": of for statistic, of in asdict(value).items()})
+    if arena.radio is not None:
+        row.update(_radio(arena.radio))
+    row.update({f"counts.{name}": count for name, count in result.counts.items()})
+    return row
+
+
+def failed_row(error: str) -> Row:
+    """A run that came to nothing: all else in its row is null."""
+    return {"ended": FAILED, "error": error}
+
+
+def _radio(radio: RadioResult) -> dict[str, Any]:
+    latencies = {
+        f"radio.{of}.{percentile}": value
+        for of in LATENCIES
+        for percentile, value in asdict(getattr(radio, of)).items()
+    }
+    fates = {f"radio.fates.{name}": count for name, count in radio.fates.items()}
+    return {**{f"radio.{name}": getattr(radio, name) for name in TOTALS}, **latencies, **fates}

@@ -1,0 +1,44 @@
+"""The tick series of a campaign on disk: a part per piece while it goes on, a few files once it is over."""
+
+from collections.abc import Collection
+from pathlib import Path
+
+from swarmwire.metrics.record.part_files import PARQUET
+from swarmwire.metrics.whole_file import written_aside
+
+
+def series_part(folder: Path, run: int) -> Path:
+    """The part whose first run is this."""
+    return folder / f"part-{run:08d}.parquet"
+
+
+def sort_out_series(folder: Path, done: Collection[int]) -> None:
+    """Take away parts of pieces whose rows were never written (runs that are not in `done`), or that were joined."""
+    import polars as pl
+
+    parts, files = _parts(folder), list(folder.glob("worker-*.parquet"))
+    if not parts:
+        return
+    joined: set[int] = {run for file in files for run in pl.read_parquet(file, columns=["run"])["run"].unique()}
+    for part in parts:
+        run = int(part.stem.partition("-")[2])
+        if run not in done or run in joined:
+            part.unlink()
+
+
+def join_series(folder: Path, files: int) -> None:
+    """Make of all parts at most so many files, `worker-N.parquet`, each a stretch of runs; read piece by piece."""
+    import polars as pl
+
+    parts = _parts(folder)
+    first, count = len(list(folder.glob("worker-*.parquet"))), min(files, len(parts))
+    for number in range(count):
+        share = parts[len(parts) * number // count : len(parts) * (number + 1) // count]
+        with written_aside(folder / f"worker-{first + number}.parquet") as aside:
+            pl.concat([pl.scan_parquet(part) for part in share], how="diagonal").sink_parquet(aside, **PARQUET)
+        for part in share:
+            part.unlink()
+
+
+def _parts(folder: Path) -> list[Path]:
+    return sorted(folder.glob("part-*.parquet"))

@@ -1,0 +1,35 @@
+"""A campaign's scenario with all its files as bytes, for workers that see another file system."""
+
+import hashlib
+import tempfile
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+
+def scenario_files(folder: Path) -> dict[str, bytes]:
+    """By path within a campaign's scenario folder: the files' contents."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def unpacked(files: Mapping[str, bytes]) -> Path:
+    """A folder of this process with these files, made at the first call; `Task.scenario` is `scenario.toml` in it."""
+    whole = hashlib.sha256()
+    for name, data in files.items():
+        whole.update(f"{name}\0{len(data)}\0".encode() + data)
+    folder = Path(_own_folder().name) / whole.hexdigest()
+    if not folder.exists():
+        aside = Path(tempfile.mkdtemp(dir=_own_folder().name))  # whole under its own name, also for other threads
+        for name, data in files.items():
+            path = aside / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        aside.replace(folder)
+    return folder
+
+
+@cache
+def _own_folder() -> "tempfile.TemporaryDirectory[str]":
+    """Goes with the process."""
+    return tempfile.TemporaryDirectory(prefix="swarmwire-campaign-")

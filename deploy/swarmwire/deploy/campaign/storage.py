@@ -1,0 +1,24 @@
+"""A disk that is full, or refuses: told in one line, with what can be done."""
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+from swarmwire.comms.errors import SwarmwireError
+
+
+class StorageFailed(SwarmwireError):
+    """A campaign's folder cannot be written any more."""
+
+
+@contextmanager
+def storing(folder: Path) -> Generator[None]:
+    """Turn what a disk refuses in the block into StorageFailed."""
+    import polars as pl
+
+    try:
+        yield
+    except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+        why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        text = f"{folder}: cannot be written: {why}; what is done stays: swarmwire sweep --resume {folder}"
+        raise StorageFailed(text) from error

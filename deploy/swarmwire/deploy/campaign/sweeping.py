@@ -1,0 +1,195 @@
+"""Run a campaign, or what is missing of it: many seeds at each point of a design, kept as a table of all runs."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, read_campaign
+from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
+from swarmwire.deploy.campaign.campaign_start import begin, default_folder
+from swarmwire.deploy.campaign.design import GRID
+from swarmwire.deploy.campaign.execution import execute
+from swarmwire.deploy.campaign.executor import LOCAL, Executor, open_executor
+from swarmwire.deploy.campaign.pieces import tasks_of
+from swarmwire.deploy.campaign.plan import Asked, Plan, planned
+from swarmwire.deploy.campaign.resumption import check_code, check_files, check_same
+from swarmwire.deploy.campaign.row import FAILED
+from swarmwire.deploy.campaign.seed_list import seed_list
+from swarmwire.deploy.campaign.task import PieceResult, Task
+from swarmwire.deploy.campaign.vary import vary_from
+from swarmwire.deploy.campaign.watcher import NobodyWatches, Watcher
+from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.world.scenario.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Means:
+    """With what a campaign is run; its results do not depend on it."""
+
+    on: str = LOCAL  # executor
+    workers: int | None = None  # None: one for each core
+    pack: int | None = None  # arenas in a world; None: as the campaign says
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """How far a campaign has come."""
+
+    folder: Path
+    runs: int  # of the whole campaign
+    done: int  # runs that have a row
+    failed: int  # of these
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no run is missing, so that the table of all runs is there."""
+        return self.done == self.runs
+
+
+def sweep(
+    scenario: Scenario | Path | str,
+    *,
+    seeds: int | str | Sequence[int],
+    vary: Mapping[str, Any] | None = None,
+    design: str = GRID,
+    points: int | None = None,
+    design_seed: int = 1,
+    overrides: Sequence[str] = (),
+    out: Path | str | None = None,
+    name: str | None = None,
+    pack: int | None = None,
+    series: bool = True,
+    record_seeds: Sequence[int] = (),
+    on: str = LOCAL,
+    workers: int | None = None,
+    watcher: Watcher | None = None,
+) -> Sweep:
+    """Run a scenario at each point of a design with each seed, in worker processes, and keep a table of all runs.
+
+    `seeds` are 1 to a number, or a list. `vary` gives, by path, a list of values, a table with from, to, count (and
+    scale = "log"), or a text as for `--vary`. `design` is "grid", "list", or "random" and "latin" with so many `points`
+    from ranges without count. `out` is a new or empty folder, campaigns/<scenario>-<UTC> by default. `pack` arenas at
+    most are run as one world. With `series` each tick's metrics are kept, too; runs of `record_seeds` get run folders.
+    Ctrl-C ends it; `resume` goes on.
+
+    Raises BadInput for anything wrong with these, before anything is run, and StorageFailed when the disk is full. What
+    a run raises is in its row.
+    """
+    varied = tuple(vary_from(path, given, f"vary {path}") for path, given in (vary or {}).items())
+    asked = Asked(
+        scenario=scenario,
+        seeds=seed_list(seeds, "seeds"),
+        varied=varied,
+        design=design,
+        points=points,
+        design_seed=design_seed,
+        overrides=tuple(overrides),
+        name=name,
+        pack=pack,
+        series=series,
+        record_seeds=tuple(record_seeds),
+    )
+    plan = planned(asked)
+    folder = Path(out) if out is not None else default_folder(_stem(scenario))
+    return begin_sweep(plan, folder, "swarmwire.deploy.sweep", Means(on, workers), watcher)
+
+
+def resume(
+    folder: Path | str,
+    *,
+    retry_failed: bool = False,
+    anyway: bool = False,
+    pack: int | None = None,
+    on: str = LOCAL,
+    workers: int | None = None,
+    watcher: Watcher | None = None,
+) -> Sweep:
+    """Run what is missing of the campaign in this folder; with `retry_failed` also the runs that failed.
+
+    Raises BadInput if the folder holds no campaign, its scenario's files have changed, or, unless `anyway`, the code,
+    versions or CPU have; and what `sweep` raises.
+    """
+    means = Means(on, workers, pack)
+    return resume_sweep(Path(folder), means, retry_failed=retry_failed, anyway=anyway, watcher=watcher)
+
+
+def begin_sweep(
+    plan: Plan,
+    path: Path,
+    command: str,
+    means: Means,
+    watcher: Watcher | None = None,
+    interrupt: Interrupt | None = None,
+) -> Sweep:
+    """Make the folder of a campaign that was checked, and run it; `command` is kept with it."""
+    with closing(_executor(means, path, plan.asked.record_seeds)) as executor:
+        folder = CampaignFolder(path, begin(plan, path, command))
+        with folder.taken():
+            return _work(folder, executor, means.pack, watcher or NobodyWatches(), interrupt or Interrupt())
+
+
+def resume_sweep(
+    path: Path,
+    means: Means,
+    *,
+    retry_failed: bool = False,
+    anyway: bool = False,
+    plan: Plan | None = None,
+    watcher: Watcher | None = None,
+    interrupt: Interrupt | None = None,
+) -> Sweep:
+    """As `resume`; a `plan` must be that of the folder's campaign."""
+    campaign = read_campaign(path)
+    if plan is not None:
+        check_same(plan, campaign, path)
+    check_files(campaign, path)
+    if not anyway:
+        check_code(campaign, path)
+    folder = CampaignFolder(path, campaign)
+    with closing(_executor(means, path, campaign.record_seeds)) as executor, folder.taken():
+        folder.clear()
+        if retry_failed:
+            folder.forget_failed()
+        return _work(folder, executor, means.pack, watcher or NobodyWatches(), interrupt or Interrupt())
+
+
+def _executor(means: Means, path: Path, record_seeds: Sequence[int]) -> Executor:
+    executor = open_executor(means.on, means.workers, path / SCENARIO_FOLDER)
+    if record_seeds and not executor.records:
+        executor.close()
+        raise BadInput("--record-seeds", "", f"expected --on {LOCAL}: others cannot write into this machine's folders")
+    return executor
+
+
+def _work(
+    folder: CampaignFolder, executor: Executor, pack: int | None, watcher: Watcher, interrupt: Interrupt
+) -> Sweep:
+    """Run what is missing; once nothing is, make the table of all runs."""
+    campaign, ended = folder.campaign, folder.ended()
+    tasks = tasks_of(campaign, folder, ended, pack, executor.slots)
+
+    def keep(_: Task, result: PieceResult) -> None:
+        folder.keep(result)
+        ended.update({row["run"]: row["ended"] for row in result.rows})
+        watcher.see(result)
+
+    watcher.begin(campaign, len(ended), _failed(ended))
+    try:
+        with interrupt:
+            if execute(tasks, executor, keep, lambda: interrupt.asked):
+                folder.finish(executor.slots)
+    finally:
+        watcher.end()
+    return Sweep(folder.path, campaign.runs, len(ended), _failed(ended))
+
+
+def _failed(ended: Mapping[int, str]) -> int:
+    return sum(how == FAILED for how in ended.values())
+
+
+def _stem(scenario: Scenario | Path | str) -> str:
+    """What the default folder is named after."""
+    return "campaign" if isinstance(scenario, Scenario) else Path(scenario).stem

@@ -1,0 +1,37 @@
+"""A worker process of a campaign: it reads tasks from standard input and writes what came of them to standard output.
+
+It is a program of its own rather than a child of multiprocessing, which would run the user's script again in each.
+Standard input is the life line: when it ends, the campaign is gone, and the worker with it, in the middle of a run.
+"""
+
+import os
+import sys
+from queue import SimpleQueue
+from threading import Thread
+
+from swarmwire.deploy.campaign.messages import receive, send
+from swarmwire.deploy.campaign.piece import run_piece
+from swarmwire.deploy.campaign.task import Task, result_message, task_from
+
+
+def main(arguments: list[str]) -> None:
+    """`name`: say that it is ready, then work until standard input ends."""
+    (name,) = arguments
+    results = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what agents print is for people
+    tasks = SimpleQueue[Task]()
+    Thread(target=_listen, args=(tasks,), daemon=True).start()
+    send(results, {"ready": name})
+    while True:
+        send(results, result_message(run_piece(tasks.get(), name)))
+
+
+def _listen(tasks: SimpleQueue[Task]) -> None:
+    """Take in tasks; end this process, whatever it is at, when nobody is there to give more."""
+    while (message := receive(sys.stdin.buffer)) is not None:
+        tasks.put(task_from(message))
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

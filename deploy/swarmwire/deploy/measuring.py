@@ -1,0 +1,28 @@
+"""What a scenario has measured: the metrics that it lists and those that end its arenas, made ready."""
+
+from pathlib import Path
+
+from swarmwire.comms.loading import resolve
+from swarmwire.metrics.judge import Condition
+from swarmwire.metrics.listed import Item, Listed, listed
+from swarmwire.world.scenario.metric_tables import MetricTable
+from swarmwire.world.scenario.scenario import Scenario
+
+
+def measuring(scenario: Scenario) -> Listed:
+    """The metrics of a run of this scenario; BadInput for what is no metric, or does not take its parameters."""
+    beside = Path(scenario.source).parent
+    items = [_item(place, item, beside) for place, item in enumerate(scenario.metrics)]
+    stops = [Item(f"{key}.metric", table.metric, None) for key, table in scenario.stops().items()]
+    return listed([*items, *stops], scenario.source, with_standard=scenario.standard_metrics)
+
+
+def conditions(scenario: Scenario) -> list[Condition]:
+    """What ends an arena before its time, in the scenario's order."""
+    return [Condition(table.metric, *table.comparison, table.hold_s) for table in scenario.stops().values()]
+
+
+def _item(place: int, item: str | MetricTable, beside: Path) -> Item:
+    if isinstance(item, MetricTable):
+        return Item(f"metrics.{place}.metric", resolve(item.metric, beside), item.params)
+    return Item(f"metrics.{place}", resolve(item, beside), {})

@@ -1,0 +1,145 @@
+"""A campaign's folder, read back: of one that is finished, that was ended, and that still goes on."""
+
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.campaign.about import About, Point, read_about
+from swarmwire.metrics.campaign.formats import ABOUT, PARTS, SUMMARY
+from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.campaign.statistic import Statistic, find_outcome, find_statistic
+from swarmwire.metrics.statistics.sample import Sample
+
+if TYPE_CHECKING:
+    import polars as pl
+
+FAILED = "failed"  # in the column `ended`
+SIM_TIME = "sim_time_s"
+CHANGES_UNDERFOOT = 3  # times that the parts of a campaign that goes on may be joined while they are read
+NEEDED = ("run", "point", "seed", "ended", SIM_TIME)
+
+
+class CampaignFolder:
+    """What was asked for, and what came of each run, as it was on disk when first asked for.
+
+    BadInput where it is no campaign, is of another format, or a file is damaged.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        """Read what was asked for; BadInput unless the folder holds a campaign."""
+        self.path = Path(path)
+        if not self.path.is_dir():
+            raise BadInput(str(path), "", "expected a campaign's folder: there is none")
+        self.about: About = read_about(self.path / ABOUT)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Paths of the parameters that are varied, in the order in which they were named."""
+        return tuple(self.about.vary)
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The design points; a point's number is its place here."""
+        return self.about.points
+
+    @property
+    def outcomes(self) -> tuple[Outcome, ...]:
+        """What was measured of each run."""
+        return self.about.outcomes
+
+    @cached_property
+    def runs(self) -> "pl.DataFrame":
+        """A row per run that has ended, sorted by run: `summary.parquet`, or what parts there are so far.
+
+        Columns: run, point, seed, one of each parameter, ended, error, ticks, sim_time_s, outcomes, timing_wall_s, …
+        Before the first run has ended there may be no columns but the first of these.
+        """
+        import polars as pl
+
+        for _ in range(CHANGES_UNDERFOOT):
+            files = self._files()
+            try:
+                frames = [pl.read_parquet(file) for file in files]
+            except FileNotFoundError:
+                continue  # it finished just now, and its parts went
+            except (OSError, pl.exceptions.PolarsError) as error:
+                reason = str(error).splitlines()[0]
+                raise BadInput(str(self.path), "", f"expected whole Parquet files: {reason}") from error
+            for file, frame in zip(files, frames, strict=True):
+                self._check_columns(file, frame)
+            if not frames:
+                return pl.DataFrame(schema=dict.fromkeys(NEEDED, pl.Int64) | {"ended": pl.String, SIM_TIME: pl.Float64})
+            return pl.concat(frames, how="diagonal_relaxed").unique("run", keep="last").sort("run")
+        raise BadInput(str(self.path), PARTS, "expected files that stay while they are read")
+
+    @property
+    def missing(self) -> tuple[int, ...]:
+        """Numbers of the runs that were asked for and have no row (yet)."""
+        there: set[int] = set(self._column("run").tolist())
+        return tuple(run for run in range(self.about.runs) if run not in there)
+
+    @property
+    def finished(self) -> bool:
+        """Whether every run that was asked for has ended, well or not."""
+        return not self.missing
+
+    def outcome(self, name: str) -> Outcome:
+        """The outcome of this column, or of a bare metric's last value; BadInput names those that there are."""
+        return find_outcome(name, self.outcomes, str(self.path))
+
+    def statistic(self, name: str) -> Statistic:
+        """The statistic that `COLUMN.STAT` names; BadInput if there is none."""
+        return find_statistic(name, self.outcomes, str(self.path))
+
+    def sample(self, column: str, point: int) -> Sample:
+        """The values of an outcome over the seeds of a design point, in the seeds' order as they were asked for.
+
+        A number that is null is undefined; a time that is null is right-censored at its run's end. BadInput for an
+        outcome or a point that there is not.
+        """
+        outcome = self.outcome(column)
+        if not 0 <= point < len(self.points):
+            raise BadInput(str(self.path), "point", f"expected 0 to {len(self.points) - 1}, got {point}")
+        here = self._column("point") == point
+        well = here & self._ended_well
+        value, seed = self._numbers(outcome.column)[well], self._column("seed")[well].astype(np.int64)
+        observed = np.isfinite(value)
+        failed = int(np.count_nonzero(here)) - int(np.count_nonzero(well))
+        if outcome.kind == "time":
+            return Sample(np.where(observed, value, self._numbers(SIM_TIME)[well]), observed, seed, "time", failed)
+        undefined = int(np.count_nonzero(~observed))
+        return Sample(value[observed], observed[observed], seed[observed], "number", failed, undefined)
+
+    @cached_property
+    def _ended_well(self) -> BoolArray:
+        """Of each run (runs,) whether it did; comparing texts takes longer than a sample."""
+        import polars as pl
+
+        return self.runs.select(pl.col("ended") != FAILED).to_series().to_numpy()
+
+    def _column(self, name: str) -> AnyArray:
+        return self.runs[name].to_numpy()
+
+    def _numbers(self, name: str) -> FloatArray:
+        """A column of numbers (runs,), NaN where it is null; all NaN before any run has told of it."""
+        import polars as pl
+
+        if name not in self.runs.columns:
+            return np.full(len(self.runs), np.nan)
+        return self.runs[name].cast(pl.Float64).fill_null(float("nan")).to_numpy()
+
+    def _files(self) -> list[Path]:
+        """The table, and parts: those of a campaign that was taken up again are newer than the table."""
+        whole = self.path / SUMMARY
+        parts = (self.path / PARTS).glob("*.parquet")
+        found = sorted(part for part in parts if not part.name.startswith("."))  # what is being written starts so
+        return [whole, *found] if whole.exists() else found
+
+    def _check_columns(self, file: Path, frame: "pl.DataFrame") -> None:
+        lacking = [name for name in NEEDED if name not in frame.columns]
+        if lacking:
+            raise BadInput(str(file), lacking[0], "expected this column of a campaign's table")

@@ -1,0 +1,18 @@
+"""Outcomes of a campaign: columns of its table that say what came of each run."""
+
+from dataclasses import dataclass
+from typing import get_args
+
+from swarmwire.metrics.statistics.sample import Kind
+
+KINDS: tuple[str, ...] = get_args(Kind)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One column. A `number` is what it is; a `time` may lack, since the run ended before it: right-censored."""
+
+    column: str  # in summary.parquet, e.g. order.final
+    unit: str  # "" if it has none
+    kind: Kind
+    help: str  # one line

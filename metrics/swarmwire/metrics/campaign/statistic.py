@@ -1,0 +1,51 @@
+"""Names of statistics, as people write them: `order`, `order.final.q50`, `aggregation_time_s.censored`."""
+
+from collections.abc import Iterable
+from typing import Literal, NamedTuple, get_args
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.one_of import one_of
+from swarmwire.metrics.campaign.outcome import Outcome
+
+Stat = Literal["q25", "q50", "q75", "mean", "censored"]
+STATS: tuple[Stat, ...] = get_args(Stat)
+USUAL: Stat = "q50"
+FINAL = ".final"  # what the bare name of a metric means
+
+
+class Statistic(NamedTuple):
+    """One number of the runs of a point: which outcome, and what of its values."""
+
+    outcome: Outcome
+    stat: Stat
+
+    @property
+    def name(self) -> str:
+        """As `statistic` reads it."""
+        return f"{self.outcome.column}.{self.stat}"
+
+
+def find_outcome(name: str, outcomes: Iterable[Outcome], where: str = "--outcome") -> Outcome:
+    """The outcome of this column; the bare name of a metric means its last value. BadInput if there is none."""
+    known = {outcome.column: outcome for outcome in outcomes}
+    found = known.get(name) or known.get(name + FINAL)
+    if found is None:
+        raise BadInput(where, name, f"expected {one_of(known, name)}")
+    return found
+
+
+def find_statistic(name: str, outcomes: Iterable[Outcome], where: str = "--outcome") -> Statistic:
+    """The statistic that `COLUMN.STAT` names; the median if it names a column alone.
+
+    Where a column itself ends like a statistic (order.mean) it is that column. BadInput for what there is not, and for
+    the censored share of what is no time.
+    """
+    known = {outcome.column: outcome for outcome in outcomes}
+    column, _, last = name.rpartition(".")
+    stat: Stat | None = STATS[STATS.index(last)] if last in STATS else None
+    if name in known or stat is None or not column:
+        return Statistic(find_outcome(name, known.values(), where), USUAL)
+    found = find_outcome(column, known.values(), where)
+    if stat == "censored" and found.kind != "time":
+        raise BadInput(where, name, "expected a time: of a number nothing is censored")
+    return Statistic(found, stat)

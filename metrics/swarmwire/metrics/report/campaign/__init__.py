@@ -1,0 +1,1 @@
+"""The report of a campaign: a section a file."""

@@ -1,0 +1,87 @@
+"""Samples of a campaign and what they come to, of one design point or of several together, worked out once."""
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray
+from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
+from swarmwire.metrics.statistics.sample import Sample
+from swarmwire.metrics.statistics.summary import Summary, summary
+
+
+class Samples:
+    """What the sections of a report ask a campaign for. `points` are numbers of design points."""
+
+    def __init__(self, folder: CampaignFolder) -> None:
+        self.folder = folder
+        self._of_point = lru_cache(maxsize=None)(folder.sample)
+        self._summary = lru_cache(maxsize=None)(self._new_summary)
+
+    def sample(self, outcome: Outcome, points: tuple[int, ...]) -> Sample:
+        """The values of all runs of these points."""
+        parts = [self._of_point(outcome.column, point) for point in points]
+        if len(parts) == 1:
+            return parts[0]
+        return Sample(
+            np.concatenate([part.value for part in parts] or [np.empty(0)]),
+            np.concatenate([part.observed for part in parts] or [np.empty(0, np.bool_)]),
+            np.concatenate([part.seed for part in parts] or [np.empty(0, np.int64)]),
+            kind=outcome.kind,
+            failed=sum(part.failed for part in parts),
+            undefined=sum(part.undefined for part in parts),
+        )
+
+    def all(self, outcome: Outcome) -> Sample:
+        """The values of all runs."""
+        return self.sample(outcome, tuple(range(len(self.folder.points))))
+
+    def table(self, outcome: Outcome, rows: Sequence[tuple[int, ...]]) -> FloatArray:
+        """Values (rows, runs), of the points of each row; a seed keeps its column, NaN where there is no value.
+
+        A time that was cut off counts as the time until then.
+        """
+        return self._table(rows, lambda point: self._of_point(outcome.column, point).value, outcome)
+
+    def reached(self, outcome: Outcome, rows: Sequence[tuple[int, ...]]) -> BoolArray:
+        """Of the same shape: whether the value was observed, not cut off."""
+        return self._table(rows, lambda point: self._of_point(outcome.column, point).observed, outcome) == 1.0
+
+    def summary(self, outcome: Outcome, points: tuple[int, ...]) -> Summary:
+        """What these runs come to."""
+        return self._summary(outcome, points)
+
+    def quartiles(self, outcome: Outcome, points: tuple[int, ...]) -> tuple[float, float, float]:
+        """A quarter, half and three quarters of the runs; inf: beyond the limit, NaN: there is no value."""
+        sample = self.sample(outcome, points)
+        if not len(sample):
+            return (np.nan, np.nan, np.nan)
+        if outcome.kind == "time":
+            curve = kaplan_meier(sample)
+            found = [curve.quantile(share) for share in (0.25, 0.5, 0.75)]
+            return tuple(np.nan_to_num(found, nan=np.inf).tolist())
+        return tuple(np.quantile(sample.value, (0.25, 0.5, 0.75)).tolist())
+
+    def limit(self, outcome: Outcome) -> float | None:
+        """Up to where the longest run that was cut off was followed; None: none was."""
+        sample = self.all(outcome)
+        cut_off = sample.value[~sample.observed]
+        return float(cut_off.max()) if len(cut_off) else None
+
+    def _table(
+        self, rows: Sequence[tuple[int, ...]], of_point: Callable[[int], AnyArray], outcome: Outcome
+    ) -> FloatArray:
+        seeds = self.folder.about.seeds
+        place = {seed: column for column, seed in enumerate(seeds)}
+        table = np.full((len(rows), max(map(len, rows), default=0) * len(seeds)), np.nan)
+        for row, points in enumerate(rows):
+            for turn, point in enumerate(points):
+                seed = self._of_point(outcome.column, point).seed.tolist()
+                table[row, [turn * len(seeds) + place[each] for each in seed]] = of_point(point)
+        return table
+
+    def _new_summary(self, outcome: Outcome, points: tuple[int, ...]) -> Summary:
+        return summary(self.sample(outcome, points))

@@ -1,0 +1,131 @@
+"""The section of tables: what each outcome came to at each design point."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.report.campaign.chosen_outcomes import ChosenOutcomes
+from swarmwire.metrics.report.campaign.levels import levels_of
+from swarmwire.metrics.report.campaign.rounding import Rounding, rounding_of
+from swarmwire.metrics.report.campaign.samples import Samples
+from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence, value_text
+from swarmwire.metrics.report.section import Section, Table
+from swarmwire.metrics.statistics.summary import Summary
+
+MOST_POINTS = 60  # beyond which tables are by the values of each parameter
+_MOST_OPEN_ROWS = 20  # of tables after the first that are not folded
+
+
+@dataclass(frozen=True)
+class _Group:
+    """A row of each table: its first cells, and the design points that it is about."""
+
+    cells: tuple[str, ...]
+    points: tuple[int, ...]
+
+
+def summary_section(samples: Samples, chosen: ChosenOutcomes) -> Section:
+    """The section."""
+    columns, groups = _groups(samples)
+    parts: list[str | Table] = []
+    if len(samples.folder.points) > MOST_POINTS:
+        parts.append(
+            f"There are {len(samples.folder.points):,} design points, so the tables are by the values of each "
+            "parameter, over all values of the others. `summary.parquet` has every run."
+        )
+    for place, outcome in enumerate(chosen.shown):
+        folded = place > 0 and len(groups) > _MOST_OPEN_ROWS
+        parts.append(_table(samples, outcome, columns, groups, folded=folded))
+    for what, outcomes in (("The same in all runs", chosen.constant), ("Never there in any run", chosen.never)):
+        if outcomes:
+            parts.append(f"{what}, and so left out: {listed([f'`{outcome.column}`' for outcome in outcomes])}.")
+    if chosen.others:
+        parts.append(_other_table(samples, chosen.others, columns, groups))
+    return Section("Summary", tuple(parts))
+
+
+def _groups(samples: Samples) -> tuple[tuple[str, ...], list[_Group]]:
+    """The names of the first columns, and the rows."""
+    points, parameters = samples.folder.points, samples.folder.parameters
+    if len(points) <= MOST_POINTS:
+        rows = [
+            _Group(tuple(value_text(point[path]) for path in parameters), (number,))
+            for number, point in enumerate(points)
+        ]
+        return parameters, rows
+    rows: list[_Group] = []
+    for path in parameters:
+        levels = levels_of(path, points)
+        rows += [_Group((path, label), tuple(levels.points(level))) for level, label in enumerate(levels.labels)]
+    return ("parameter", "value"), rows
+
+
+def _table(
+    samples: Samples, outcome: Outcome, columns: tuple[str, ...], groups: list[_Group], *, folded: bool
+) -> Table:
+    summaries = [samples.summary(outcome, group.points) for group in groups]
+    rounding = _rounding(summaries)
+    some_undefined = any(found.undefined for found in summaries)
+    header = [*columns, "n", "median", "quartiles", "95 % interval of the median"]
+    header += ["not reached"] if outcome.kind == "time" else []
+    header += ["undefined"] if some_undefined else []
+    rows = [
+        (
+            *group.cells,
+            str(found.n),
+            *_figures(found, outcome, rounding),
+            *([_share(found)] if outcome.kind == "time" else []),
+            *([str(found.undefined)] if some_undefined else []),
+        )
+        for group, found in zip(groups, summaries, strict=True)
+    ]
+    what = f"{sentence(outcome_title(outcome))} (`{outcome.column}`): {outcome.help.rstrip('.')}."
+    return Table(tuple(header), tuple(rows), what, folded=folded)
+
+
+def _other_table(
+    samples: Samples, outcomes: tuple[Outcome, ...], columns: tuple[str, ...], groups: list[_Group]
+) -> Table:
+    rows: list[tuple[str, ...]] = []
+    for outcome in outcomes:
+        summaries = [samples.summary(outcome, group.points) for group in groups]
+        rounding = _rounding(summaries)
+        rows += [
+            (outcome.column, *group.cells, str(found.n), *_figures(found, outcome, rounding)[:2], _share(found))
+            for group, found in zip(groups, summaries, strict=True)
+        ]
+    header = ("outcome", *columns, "n", "median", "quartiles", "not reached")
+    return Table(header, tuple(rows), f"The other outcomes ({len(outcomes)})", folded=True)
+
+
+def _figures(found: Summary, outcome: Outcome, rounding: Rounding) -> tuple[str, str, str]:
+    """Median, quartiles and the median's interval."""
+    beyond = f"> {rounding.text(found.limit)}{' ' + outcome.unit if outcome.unit else ''}"
+    censored = outcome.kind == "time" and found.n > 0
+
+    def text(value: float) -> str:
+        return beyond if censored and not math.isfinite(value) else rounding.text(value)
+
+    low, high = found.q50_interval
+    interval = "–" if not censored and not math.isfinite(low) else f"{text(low)} to {text(high)}"
+    return (
+        text(found.q50),
+        _span(text(found.q25), text(found.q75)),
+        _span(text(low), text(high)) if censored else interval,
+    )
+
+
+def _span(low: str, high: str) -> str:
+    return low if low == high else f"{low} to {high}"
+
+
+def _share(found: Summary) -> str:
+    return f"{100.0 * found.censored:.0f} %" if math.isfinite(found.censored) else "–"
+
+
+def _rounding(summaries: Sequence[Summary]) -> Rounding:
+    return rounding_of(
+        [value for found in summaries for value in (found.q25, found.q50, found.q75)],
+        [found.q75 - found.q25 for found in summaries],
+    )

@@ -1,0 +1,54 @@
+"""The section of survival curves: how long things take, with the runs in which they never came."""
+
+from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.report.campaign.figure_name import figure_name
+from swarmwire.metrics.report.campaign.levels import Levels, levels_of
+from swarmwire.metrics.report.campaign.samples import Samples
+from swarmwire.metrics.report.campaign.words import outcome_title, sentence
+from swarmwire.metrics.report.figures.survival_curves import SurvivalCurve, survival_curves
+from swarmwire.metrics.report.section import Figure, Section
+from swarmwire.metrics.report.svg import as_svg
+from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
+
+MOST_CURVES = 6
+_MOST_PARAMETERS = 2
+
+
+def survival_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Section | None:
+    """The section; None if no outcome is a time."""
+    times = [outcome for outcome in outcomes if outcome.kind == "time"]
+    levels = [levels_of(path, samples.folder.points) for path in samples.folder.parameters[:_MOST_PARAMETERS]]
+    levels = [each for each in levels if len(each) > 1] or [None]
+    figures = [_figure(samples, outcome, each) for outcome in times for each in levels]
+    if not figures:
+        return None
+    text = (
+        "The share of runs in which it has not happened yet, by Kaplan and Meier's estimate. A curve falls with "
+        "each run in which it happens; a tick on it is a run that ended before."
+    )
+    return Section("Survival", (text, *figures))
+
+
+def _figure(samples: Samples, outcome: Outcome, levels: Levels | None) -> Figure:
+    title = outcome_title(outcome)
+    if levels is None:
+        name = figure_name("survival", outcome.column)
+        everything = tuple(range(len(samples.folder.points)))
+        curves = [_curve(samples, outcome, "all runs", everything)]
+        return Figure(name, as_svg(survival_curves(curves, "share still waiting", title), name), f"{title}.")
+    name = figure_name("survival", outcome.column, levels.path)
+    last, count = len(levels) - 1, min(MOST_CURVES, len(levels))
+    shown = [round(last * turn / (count - 1)) for turn in range(count)]
+    curves = [_curve(samples, outcome, levels.labels[level], tuple(levels.points(level))) for level in shown]
+    drawn = survival_curves(curves, f"share still waiting, by {levels.path}", title)
+    some = f", {len(shown)} of its {len(levels)} values" if len(shown) < len(levels) else ""
+    pooled = ", over all values of the others" if len(samples.folder.parameters) > 1 else ""
+    return Figure(name, as_svg(drawn, name), f"{sentence(title)} by `{levels.path}`{some}{pooled}.")
+
+
+def _curve(samples: Samples, outcome: Outcome, label: str, points: tuple[int, ...]) -> SurvivalCurve:
+    sample = samples.sample(outcome, points)
+    estimate = kaplan_meier(sample)
+    cut_off = sample.value[~sample.observed]
+    end_s = float(sample.value.max()) if len(sample) else 0.0
+    return SurvivalCurve(label, estimate.time, estimate.survival, cut_off, end_s)

@@ -1,0 +1,114 @@
+"""The section that says what was run, how to run it again, and what failed."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from swarmwire.metrics.campaign.about import About, Value
+from swarmwire.metrics.campaign.campaign_folder import FAILED, CampaignFolder
+from swarmwire.metrics.report.campaign.words import counted, listed, value_text
+from swarmwire.metrics.report.section import Listing, Section, Table
+
+_MOST_VALUES = 24  # of a parameter, named one by one
+_MOST_ERRORS = 20
+_LONGEST_ERROR = 240
+_MOST_POINTS = 6
+
+
+def what_was_run(folder: CampaignFolder) -> Section:
+    """The section."""
+    about = folder.about
+    failed = folder.runs.filter(folder.runs["ended"] == FAILED)["run"].to_list()
+    rows = [
+        ("scenario", about.scenario if about.name == about.scenario else f"{about.scenario} ({about.name})"),
+        ("design", _design(about)),
+        *((path, _values(wanted)) for path, wanted in about.vary.items()),
+        ("seeds", _seeds(about.seeds)),
+        ("settings for all", ", ".join(about.overrides) or "none"),
+        ("a run lasts", f"{about.duration_s:g} s of simulated time, unless it stops before"),
+        ("runs", _runs(folder, len(failed))),
+        ("begun", about.began_utc),
+        ("versions", ", ".join(f"{name} {value_text(version)}" for name, version in about.versions.items())),
+        ("CPU", listed(_machines(folder))),
+    ]
+    name = folder.path.resolve().name
+    example = failed[0] if failed else folder.about.runs // 2
+    parts: list[str | Listing | Table] = [Table(("", ""), tuple(rows), "")]
+    parts.append(
+        f"The campaign was started by the first of these lines; the second repeats run {example}, bit for bit."
+    )
+    parts.append(Listing(f"{about.command}\nswarmwire repeat {name} --run {example}"))
+    if not folder.finished:
+        parts.append(
+            f"{counted(len(folder.missing), 'run')} of {about.runs:,} had not ended when this report was made, and "
+            "what follows is about the others. The first of these lines with `--resume` runs only what is missing."
+        )
+    return Section("What was run", (*parts, *_failures(folder)))
+
+
+def _design(about: About) -> str:
+    points, seeds = len(about.points), len(about.seeds)
+    return (
+        f"{about.design}: {counted(points, 'point')} × {counted(seeds, 'seed')} = {counted(about.runs, 'run')}; "
+        "every point has the same seeds"
+    )
+
+
+def _values(wanted: Sequence[Value] | Mapping[str, Value]) -> str:
+    if isinstance(wanted, Mapping):
+        return f"from {value_text(wanted['from'])} to {value_text(wanted['to'])}"
+    values = list(map(value_text, wanted))
+    if len(values) <= _MOST_VALUES:
+        return ", ".join(values)
+    return f"{', '.join(values[:3])}, … {values[-1]} ({len(values):,} values)"
+
+
+def _seeds(seeds: tuple[int, ...]) -> str:
+    if len(seeds) > 2 and list(seeds) == list(range(seeds[0], seeds[0] + len(seeds))):
+        return f"{seeds[0]} to {seeds[-1]}"
+    return _values(seeds)
+
+
+def _runs(folder: CampaignFolder, failed: int) -> str:
+    ended = len(folder.runs)
+    return f"{ended - failed:,} done, {failed:,} failed, {len(folder.missing):,} missing"
+
+
+def _machines(folder: CampaignFolder) -> list[str]:
+    """The CPUs that it began on and that runs were made on."""
+    found: Iterable[str] = (
+        folder.runs["machine_cpu"].drop_nulls().unique().sort() if "machine_cpu" in folder.runs else ()
+    )
+    return list(dict.fromkeys([folder.about.cpu, *found]))
+
+
+def _failures(folder: CampaignFolder) -> list[str | Table]:
+    """Errors with the runs that they ended, the most frequent first."""
+    import polars as pl
+
+    failed = folder.runs.filter(pl.col("ended") == FAILED)
+    if not len(failed):
+        return []
+    groups = (
+        failed.with_columns(pl.col("error").fill_null("no error was told").str.strip_chars())
+        .group_by("error")
+        .agg(
+            pl.len().alias("count"), pl.col("run").min().alias("first"), pl.col("point").unique().sort().alias("points")
+        )
+        .sort("count", "first", descending=[True, False])
+    )
+    rows = [
+        (_short(error), str(count), str(first), _points(points))
+        for error, count, first, points in groups.select("error", "count", "first", "points").head(_MOST_ERRORS).rows()
+    ]
+    more = f" {counted(len(groups) - len(rows), 'rarer error')} left out." if len(groups) > len(rows) else ""
+    caption = f"Runs that failed, by their error. They have no part in what follows.{more}"
+    return [Table(("error", "runs", "first run", "design points"), tuple(rows), caption)]
+
+
+def _short(error: str) -> str:
+    line = " ".join(error.split())
+    return line if len(line) <= _LONGEST_ERROR else f"{line[: _LONGEST_ERROR - 1]}…"
+
+
+def _points(points: list[int]) -> str:
+    named = ", ".join(map(str, points[:_MOST_POINTS]))
+    return named if len(points) <= _MOST_POINTS else f"{named}, … ({len(points)})"

@@ -1,0 +1,62 @@
+"""How outcomes, parameters and values are called in tables and figures."""
+
+from swarmwire.metrics.campaign.about import Point, Value
+from swarmwire.metrics.campaign.outcome import Outcome
+
+_ENDINGS = {
+    "final": " at the end",
+    "mean": ", mean over the run",
+    "min": ", least in the run",
+    "max": ", greatest in the run",
+}
+_KNOWN = {
+    "radio.pdr": "delivery ratio (PDR)",
+    "stop_time_s": "time until it stopped in s",
+    "radio.sent": "packets sent",
+    "radio.intended": "receivers meant",
+    "radio.in_range": "receivers in range",
+}
+
+
+def outcome_title(outcome: Outcome) -> str:
+    """What an outcome is, in words, with its unit: "aggregation time in s"."""
+    if outcome.column in _KNOWN:
+        return _KNOWN[outcome.column]
+    name, _, ending = outcome.column.rpartition(".")
+    if ending not in _ENDINGS or not name:
+        name, ending = outcome.column, ""
+    name = name.removesuffix(f"_{outcome.unit}") if outcome.unit else name
+    words = name.replace("_", " ")
+    unit = f" in {outcome.unit}" if outcome.unit else ""
+    return f"{words}{unit}{_ENDINGS[ending]}" if ending else f"{words}{unit}"
+
+
+def sentence(text: str) -> str:
+    """The text with its first letter large."""
+    return text[:1].upper() + text[1:]
+
+
+def value_text(value: Value) -> str:
+    """A parameter's value as short as it can be said, of numbers the first six digits."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(value_text, value)) + "]"
+    return "" if value is None else value
+
+
+def point_text(point: Point) -> str:
+    """A design point in one line: `radio.loss` 0.2, `robots.flock.count` 10."""
+    return ", ".join(f"`{path}` {value_text(value)}" for path, value in point.items())
+
+
+def listed(words: list[str], last: str = "and") -> str:
+    """`a, b and c`."""
+    return f" {last} ".join(filter(None, (", ".join(words[:-1]), words[-1]))) if words else ""
+
+
+def counted(count: int, what: str, many: str = "") -> str:
+    """`1 run`, `1,200 runs`."""
+    return f"{count:,} {what if count == 1 else many or what + 's'}"

@@ -1,0 +1,90 @@
+"""How the median of an outcome answers to a parameter: with its interval, the quartiles, and where it jumps."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.metrics.drawing.looks import CURVE, INK, SOFT, Look
+from swarmwire.metrics.report.figures.column_axes import ACCENT, LETTERS_PT, column_axes, plain_legend
+from swarmwire.metrics.report.figures.log_axis import fits_log, set_log
+from swarmwire.metrics.report.figures.ordered_colors import ordered_colors
+
+
+@dataclass(frozen=True)
+class Jump:
+    """Where the outcome changes most, and the interval in which that place lies."""
+
+    at: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Response:
+    """Medians over the values of a parameter; arrays (k,), inf where it lies beyond the limit, NaN where none is."""
+
+    label: str
+    x: FloatArray  # ascending
+    median: FloatArray
+    low: FloatArray  # of the median's interval
+    high: FloatArray
+    q25: FloatArray
+    q75: FloatArray
+    jump: Jump | None = None
+
+
+def response_curve(responses: Sequence[Response], title: str, x_label: str, limit: float | None = None) -> Any:
+    """The figure; of one response with its quartiles, of several with a legend.
+
+    `limit`: up to where a censored value was followed, None where nothing is censored.
+    """
+    figure, axes = column_axes(title, x_label)
+    alone = len(responses) == 1
+    if limit is not None:
+        axes.axhline(limit, color=SOFT, lw=0.7, ls="--", zorder=1)
+    for response, color in zip(responses, [CURVE] if alone else ordered_colors(len(responses)), strict=True):
+        if response.jump is not None:
+            _draw_jump(axes, response.jump, ACCENT if alone else color, written=alone)
+        if alone:
+            _fill(axes, response.x, response.q25, response.q75, limit, color, 0.12)
+        _fill(axes, response.x, response.low, response.high, limit, color, 0.3 if alone else 0.2)
+        _draw_medians(axes, response, limit, color)
+    if fits_log(responses[0].x):
+        set_log(axes.xaxis)
+    reached = [quartile for response in responses for quartile in (response.q25, response.q75)]
+    if fits_log(np.concatenate(reached + ([] if limit is None else [np.array([limit])]))):
+        set_log(axes.yaxis)
+    if not alone:
+        plain_legend(axes, loc="best")
+    return figure
+
+
+def _fill(
+    axes: Any, x: FloatArray, low: FloatArray, high: FloatArray, limit: float | None, color: Any, alpha: float
+) -> None:
+    """A band, which ends at the limit where it lies beyond."""
+    top = np.nan if limit is None else limit
+    edges = (np.where(np.isposinf(edge), top, edge) for edge in (low, high))
+    axes.fill_between(x, *edges, color=color, alpha=alpha, lw=0)
+
+
+def _draw_medians(axes: Any, response: Response, limit: float | None, color: Any) -> None:
+    known = np.isfinite(response.median)
+    # NaN where the median is censored: the line breaks there.
+    medians = np.where(known, response.median, np.nan)
+    axes.plot(response.x, medians, "o-", color=color, lw=1.3, ms=3, zorder=4, label=response.label)
+    beyond = np.isposinf(response.median)
+    if limit is not None and beyond.any():
+        mark: Look = {"ms": 4, "mfc": "white", "mec": INK, "mew": 0.8, "zorder": 5, "clip_on": False, "ls": ""}
+        axes.plot(response.x[beyond], np.full(int(beyond.sum()), limit), "^", **mark)
+
+
+def _draw_jump(axes: Any, jump: Jump, color: Any, *, written: bool) -> None:
+    axes.axvspan(jump.low, jump.high, color=color, alpha=0.12, lw=0, zorder=0)
+    axes.axvline(jump.at, color=color, lw=1.0, zorder=1)
+    if written:
+        at: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "va": "top", "color": color}
+        axes.annotate(f"{jump.at:.3g}", (jump.at, 1.0), (3, 7), fontsize=LETTERS_PT, **at)

@@ -1,0 +1,1 @@
+"""What the report of a single run holds, a section a file."""

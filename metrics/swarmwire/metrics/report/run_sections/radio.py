@@ -1,0 +1,37 @@
+"""What the radio did: delivery over distance, latencies, links, and what became of packets."""
+
+from typing import Any
+
+from swarmwire.metrics.report.in_words import share
+from swarmwire.metrics.report.run_data import RunData
+from swarmwire.metrics.report.run_sections.distances import distances
+from swarmwire.metrics.report.run_sections.fates import fates
+from swarmwire.metrics.report.run_sections.latencies import latencies
+from swarmwire.metrics.report.run_sections.links import links
+from swarmwire.metrics.report.section import Figure, Listing, Section
+
+TITLE = "The radio"
+
+
+def radio(run: RunData) -> Section:
+    """The section: figures side by side, then what is to be said of those that cannot be drawn, then tables."""
+    if not run.has_radio:
+        return Section(TITLE, ("The robots have no radio.",))
+    found = run.of_arena("radio")
+    said = [_account(found, run.static.arenas)] if found else []
+    drawn = [distances(run), latencies(run), links(run)]
+    figures = [part for part in drawn if isinstance(part, Figure)]
+    missing = [part for part in drawn if isinstance(part, str)]
+    if missing and run.started:
+        missing.append("A repetition records it, and is the same run:")
+        again = Listing(f"swarmwire repeat {run.folder.path} --packets all --links --out {run.folder.path}-again")
+        return Section(TITLE, (*said, *figures, *missing, again, *fates(run)))
+    return Section(TITLE, (*said, *figures, *missing, *fates(run)))
+
+
+def _account(radio: dict[str, Any], arenas: int) -> str:
+    sent, intended, in_range, pdr = (radio.get(key) for key in ("sent", "intended", "in_range", "pdr"))
+    heard = f"; {share(pdr)} of these heard it" if isinstance(pdr, float) else ""
+    where = "In the first arena " if arenas > 1 else ""
+    reached = f"meant for {intended:,} receivers, of which {in_range:,} were in range{heard}"
+    return f"{where}{sent:,} packets were sent, {reached}."

@@ -1,0 +1,39 @@
+"""A report written down: the page, and its figures as files beside it."""
+
+from pathlib import Path
+
+from swarmwire.metrics.report.page import page
+from swarmwire.metrics.report.section import Report
+from swarmwire.metrics.whole_file import check_path, chosen_file
+
+PAGE = "report.html"
+FIGURES = "figures"
+_SVG_HEAD = '<?xml version="1.0" encoding="utf-8"?>\n'
+
+
+def write_report(report: Report, to: Path) -> list[Path]:
+    """Write the page there and the figures to `figures/` beside it; the paths of all of them, the page first.
+
+    BadInput for a path that cannot be.
+    """
+    check_path(to, (".html", ".htm"))
+    text = page(report)
+    folder = to.parent / FIGURES
+    written = [to, *(folder / f"{figure.name}.svg" for figure in report.figures)]
+    if report.figures:
+        _make(folder)
+    for path, content in zip(
+        written, [text, *(_SVG_HEAD + figure.svg + "\n" for figure in report.figures)], strict=True
+    ):
+        with chosen_file(path) as aside:
+            aside.write_text(content, encoding="utf-8")
+    return written
+
+
+def _make(folder: Path) -> None:
+    from swarmwire.comms.errors import BadInput
+
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise BadInput(str(folder), "", f"expected a folder that can be made: {error.strerror}") from None

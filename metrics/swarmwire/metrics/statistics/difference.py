@@ -1,0 +1,110 @@
+"""How a second sample differs from a first: by how much, how surely, and how much that is.
+
+Where two seeds or more are in both, these are compared seed by seed: runs of one seed begin alike, so that their
+difference varies less than either. Else the samples are compared as wholes. Failed runs take no part.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from scipy import stats
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval, resampled_means, resampled_medians
+from swarmwire.metrics.statistics.effect_size import cliffs_delta, hedges_g
+from swarmwire.metrics.statistics.gehan import paired_p
+from swarmwire.metrics.statistics.interval import LEVEL, UNKNOWN, Interval
+from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
+from swarmwire.metrics.statistics.log_rank import log_rank
+from swarmwire.metrics.statistics.resampled_times import resampled_quantiles
+from swarmwire.metrics.statistics.sample import Sample
+
+Test = Literal["Wilcoxon signed-rank", "Mann-Whitney", "paired Gehan", "log-rank"]
+FEWEST_PAIRS = 2
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Second less first; NaN where it is not known."""
+
+    pairs: int  # seeds that were compared one by one; 0: the samples were compared as wholes
+    median: float  # of numbers in pairs the median of the differences, else the difference of the medians
+    median_interval: Interval  # bootstrap; open where resampled medians of times lie beyond what was watched
+    mean: float  # of times: of min(time, horizon)
+    mean_interval: Interval  # bootstrap
+    horizon: float  # of times: up to when every run was watched; inf of numbers
+    delta: float  # Cliff's, -1 to 1: P(second > first) - P(second < first), over all values of both
+    g: float  # Hedges'; NaN of times
+    p: float  # two-sided, of the test; NaN: nothing tells the two apart
+    test: Test
+
+
+def difference(first: Sample, second: Sample, level: float = LEVEL) -> Difference:
+    """The difference of two samples of one kind."""
+    seeds = np.intersect1d(first.seed, second.seed)
+    paired = len(seeds) >= FEWEST_PAIRS
+    one, other = (first.of_seeds(seeds), second.of_seeds(seeds)) if paired else (first, second)
+    if not (len(one) and len(other)):
+        test: Test = "log-rank" if first.kind == "time" else "Mann-Whitney"
+        return Difference(0, math.nan, UNKNOWN, math.nan, UNKNOWN, math.inf, math.nan, math.nan, math.nan, test)
+    pairs = len(seeds) if paired else 0
+    delta = cliffs_delta(second, first)
+    if first.kind == "time":
+        horizon = _horizon(one, other)
+        least = (np.minimum(one.value, horizon), np.minimum(other.value, horizon))
+        p, test = (paired_p(one, other), "paired Gehan") if paired else (log_rank(one, other).p, "log-rank")
+        median, mean = _medians_of_times(one, other, paired, level), _means(*least, paired, level)
+        return Difference(pairs, *median, *mean, horizon, delta, math.nan, p, test)
+    p, test = _p_of_numbers(one.value, other.value, paired)
+    median, mean = _medians(one.value, other.value, paired, level), _means(one.value, other.value, paired, level)
+    g = hedges_g(second.value, first.value)
+    return Difference(pairs, *median, *mean, math.inf, delta, g, p, test)
+
+
+def _medians(one: FloatArray, other: FloatArray, paired: bool, level: float) -> tuple[float, Interval]:
+    if paired:
+        resampled = resampled_medians(other - one)
+        return float(np.median(other - one)), percentile_interval(resampled, len(one), level)
+    return float(np.median(other) - np.median(one)), _unpaired(resampled_medians, one, other, level)
+
+
+def _means(one: FloatArray, other: FloatArray, paired: bool, level: float) -> tuple[float, Interval]:
+    mean = float(other.mean() - one.mean())
+    if paired:
+        return mean, percentile_interval(resampled_means(other - one), len(one), level)
+    return mean, _unpaired(resampled_means, one, other, level)
+
+
+def _unpaired(resampled: Any, one: FloatArray, other: FloatArray, level: float) -> Interval:
+    """Of samples drawn independently; as many resamples as there are of the larger."""
+    first, second = resampled(one), resampled(other, 1)
+    fewer = min(len(first), len(second))
+    return percentile_interval(second[:fewer] - first[:fewer], min(len(one), len(other)), level)
+
+
+def _medians_of_times(one: Sample, other: Sample, paired: bool, level: float) -> tuple[float, Interval]:
+    median = kaplan_meier(other).quantile(0.5) - kaplan_meier(one).quantile(0.5)
+    first = resampled_quantiles(one, drawn(len(one)), 0.5)
+    second = resampled_quantiles(other, drawn(len(other), 0 if paired else 1), 0.5)
+    fewer = min(len(first), len(second))
+    with np.errstate(invalid="ignore"):  # both beyond: it may be anything
+        resampled = second[:fewer] - first[:fewer]
+    unknown, n = np.isnan(resampled), min(len(one), len(other))
+    low = percentile_interval(np.where(unknown, -np.inf, resampled), n, level).low
+    return median, Interval(low, percentile_interval(np.where(unknown, np.inf, resampled), n, level).high)
+
+
+def _horizon(one: Sample, other: Sample) -> float:
+    """Up to when every run was watched: the first end of one that still waited; the last time if none did."""
+    ends = np.concatenate([one.value[~one.observed], other.value[~other.observed]])
+    return float(ends.min()) if len(ends) else float(max(one.value.max(), other.value.max()))
+
+
+def _p_of_numbers(one: FloatArray, other: FloatArray, paired: bool) -> tuple[float, Test]:
+    scipy: Any = stats
+    if not paired:
+        return float(scipy.mannwhitneyu(one, other).pvalue), "Mann-Whitney"
+    change = other - one
+    return float(scipy.wilcoxon(change).pvalue) if change.any() else 1.0, "Wilcoxon signed-rank"

@@ -1,0 +1,50 @@
+"""A sample: what the runs of one design point gave, each with its seed."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+
+Kind = Literal["number", "time"]  # a time may lie beyond its run's end: right-censored
+
+
+@dataclass(frozen=True)
+class Sample:
+    """n values, in the order of their seeds; runs without a value are counted beside them."""
+
+    value: FloatArray  # (n,) finite; where not observed: the time up to which it had not happened
+    observed: BoolArray  # (n,) False: right-censored, the true value lies beyond
+    seed: IntArray  # (n,) of each value's run: who has the same seed began alike
+    kind: Kind = "number"  # quantiles of times are Kaplan and Meier's, censored or not
+    failed: int = 0  # runs that ended in an error
+    undefined: int = 0  # runs that ended well with nothing to measure
+
+    @cached_property
+    def censored(self) -> float:
+        """Share of the values that are right-censored; NaN of none."""
+        return float(np.mean(~self.observed)) if len(self.value) else float("nan")
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+    def of_seeds(self, seed: IntArray) -> "Sample":
+        """The values (k,) of these seeds, in the order given; each must be there, once."""
+        order = np.argsort(self.seed)
+        place = order[np.searchsorted(self.seed, seed, sorter=order)]
+        return replace(self, value=self.value[place], observed=self.observed[place], seed=seed)
+
+
+def number_sample(value: FloatArray, seed: IntArray | None = None) -> Sample:
+    """A sample of numbers (n,), of which NaN are undefined; seeds are 0, 1, … unless told."""
+    there = np.isfinite(value)
+    seeds = np.arange(len(value)) if seed is None else seed
+    undefined = int(np.count_nonzero(~there))
+    return Sample(value[there], there[there], seeds[there], undefined=undefined)
+
+
+def time_sample(value: FloatArray, observed: BoolArray, seed: IntArray | None = None) -> Sample:
+    """A sample of finite times (n,), right-censored where not observed; seeds are 0, 1, … unless told."""
+    return Sample(value, observed, np.arange(len(value)) if seed is None else seed, "time")
