@@ -4,10 +4,10 @@ import pytest
 
 from swarmwire.deploy.campaign.campaign import Campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder as Written
-from swarmwire.deploy.campaign.outcomes import Outcome
 from swarmwire.deploy.campaign.task import PieceResult
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.metrics.campaign.outcome import Outcome
 
 CAMPAIGN = Campaign(
     name="loss",
