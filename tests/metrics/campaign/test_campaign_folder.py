@@ -141,7 +141,7 @@ def test_a_point_that_there_is_not_is_refused(tmp_path, point):
         ({"outcomes": [{"column": "x", "unit": "", "kind": "level", "help": ""}]}, "outcomes[0].kind"),
         ({"outcomes": [{"column": "x"}]}, "outcomes[0].unit"),
         ({"files": [3]}, "files[0]"),
-        ({"files": [{"path": "a"}]}, "files[0].sha256"),
+        ({"files": [{"what": "a"}]}, "files[0].path"),
         ({"overrides": [3]}, "overrides"),
         ({"modules": []}, "modules"),
         ({"name": None}, "name: expected a text"),

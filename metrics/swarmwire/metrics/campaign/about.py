@@ -28,8 +28,8 @@ class About:
     began_utc: str  # ISO 8601
     versions: Mapping[str, Any]  # of Python and packages
     cpu: str
-    modules: Mapping[str, str]  # sha256 of the installed code that was used, by import path
-    files: tuple[Mapping[str, str], ...]  # path, sha256 and what of each file below scenario/
+    modules: Mapping[str, str]  # sha256 of the installed code, by module
+    files: tuple[str, ...]  # that the scenario needs, below scenario/
     design: str  # one of DESIGNS
     seeds: tuple[int, ...]
     vary: Mapping[str, list[Value] | Mapping[str, Value]]  # path -> values, or {"from", "to"}
@@ -102,7 +102,7 @@ def _about(fields: _Fields) -> About:
         versions=fields.get("versions", dict, "an object"),
         cpu=fields.text("cpu"),
         modules=fields.get("modules", dict, "an object"),
-        files=tuple({name: of.text(name) for name in ("path", "sha256", "what")} for of in fields.objects("files")),
+        files=tuple(of.text("path") for of in fields.objects("files")),
         design=fields.one_of("design", DESIGNS),
         seeds=_seeds(fields),
         vary=fields.get("vary", dict, "an object"),
