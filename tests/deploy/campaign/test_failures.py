@@ -8,8 +8,8 @@ import pytest
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.deploy import sweep
 from swarmwire.deploy.campaign import worker_process
-from swarmwire.deploy.campaign.executor import Finished
 from swarmwire.deploy.campaign.execution import execute
+from swarmwire.deploy.campaign.executor import Finished
 from swarmwire.deploy.campaign.local_executor import LocalExecutor
 from swarmwire.deploy.campaign.task import PieceResult, Task
 from tests.deploy.campaign.small import rows_in, series_in
@@ -21,13 +21,12 @@ def test_an_agent_that_fails_for_some_seeds_costs_no_others(tmp_path, stumbling,
     failed = [row["seed"] for row in rows if row["ended"] == "failed"]
     assert done.is_over
     assert done.failed == len(failed)
-    assert 0 < len(failed) < 12
+    assert 1 < len(failed) < 12
     for row in rows:
         assert (row["error"] is None) == (row["seed"] not in failed) == (row["order.final"] is not None)
         if row["error"]:
             assert "ValueError: stumbled" in row["error"]
             assert 'File "scenario/files/stumbling.py", line' in row["error"]
-            assert row["counts.clipped_commands"] is None
     assert set(series_in(tmp_path / "c")["run"]) == {seed - 1 for seed in range(1, 13) if seed not in failed}
     sweep(stumbling, seeds=12, out=tmp_path / "unpacked", pack=1)
     assert rows_in(tmp_path / "unpacked") == rows
@@ -50,7 +49,9 @@ def test_a_metric_of_ones_own_that_raises_is_a_failed_row(tmp_path, scenario, he
     assert "no number" in rows_in(tmp_path / "c")[1]["error"]
 
 
-@pytest.mark.parametrize(("how", "told"), [("kill", "the worker died, signal 9"), ("exit", "the worker ended, exit code 3")])
+@pytest.mark.parametrize(
+    ("how", "told"), [("kill", "the worker died, signal 9"), ("exit", "the worker ended, exit code 3")]
+)
 def test_a_seed_of_which_workers_die_is_a_failed_row(tmp_path, stumbling, how, told):
     raised, out = sweep(stumbling, seeds=3, out=tmp_path / "raised", workers=2), tmp_path / "c"
     assert raised.failed == 1

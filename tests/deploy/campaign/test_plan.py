@@ -16,7 +16,10 @@ def test_a_range_over_what_the_scenario_counts_gives_whole_numbers(scenario):
         "from swarmwire.agent import Agent\nclass Counting(Agent):\n    n: int = 3\n    x: float = 1.0\n"
         "    def step(self, robot): pass\n"
     )
-    agent = ('robots.pair.agent="counting.py:Counting"', 'events=[{at_s=0.1, do="kill", robots={group="pair", count=1}}]')
+    agent = (
+        'robots.pair.agent="counting.py:Counting"',
+        'events=[{at_s=0.1, do="kill", robots={group="pair", count=1}}]',
+    )
     found = plan(
         scenario, "robots.pair.count=2:8:2", "robots.pair.params.n=1:3:2", "robots.pair.params.x=1:3:2",
         "time.rate_hz=10:20:2", "duration_s=1:2:2", "events.0.robots.count=1:2:2", overrides=agent,

@@ -30,7 +30,12 @@ def test_each_run_has_a_row_that_says_what_a_run_of_its_own_would(reference):
     assert [(row["run"], row["point"], row["seed"]) for row in rows] == [
         (i, i // 3, i % 3 + 1) for i in range(12)
     ]  # fmt: skip
-    assert [(row["radio.loss"], row["robots.pair.count"]) for row in rows[::3]] == [(0.0, 2), (0.0, 3), (0.8, 2), (0.8, 3)]
+    assert [(row["radio.loss"], row["robots.pair.count"]) for row in rows[::3]] == [
+        (0.0, 2),
+        (0.0, 3),
+        (0.8, 2),
+        (0.8, 3),
+    ]
     alone = run(reference / "two.toml", seed=2, overrides=["radio.loss=0.8", "robots.pair.count=3"])
     row, radio = rows[10], alone.radio
     assert row["trajectory_sha256"] == alone.trajectory_sha256[0]
@@ -91,7 +96,13 @@ def test_files_that_points_name_are_kept_with_the_campaign(tmp_path, scenario, h
         (tmp_path / f"{name}.py").write_text(
             f"from swarmwire.agent import Agent\nclass Mine(Agent):\n    def step(self, robot): robot.drive({speed}, 0.0)\n"
         )
-    sweep(scenario, seeds=1, vary={"robots.pair.agent": ["slow.py:Mine", "fast.py:Mine"]}, out=tmp_path / "c", overrides=[])
+    sweep(
+        scenario,
+        seeds=1,
+        vary={"robots.pair.agent": ["slow.py:Mine", "fast.py:Mine"]},
+        out=tmp_path / "c",
+        overrides=[],
+    )
     campaign = read_campaign(tmp_path / "c")
     assert [dict(point) for point in campaign.points] == [
         {"robots.pair.agent": "slow.py:Mine"}, {"robots.pair.agent": "fast.py:Mine"}
@@ -99,7 +110,8 @@ def test_files_that_points_name_are_kept_with_the_campaign(tmp_path, scenario, h
     assert {file.path for file in campaign.files} == {"scenario.toml", "files/slow.py", "files/fast.py"}
     hashes = [row["trajectory_sha256"] for row in rows_in(tmp_path / "c")]
     assert hashes == [
-        run(scenario, overrides=[f'robots.pair.agent="{name}.py:Mine"']).trajectory_sha256[0] for name in ("slow", "fast")
+        run(scenario, overrides=[f'robots.pair.agent="{name}.py:Mine"']).trajectory_sha256[0]
+        for name in ("slow", "fast")
     ]
 
 

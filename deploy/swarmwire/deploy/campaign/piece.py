@@ -61,8 +61,8 @@ def _together(task: Task) -> tuple[list[Row], bytes | None]:
     finally:
         if out is not None and out.exists():
             out.replace(str(task.record_to))
-    result = simulation.result
-    rows = [row_of(arena, result) for arena in result.arenas]
+    times = {metric.name for metric in simulation.metrics.metrics if metric.kind == "time"}
+    rows = [row_of(arena, times) for arena in simulation.result.arenas]
     return rows, series.parquet(task.runs, [row["ticks"] for row in rows]) if task.series else None
 
 
