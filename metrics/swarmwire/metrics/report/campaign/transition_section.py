@@ -100,7 +100,7 @@ def _map(
 ) -> Figure:
     name = figure_name("map", outcome.column, x.path, y.path, *([str(number)] if number else []))
     jumps = [None if change is None else _jump(change, x, np.arange(len(x), dtype=np.float64)) for change in changes]
-    figure = heat_map(medians, x.labels, y.labels, f"median {outcome_title(outcome)}", x.path, y.path, jumps)
+    figure = heat_map(medians, x.short, y.short, f"median {outcome_title(outcome)}", x.path, y.path, jumps)
     at = f", at {of.label}" if of.label else ""
     return Figure(name, as_svg(figure, name), f"{sentence(outcome_title(outcome))} over `{x.path}` and `{y.path}`{at}.")
 
