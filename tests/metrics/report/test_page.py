@@ -47,7 +47,12 @@ def test_the_contents_lead_to_each_section():
 def test_texts_are_no_markup():
     evil = '<script>alert("1")</script> & `<b>`'
     shown = report(
-        evil, Listing(evil), Table((evil, "b"), ((evil, "1"),), evil), Figure("a", drawn("a"), evil), title=evil, about=evil
+        evil,
+        Listing(evil),
+        Table((evil, "b"), ((evil, "1"),), evil),
+        Figure("a", drawn("a"), evil),
+        title=evil,
+        about=evil,
     )
     assert "script" not in shown.tags
     assert "b" not in shown.tags

@@ -114,12 +114,19 @@ class CampaignFolder:
         """Read once: a report asks for every outcome at every point."""
         order = np.argsort(self._column("point"), kind="stable")
         value, end_s = self._numbers(outcome.column)[order], self._numbers(SIM_TIME)[order]
-        seed, well = self._column("seed")[order].astype(np.int64), self._column("ended")[order] != FAILED
+        seed, well = self._column("seed")[order].astype(np.int64), self._ended_well[order]
         edges = np.searchsorted(self._column("point")[order], np.arange(len(self.points) + 1)).tolist()
         return tuple(
             _sample(outcome, value[here], end_s[here], seed[here], well[here])
             for here in (slice(start, end) for start, end in pairwise(edges))
         )
+
+    @cached_property
+    def _ended_well(self) -> BoolArray:
+        """Of each run (runs,) whether it did; comparing texts takes longer than a sample."""
+        import polars as pl
+
+        return self.runs.select(pl.col("ended") != FAILED).to_series().to_numpy()
 
     def _column(self, name: str) -> AnyArray:
         return self.runs[name].to_numpy()
