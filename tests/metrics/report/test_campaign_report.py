@@ -84,17 +84,15 @@ def test_many_points_are_put_together_into_ranges(tmp_path):
 
 
 def test_numbers_in_the_table_are_those_of_the_runs(tmp_path):
-    values = {"gap_m.final": lambda point, _: float(point["run"])}
-    points = [{"run": run} for run in range(1, 10)]
-    folder = write_campaign(
-        tmp_path / "a", {"run": list(range(1, 10))}, (1,), points=points, numbers=values, times={}, design="list"
-    )
-    _, shown = of(folder)
-    assert [row[:4] for row in shown.table("run", "n")] == [[str(run), "1", str(run), str(run)] for run in range(1, 10)]
+    values = iter([3.0, 1.0, 2.0, 5.0, 4.0, *[7.5] * 5])
+    numbers = {"gap_m.final": lambda *_: next(values)}
+    _, shown = of(write_campaign(tmp_path / "a", {"radio.loss": [0.0, 0.5]}, range(5), numbers=numbers, times={}))
+    [first, second] = shown.table("radio.loss", "n", "median", "quartiles", "95 % interval of the median")
+    assert first[:4] == ["0", "5", "3.0", "2.0 to 4.0"]
+    assert second == ["0.5", "5", "7.5", "7.5", "7.5 to 7.5"]
 
 
 def test_quartiles_of_times_beyond_the_limit_say_so(tmp_path):
-    """Of ten runs 3, 5 and 8 arrive by 40, 60 and 80 s: two values, three groups."""
     arrive = {"early": [10.0] * 8 + [None] * 2, "late": [10.0] * 4 + [None] * 6, "never": [None] * 10}
     drawn = {key: iter(times) for key, times in arrive.items()}
     times = {"found_s": lambda point, _: next(drawn[point["who"]])}
@@ -152,7 +150,7 @@ def test_what_is_asked_for_is_shown_even_if_it_never_varies(tmp_path):
     numbers = {"order.final": lambda _, rng: rng.random(), "components.final": lambda *_: 1.0}
     _, shown = of(ordinary(tmp_path, numbers=numbers), ["components", "aggregation_time_s"])
     assert [row[2] for row in shown.table("radio.loss", "n")] == ["1"] * 4
-    with pytest.raises(BadInput, match="did you mean order"):
+    with pytest.raises(BadInput, match="expected one of order.final"):
         of(tmp_path / "made-up", ["ordre"])
 
 
