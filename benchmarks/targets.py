@@ -47,6 +47,8 @@ TARGETS = {
     "view-cost-size": most(60, "`run.rrd` of that run"),
     "view-cost-radio": most(15, "with the radio, 8.7 packets heard per robot and tick"),
     "view-cost-radio-size": most(60, "`run.rrd` of that run"),
+    "metrics-share": most(20, "what the metrics of every run cost of `inprocess-1000-d1`"),
+    "metrics-share-radio": most(20, "the same, of `inprocess-1000-d1-radio`"),
     "air-802154-1000": Target(
         20, "1,000 robots, 20 bytes, 29 in range, 802.15.4: shadowing, fading, CSMA, SINR to 10 dB below noise"
     ),

@@ -5,7 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from swarmwire.metrics.campaign.about import About, Value
 from swarmwire.metrics.campaign.campaign_folder import FAILED, CampaignFolder
-from swarmwire.metrics.report.campaign.words import counted, listed, value_text
+from swarmwire.metrics.report.campaign.words import listed, value_text
+from swarmwire.metrics.report.in_words import counted
 from swarmwire.metrics.report.section import Listing, Section, Table
 
 _MOST_VALUES = 24  # of a parameter, named one by one
