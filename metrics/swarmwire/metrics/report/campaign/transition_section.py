@@ -49,9 +49,9 @@ def _how_to_read(numbers: int) -> str:
     )
     if numbers == 1:
         return (
-            "The line is the median; the darker band its 95 % interval, the lighter one from quartile to quartile; "
-            "a triangle is a median beyond the time limit. The upright line is the change point, with its 95 % "
-            f"interval: {change}"
+            "The line is the median, with its 95 % intervals; a band reaches from quartile to quartile; a triangle is "
+            "a median beyond the time limit. The upright line across is the change point, with its 95 % interval: "
+            f"{change}"
         )
     others = " Other numbers of a grid are at their middle value, all else is taken together." if numbers > 2 else ""
     return (
