@@ -171,7 +171,7 @@ def test_the_shape_of_what_is_left_is_named(tmp_path, shape, better):
     }
     sections, shown = of(ordinary(tmp_path, vary=vary, numbers=numbers, times={}))
     assert [row[2] for row in shown.table("outcome", "over", "shape") if row[-1] == "better"] == [better]
-    assert "without a curve: `wait.final`" in sections["Resilience"].parts[0]
+    assert "without a curve: `wait.final`" in str(sections["Resilience"].parts[0])
 
 
 def test_a_scenario_may_be_called_anything(tmp_path):

@@ -31,7 +31,7 @@ class Group:
 
 
 def distributions(groups: Sequence[Group], title: str, x_label: str, limit: float | None = None) -> Any:
-    """The figure of at least one group. `limit`: up to where a censored value was followed, None where nothing is censored."""
+    """The figure of at least one group. `limit`: up to where censored values were followed, None if nothing is."""
     labels = [group.label for group in groups]
     figure, axes = column_axes(title, x_label, foot_in=room_below_in(labels))
     everything = np.concatenate([group.values for group in groups])
