@@ -251,10 +251,11 @@ def test_in_an_arena_that_left_nobody_lives_moves_sends_or_is_told_anything(tmp_
         assert np.array_equal(truth.pose[rows], last.pose[rows])
         assert all((group.rows >= 7).all() for group in truth.senses.values())
         assert not truth.contact_onsets[0].any()
-        assert truth.edges is not None and (truth.edges >= 7).all()
-        assert truth.tally is not None and not truth.tally.sent[0] and not truth.tally.fates[0].any()
-        assert truth.finished is not None and (truth.finished.arena > 0).all()
-        assert truth.departed is not None and (truth.departed.arena > 0).all()
+        edges, tally, finished, departed = truth.edges, truth.tally, truth.finished, truth.departed
+        assert not (edges is None or tally is None or finished is None or departed is None)
+        assert (edges >= 7).all()
+        assert not (tally.sent[0] or tally.intended[0] or tally.fates[0].any())
+        assert all((told.arena > 0).all() for told in (finished, departed))
         assert not any(event.changed[rows].any() for event in truth.events)
 
 
