@@ -252,9 +252,12 @@ def test_in_an_arena_that_left_nobody_lives_moves_sends_or_is_told_anything(tmp_
         assert all((group.rows >= 7).all() for group in truth.senses.values())
         assert not truth.contact_onsets[0].any()
         edges, tally, finished, departed = truth.edges, truth.tally, truth.finished, truth.departed
-        assert not (edges is None or tally is None or finished is None or departed is None)
+        assert edges is not None
+        assert tally is not None
+        assert finished is not None
+        assert departed is not None
         assert (edges >= 7).all()
-        assert not (tally.sent[0] or tally.intended[0] or tally.fates[0].any())
+        assert tally.intended[0] == tally.fates[0].sum() == 0
         assert all((told.arena > 0).all() for told in (finished, departed))
         assert not any(event.changed[rows].any() for event in truth.events)
 
