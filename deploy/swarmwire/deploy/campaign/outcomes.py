@@ -1,14 +1,14 @@
 """What can be asked of a campaign's runs: columns of `summary.parquet` that hold a number, or a time."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import Literal
 
 from swarmwire.comms.fates import FATE_NAMES
-from swarmwire.deploy.campaign.row import LATENCIES, STATISTICS, STOP_TIME, TOTALS
+from swarmwire.deploy.campaign.row import LATENCIES, STATISTICS, TOTALS
 from swarmwire.deploy.measuring import measuring
+from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.world.scenario.scenario import Scenario
 
+STOP_TIME = "stop_time_s"
 OF_RADIO = {
     "sent": ("", "packets sent"),
     "intended": ("", "receivers that packets were meant for"),
@@ -22,18 +22,6 @@ LATENCY_HELP = {
 }
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """A column of `summary.parquet` that statistics can be made of."""
-
-    column: str
-    unit: str
-    kind: Literal[
-        "number", "time"
-    ]  # a time is right-censored at `sim_time_s` where it is null and the run did not fail
-    help: str
-
-
 def outcomes_of(scenarios: Iterable[Scenario]) -> tuple[Outcome, ...]:
     """The outcomes of runs of these scenarios, each once, in the order of the columns; BadInput for a bad metric."""
     found: dict[str, Outcome] = {}
@@ -45,8 +33,8 @@ def outcomes_of(scenarios: Iterable[Scenario]) -> tuple[Outcome, ...]:
 
 
 def _outcomes(scenario: Scenario) -> Iterator[Outcome]:
-    if scenario.stop:
-        yield Outcome(STOP_TIME, "s", "time", "since when what ended the run held")
+    if scenario.stops():
+        yield Outcome(STOP_TIME, "s", "time", "since when what ended the run had held")
     for metric in measuring(scenario).metrics:
         if metric.kind == "time":
             yield Outcome(metric.name, metric.unit, "time", metric.help)
