@@ -28,7 +28,7 @@ loss = 0.2
 gives = { range = {}, bearing = {} }
 """
 # An agent that does what it was asked to where its robot draws a low number in its first tick: for some seeds.
-STUMBLING = '''
+STUMBLING = """
 import os
 from swarmwire.agent import Agent
 class Stumbling(Agent):
@@ -45,7 +45,7 @@ class Stumbling(Agent):
             os.kill(os.getpid(), 9)
         self.began = True
         robot.drive(0.05, 0.0)
-'''
+"""
 
 
 def scenario_in(folder: Path, agent: str = FLOCKING) -> Path:

@@ -11,7 +11,9 @@ def test_seeds_are_a_number_a_range_or_a_list():
     assert seed_list("5,") == (5,)
 
 
-@pytest.mark.parametrize("given", ["0", "", "x", "5:5", "1,1", "-1,2", "1:99999999999999999999", "9" * 30, [], [1.5], "0.5"])
+@pytest.mark.parametrize(
+    "given", ["0", "", "x", "5:5", "1,1", "-1,2", "1:99999999999999999999", "9" * 30, [], [1.5], "0.5"]
+)
 def test_what_gives_no_seeds_is_refused_by_its_name(given):
     with pytest.raises(BadInput, match="^--seeds: expected "):
         seed_list(given)

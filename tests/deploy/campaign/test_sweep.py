@@ -6,9 +6,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.deploy import run, sweep
+from swarmwire.deploy import RunFolder, run, sweep
 from swarmwire.deploy.campaign.campaign import read_campaign
-from tests.deploy.campaign.small import rows_in, series_in
+from tests.deploy.campaign.small import rows_in, scenario_in, series_in
 
 VARY = {"radio.loss": "0:0.8:2", "robots.pair.count": [2, 3]}
 
@@ -16,8 +16,6 @@ VARY = {"radio.loss": "0:0.8:2", "robots.pair.count": [2, 3]}
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
     """A campaign by two worker processes, as it is by default."""
-    from tests.deploy.campaign.small import scenario_in
-
     folder = tmp_path_factory.mktemp("reference")
     scenario = scenario_in(folder)
     done = sweep(scenario, seeds=3, vary=VARY, out=folder / "c", workers=2)
@@ -30,9 +28,15 @@ def test_each_run_has_a_row_that_says_what_a_run_of_its_own_would(reference):
     assert [(row["run"], row["point"], row["seed"]) for row in rows] == [
         (i, i // 3, i % 3 + 1) for i in range(12)
     ]  # fmt: skip
-    assert [(row["radio.loss"], row["robots.pair.count"]) for row in rows[::3]] == [(0.0, 2), (0.0, 3), (0.8, 2), (0.8, 3)]
+    assert [(row["radio.loss"], row["robots.pair.count"]) for row in rows[::3]] == [
+        (0.0, 2),
+        (0.0, 3),
+        (0.8, 2),
+        (0.8, 3),
+    ]
     alone = run(reference / "two.toml", seed=2, overrides=["radio.loss=0.8", "robots.pair.count=3"])
     row, radio = rows[10], alone.radio
+    assert radio is not None
     assert row["trajectory_sha256"] == alone.trajectory_sha256[0]
     assert (row["ended"], row["error"], row["ticks"], row["sim_time_s"]) == ("duration", None, 5, 0.5)
     assert row["order.mean"] == alone.metrics["order"].mean
@@ -88,28 +92,25 @@ def test_without_series_there_are_none(scenario, tmp_path, here):
 
 def test_files_that_points_name_are_kept_with_the_campaign(tmp_path, scenario, here):
     for name, speed in (("slow", 0.01), ("fast", 0.1)):
-        (tmp_path / f"{name}.py").write_text(
-            f"from swarmwire.agent import Agent\nclass Mine(Agent):\n    def step(self, robot): robot.drive({speed}, 0.0)\n"
+        code = (
+            f"from swarmwire.agent import Agent\nclass Mine(Agent):\n    def step(self, it): it.drive({speed}, 0.0)\n"
         )
-    sweep(scenario, seeds=1, vary={"robots.pair.agent": ["slow.py:Mine", "fast.py:Mine"]}, out=tmp_path / "c", overrides=[])
+        (tmp_path / f"{name}.py").write_text(code)
+    agents = [f"{name}.py:Mine" for name in ("slow", "fast")]
+    sweep(scenario, seeds=1, vary={"robots.pair.agent": agents}, out=tmp_path / "c")
     campaign = read_campaign(tmp_path / "c")
-    assert [dict(point) for point in campaign.points] == [
-        {"robots.pair.agent": "slow.py:Mine"}, {"robots.pair.agent": "fast.py:Mine"}
-    ]  # fmt: skip
+    assert [point["robots.pair.agent"] for point in campaign.points] == agents
     assert {file.path for file in campaign.files} == {"scenario.toml", "files/slow.py", "files/fast.py"}
-    hashes = [row["trajectory_sha256"] for row in rows_in(tmp_path / "c")]
-    assert hashes == [
-        run(scenario, overrides=[f'robots.pair.agent="{name}.py:Mine"']).trajectory_sha256[0] for name in ("slow", "fast")
-    ]
+    for agent, row in zip(agents, rows_in(tmp_path / "c"), strict=True):
+        assert run(scenario, overrides=[f"robots.pair.agent={agent}"]).trajectory_sha256 == [row["trajectory_sha256"]]
 
 
 def test_chosen_seeds_are_recorded_in_full(tmp_path, scenario, here):
-    from swarmwire.deploy import RunFolder
-
     sweep(scenario, seeds=3, vary={"radio.loss": [0.0, 0.5]}, out=tmp_path / "c", record_seeds=[2])
     assert sorted(path.name for path in (tmp_path / "c" / "runs").iterdir()) == ["run-000001", "run-000004"]
     recorded = RunFolder(tmp_path / "c" / "runs" / "run-000004")
     assert (recorded.path / "run.rrd").exists()
+    assert recorded.summary is not None
     assert recorded.summary["trajectory_sha256"] == [rows_in(tmp_path / "c")[4]["trajectory_sha256"]]
 
 

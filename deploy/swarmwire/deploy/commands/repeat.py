@@ -35,12 +35,12 @@ def repeat_command(
     holds no run that can be repeated.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.deploy.campaign.campaign import CAMPAIGN_JSON
     from swarmwire.deploy.campaign.run_again import CampaignRun
     from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.repetition import RepeatedRun
     from swarmwire.deploy.terminal.shown import progress
+    from swarmwire.metrics.campaign.formats import ABOUT
 
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     record = Recording(packets=packet_share(packets), links=links)
@@ -51,7 +51,7 @@ def repeat_command(
     if run is not None:
         _repeat_of_campaign(CampaignRun(folder, run, runners=runners, out=out, record=record), out, console)
         return
-    if (folder / CAMPAIGN_JSON).exists():
+    if (folder / ABOUT).exists():
         raise BadInput(str(folder), "", "expected --run NUMBER with it: this is a campaign's folder")
     repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
     repeated.simulation.watch(progress(repeated.simulation, console))
