@@ -54,6 +54,19 @@ def test_times_and_last_values_are_compared_unless_others_are_named(plain, bette
     ] * 2
 
 
+def test_what_neither_has_a_value_of_is_left_out_unless_named(tmp_path, plain):
+    folders = [
+        write_campaign(tmp_path / name, numbers=NUMBERS | {"gap_m.final": lambda *_: None}, seeds=(1, 2))
+        for name in "ab"
+    ]
+    assert "gap_m.final" not in {row.outcome.column for row in compared(*folders).rows}
+    (row, *_) = compared(*folders, "gap_m").rows
+    assert (row.first.n, row.first.undefined) == (0, 2)
+    none = write_campaign(tmp_path / "none", missing=range(30))
+    with pytest.raises(BadInput, match="expected runs with a value"):
+        compared(none, none)
+
+
 def test_two_parts_of_one_campaign_meet_where_they_were_chosen(plain):
     found = compared(f"{plain}@radio.loss=0", f"{plain}@radio.loss=0.4", "order.final")
     assert found.paths == ()

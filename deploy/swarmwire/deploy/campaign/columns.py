@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.deploy.campaign.row import FAILED
+from swarmwire.deploy.campaign.row import FAILED, STOP_TIME, STOPPED_BY
 from swarmwire.deploy.campaign.task import Row
 
 if TYPE_CHECKING:
@@ -12,7 +12,6 @@ if TYPE_CHECKING:
 
 KEYS = ("run", "point", "seed")
 ENDS = ("ended", "error", "ticks", "sim_time_s", "trajectory_sha256")
-STOP_TIME, STOPPED_BY = "stop_time_s", "stopped_by"
 MACHINE = ("timing_wall_s", "machine_cpu", "machine_host", "machine_worker")
 FIXED = {*KEYS, *ENDS, STOP_TIME, STOPPED_BY, *MACHINE}
 COUNTS, FATES = "counts.", "radio.fates."

@@ -2,16 +2,11 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from swarmwire.comms.fates import FATE_NAMES
-from swarmwire.comms.loading import resolve
-from swarmwire.deploy.campaign.row import LATENCIES, STATISTICS, TOTALS
-from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.own_metrics import own_metrics
-from swarmwire.metrics.registry import standard
+from swarmwire.deploy.campaign.row import LATENCIES, STATISTICS, STOP_TIME, TOTALS
+from swarmwire.deploy.measuring import measuring
 from swarmwire.world.scenario.scenario import Scenario
 
 OF_RADIO = {
@@ -50,7 +45,9 @@ def outcomes_of(scenarios: Iterable[Scenario]) -> tuple[Outcome, ...]:
 
 
 def _outcomes(scenario: Scenario) -> Iterator[Outcome]:
-    for metric in _measured(scenario):
+    if scenario.stop:
+        yield Outcome(STOP_TIME, "s", "time", "since when what ended the run held")
+    for metric in measuring(scenario).metrics:
         if metric.kind == "time":
             yield Outcome(metric.name, metric.unit, "time", metric.help)
             continue
@@ -58,11 +55,6 @@ def _outcomes(scenario: Scenario) -> Iterator[Outcome]:
             yield Outcome(f"{metric.name}.{statistic}", metric.unit, "number", metric.help)
     if scenario.radio is not None:
         yield from _radio()
-
-
-def _measured(scenario: Scenario) -> list[Metric]:
-    specs = [resolve(spec, Path(scenario.source).parent) for spec in scenario.metrics]
-    return Metrics([*standard(), *own_metrics(specs, scenario.source)]).metrics
 
 
 def _radio() -> Iterator[Outcome]:

@@ -62,7 +62,7 @@ def _together(task: Task) -> tuple[list[Row], bytes | None]:
         if out is not None and out.exists():
             out.replace(str(task.record_to))
     result = simulation.result
-    rows = [row_of(arena, result) for arena in result.arenas]
+    rows = [row_of(arena) for arena in result.arenas]
     return rows, series.parquet(task.runs, [row["ticks"] for row in rows]) if task.series else None
 
 

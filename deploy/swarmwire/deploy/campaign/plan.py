@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.loading import resolve
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.campaign.columns import FIXED
 from swarmwire.deploy.campaign.design import GRID, Point, points_of
@@ -14,6 +13,7 @@ from swarmwire.deploy.campaign.outcomes import Outcome, outcomes_of
 from swarmwire.deploy.campaign.toml_value import toml_value
 from swarmwire.deploy.campaign.vary import Range, Vary
 from swarmwire.deploy.campaign.whole_numbers import whole_numbers
+from swarmwire.deploy.measuring import measuring
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.world.scenario.as_mapping import mapping_of
 from swarmwire.world.scenario.bodies import bodies_of, own_code_of
@@ -111,9 +111,9 @@ def _checked(scenario: Scenario, varied: Sequence[Vary], point: Point) -> list[s
         check_agents(scenario, agents)
         scenario_traces(scenario)
         bodies = bodies_of(scenario, scenario.source)
+        metrics = measuring(scenario).code
     except BadInput as error:
         raise _blamed(error, varied, point) from None
-    metrics = [resolve(spec, Path(scenario.source).parent) for spec in scenario.metrics]
     return [*agents.values(), *own_code_of(bodies.values()), *metrics]
 
 

@@ -4,28 +4,32 @@ from dataclasses import asdict
 from typing import Any
 
 from swarmwire.deploy.campaign.task import Row
-from swarmwire.deploy.result import ArenaResult, RadioResult, Result
+from swarmwire.deploy.result import ArenaResult, RadioResult
 
 FAILED = "failed"
+STOP_TIME, STOPPED_BY = "stop_time_s", "stopped_by"
 STATISTICS = ("final", "mean", "min", "max")
 LATENCIES = ("latency_air_s", "latency_agent_s")
 TOTALS = ("sent", "intended", "in_range", "pdr")
 
 
-def row_of(arena: ArenaResult, result: Result) -> Row:
+def row_of(arena: ArenaResult) -> Row:
     """What came of one arena, by column."""
     row: Row = {
-        "ended": result.ended,
+        "ended": arena.ended,
         "error": None,
-        "ticks": result.ticks,
-        "sim_time_s": result.sim_time_s,
+        "ticks": arena.ticks,
+        "sim_time_s": arena.sim_time_s,
+        STOP_TIME: arena.stop_time_s,
+        STOPPED_BY: arena.stopped_by,
         "trajectory_sha256": arena.trajectory_sha256,
     }
     for name, value in arena.metrics.items():
+        row[name] = value.final  # of a time
         row.update({f"{name}.{statistic}": of for statistic, of in asdict(value).items()})
     if arena.radio is not None:
         row.update(_radio(arena.radio))
-    row.update({f"counts.{name}": count for name, count in result.counts.items()})
+    row.update({f"counts.{name}": count for name, count in arena.counts.items()})
     return row
 
 
