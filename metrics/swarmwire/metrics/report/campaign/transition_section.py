@@ -37,7 +37,8 @@ def transition_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Secti
         if len(numbers) == 1:
             figures.append(_response(samples, outcome, numbers[0], rows))
         for x, y in combinations(numbers, 2):
-            figures += _maps(samples, outcome, x, y, rows)
+            beside = slices_beside(folder, (x.path, y.path), names_apart=len(numbers) == 2)
+            figures += _maps(samples, outcome, x, y, beside, rows)
     return Section("Transitions", (_how_to_read(len(numbers)), *figures, _table(rows)))
 
 
@@ -52,7 +53,7 @@ def _how_to_read(numbers: int) -> str:
             "a triangle is a median beyond the time limit. The upright line is the change point, with its 95 % "
             f"interval: {change}"
         )
-    others = " Numbers that a map does not show are at their middle value." if numbers > 2 else ""
+    others = " Other numbers of a grid are at their middle value, all else is taken together." if numbers > 2 else ""
     return (
         f"Each cell is the median of its runs. The red mark in a row is its change point: {change} The thin line is "
         f"its 95 % interval; a cell with > has its median beyond the time limit.{others}"
@@ -72,9 +73,11 @@ def _response(samples: Samples, outcome: Outcome, x: Levels, rows: list[_Row]) -
     return Figure(name, as_svg(figure, name), f"{sentence(outcome_title(outcome))} over `{x.path}`.")
 
 
-def _maps(samples: Samples, outcome: Outcome, x: Levels, y: Levels, rows: list[_Row]) -> list[Figure]:
+def _maps(
+    samples: Samples, outcome: Outcome, x: Levels, y: Levels, beside: list[Slice], rows: list[_Row]
+) -> list[Figure]:
     figures: list[Figure] = []
-    for number, each in enumerate(slices_beside(samples.folder, (x.path, y.path))):
+    for number, each in enumerate(beside):
         cells = [[each.cell((y, row), (x, column)) for column in range(len(x))] for row in range(len(y))]
         medians = np.array([[samples.quartiles(outcome, cell)[1] for cell in row] for row in cells])
         changes = [_change(samples, outcome, x, row) for row in cells]

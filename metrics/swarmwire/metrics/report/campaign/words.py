@@ -55,8 +55,3 @@ def point_text(point: Point) -> str:
 def listed(words: list[str], last: str = "and") -> str:
     """`a, b and c`."""
     return f" {last} ".join(filter(None, (", ".join(words[:-1]), words[-1]))) if words else ""
-
-
-def counted(count: int, what: str, many: str = "") -> str:
-    """`1 run`, `1,200 runs`."""
-    return f"{count:,} {what if count == 1 else many or what + 's'}"

@@ -13,7 +13,7 @@ from swarmwire.metrics.report.figures.response_curve import Jump
 
 _COLORS = "cividis"  # as ordered for those who cannot tell red from green, and in print without colours
 _ROW_IN, _LEAST_IN, _MOST_IN, _HEAD_IN = 0.2, 1.0, 2.6, 0.42
-_MOST_WRITTEN = 8  # columns whose values can be written into their cells
+_MOST_WRITTEN = 7  # columns and rows of cells into which values are written
 _BEYOND, _NONE = "#f1e9f5", "#ffffff"
 
 
@@ -46,11 +46,12 @@ def heat_map(
     shown = np.ma.masked_invalid(np.where(np.isposinf(values), greatest + 1.0 + abs(greatest), values))
     edges = np.arange(len(x_labels) + 1) - 0.5, np.arange(rows + 1) - 0.5
     axes.pcolormesh(*edges, shown, cmap=colors, norm=norm, edgecolors="white", linewidth=0.4)
-    if len(x_labels) <= _MOST_WRITTEN:
+    written = max(len(x_labels), rows) <= _MOST_WRITTEN
+    if written:
         _write_values(axes, values, norm)
     else:
         _mark_beyond(axes, values)
-    _draw_jumps(axes, jumps, 0.0 if len(x_labels) > _MOST_WRITTEN else 0.38)
+    _draw_jumps(axes, jumps, 0.38 if written else 0.0)
     set_categories(axes, x_labels)
     axes.set_xlim(-0.5, len(x_labels) - 0.5)
     every = max(1, -(-rows // 12))
