@@ -49,9 +49,9 @@ def _how_to_read(numbers: int) -> str:
     )
     if numbers == 1:
         return (
-            "The line is the median; the darker band its 95 % interval, the lighter one from quartile to quartile; "
-            "a triangle is a median beyond the time limit. The upright line is the change point, with its 95 % "
-            f"interval: {change}"
+            "The line is the median, with its 95 % intervals; a band reaches from quartile to quartile; a triangle is "
+            "a median beyond the time limit. The upright line across is the change point, with its 95 % interval: "
+            f"{change}"
         )
     others = " Other numbers of a grid are at their middle value, all else is taken together." if numbers > 2 else ""
     return (
@@ -100,7 +100,7 @@ def _map(
 ) -> Figure:
     name = figure_name("map", outcome.column, x.path, y.path, *([str(number)] if number else []))
     jumps = [None if change is None else _jump(change, x, np.arange(len(x), dtype=np.float64)) for change in changes]
-    figure = heat_map(medians, x.labels, y.labels, f"median {outcome_title(outcome)}", x.path, y.path, jumps)
+    figure = heat_map(medians, x.short, y.short, f"median {outcome_title(outcome)}", x.path, y.path, jumps)
     at = f", at {of.label}" if of.label else ""
     return Figure(name, as_svg(figure, name), f"{sentence(outcome_title(outcome))} over `{x.path}` and `{y.path}`{at}.")
 

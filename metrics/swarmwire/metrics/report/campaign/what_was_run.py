@@ -1,5 +1,6 @@
 """The section that says what was run, how to run it again, and what failed."""
 
+import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -27,7 +28,7 @@ def what_was_run(folder: CampaignFolder) -> Section:
         ("settings for all", ", ".join(about.overrides) or "none"),
         ("a run lasts", f"{about.duration_s:g} s of simulated time, unless it stops before"),
         ("runs", _runs(folder, len(failed))),
-        ("begun", about.began_utc),
+        ("begun", _moment(about.began_utc)),
         ("versions", ", ".join(f"{name} {value_text(version)}" for name, version in about.versions.items())),
         ("CPU", listed(_machines(folder))),
     ]
@@ -50,6 +51,12 @@ def _commands(folder: CampaignFolder, failed: list[int]) -> list[str | Listing]:
         )
         parts.append(Listing(f"swarmwire sweep --resume {name}"))
     return parts
+
+
+def _moment(utc: str) -> str:
+    """ISO 8601 in its short form, as people read it; any other text as it is."""
+    found = re.fullmatch(r"(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)\d\dZ", utc)
+    return "{}-{}-{} {}:{} UTC".format(*found.groups()) if found else utc
 
 
 def _design(about: About) -> str:
