@@ -53,6 +53,7 @@ WRITES = 9  # four pieces of rows and series each, and the table
 
 
 def test_whichever_write_was_the_last_nothing_is_lost_or_there_twice(tmp_path, stumbling, whole, monkeypatch):
+    tried = []
     for count in range(WRITES):
         folder = tmp_path / f"died{count}"
         with monkeypatch.context() as patched:

@@ -1,10 +1,14 @@
 """`swarmwire sweep` and `swarmwire repeat --run`, as people type them."""
 
 import json
+import os
+import re
+import signal
 
 import pytest
 
 from swarmwire.deploy import RunFolder
+from swarmwire.deploy.terminal import sweep_progress
 from tests.deploy.campaign.small import rows_in
 from tests.deploy.commands import called
 
@@ -79,8 +83,6 @@ def test_a_campaigns_file_is_refused_by_its_key(tmp_path, scenario, typed, line,
     file.write_text("\n".join(f"{key} = {value}" for key, value in keys.items()))
     code, _, errors = typed("sweep", file, "--out", tmp_path / "c")
     assert code == 2
-    import re
-
     assert re.match(f"error: (.*campaign.toml: )?{told}", errors), errors
     assert errors.count("\n") == 1
     assert not (tmp_path / "c").exists()
@@ -103,8 +105,6 @@ def test_a_campaigns_file_is_refused_by_its_key(tmp_path, scenario, typed, line,
 def test_what_cannot_be_run_is_refused_in_a_line_before_anything_is(
     tmp_path, scenario, typed, monkeypatch, arguments, told
 ):
-    import re
-
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.iterdir())
     code, out, errors = typed("sweep", *arguments)
@@ -144,3 +144,28 @@ def test_a_run_is_repeated_by_its_number(tmp_path, scenario, typed):
     assert typed("repeat", folder, "--run", "4")[2] == "error: --run: expected a run from 0 to 3, got 4\n"
     assert "expected --run NUMBER" in typed("repeat", folder)[2]
     assert typed("repeat", tmp_path / "again", "--run", "0")[0] == 2
+
+
+class Interrupting:
+    """Looks on, and presses Ctrl-C after the first piece."""
+
+    def begin(self, campaign, done, failed):
+        self.pieces = done
+
+    def see(self, result):
+        self.pieces += 1
+        if self.pieces == 1:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    def end(self):
+        pass
+
+
+def test_ctrl_c_ends_it_with_a_word_how_to_go_on(tmp_path, scenario, typed, monkeypatch):
+    folder = tmp_path / "c"
+    monkeypatch.setattr(sweep_progress, "sweep_progress", lambda _: Interrupting())
+    code, out, errors = typed("sweep", scenario, "--seeds", "5", "--pack", "1", "--out", folder)
+    assert (code, errors) == (130, "")
+    assert out.splitlines() == ["interrupted: 3 of 5 runs are done", f"go on: swarmwire sweep --resume {folder}"]
+    assert typed("sweep", "--resume", folder)[0] == 0
+    assert len(rows_in(folder)) == 5
