@@ -5,8 +5,11 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
+from swarmwire.deploy.campaign.outcomes import outcomes_of
+from swarmwire.deploy.campaign.row import row_of
 from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.verify import verify
+from swarmwire.world.scenario.scenario_file import load_scenario
 from tests.metrics.packages import CODE
 
 SCENARIO = """
@@ -77,6 +80,18 @@ def test_an_arena_comes_to_the_same_alone_as_beside_others(scenario):
     together = run(scenario, seeds=SEEDS)
     for seed, arena in zip(SEEDS, together.arenas, strict=True):
         assert run(scenario, seed=seed).arenas == (arena,)
+
+
+def test_rows_of_a_campaign_say_when_and_by_what_each_run_stopped(scenario):
+    listed = 'metrics=["aggregation_time_s"]'
+    for arena in run(scenario, seeds=SEEDS, overrides=[listed, "robots.flock.count=3"]).arenas:
+        row = row_of(arena)
+        expected = (arena.ended, arena.ticks, arena.sim_time_s, arena.stop_time_s, arena.stopped_by)
+        assert tuple(row[name] for name in ("ended", "ticks", "sim_time_s", "stop_time_s", "stopped_by")) == expected
+        assert row["aggregation_time_s"] == arena.metrics["aggregation_time_s"].final
+    by_column = {outcome.column: outcome.kind for outcome in outcomes_of([load_scenario(scenario, [listed])])}
+    assert by_column["stop_time_s"] == by_column["aggregation_time_s"] == "time"
+    assert "stop_time_s" not in {of.column for of in outcomes_of([load_scenario(scenario, ["stop=[]"])])}
 
 
 def test_a_run_whose_arenas_have_all_stopped_is_over_and_is_repeated_from_its_folder(tmp_path, scenario):

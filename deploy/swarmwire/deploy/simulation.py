@@ -157,7 +157,13 @@ class Simulation:
         keep_memory()
         rows, realtime = self.static.arenas * self.static.robots, self._pace.factor if self._pace else None
         self._origin = self._record.begin(
-            self.scenario, self.code, self.static.seeds, ticks=self.ticks, runners=self.runners, realtime=realtime
+            self.scenario,
+            self.code,
+            self.static.seeds,
+            ticks=self.ticks,
+            runners=self.runners,
+            realtime=realtime,
+            metrics=self.metrics,
         )
         with ExitStack() as stack:
             stack.push(self._record.failed_to_start)

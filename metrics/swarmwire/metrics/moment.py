@@ -45,7 +45,10 @@ class Moment:
         self.robots_alive, self.per_robot_alive, everyone = _count(self.alive)
         edges = truth.edges
         self.components = None if edges is None else Components(*components_of(edges, self.alive))
-        self._counted = True if everyone else self.alive  # a mask costs numpy as much as the sum
+        # Arenas that left would cost as much as those that have not; and a mask costs numpy as much as the sum.
+        self._few: IntArray | None = None if truth.running.all() else np.flatnonzero(truth.running)
+        counted = self.alive if self._few is None else self.alive[self._few]
+        self._counted = True if everyone or counted.all() else counted
 
     @property
     def position_m(self) -> FloatArray:
@@ -64,7 +67,11 @@ class Moment:
 
     def sum_alive(self, values: FloatArray) -> FloatArray:
         """The sum of `values` (arenas, robots) over the robots alive of each arena, (arenas,)."""
-        return np.add.reduce(values, 1, where=self._counted)
+        if self._few is None:
+            return np.add.reduce(values, 1, where=self._counted)
+        found = np.zeros(len(values))
+        found[self._few] = np.add.reduce(values[self._few], 1, where=self._counted)
+        return found
 
 
 @njit(cache=True)

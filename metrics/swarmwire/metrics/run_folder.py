@@ -13,6 +13,7 @@ from swarmwire.metrics.record.distance_totals import distance_totals_schema
 from swarmwire.metrics.record.event_recorder import event_schema
 from swarmwire.metrics.record.formats import SUMMARY_FORMAT, TABLES_FORMAT, refuse_other_format
 from swarmwire.metrics.record.link_totals import link_totals_schema
+from swarmwire.metrics.record.metric_facts import MetricFacts, read_facts
 from swarmwire.metrics.record.names import STATIC, SUMMARY
 from swarmwire.metrics.record.packet_columns import packet_schema
 from swarmwire.metrics.record.part_files import parts_of, scan_files, table_file
@@ -70,6 +71,11 @@ class RunFolder:
     def static(self) -> Static:
         """Arena, bodies, groups and names."""
         return self._static
+
+    @property
+    def measured(self) -> dict[str, MetricFacts]:
+        """By name: what each metric that the run measured says of itself; empty where older runs did not keep it."""
+        return read_facts(self.path)
 
     def ticks(self, arena: int | None = None) -> "pl.DataFrame":
         """A row per tick and arena, of one arena or of all; lists with an item per robot in its order.

@@ -39,6 +39,12 @@ def test_a_count_is_shown_as_its_total_and_a_level_by_its_course(result):
     assert row(text, "min_gap") == "final 3, mean 0.25, min 0 (m)"
 
 
+def test_a_time_is_told_also_if_it_did_not_come(result):
+    never, came = Statistics(None, None, None, None), Statistics(12.5, 12.5, 12.5, 12.5)
+    assert row(shown(result, metrics={"aggregation_time_s": came}), "aggregation_time_s") == "at 12.5 s"
+    assert row(shown(result, metrics={"aggregation_time_s": never}), "aggregation_time_s") == "not in 1 s"
+
+
 def test_who_has_an_obstacle_in_between_does_not_count_as_in_range(result):
     radio = result.radio
     assert radio is not None

@@ -1,5 +1,6 @@
 """The report of a single run tells what its folder holds, whatever is missing."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +10,13 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Happened
 from swarmwire.metrics.report.in_words import number
+from swarmwire.metrics.report.lanes import Span
 from swarmwire.metrics.report.run_data import read_run
 from swarmwire.metrics.report.run_report import run_report
+from swarmwire.metrics.report.run_sections import what_happened
 from swarmwire.metrics.report.run_sections.measured import of_metrics
 from swarmwire.metrics.report.section import Listing, Table
+from swarmwire.metrics.report.svg import blank_figure
 from swarmwire.metrics.run_folder import RunFolder
 from tests.metrics.radio_runs import DISK, ticks
 from tests.metrics.recorded import links, wandering
@@ -162,6 +166,33 @@ def test_events_are_listed_with_the_robots_that_they_changed(tmp_path):
     report = run_report(run_folder(tmp_path, of, seen))
     assert table(report, "All events") == {"0.1": ("kill", "flock-1, flock-2")}
     assert "a bar until it was over" in texts(report)
+
+
+def test_what_stopped_a_run_and_the_times_that_metrics_wait_for_are_marked(tmp_path, monkeypatch):
+    of, drawn = static(3), []
+    folder = run_folder(tmp_path, of, wandering(of, 20), ended="stopped")
+    summary = json.loads((folder / "summary.json").read_text())
+    end = {
+        "ended": "stopped",
+        "ticks": 20,
+        "sim_time_s": 2.0,
+        "stop_time_s": 0.7,
+        "stopped_by": "order at least 0.1 for 1 s",
+    }
+    (folder / "summary.json").write_text(json.dumps({**summary, "stop": [end["stopped_by"]], "by_arena": [end]}))
+    file = folder / "ticks.parquet"
+    found = pl.when(pl.col("tick") > 11).then(1.2).alias("aggregation_time_s")
+    pl.read_parquet(file).with_columns(found).write_parquet(file)
+    monkeypatch.setattr(what_happened, "timeline", lambda *of: (drawn.append(of), blank_figure(1.0, 1.0))[1])
+    report = run_report(folder)
+    [(_, _, lanes)] = drawn
+    assert {lane.words: lane.spans for lane in lanes} == {
+        "stop: order at least 0.1 for 1 s, since 0.7 s": [Span(0.7, None)],
+        "aggregation_time: 1.2 s": [Span(1.2, None)],
+    }
+    about = table(report, "")
+    assert about["stops at"] == ("order at least 0.1 for 1 s",)
+    assert about["ended"] == ("stopped: order at least 0.1 for 1 s, since 0.7 s",)
 
 
 def test_what_is_no_run_folder_is_refused(tmp_path):

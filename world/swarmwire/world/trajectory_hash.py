@@ -26,18 +26,21 @@ class TrajectoryHash:
 
         Tables are (rows, 3), a row per robot of all arenas, `heard` is sorted by receiver.
         """
-        open_ = np.flatnonzero(running).tolist()
-        self._add(np.concatenate([pose, velocity, command], axis=1), self._first_row, open_)
+        arenas, tables = np.flatnonzero(running), [pose, velocity, command]
+        if len(arenas) < len(running):
+            tables = [table.reshape(len(running), -1, 3)[arenas].reshape(-1, 3) for table in tables]
+        hashes = [self._hashes[arena] for arena in arenas.tolist()]
+        self._add(np.concatenate(tables, axis=1), self._first_row[: len(hashes) + 1], hashes)
         if len(heard):
             first = np.searchsorted(heard.receiver, self._first_row)
             packets = _packets(heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, first, self._robots)
-            self._add(packets, first.tolist(), open_)
+            self._add(packets, [*first[arenas].tolist(), len(packets)], hashes)
 
-    def _add(self, table: AnyArray, first: list[int], arenas: list[int]) -> None:
-        """The rows first[a] to first[a + 1] - 1 of a table go into the hash of each arena a of these."""
+    def _add(self, table: AnyArray, first: list[int], hashes: "list[hashlib._Hash]") -> None:
+        """The rows first[k] to first[k + 1] - 1 of a table go into hash k."""
         row_bytes, view = table.shape[1] * table.itemsize, table.data.cast("B")
-        for arena in arenas:
-            self._hashes[arena].update(view[first[arena] * row_bytes : first[arena + 1] * row_bytes])
+        for digest, start, stop in zip(hashes, first[:-1], first[1:], strict=True):
+            digest.update(view[start * row_bytes : stop * row_bytes])
 
     def hexdigests(self) -> list[str]:
         """The hash of each arena so far."""

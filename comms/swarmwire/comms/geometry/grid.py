@@ -48,6 +48,13 @@ def cell_of(at_m, origin_m, cell_m, cells):
 
 
 @njit(cache=True)
+def is_empty(cells, arena):
+    """Whether no robot of an arena is in the grid."""
+    per_arena = cells.nx * cells.ny
+    return cells.start[arena * per_arena] == cells.start[(arena + 1) * per_arena]
+
+
+@njit(cache=True)
 def _sort(x, y, present, cell_m, nx, ny, left_m, bottom_m):
     rows, arenas = len(x), len(present)
     robots = rows // arenas

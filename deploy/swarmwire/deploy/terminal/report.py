@@ -37,7 +37,10 @@ def print_result(result: Result, metrics: "Iterable[Metric]", console: Console) 
         table.add_row("shown below", f"the arena of seed {arena.seed}")
     _add_radio(table, arena)
     for name, value in arena.metrics.items():
-        if value.mean is not None:
+        if of[name].kind == "time":
+            late = f"not in {arena.sim_time_s:g} s"
+            table.add_row(name, late if value.final is None else f"at {_number(value.final)} s")
+        elif value.mean is not None:
             table.add_row(name, _in_words(of[name], value))
     for body, senses in result.global_senses.items():
         table.add_row("global senses", f"{body}: {', '.join(senses)}")

@@ -103,6 +103,8 @@ def _strips(x, y, robots, cells):
     first, stop = np.zeros((len(x), 3), np.int64), np.zeros((len(x), 3), np.int64)
     nx, ny, start = cells.nx, cells.ny, cells.start  # out of the tuple once, which costs as much as the rest
     for row in range(len(x)):
+        if grid.is_empty(cells, row // robots):
+            continue
         i = grid.cell_of(x[row], cells.left_m, cells.cell_m, nx)
         j = grid.cell_of(y[row], cells.bottom_m, cells.cell_m, ny)
         for below in range(max(j - 1, 0), min(j + 2, ny)):

@@ -42,6 +42,8 @@ def _within(x, y, robots, cells, size_m, range_m):
 @njit(cache=True)
 def _near(cells, x, y, robots, s, near):
     """How many robots are in the cells around robot s, itself among them; put into `near` if there is room."""
+    if grid.is_empty(cells, s // robots):
+        return 0
     i, columns = _first_of(grid.cell_of(x[s], cells.left_m, cells.cell_m, cells.nx), cells.nx)
     j, rows = _first_of(grid.cell_of(y[s], cells.bottom_m, cells.cell_m, cells.ny), cells.ny)
     count = 0

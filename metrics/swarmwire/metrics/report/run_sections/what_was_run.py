@@ -11,7 +11,7 @@ from swarmwire.metrics.report.section import Listing, Section, Table
 _MOST_LINES = 300  # of the scenario
 _ENDED = {
     "duration": "with its duration",
-    "stopped": "by its stop condition",
+    "stopped": "stopped",
     "interrupted": "interrupted (Ctrl-C)",
     "left": "left by the program that stepped it",
     "failed": "failed",
@@ -87,6 +87,7 @@ def _course(run: RunData) -> list[tuple[str, str]]:
     return [
         ("engine", str(summary.get("engine", "–"))),
         ("mode", f"{summary.get('mode', '–')}, {crew}"),
+        *([("stops at", "; ".join(summary["stop"]))] if summary.get("stop") else []),
         ("ended", _ended(summary)),
         (
             "simulated",
@@ -99,9 +100,11 @@ def _course(run: RunData) -> list[tuple[str, str]]:
 def _ended(summary: dict[str, Any]) -> str:
     how = str(_ENDED.get(summary["ended"], summary["ended"]))
     arenas: list[dict[str, Any]] = summary.get("by_arena") or []
-    stopped = sum(arena.get("ended") == "stopped" for arena in arenas)
+    stopped = [arena for arena in arenas if arena.get("stopped_by")]
     if len(arenas) > 1 and stopped:
-        how += f"; {stopped} of {len(arenas)} arenas stopped before"
+        how += f"; {len(stopped)} of {len(arenas)} arenas by what they stop at"
+    elif stopped:
+        how += f": {stopped[0]['stopped_by']}, since {number(stopped[0]['stop_time_s'])} s"
     return f"{how}: {summary['error']}" if summary.get("error") else how
 
 
