@@ -45,6 +45,7 @@ def test_a_page_of_another_name_has_figures_of_its_own(report, campaign, tmp_pat
 
 def test_a_runs_report_lies_in_its_folder(report, tmp_path):
     of = static(3)
+    (tmp_path / "run").mkdir()
     run_folder(tmp_path / "run", of, wandering(of, 12))
     code, out, _ = report(tmp_path / "run")
     assert code == 0
