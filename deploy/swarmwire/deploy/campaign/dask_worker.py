@@ -14,7 +14,7 @@ from distributed import get_worker
 from distributed.worker import WORKER_ANY_RUNNING, Worker
 
 from swarmwire.deploy.campaign.shipped import unpacked
-from swarmwire.deploy.campaign.spare_processes import SpareProcesses
+from swarmwire.deploy.campaign.spare_processes import CannotStart, SpareProcesses
 from swarmwire.deploy.campaign.task import task_from
 from swarmwire.deploy.record import machine
 from swarmwire.deploy.record.modules import module_digests
@@ -45,7 +45,7 @@ async def receive(files: bytes, modules: list[str], dask_worker: Worker) -> dict
 
 
 def work(task: bytes, campaign: str) -> dict[str, Any]:
-    """What came of a task: a result as a mapping, or {"lost": how the process that was at it died}."""
+    """What came of a task: a result as a mapping, {"lost": how the process that was at it died} or {"cannot": why}."""
     worker = get_worker()
     key = worker.get_current_task()
 
@@ -54,7 +54,10 @@ def work(task: bytes, campaign: str) -> dict[str, Any]:
         state = worker.state.tasks.get(key)
         return worker.status in WORKER_ANY_RUNNING and state is not None and state.state != "cancelled"
 
-    return _processes().done(campaign, str(worker.name), task_from(msgpack.unpackb(task)), wanted)
+    try:
+        return _processes().done(campaign, str(worker.name), task_from(msgpack.unpackb(task)), wanted)
+    except CannotStart as error:
+        return {"cannot": str(error)}
 
 
 @cache
