@@ -55,6 +55,8 @@ class DaskCrew:
 
     async def look_around(self) -> None:
         """Ask who is there: dask tells nobody twice, nor before it was asked to."""
+        if self._client.status != "running":
+            return
         there = (await self._client.scheduler.identity(n_workers=-1))["workers"]
         for address in there:
             self._join(address)

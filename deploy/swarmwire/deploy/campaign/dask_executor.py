@@ -118,7 +118,7 @@ class DaskExecutor:
 
     def _look_around(self) -> None:
         if self._clock.now_ns() - self._looked_ns > to_ns(LOOK_S):
-            with suppress(TimeoutError, OSError, AttributeError):  # a client that lost its scheduler may have none
+            with suppress(TimeoutError, OSError):  # then `_check` will know, or the next look
                 self._client.sync(self._crew.look_around, callback_timeout=LOOK_S)
             self._looked_ns = self._clock.now_ns()
 
