@@ -215,7 +215,7 @@ def test_workers_are_fit_with_the_same_versions_and_code_alone():
     fitness = Fitness()
     assert (fitness.fault(card()), fitness.warning(card())) == ("", "")
     assert fitness.fault(card(versions={**machine.versions(), "python": "3.9.0"})).startswith("python is 3.9.0; here")
-    assert "numpy is not there" in fitness.fault(card(versions={"python": machine.versions()["python"]}))
+    assert fitness.fault(card(versions={})).startswith("python is not there; here")
     assert fitness.fault(card(modules={})) == "its module swarmwire.comms is another version than here"
 
 
