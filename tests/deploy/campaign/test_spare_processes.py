@@ -1,6 +1,7 @@
 """Worker processes kept for a campaign: taken again, ended when they died, are not wanted, or nobody takes them."""
 
 from threading import Event
+from typing import ClassVar
 
 import pytest
 
@@ -14,8 +15,8 @@ TASK = Task("x", (), 0, (0,), (1,))
 class Process:
     """Stands for one that does what it is told to in `says`."""
 
-    made: "list[Process]" = []
-    says: dict = {}
+    made: "ClassVar[list[Process]]" = []
+    says: ClassVar[dict[str, str]] = {}
 
     def __init__(self, name):
         self.ended = Event()
