@@ -12,7 +12,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign import sweeping
+from swarmwire.deploy.campaign import execution, sweeping
 from swarmwire.deploy.campaign.campaign import read_campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
 from swarmwire.deploy.campaign.cluster_failed import ClusterFailed
@@ -102,7 +102,7 @@ def test_ctrl_c_ends_what_is_under_way_on_the_workers(tmp_path, reference, two_t
 
 def interrupted_once_at_work(worker, busy):
     """`execute`, with a Ctrl-C as soon as a process of the worker's has worked for a while."""
-    execute, before = sweeping.execute, children(worker)
+    execute, before = execution.execute, children(worker)
 
     def execute_interrupted(tasks, executor, keep, stopped):
         def asked():

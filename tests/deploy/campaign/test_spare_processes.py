@@ -15,7 +15,7 @@ TASK = Task("x", (), 0, (0,), (1,))
 class Process:
     """Stands for one that does what it is told to in `says`."""
 
-    made: "ClassVar[list[Process]]" = []
+    made: ClassVar[list["Process"]] = []
     says: ClassVar[dict[str, str]] = {}
 
     def __init__(self, name):
