@@ -14,8 +14,10 @@ from benchmarks.air import CASES as AIRS
 from benchmarks.air import air_cost, air_scaling
 from benchmarks.first_compile import CASES as COMPILES
 from benchmarks.first_compile import first_compile
+from benchmarks.metrics_share import metrics_share
 from benchmarks.processes import processes
 from benchmarks.record_cost import record_cost
+from benchmarks.report_cost import report_cost
 from benchmarks.robot_steps import CASES, D1, robot_steps, start
 from benchmarks.view_cost import view_cost
 
@@ -27,12 +29,15 @@ WITH_ENGINE: dict[str, Callable[[str, str | None, int], None]] = {
 OTHERS: dict[str, Callable[[str, int], None]] = {
     "agent-overhead": agent_overhead,
     "record-cost": partial(record_cost, robots=1000, ticks=600),
+    "metrics-share": partial(metrics_share, of="inprocess-1000-d1"),
+    "metrics-share-radio": partial(metrics_share, of="inprocess-1000-d1-radio"),
     "view-cost": partial(view_cost, robots=1000, ticks=600, neighbours=0.0),
     "view-cost-radio": partial(view_cost, robots=1000, ticks=600, neighbours=D1),
     **dict.fromkeys(AIRS, air_cost),
     "air-scaling": air_scaling,
     "processes-100": partial(processes, robots=100, ticks=300),
     **dict.fromkeys(COMPILES, first_compile),
+    "report-10000": partial(report_cost, seeds=200),
 }
 
 

@@ -47,6 +47,8 @@ TARGETS = {
     "view-cost-size": most(60, "`run.rrd` of that run"),
     "view-cost-radio": most(15, "with the radio, 8.7 packets heard per robot and tick"),
     "view-cost-radio-size": most(60, "`run.rrd` of that run"),
+    "metrics-share": most(20, "what the metrics of every run cost of `inprocess-1000-d1`"),
+    "metrics-share-radio": most(20, "the same, of `inprocess-1000-d1-radio`"),
     "air-802154-1000": Target(
         20, "1,000 robots, 20 bytes, 29 in range, 802.15.4: shadowing, fading, CSMA, SINR to 10 dB below noise"
     ),
@@ -59,4 +61,6 @@ TARGETS = {
     "compile-world": most(30, "a machine's first run without a radio: what it takes longer than the next"),
     "compile-disk": most(30, "with a disk radio"),
     "compile-signals": most(30, "with a radio of signals"),
+    "report-10000": most(30, "`swarmwire report` of 50 points x 200 seeds with 10 outcomes, from the call to its end"),
+    "report-10000-memory": most(1000, "the most memory that it held"),
 }

@@ -355,7 +355,33 @@ def test_the_last_state_that_a_robot_names_in_a_tick_counts() -> None:
     assert [len(step(host, tick, [2, 5]).notes) for tick in (0, 1)] == [2, 0]
 
 
-@pytest.mark.parametrize("state", ["", "x" * 65, 3, None], ids=repr)
+def test_the_last_number_that_a_robot_tells_in_a_tick_counts() -> None:
+    class Rows(VectorAgent):
+        def step(self, robots: Robots, state: State) -> None:
+            robots.note("search", value=np.array([1.0, 2.0, 3.0]))
+            robots.note(value=np.array([np.nan, 5.0, np.inf]), rows=np.array([False, True, False]))
+
+    class One(Agent):
+        def step(self, robot: Robot) -> None:
+            if robot.time_s == 0.0:
+                robot.note(value=0.5)
+                robot.note("search", value=1.25)
+
+    class Same(VectorAgent):
+        def step(self, robots: Robots, state: State) -> None:
+            robots.note(value=4, rows=np.array([True, False, True]))
+
+    actions = once(Rows, [1, 4, 6])
+    assert (actions.values.rows.tolist(), actions.values.value.tolist()) == ([1, 4, 6], [1.0, 5.0, 3.0])
+    assert len(actions.notes) == 3
+    same = once(Same, [1, 4, 6])
+    assert (same.values.rows.tolist(), same.values.value.tolist(), len(same.notes)) == ([1, 6], [4.0, 4.0], 0)
+    host = host_of(One, [2, 5])
+    first, second = (step(host, tick, [2, 5]) for tick in (0, 1))
+    assert (first.values.value.tolist(), len(first.notes), len(second.values)) == ([1.25, 1.25], 2, 0)
+
+
+@pytest.mark.parametrize("state", ["", "x" * 65, 3], ids=repr)
 def test_a_state_is_a_short_text(state: object) -> None:
     class Wrong(Agent):
         def step(self, robot: Robot) -> None:

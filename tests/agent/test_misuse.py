@@ -59,6 +59,9 @@ def test_a_failure_is_told_from_the_agents_first_line_on_and_when_it_was() -> No
         (lambda robot: robot.radio.send(Word(number=1.0), to=1.5), "expected the index of a robot in the arena"),
         (lambda robot: robot.radio.heard("Word"), "expected a class of messages, got 'Word'"),
         (lambda robot: robot.radio.heard(Word(number=1.0)), "expected a class of messages, got Word(number=1.0)"),
+        (lambda robot: robot.note(), "expected a state, a value, or both"),
+        (lambda robot: robot.note(value=float("nan")), "note(value=…): expected finite numbers, got nan"),
+        (lambda robot: robot.note(value="up"), "could not convert string to float: 'up'"),
         (lambda robot: setattr(robot, "linear_mps", 0.1), "no attribute 'linear_mps'"),
     ],
 )
@@ -77,6 +80,10 @@ def test_misuse_of_a_robot_is_refused(deed: Callable[[Any], object], told: str) 
             "rows: expected a mask, bool (3,), got int64 (2,)",
         ),
         (lambda robots: robots.note("up", rows=np.array([0, 1])), "rows: expected a mask"),
+        (lambda robots: robots.note(value=1.0, rows=np.array([0, 1])), "rows: expected a mask"),
+        (lambda robots: robots.note(rows=np.ones(3, bool)), "expected a state, a value, or both"),
+        (lambda robots: robots.note(value=np.zeros(2)), "expected one number or 3, got the shape (2,)"),
+        (lambda robots: robots.note(value=np.array([0, np.inf, 0])), "expected finite numbers"),
         (lambda robots: robots.led(0.1, 0.0, 0.0, rows=np.ones(2, bool)), "rows: expected a mask"),
         (lambda robots: robots.radio.send(Word, np.array([1]), number=1.0), "rows: expected a mask"),
         (

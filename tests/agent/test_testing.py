@@ -113,6 +113,19 @@ def test_a_difference_names_the_tick_the_robots_and_what_each_did() -> None:
     ]
 
 
+def test_a_difference_in_a_number_told_names_both() -> None:
+    class Tells(VectorAgent):
+        def step(self, robots, state) -> None:
+            robots.note(value=np.full(robots.n, 0.5))
+
+    class TellsOther(Agent):
+        def step(self, robot: Robot) -> None:
+            robot.note(value=0.25)
+
+    with pytest.raises(AssertionError, match=r"note: value: 0.25 \(TellsOther\), 0.5 \(Tells\)"):
+        assert_equivalent(TellsOther, Tells, Trial(robots=2))
+
+
 def test_a_difference_in_a_message_names_its_field() -> None:
     different = type("Different", (SaysOther,), {"said": 0.25})
     with pytest.raises(AssertionError) as caught:

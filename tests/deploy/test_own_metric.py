@@ -4,6 +4,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
+from swarmwire.metrics.drawing.film import film_of
 from tests.docs.pages import files_of
 from tests.metrics.packages import CODE, install
 
@@ -32,7 +33,10 @@ def scenario(tmp_path):
 @pytest.mark.parametrize("runners", ["none", 2])
 def test_it_is_in_summary_and_table_and_in_a_repetition_from_the_run_folder_alone(tmp_path, scenario, runners):
     result = run(scenario, runners=runners, out=tmp_path / "run")
-    ticks = RunFolder(tmp_path / "run").metrics()
+    folder = RunFolder(tmp_path / "run")
+    ticks = folder.metrics()
+    assert list(folder.measured) == list(result.metrics)
+    assert (folder.measured["spread"].unit, film_of(folder, 0, "").facts["spread"].kind) == ("m", "level")
     assert result.metrics["spread"].final == ticks["spread"][-1] > 0.0
     (tmp_path / "spread.py").unlink()
     again = repeat(tmp_path / "run", out=tmp_path / "again")
@@ -50,7 +54,7 @@ def test_its_parameters_are_kept_with_the_run(tmp_path, scenario):
     assert again.changes == ()
     assert again.result.metrics["east"] == result.metrics["east"]
     east, two_metres_on = (run(tmp_path / "run" / "scenario.toml", overrides=over) for over in ([], [FROM_ZERO]))
-    assert two_metres_on.metrics["east"].final == pytest.approx(east.metrics["east"].final + 2.0)
+    assert two_metres_on.metrics["east"].final == pytest.approx((east.metrics["east"].final or 0.0) + 2.0)
 
 
 def test_a_package_brings_one_by_name_and_its_code_is_told_with_the_run(tmp_path, scenario, monkeypatch):

@@ -1,9 +1,10 @@
 """A moment gives a metric's author a row per arena and a column per robot."""
 
 import numpy as np
+import pytest
 
 from swarmwire.metrics.moment import Components, Moment, agreement
-from tests.metrics.truths import edges, static, truth
+from tests.metrics.truths import edges, poses, static, truth
 
 
 def test_rows_are_folded_by_arena():
@@ -28,5 +29,16 @@ def test_components_are_those_of_the_robots_alive():
 
 
 def test_vectors_agree_by_how_near_their_sum_comes_to_the_most():
-    x, y = np.array([3.0, 1.0, 0.0]), np.array([4.0, 0.0, 0.0])
-    assert agreement(x, y, np.array([5.0, 2.0, 1.0]), np.array([5, 2, 0])).tolist()[:2] == [1.0, 0.5]
+    x = np.array([[3.0, 3.0, 9.0], [1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    y = np.array([[4.0, 4.0, 9.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    alive = np.array([[1, 1, 0], [1, 1, 1], [0, 0, 0], [1, 1, 1]], np.bool_)
+    assert agreement(x, y, alive, True)[[0, 1, 3]].tolist() == [1.0, pytest.approx(1 / 3), 0.0]
+    assert agreement(x / 5, y / 5, alive, False)[[0, 1]].tolist() == [pytest.approx(1.0), pytest.approx(1 / 15)]
+    assert np.isnan(agreement(x, y, alive, True)[2])
+
+
+def test_directions_are_the_cosines_and_sines_of_headings():
+    of = static(3, arenas=2)
+    moment = Moment(of, truth(of, pose=poses([0.3, -2.0, 9.0, 0.0, 3.1, -0.1])))
+    np.testing.assert_allclose(moment.direction[0], np.cos(moment.heading_rad))
+    np.testing.assert_allclose(moment.direction[1], np.sin(moment.heading_rad))

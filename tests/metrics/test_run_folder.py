@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
@@ -8,9 +9,11 @@ from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Happened
 from swarmwire.metrics.record import recorders, table_writer, tick_recorder
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.registry import standard
 from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.table_faults import table_fault
+from swarmwire.metrics.verify.verify import verify
 from tests.metrics.recorded import links, record, wandering
 from tests.metrics.truths import static
 
@@ -57,6 +60,36 @@ def test_robots_have_a_row_each_per_tick(recorded):
         assert own["state"].to_list() == [one.states[one.state[at]] for one in seen]
 
 
+@pytest.mark.parametrize("since", [0, 2, 6, TICKS - 1, TICKS])
+@pytest.mark.parametrize("killed", [False, True])
+def test_numbers_that_robots_told_are_recorded_from_the_first_on(tmp_path, monkeypatch, since, killed):
+    """In parts of 4 ticks: told in the first, in the midst of one, in a later one, in the last, or never."""
+    if killed:
+        monkeypatch.setattr(table_writer, "join_parts", lambda *_: None)
+    monkeypatch.setattr(tick_recorder, "MOST_TICKS", 4)
+    of, rng = static(3, arenas=2), np.random.default_rng(3)
+    values = rng.normal(size=(TICKS, 6))
+    values[:since] = np.nan
+    values[:, 4] = np.nan
+    seen = [
+        replace(one, value=values[tick] if tick >= since else None) for tick, one in enumerate(wandering(of, TICKS))
+    ]
+    record(tmp_path, of, seen)
+    folder = RunFolder(tmp_path)
+    assert folder.metrics(0).columns == [name for name in folder.metrics(1).columns if name != "value"]
+    assert table_fault("ticks", folder.ticks().lazy(), of) is None
+    assert {finding.state for finding in verify(tmp_path) if finding.part == "ticks"} <= {State.WHOLE, State.PARTIAL}
+    if since == TICKS:
+        assert "value" not in folder.ticks().columns
+        assert "value" not in folder.robots(0).columns
+        return
+    for arena in range(2):
+        own = values[:, arena * 3 : arena * 3 + 3]
+        expected = [[None if np.isnan(value) else value for value in row] for row in own]
+        assert folder.ticks(arena)["value"].to_list() == expected
+        assert folder.robots(arena)["value"].to_list() == [value for row in expected for value in row]
+
+
 def test_speeds_to_the_left_are_recorded_of_robots_that_can_move_so(tmp_path):
     drive = {"kind": "holonomic", "max_speed_mps": 1, "max_angular_radps": 1, "max_force_n": 1, "max_torque_nm": 1}
     of = static(3, body=body_from({"like": "epuck", "name": "disc", "drive": drive}, "disc.toml"))
@@ -72,7 +105,7 @@ def test_speeds_to_the_left_are_recorded_of_robots_that_can_move_so(tmp_path):
 def test_metrics_have_a_row_per_tick_and_no_lists(recorded):
     folder, _, _ = recorded
     table = folder.metrics(1)
-    assert table.columns == ["tick", "time_s", *METRICS, "sent", "heard", "in_range"]
+    assert table.columns == ["tick", "time_s", *standard(), "sent", "heard", "in_range"]
     assert table["order"].to_list() == folder.ticks(1)["order"].to_list()
 
 

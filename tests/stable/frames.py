@@ -16,6 +16,7 @@ from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
 from swarmwire.comms.truth import Finished, Happened, Tally, Truth
+from swarmwire.comms.values import Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.scene_frames import OBSERVED_VERSION, encode_scene
@@ -25,7 +26,7 @@ from tests.stable.samples import LEFT_OUT, joined, lines_of, paths_of, sample
 
 # Lengths of axes, each its own, so that a shape can be told in words.
 ARENAS, ROBOTS, TOLD_OF, HEARD, SENT, OUTCOMES, GIVES, BYTES, WIDE = 11, 13, 17, 19, 23, 29, 31, 37, 41
-SERIES, EDGES, LINKS, LEDS, MOVABLE, NOTED, SWITCHED, ACTUATED = 43, 47, 53, 59, 61, 67, 71, 73
+SERIES, EDGES, LINKS, LEDS, MOVABLE, NOTED, SWITCHED, ACTUATED, TOLD = 43, 47, 53, 59, 61, 67, 71, 73, 79
 AXES = {
     ARENAS: "arenas",
     ARENAS * ROBOTS: "robots",
@@ -45,6 +46,7 @@ AXES = {
     NOTED: "noted",
     SWITCHED: "switched",
     ACTUATED: "actuated",
+    TOLD: "told",
     len(Fate): "fates",
 }
 
@@ -118,6 +120,7 @@ def _actions() -> Actions:
         Notes(*_ints(2, NOTED), ("",)),
         LedChanges(*_ints(3, SWITCHED)),
         Actuations(*_ints(2, ACTUATED), _floats(ACTUATED)),
+        Values(_ints(TOLD), _floats(TOLD)),
     )
 
 

@@ -83,9 +83,13 @@ class Robot(Sensing[float]):
         """
         self._turn.actuate(name, np.reshape(values, (1, -1)), slice(self._row, self._row + 1))
 
-    def note(self, state: str) -> None:
-        """Name what the robot is at ("search", "wait"), for recordings and pictures; it holds until the next call."""
-        self._turn.note(np.array([self._row]), state)
+    def note(self, state: str | None = None, *, value: float | None = None) -> None:
+        """Name what the robot is at ("search", "wait"), and tell a number, such as its estimate: for whoever looks on.
+
+        States are for recordings and pictures, numbers for recordings and metrics (`consensus_error`); each holds until
+        the next is given. ValueError if neither is, for a state that is no short text, for a number that is not finite.
+        """
+        self._turn.note(slice(self._row, self._row + 1), state, None if value is None else float(value))
 
     def _number(self, sense: str, field: str) -> float:
         return float(self._turn.field(sense, field)[self._row])

@@ -96,9 +96,15 @@ class Robots(Sensing[FloatArray]):
         """
         self._turn.actuate(name, values, slice(None), None if rows is None else self._turn.mask(rows))
 
-    def note(self, state: str, rows: BoolArray | None = None) -> None:
-        """Name what the robots of the mask `rows`, or all, are at; for recordings and pictures, until the next call."""
-        self._turn.note(slice(None) if rows is None else self._turn.mask(rows), state)
+    def note(self, state: str | None = None, rows: BoolArray | None = None, *, value: ArrayLike | None = None) -> None:
+        """Name what the robots of the mask `rows`, or all, are at, and tell a number of each: for whoever looks on.
+
+        States are for recordings and pictures, numbers for recordings and metrics (`consensus_error`); each holds until
+        the next is given. `value` is (n,) or one number for each of them; of robots outside the mask it does not count.
+        ValueError if neither is given, for a state that is no short text, for numbers that do not fit or are not
+        finite.
+        """
+        self._turn.note(slice(None) if rows is None else self._turn.mask(rows), state, value)
 
     def _number(self, sense: str, field: str) -> FloatArray:
         return self._turn.field(sense, field)

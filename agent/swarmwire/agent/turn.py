@@ -16,6 +16,7 @@ from swarmwire.comms.notes import Notes, checked_state
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
+from swarmwire.comms.values import NO_VALUES, Values
 
 M = TypeVar("M", bound=Message)
 OUTCOMES = "radio.outcomes"  # what `needs` calls the outcomes of addressed packets
@@ -48,6 +49,7 @@ class Turn:
         self._outbox: list[Sent] = []
         self._states: dict[str, int] = {}  # that were named in this tick, by code
         self._state: IntArray | None = None  # (n,) codes; -1: none named
+        self._value: FloatArray | None = None  # (n,) numbers told in this tick; NaN: none
         self._leds: IntArray | None = None  # (n, leds) colours; NOT_SWITCHED: none given in this tick
         self._own: FloatArray | None = None  # (n, numbers of all own actuators); NaN: not set in this tick
         self._packets: dict[type[Message], Packets[Any]] = {}
@@ -112,11 +114,27 @@ class Turn:
             raise TypeError(f"rows: expected a mask, bool ({self.n},), got {given.dtype} {given.shape}")
         return given
 
-    def note(self, rows: IntArray | BoolArray | slice, state: str) -> None:
-        """Name a state for some of the robots; the last one named in a tick counts."""
-        if self._state is None:
-            self._state = np.full(self.n, -1)
-        self._state[rows] = self._states.setdefault(checked_state(state), len(self._states))
+    def note(self, rows: BoolArray | slice, state: str | None, value: ArrayLike | None) -> None:
+        """Name a state for some of the robots, and tell a number (n,) or for all; of each the last in a tick counts.
+
+        ValueError if there is neither, or for one that is not fit to be told.
+        """
+        if state is None and value is None:
+            raise ValueError("note(…): expected a state, a value, or both")
+        if state is not None:
+            if self._state is None:
+                self._state = np.full(self.n, -1)
+            self._state[rows] = self._states.setdefault(checked_state(state), len(self._states))
+        if value is not None:
+            given = np.asarray(value, np.float64)
+            if given.ndim and given.shape != (self.n,):
+                raise ValueError(f"note(value=…): expected one number or {self.n}, got the shape {given.shape}")
+            given = np.broadcast_to(given, self.n)[rows]
+            if not np.isfinite(given).all():
+                raise ValueError(f"note(value=…): expected finite numbers, got {value!r}")
+            if self._value is None:
+                self._value = np.full(self.n, np.nan)
+            self._value[rows] = given
 
     def leds(self, which: int | None) -> IntArray:
         """The colours to switch an LED of each body to, or all, (n, leds), to write into; NotFitted if it has none."""
@@ -168,7 +186,14 @@ class Turn:
         sent = Sent.joined(self._outbox)
         command = self.linear_mps, self.angular_radps, self.lateral_mps
         return Actions(
-            self.senses.rows, self.drive, *command, sent, self._notes(), self._led_changes(), self._actuations()
+            self.senses.rows,
+            self.drive,
+            *command,
+            sent,
+            self._notes(),
+            self._led_changes(),
+            self._actuations(),
+            self._values(),
         )
 
     def _require(self, need: str) -> None:
@@ -192,3 +217,9 @@ class Turn:
             return Notes.none()
         noted = np.flatnonzero(self._state >= 0)
         return Notes(self.senses.rows[noted], self._state[noted], tuple(self._states))
+
+    def _values(self) -> Values:
+        if self._value is None:
+            return NO_VALUES
+        told = np.flatnonzero(~np.isnan(self._value))
+        return Values(self.senses.rows[told], self._value[told])

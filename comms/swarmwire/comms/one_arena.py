@@ -23,7 +23,7 @@ def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
     within = senses_within(truth.senses, rows)
     senses = {name: GroupSenses(group.rows - rows.start, group.fields) for name, group in within.items()}
     edges, tally, finished, departed = truth.edges, truth.tally, truth.finished, truth.departed
-    movable = truth.movable
+    movable, value = truth.movable, truth.value
     if edges is not None:
         edges = edges[(edges[:, 0] >= rows.start) & (edges[:, 0] < rows.stop)] - rows.start
     return replace(
@@ -43,6 +43,7 @@ def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
         events=tuple(replace(event, changed=event.changed[rows]) for event in truth.events),
         departed=None if departed is None else _departed_of(departed, arena),
         movable=None if movable is None else movable[arena : arena + 1],
+        value=None if value is None else value[rows],
     )
 
 

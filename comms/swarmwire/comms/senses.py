@@ -9,6 +9,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
 from swarmwire.comms.notes import Notes
 from swarmwire.comms.packets import Sent
+from swarmwire.comms.values import NO_VALUES, Values
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +36,7 @@ class Actions:
     notes: Notes = field(default_factory=Notes.none)
     leds: LedChanges = NO_LED_CHANGES
     own: Actuations = NO_ACTUATIONS  # of actuators of the user's own
+    values: Values = NO_VALUES
 
     @classmethod
     def joined(cls, parts: "list[Actions]") -> "Actions":
@@ -55,4 +57,5 @@ class Actions:
             Notes.joined([part.notes for part in parts]),
             LedChanges.joined([part.leds for part in parts]),
             Actuations.joined([part.own for part in parts]),
+            Values.joined([part.values for part in parts]),
         )

@@ -236,3 +236,5 @@ class Truth:
     events: tuple[Happened, ...] = ()  # at the tick's start, in order
     departed: Departed | None = None  # None without a radio; views of a run elsewhere do not get it
     movable: FloatArray | None = None  # (arenas, movable obstacles, 3) x, y, heading of those; None: there are none
+    # (rows,) number that the agent told last, NaN: none; None: nobody ever has; views of a run elsewhere do not get it
+    value: FloatArray | None = None

@@ -16,6 +16,7 @@ from swarmwire.deploy.commands.list_kinds import list_command
 from swarmwire.deploy.commands.new import new_command
 from swarmwire.deploy.commands.radio.group import radio_app
 from swarmwire.deploy.commands.repeat import repeat_command
+from swarmwire.deploy.commands.report import report_command
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
@@ -44,6 +45,7 @@ app.command("describe")(describe_command)
 app.command("new")(new_command)
 app.command("verify")(verify_command)
 app.command("compare")(compare_command)
+app.command("report")(report_command)
 app.add_typer(radio_app, name="radio")
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from swarmwire.comms.loading import resolve
+from swarmwire.metrics.judge import Condition
 from swarmwire.metrics.listed import Item, Listed, listed
 from swarmwire.world.scenario.metric_tables import MetricTable
 from swarmwire.world.scenario.scenario import Scenario
@@ -14,6 +15,11 @@ def measuring(scenario: Scenario) -> Listed:
     items = [_item(place, item, beside) for place, item in enumerate(scenario.metrics)]
     stops = [Item(f"{key}.metric", table.metric, None) for key, table in scenario.stops().items()]
     return listed([*items, *stops], scenario.source, with_standard=scenario.standard_metrics)
+
+
+def conditions(scenario: Scenario) -> list[Condition]:
+    """What ends an arena before its time, in the scenario's order."""
+    return [Condition(table.metric, *table.comparison, table.hold_s) for table in scenario.stops().values()]
 
 
 def _item(place: int, item: str | MetricTable, beside: Path) -> Item:

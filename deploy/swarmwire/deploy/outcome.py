@@ -13,6 +13,8 @@ from swarmwire.metrics.record.recorders import record_summary
 from swarmwire.world.crews.realtime_crew import RealTimeReport
 from swarmwire.world.crews.roster import Loss
 
+NO_STOP = {"stop_time_s": None, "stopped_by": None}
+
 
 def outcome(
     static: Static,
@@ -44,7 +46,8 @@ def outcome(
     radios: list[Any] = parts.get("radio", [None] * static.arenas)
     ends = ["stopped" if over else ended for over in stopped]
     times_s = [to_s(tick_start_ns(done, static.rate_hz)) for done in arena_ticks]
-    columns = static.seeds, ends, arena_ticks, times_s, hashes, arena_counts, radios, parts["metrics"]
+    stops: list[Any] = parts.get("stops", [NO_STOP] * static.arenas)
+    columns = static.seeds, ends, arena_ticks, times_s, hashes, arena_counts, radios, parts["metrics"], stops
     arenas = zip(*columns, strict=True)
     record = record_summary(parts)
     return Result(
@@ -59,6 +62,7 @@ def outcome(
         sim_time_s=to_s(tick_start_ns(ticks, static.rate_hz)),
         wall_time_s=wall_s,
         start_time_s=start_s,
+        stop=tuple(parts.get("stop", ())),
         arenas=tuple(arena_result(*arena) for arena in arenas),
         events=tuple(EventResult(**event) for event in parts["events"]),
         global_senses=_global_senses(static),

@@ -56,10 +56,13 @@ class ArenaResult:
     counts: dict[str, int]  # of the run's, those that belong to it, by name; only what is not 0
     radio: RadioResult | None
     metrics: dict[str, Statistics]
+    stop_time_s: float | None  # since when what ended it had held; None: nothing came to hold (censored at sim_time_s)
+    stopped_by: str | None  # what ended it, in words: "order at least 0.9 for 5 s"
 
     def end(self) -> dict[str, Any]:
-        """When and how it ended, as the summary says it, and what was not as it should be."""
-        return {"ended": self.ended, "ticks": self.ticks, "sim_time_s": self.sim_time_s, "counts": self.counts}
+        """When, how and why it ended, as the summary says it, and what was not as it should be."""
+        names = ("ended", "ticks", "sim_time_s", "stop_time_s", "stopped_by", "counts")
+        return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -96,6 +99,7 @@ class Result:
     cpu: str
     versions: dict[str, str]
     modules: dict[str, str]  # sha256 of the installed code: swarmwire's parts and packages of agents
+    stop: tuple[str, ...] = ()  # what ends an arena, in words: "order at least 0.9 for 5 s"
     files: tuple[CopiedFile, ...] = ()  # in the run folder, from which the run can be repeated
     inputs: InputsRecord | None = None  # what came from outside, if anything did
     lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
@@ -146,6 +150,7 @@ class Result:
             "wall_time_s": self.wall_time_s,
             "start_time_s": self.start_time_s,
             "realtime_factor": self.realtime_factor,
+            "stop": list(self.stop),
             "by_arena": [arena.end() for arena in self.arenas],
             "trajectory_sha256": self.trajectory_sha256,
             "radio": radios[0] if one else radios,
@@ -177,11 +182,12 @@ def arena_result(
     counts: dict[str, int],
     radio: dict[str, Any] | None,
     metrics: dict[str, Any],
+    stop: dict[str, Any],
 ) -> ArenaResult:
     """The parts of the observers' summaries that belong to one arena, typed."""
     of_radio = None if radio is None else _radio_result(**radio)
     of_metrics = {name: Statistics(**value) for name, value in metrics.items()}
-    return ArenaResult(seed, ended, ticks, sim_time_s, sha256, counts, of_radio, of_metrics)
+    return ArenaResult(seed, ended, ticks, sim_time_s, sha256, counts, of_radio, of_metrics, **stop)
 
 
 def _radio_result(latency_air_s: dict[str, Any], latency_agent_s: dict[str, Any], **counts: Any) -> RadioResult:

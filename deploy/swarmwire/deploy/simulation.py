@@ -18,7 +18,7 @@ from swarmwire.deploy.endpoint import check_socket, new_run_id
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.kept_memory import keep_memory
-from swarmwire.deploy.measuring import measuring
+from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.deploy.new_air import new_air
 from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
@@ -29,6 +29,7 @@ from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.too_large import TooLarge
 from swarmwire.metrics.event_log import EventLog
+from swarmwire.metrics.judge import Judge as StopJudge
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.world.crews.pace import Pace
@@ -92,6 +93,9 @@ class Simulation:
         self.world = self._new_world(seed, seeds)
         measures = measuring(self.scenario)
         self.metrics = Metrics(measures.metrics)
+        stops = conditions(self.scenario)
+        self._stop = StopJudge(self.metrics, stops) if stops else None
+        self._judge: Judge | None = self._stop
         self.code = tuple(dict.fromkeys([*self.agents.values(), *own_code(self.world.static), *measures.code]))
         self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else _ticks(self.scenario)
@@ -110,7 +114,6 @@ class Simulation:
         self._observers: list[Guarded] = []
         for observer in (TooLarge(self._record.say), *self._recorders(what), *observers):
             self.watch(observer)
-        self._judge: Judge | None = None
         self._losses: list[Loss] = []
         self._crews = self._new_crews(socket)
         self._crew: Crew | None = None
@@ -154,12 +157,19 @@ class Simulation:
         keep_memory()
         rows, realtime = self.static.arenas * self.static.robots, self._pace.factor if self._pace else None
         self._origin = self._record.begin(
-            self.scenario, self.code, self.static.seeds, ticks=self.ticks, runners=self.runners, realtime=realtime
+            self.scenario,
+            self.code,
+            self.static.seeds,
+            ticks=self.ticks,
+            runners=self.runners,
+            realtime=realtime,
+            metrics=self.metrics,
         )
         with ExitStack() as stack:
             stack.push(self._record.failed_to_start)
             crew = self._crew = stack.enter_context(self._crews.crew())
-            self._watching: list[Observer] = [self.metrics, RadioTally(), EventLog(), *self._observers]
+            judging = [self._stop] if self._stop else []
+            self._watching: list[Observer] = [self.metrics, *judging, RadioTally(), EventLog(), *self._observers]
             acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows)
             acting = self._record.recorded(acting, self._from_outside)
             self._loop = Loop(

@@ -30,7 +30,9 @@ class Condition:
 
 
 class Judge:
-    """Observer that finds arenas over. Summary part: `stops`, per arena {stop_time_s, stopped_by}.
+    """Observer that finds arenas over.
+
+    Summary parts: `stop`, the conditions in words; `stops`, per arena {stop_time_s, stopped_by}.
 
     A condition holds in an arena once it has been true in every tick from one at t0 on, and t0 is `hold_s` ago; the
     arena is over then, and t0 its stop time. What has no value is not true. Of several conditions any will do; of those
@@ -76,7 +78,8 @@ class Judge:
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """When each arena was over, in s from the start of the run, and by which condition; None where it was not."""
-        return {"stops": [self._stop(arena) for arena in range(len(self._over))]}
+        stops = [self._stop(arena) for arena in range(len(self._over))]
+        return {"stop": [str(condition) for condition in self._conditions], "stops": stops}
 
     def _stop(self, arena: int) -> dict[str, Any]:
         if not self._over[arena]:

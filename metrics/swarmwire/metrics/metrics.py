@@ -58,8 +58,8 @@ class Metrics:
     def _begun(self, metric: Metric) -> Measure:
         try:
             return metric.begin(self._static)
-        except BadInput:  # parameters that do not go with this run
-            raise
+        except BadInput as error:  # parameters that do not go with this run
+            raise BadInput(error.where, f"metrics.{metric.name}.{error.key}", error.expected) from None
         except (Exception, SystemExit) as error:
             raise _failed(metric) from error
 

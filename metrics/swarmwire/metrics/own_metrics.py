@@ -5,10 +5,10 @@ from typing import Any, get_args
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.own_class import own_class
 from swarmwire.metrics.metric import Kind, Metric
-from swarmwire.metrics.record.tick_columns import KEYS, MOVABLE, RADIO, ROBOT_COLUMNS, SIDEWAYS
+from swarmwire.metrics.record.tick_columns import KEYS, MOVABLE, RADIO, ROBOT_COLUMNS, SIDEWAYS, VALUE
 from swarmwire.metrics.registry import DELIVERY, METRICS
 
-COLUMNS = {*KEYS, *ROBOT_COLUMNS, SIDEWAYS, *MOVABLE, *RADIO}  # of the table of ticks, where each has one, too
+COLUMNS = {*KEYS, *ROBOT_COLUMNS, SIDEWAYS, VALUE, *MOVABLE, *RADIO}  # of the table of ticks, where each has one, too
 
 
 def own_kind(spec: str, where: str, key: str) -> type[Metric]:

@@ -33,11 +33,12 @@ from swarmwire.metrics.swarm.order_velocity import OrderVelocity
 from swarmwire.metrics.swarm.oscillation import Oscillation
 from swarmwire.metrics.swarm.path_efficiency import PathEfficiency
 from swarmwire.metrics.swarm.rotation import Rotation
+from swarmwire.metrics.task.consensus_bias import ConsensusBias
+from swarmwire.metrics.task.consensus_error import ConsensusError
 from swarmwire.metrics.task.coverage import Coverage
 from swarmwire.metrics.task.coverage_time import CoverageTime
 from swarmwire.metrics.task.find_time import FindTime
-from swarmwire.metrics.task.target_best import TargetBest
-from swarmwire.metrics.task.target_mean import TargetMean
+from swarmwire.metrics.task.target_distance import TargetBest, TargetMean
 
 DELIVERY = "delivery"  # drawn beside the metrics, of packets in the last second: no metric may have its name
 
@@ -82,6 +83,8 @@ METRICS: dict[str, type[Metric]] = {
         FindTime,
         Coverage,
         CoverageTime,
+        ConsensusError,
+        ConsensusBias,
     )
 }
 

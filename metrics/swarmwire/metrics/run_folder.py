@@ -13,12 +13,13 @@ from swarmwire.metrics.record.distance_totals import distance_totals_schema
 from swarmwire.metrics.record.event_recorder import event_schema
 from swarmwire.metrics.record.formats import SUMMARY_FORMAT, TABLES_FORMAT, refuse_other_format
 from swarmwire.metrics.record.link_totals import link_totals_schema
+from swarmwire.metrics.record.metric_facts import MetricFacts, read_facts
 from swarmwire.metrics.record.names import STATIC, SUMMARY
 from swarmwire.metrics.record.packet_columns import packet_schema
-from swarmwire.metrics.record.part_files import parts_of, table_file
+from swarmwire.metrics.record.part_files import parts_of, scan_files, table_file
 from swarmwire.metrics.record.robot_totals import robot_totals_schema
 from swarmwire.metrics.record.static_file import read_static
-from swarmwire.metrics.record.tick_columns import movable_columns, robot_columns
+from swarmwire.metrics.record.tick_columns import VALUE, movable_columns, robot_columns
 
 if TYPE_CHECKING:
     import polars as pl
@@ -71,14 +72,20 @@ class RunFolder:
         """Arena, bodies, groups and names."""
         return self._static
 
+    @property
+    def measured(self) -> dict[str, MetricFacts]:
+        """By name: what each metric that the run measured says of itself; empty where older runs did not keep it."""
+        return read_facts(self.path)
+
     def ticks(self, arena: int | None = None) -> "pl.DataFrame":
         """A row per tick and arena, of one arena or of all; lists with an item per robot in its order.
 
         Columns: tick, time_s, arena, seed; lists x_m, y_m, heading_rad, vx_mps, vy_mps, turn_radps (arena frame),
         command_forward_mps, command_turn_radps (as applied) and, if a robot can move sideways, command_left_mps, all
-        float32, alive, state ("": none named); if obstacles are movable, lists movable_x_m, movable_y_m,
-        movable_heading_rad with an item for each of them in the scenario's order; each metric (a count's total so far;
-        null: undefined); sent, heard, in_range since the tick before (null without a radio).
+        float32, alive, state ("": none named); if a robot ever told a number, value (float64; null: none told); if
+        obstacles are movable, lists movable_x_m, movable_y_m, movable_heading_rad with an item for each of them in the
+        scenario's order; each metric (a count's total so far; null: undefined); sent, heard, in_range since the tick
+        before (null without a radio).
         """
         return self._read("ticks", arena)
 
@@ -96,13 +103,13 @@ class RunFolder:
                 *(ticks[name].gather(_repeated(len(ticks), static.robots)) for name in ("tick", "time_s")),
                 names.gather(index).alias("robot"),
                 groups.gather(index).alias("group"),
-                *(ticks[name].explode() for name in robot_columns(static)),
+                *(ticks[name].explode() for name in (*robot_columns(static), VALUE) if name in ticks.columns),
             ]
         )
 
     def metrics(self, arena: int = 0) -> "pl.DataFrame":
         """A row per tick of one arena: tick, time_s, each metric, and the radio's counts."""
-        wide = (*robot_columns(self.static), *movable_columns(self.static))
+        wide = (*robot_columns(self.static), VALUE, *movable_columns(self.static))
         return self._read("ticks", self._checked(arena), [*wide, "arena", "seed"])
 
     def packets(self, arena: int | None = None) -> "pl.DataFrame":
@@ -185,10 +192,10 @@ class RunFolder:
             if not files:
                 break
             try:
-                lazy = pl.scan_parquet(files)
+                lazy = scan_files(files)
                 if arena is not None:
                     lazy = lazy.filter(pl.col("arena") == arena)
-                return lazy.drop(*left_out).collect()
+                return lazy.drop(*left_out, strict=False).collect()
             except FileNotFoundError:
                 continue  # the run ended just now, and its parts were joined
             except pl.exceptions.PolarsError as error:

@@ -17,6 +17,7 @@ from swarmwire.comms.notes import Notes
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
+from swarmwire.comms.values import Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_actions, encode_tick
 
@@ -300,4 +301,25 @@ def test_named_states_come_over_whole() -> None:
 def test_states_that_contradict_themselves_are_refused(rows: list[int], code: list[int], names: tuple[str]) -> None:
     with pytest.raises(BadFrame) as caught:
         decode_actions(frames.decode(noting(rows, code, names)), ROWS)
+    assert caught.value.fault == "malformed"
+
+
+def numbering(rows: list[int], value: list[float]) -> bytes:
+    return encode_actions(0, replace(sound(), values=Values(np.array(rows, np.int64), np.array(value, np.float64))))
+
+
+def test_numbers_that_were_told_come_over_bit_for_bit_and_nobodys_take_no_room() -> None:
+    value = [0.1 + 0.2, -0.0, 5e-324]
+    told = decode_actions(frames.decode(numbering([9, 4, 4], value)), ROWS).values
+    assert (told.rows.tolist(), told.value.tobytes()) == ([9, 4, 4], np.array(value).tobytes())
+    assert numbering([], []) == encode_actions(0, sound())
+    assert len(decode_actions(frames.decode(numbering([], [])), ROWS).values) == 0
+
+
+@pytest.mark.parametrize(
+    ("rows", "value"), [([5], [1.0]), ([4], [np.nan]), ([4], [np.inf]), ([4, 9], [1.0]), ([4], [])], ids=repr
+)
+def test_numbers_that_are_none_or_anothers_are_refused(rows: list[int], value: list[float]) -> None:
+    with pytest.raises(BadFrame) as caught:
+        decode_actions(frames.decode(numbering(rows, value)), ROWS)
     assert caught.value.fault == "malformed"

@@ -265,7 +265,7 @@ def test_a_scene_of_anything_else_is_refused(junk):
 @given(glimpses(), st.integers(0, ARENAS - 1))
 @settings(max_examples=40)
 def test_one_arena_of_several_is_a_run_of_its_own(glimpse, arena):
-    truth, rows = glimpse.truth, slice(arena * ROBOTS, (arena + 1) * ROBOTS)
+    truth, rows = replace(glimpse.truth, value=np.arange(ROWS) / 2), slice(arena * ROBOTS, (arena + 1) * ROBOTS)
     if truth.edges is not None:  # no edge joins robots of different arenas
         truth = replace(truth, edges=truth.edges[truth.edges[:, 0] // ROBOTS == truth.edges[:, 1] // ROBOTS])
     one = truth_of(truth, STATIC, arena)
@@ -273,6 +273,8 @@ def test_one_arena_of_several_is_a_run_of_its_own(glimpse, arena):
     values = glimpse.values[:, arena : arena + 1]
     decoded = decode_truth(frames.decode(encode_truth(replace(glimpse, truth=one, values=values))), scene)
     assert equal(decoded.truth.pose, truth.pose[rows])
+    assert equal(one.value, truth.value[rows])
+    assert decoded.truth.value is None  # it is not sent
     if truth.edges is not None:
         assert (one.edges + rows.start).tolist() == [e for e in truth.edges.tolist() if e[0] // ROBOTS == arena]
     if truth.finished is not None and one.finished is not None:

@@ -39,6 +39,12 @@ def test_a_count_is_shown_as_its_total_and_a_level_by_its_course(result):
     assert row(text, "min_gap") == "final 3, mean 0.25, min 0 (m)"
 
 
+def test_a_time_is_told_also_if_it_did_not_come(result):
+    never, came = Statistics(None, None, None, None), Statistics(12.5, 12.5, 12.5, 12.5)
+    assert row(shown(result, metrics={"aggregation_time_s": came}), "aggregation_time_s") == "at 12.5 s"
+    assert row(shown(result, metrics={"aggregation_time_s": never}), "aggregation_time_s") == "not in 1 s"
+
+
 def test_who_has_an_obstacle_in_between_does_not_count_as_in_range(result):
     radio = result.radio
     assert radio is not None
@@ -52,3 +58,25 @@ def test_who_has_an_obstacle_in_between_does_not_count_as_in_range(result):
 def test_where_nobody_was_in_range_there_is_no_share(result):
     told = replace(result.radio, sent=1, intended=19, in_range=0, pdr=None)
     assert row(shown(result, radio=told), "radio") == "1 packets, 19 intended receivers, 0 in range"
+
+
+def test_arenas_that_stopped_are_told_with_when_and_by_what_and_those_that_did_not(result):
+    early, late = "order at least 0.9 for 5 s", "target_best below 0.1"
+    [arena] = result.arenas
+    stopped = {3: (early, 1.5), 5: (late, 0.0)}
+    of = [
+        replace(
+            arena, seed=seed, stopped_by=stopped.get(seed, (None, None))[0], stop_time_s=stopped.get(seed, (0, None))[1]
+        )
+        for seed in range(1, 11)
+    ]
+    out = StringIO()
+    told = replace(result, arenas=tuple(of), stop=(early, late), ended="duration")
+    print_result(told, METRICS.values(), Console(file=out, width=160, color_system=None))
+    rows = [line.strip("│ ") for line in out.getvalue().splitlines() if "stopped" in line]
+    assert [" ".join(row.split()) for row in rows] == [
+        f"stopped │ {early}: seed 3 since 1.5 s",
+        f"stopped │ {late}: seed 5 since 0 s",
+        f"not stopped │ seed 1, seed 2, seed 4, seed 6, seed 7, seed 8 and 2 more in 1 s: {early} or {late}",
+    ]
+    assert "stopped" not in shown(result)

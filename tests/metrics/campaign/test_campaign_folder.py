@@ -140,7 +140,10 @@ def test_a_point_that_there_is_not_is_refused(tmp_path, point):
         ({"duration_s": True}, "duration_s"),
         ({"outcomes": [{"column": "x", "unit": "", "kind": "level", "help": ""}]}, "outcomes[0].kind"),
         ({"outcomes": [{"column": "x"}]}, "outcomes[0].unit"),
-        ({"files": [3]}, "files"),
+        ({"files": [3]}, "files[0]"),
+        ({"files": [{"what": "a"}]}, "files[0].path"),
+        ({"overrides": [3]}, "overrides"),
+        ({"modules": []}, "modules"),
         ({"name": None}, "name: expected a text"),
     ],
 )

@@ -40,7 +40,7 @@ def test_a_film_is_of_one_arena(tmp_path):
 
 
 def test_a_run_without_a_tick_yet_is_refused():
-    empty = SimpleNamespace(static=two_groups(), ticks=lambda _: ticks_frame(film())[:0])
+    empty = SimpleNamespace(static=two_groups(), measured={}, ticks=lambda _: ticks_frame(film())[:0])
     with pytest.raises(BadInput, match="run: holds no tick yet"):
         film_of(empty, 0, "run")
 
@@ -75,7 +75,9 @@ def test_delivery_is_what_was_heard_of_what_was_in_range_within_the_last_second(
     heard[:15], in_range[0] = 0, 0
     counts = {"heard": pl.Series(heard), "in_range": pl.Series(in_range)}
     frame = ticks_frame(film(ticks)).with_columns(**counts)
-    found = film_of(SimpleNamespace(static=two_groups(), ticks=lambda _: frame), 0, "run").metrics["delivery"]
+    found = film_of(SimpleNamespace(static=two_groups(), measured={}, ticks=lambda _: frame), 0, "run").metrics[
+        "delivery"
+    ]
     assert np.isnan(found[0])
     np.testing.assert_allclose(found[[14, 15, 19, 24, 30]], [0.0, 0.075, 0.375, 0.75, 0.75])
 
@@ -83,5 +85,7 @@ def test_delivery_is_what_was_heard_of_what_was_in_range_within_the_last_second(
 def test_without_a_radio_there_is_no_delivery():
     none = pl.Series([None] * 31, dtype=pl.Int64)
     frame = ticks_frame(film()).with_columns(heard=none, in_range=none)
-    found = film_of(SimpleNamespace(static=two_groups(), ticks=lambda _: frame), 0, "run").metrics["delivery"]
+    found = film_of(SimpleNamespace(static=two_groups(), measured={}, ticks=lambda _: frame), 0, "run").metrics[
+        "delivery"
+    ]
     assert np.isnan(found).all()

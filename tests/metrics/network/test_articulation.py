@@ -1,10 +1,12 @@
 """Articulation: known graphs, and components counted after taking out each robot in turn."""
 
+import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from swarmwire.metrics.network.articulation import cut_vertices
 from tests.metrics.truths import edges, measured, static, truth
 
 NAME = "articulation"
@@ -51,3 +53,12 @@ def test_they_are_those_without_which_there_are_more_pieces(drawn):
         expected.append(sum(pieces(set(range(8)) - {robot}, own) > whole for robot in range(8)))
     pairs = [(8 * i + a, 8 * i + b) for i, own in enumerate(arenas) for a, b in own]
     assert points(static(8, arenas=len(arenas)), pairs) == expected
+
+
+def test_of_a_large_swarm_they_are_those_that_networkx_finds():
+    for seed, reach in ((1, 1.0), (2, 1.2), (3, 1.4)):
+        at = np.random.default_rng(seed).uniform(0, 20, (400, 2))
+        pairs = np.argwhere(np.triu(np.hypot(*(at[:, None] - at[None]).transpose(2, 0, 1)) < reach, 1))
+        expected = sorted(nx.articulation_points(nx.Graph(pairs.tolist())))
+        assert np.flatnonzero(cut_vertices(pairs, 400)).tolist() == expected
+        assert len(expected) > 5

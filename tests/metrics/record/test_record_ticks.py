@@ -11,7 +11,7 @@ from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record import tick_recorder
 from swarmwire.metrics.record.part_files import parts_of
 from swarmwire.metrics.record.tick_recorder import TickRecorder
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.registry import standard
 from swarmwire.metrics.swarm.order import Order
 from tests.clocks import StillClock
 from tests.metrics.recorded import record, wandering
@@ -57,7 +57,7 @@ def test_every_tick_comes_back_however_it_was_cut_into_parts(tmp_path_factory, t
 def test_metrics_are_those_measured_and_null_where_undefined(tmp_path):
     of, metrics = static(3, arenas=2), Metrics()
     recorder = TickRecorder(tmp_path, metrics, StillClock())
-    expected = {name: [] for name in METRICS}
+    expected = {name: [] for name in standard()}
     for observer in (metrics, recorder):
         observer.begin(of)
     for seen in wandering(of, 12, edges=edges((0, 1), (4, 5))):
@@ -67,7 +67,7 @@ def test_metrics_are_those_measured_and_null_where_undefined(tmp_path):
             expected[name] += [None if np.isnan(value) else value for value in values]
     recorder.end(None)
     table = pl.read_parquet(tmp_path / "ticks.parquet")
-    assert {name: table[name].to_list() for name in METRICS} == expected
+    assert {name: table[name].to_list() for name in standard()} == expected
     assert table["target_best"].null_count() == 24  # there is no light
 
 

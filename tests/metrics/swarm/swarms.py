@@ -81,9 +81,9 @@ def mixed(of: Static, first: int) -> Static:
 
 
 @st.composite
-def swarms(draw: st.DrawFn, most: int = 14) -> Swarm:
+def swarms(draw: st.DrawFn, least: int = 1, most: int = 14) -> Swarm:
     """Several arenas with walls or on a torus, two kinds of bodies, some dead; spread out, in a heap, or on a grid."""
-    robots, arenas = draw(st.integers(1, most)), draw(st.integers(1, 3))
+    robots, arenas = draw(st.integers(least, most)), draw(st.integers(1, 3))
     of = mixed(static(robots, arenas=arenas), draw(st.integers(1, robots)))
     of = replace(of, boundary=draw(st.sampled_from(["walls", "torus"])))
     rng = np.random.default_rng(draw(st.integers(0, 10**6)))

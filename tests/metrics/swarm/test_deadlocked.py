@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.metrics.swarm.deadlocked import Deadlocked
@@ -68,6 +68,7 @@ def test_who_went_across_the_seam_of_a_torus_by_little_is_deadlocked():
     assert after(place, robots(AHEAD)) == [0.0]
 
 
+@settings(max_examples=50)
 @given(st.integers(0, 1000), st.integers(2, 30), st.sampled_from(["walls", "torus"]))
 def test_it_is_that_of_the_definition(seed, ticks, boundary):
     rng, window = np.random.default_rng(seed), 10

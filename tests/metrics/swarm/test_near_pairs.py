@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.metrics.moment import Moment
@@ -24,7 +24,8 @@ def expected(swarm: Swarm, reach_m):
     return sorted(pairs)
 
 
-@given(swarms(), st.sampled_from([0.02, 0.2, 0.9, 2.1, 9.0]), st.integers(0, 1000))
+@settings(max_examples=400)
+@given(swarms(least=5), st.sampled_from([0.02, 0.2, 0.9, 1.3, 2.1, 9.0]), st.integers(0, 1000))
 def test_they_are_those_of_all_pairs_each_once_whatever_the_reaches(swarm, reach_m, seed):
     reaches_m = reach_m * np.random.default_rng(seed).choice([0.3, 1.0, 1.01], swarm.of.robots)
     assert found(swarm, reaches_m) == expected(swarm, reaches_m)
@@ -34,12 +35,18 @@ def test_they_are_those_of_all_pairs_each_once_whatever_the_reaches(swarm, reach
 def test_of_many_robots_that_move_they_are_found_tick_by_tick(boundary):
     rng = np.random.default_rng(1)
     place = rng.uniform([-4.0, -3.0], [4.0, 3.0], (200, 2))
-    reach_m = rng.uniform(0.05, 0.3, 200)
+    reach_m = rng.choice([0.02, 0.3], 200)
     finder = NearPairs(stand(*place, boundary=boundary).of, reach_m)
     for _ in range(5):
         place = rolled(place + rng.normal(0.0, 0.2, place.shape))
         swarm = stand(*place, boundary=boundary)
         assert found(swarm, reach_m, finder) == expected(swarm, reach_m)
+
+
+@pytest.mark.parametrize("x", [-4.0, -3.0, -1.0, 0.0])
+def test_half_a_torus_apart_is_one_pair_not_two(x):
+    half = stand((x, 1.0), (x + 4.0, 1.0), boundary="torus")
+    assert found(half, np.full(2, 2.5)) == [(0, 1)]
 
 
 def test_robots_far_outside_an_open_arena_are_found():

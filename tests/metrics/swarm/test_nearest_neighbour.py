@@ -2,7 +2,7 @@ from math import lgamma
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 
 from swarmwire.metrics.metrics import Metrics
 from tests.metrics.swarm.swarms import said, stand, swarms
@@ -17,8 +17,14 @@ def mean_nearest_m(swarm):
     return values
 
 
-@given(swarms(most=40))
+@given(swarms())
 def test_it_is_that_of_all_pairs(swarm):
+    assert said("nearest_neighbour", swarm) == pytest.approx(mean_nearest_m(swarm), abs=1e-12, nan_ok=True)
+
+
+@settings(max_examples=300)
+@given(swarms(least=9, most=40))
+def test_it_is_that_of_all_pairs_of_more_robots(swarm):
     assert said("nearest_neighbour", swarm) == pytest.approx(mean_nearest_m(swarm), abs=1e-12, nan_ok=True)
 
 

@@ -12,6 +12,7 @@ from swarmwire.comms.led_changes import LedChanges
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions
+from swarmwire.comms.values import Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import encode_actions
 from swarmwire.world.crews.pace import Pace
@@ -123,6 +124,19 @@ def test_leds_switched_in_answers_between_two_takes_are_all_switched_and_the_new
     got = runners.take().leds
     assert (got.rows.tolist(), got.which.tolist(), got.rgb.tolist()) == ([0, 2, 2, 2], [3, 3, 3, 4], [7, 8, 9, 10])
     assert len(runners.take().leds) == 0
+
+
+def test_of_two_numbers_told_in_answers_between_two_takes_the_newer_comes_last() -> None:
+    runners = playing()
+    opened(runners, 0)
+    opened(runners, 1)
+    rows = np.array(OWN["a"], np.int64)
+    still = np.zeros(len(rows))
+    for tick, told in enumerate((Values(rows, still + 0.5), Values(rows[1:], still[1:] + 0.75))):
+        runners.answer("a", encode_actions(tick, Actions(rows, still.astype(bool), still, still, still, values=told)))
+    got = runners.take().values
+    assert (got.rows.tolist(), got.value.tolist()) == ([*OWN["a"], *OWN["a"][1:]], [0.5, 0.5, 0.75])
+    assert len(runners.take().values) == 0
 
 
 def test_a_speed_sideways_crosses_with_the_others_and_who_is_stopped_has_none() -> None:

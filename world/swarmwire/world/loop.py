@@ -108,6 +108,7 @@ class Loop:
             events=events,
             departed=news.departed if news else None,
             movable=movable,
+            value=world.values.value,
         )
         for observer in self.observers:
             observer.see(truth)

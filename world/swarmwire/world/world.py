@@ -34,6 +34,7 @@ from swarmwire.world.sensors.sensor import TrueSense
 from swarmwire.world.sensors.staged import Staged
 from swarmwire.world.snapshot import snapshot
 from swarmwire.world.states import States
+from swarmwire.world.told_values import ToldValues
 
 
 class World:
@@ -86,6 +87,7 @@ class World:
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
         self.states = States(self.static.arenas, self.static.robots)
+        self.values = ToldValues()
         self._show()
 
     @property
@@ -98,6 +100,7 @@ class World:
         alive = alive & self.rows_running
         revived = alive & ~self.alive  # they start afresh
         self.states.forget(revived)
+        self.values.forget(revived)
         self.batteries.renew(revived)
         self.alive[:] = alive
         self.actuators.stop(~alive)
@@ -152,6 +155,7 @@ class World:
         """
         self.actuators.take(actions, self.alive)
         self.states.take(actions.notes, self.alive)
+        self.values.take(actions.values, self.alive)
         if self._own.any:
             self._own.act(actions.own, self.alive)
             self.actuators.leds.tell()

@@ -33,6 +33,8 @@ def _shown(actions: Actions) -> Iterator[Deed]:
     codes: list[int] = notes.code.tolist()
     for robot, code in zip(notes.rows.tolist(), codes, strict=True):
         yield robot, "note", repr(notes.names[code])
+    for robot, value in zip(actions.values.rows.tolist(), actions.values.value.tolist(), strict=True):
+        yield robot, "note: value", repr(value)
     for robot, which, rgb in zip(leds.rows.tolist(), leds.which.tolist(), leds.rgb.tolist(), strict=True):
         yield robot, f"led {which}", f"0x{rgb:06x}"
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from math import isfinite
+from types import UnionType
 from typing import Any, cast, get_args, get_origin, get_type_hints
 
 from swarmwire.comms.errors import BadInput
@@ -46,6 +47,8 @@ def built(kind: type[Any], value: object, where: str, key: str) -> Any:
 def _value(hint: Any, value: object, where: str, key: str) -> Any:
     if is_dataclass(hint) and isinstance(hint, type):
         return built(hint, value, where, key)
+    if isinstance(hint, UnionType) and not is_dataclass(get_args(hint)[0]):
+        return _value(get_args(hint)[0], value, where, key)  # X | None: given, it is an X
     if hint is float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise BadInput(where, key, f"expected a number, got {value!r}")

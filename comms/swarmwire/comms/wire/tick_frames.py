@@ -14,6 +14,7 @@ from swarmwire.comms.notes import MOST_STATES, Notes, checked_state
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
+from swarmwire.comms.values import NO_VALUES, Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.checked import checked_array
 from swarmwire.comms.wire.frames import Frame
@@ -89,6 +90,9 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
     if len(actions.own):
         arrays["own"] = np.array((actions.own.rows, actions.own.place))
         arrays["own/value"] = actions.own.value
+    if len(actions.values):
+        arrays["values"] = actions.values.rows
+        arrays["values/value"] = actions.values.value
     values: dict[str, Any] = {"dropped": dropped} if dropped else {}
     if len(actions.notes):
         arrays["notes"] = np.array((actions.notes.rows, actions.notes.code))
@@ -106,7 +110,8 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
     leds = _leds(frame, rows) if "leds" in frame.arrays else NO_LED_CHANGES
     own = _actuations(frame, rows) if "own" in frame.arrays else NO_ACTUATIONS
-    return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own)
+    told = _values(frame, rows) if "values" in frame.arrays else NO_VALUES
+    return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own, told)
 
 
 def _sent(frame: Frame, rows: IntArray) -> Sent:
@@ -158,6 +163,14 @@ def _actuations(frame: Frame, rows: IntArray) -> Actuations:
     if not _own(actuated, rows) or (place < 0).any() or not np.isfinite(value).all():
         raise BadFrame("malformed", "own: expected finite numbers for actuators of the runner's own robots")
     return Actuations(actuated, place, value)
+
+
+def _values(frame: Frame, rows: IntArray) -> Values:
+    told = checked_array(frame, "values", "<i8", (None,))
+    value = checked_array(frame, "values/value", "<f8", (len(told),))
+    if not _own(told, rows) or not np.isfinite(value).all():
+        raise BadFrame("malformed", "values: expected finite numbers of the runner's own robots")
+    return Values(told, value)
 
 
 def _own(some: IntArray, rows: IntArray) -> bool:

@@ -9,13 +9,12 @@ from typing import Any
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.columns import Columns
 from swarmwire.deploy.campaign.design import Point
-from swarmwire.deploy.campaign.outcomes import Outcome
 from swarmwire.deploy.record.scenario_copy import CopiedFile
+from swarmwire.metrics.campaign.formats import ABOUT, CAMPAIGN_FORMAT
+from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.record.formats import refuse_other_format
 from swarmwire.metrics.whole_file import write_whole
 
-CAMPAIGN_JSON = "campaign.json"
-CAMPAIGN_FORMAT = 1
 SCENARIO_FOLDER = "scenario"
 
 
@@ -63,16 +62,16 @@ class Campaign:
 
     def write(self, folder: Path) -> None:
         """Write `campaign.json`; OSError if the disk will not."""
-        write_whole(folder / CAMPAIGN_JSON, json.dumps({"format": CAMPAIGN_FORMAT, **asdict(self)}, indent=1) + "\n")
+        write_whole(folder / ABOUT, json.dumps({"format": CAMPAIGN_FORMAT, **asdict(self)}, indent=1) + "\n")
 
 
 def read_campaign(folder: Path) -> Campaign:
     """The campaign of this folder; BadInput if there is none."""
-    path = folder / CAMPAIGN_JSON
+    path = folder / ABOUT
     try:
         found: Any = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        expected = f"expected a campaign's folder, with its {CAMPAIGN_JSON}: {error.strerror}"
+        expected = f"expected a campaign's folder, with its {ABOUT}: {error.strerror}"
         raise BadInput(str(folder), "", expected) from None
     except ValueError:  # no JSON, or no UTF-8
         found = None

@@ -1,9 +1,9 @@
 """The folder of a campaign while it is written: finished pieces at once, one table of all runs at the end.
 
     campaign.json, scenario/       from what it is made; written first
-    parts/part-RUN.parquet         rows of a finished piece, named after its first run
+    parts/part-N.parquet           rows of a finished piece, numbered as they came
     series/part-RUN.parquet        its tick series, written before its rows, named after the first run in it
-    summary.parquet                all rows, by run; once it is there the campaign is over, and the parts go
+    summary.parquet                all rows, by run; then the parts go (of runs that are tried again, parts come first)
     series/worker-N.parquet        all tick series, by run
 
 Each file is written aside and renamed, so that what has its name is whole.
@@ -24,6 +24,7 @@ from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.series_files import join_series, series_part, sort_out_series
 from swarmwire.deploy.campaign.storage import storing
 from swarmwire.deploy.campaign.task import PieceResult, Row
+from swarmwire.metrics.campaign.formats import PARTS, SERIES, SUMMARY
 from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.metrics.record.part_files import PARQUET
 from swarmwire.metrics.whole_file import written_aside
@@ -31,7 +32,7 @@ from swarmwire.metrics.whole_file import written_aside
 if TYPE_CHECKING:
     import polars as pl
 
-SUMMARY, PARTS, SERIES, RUNS = "summary.parquet", "parts", "series", "runs"
+RUNS = "runs"
 
 
 class CampaignFolder:
@@ -49,11 +50,6 @@ class CampaignFolder:
     def scenario(self) -> Path:
         """The scenario's file, as tasks name it."""
         return (self.path / SCENARIO_FOLDER / SCENARIO).absolute()
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the table of all runs is there."""
-        return (self.path / SUMMARY).exists()
 
     def run_folder(self, run: int) -> Path:
         """Where a run that is recorded in full has its folder."""
@@ -77,8 +73,6 @@ class CampaignFolder:
             for folder in (self.path, self.path / PARTS, self.path / SERIES, self.path / RUNS):
                 for aside in folder.glob(".aside-*"):
                     shutil.rmtree(aside) if aside.is_dir() else aside.unlink()
-            if self.is_over:
-                self._remove_parts()
             sort_out_series(self.path / SERIES, self.ended())
 
     def keep(self, result: PieceResult) -> None:
@@ -89,13 +83,14 @@ class CampaignFolder:
             if result.series is not None:
                 first = next(row["run"] for row in rows if row["ended"] != FAILED)
                 _write(series_part(self.path / SERIES, first), result.series)
-            _write(self._part(rows[0]["run"]), _parquet(self._columns.frame(rows)))
+            _write(self._next_part(), _parquet(self._columns.frame(rows)))
 
     def rows(self) -> "pl.DataFrame":
         """All rows that are there, by run."""
         import polars as pl
 
-        files = [self.path / SUMMARY] if self.is_over else self._parts()
+        whole = self.path / SUMMARY
+        files = [*([whole] if whole.exists() else []), *self._parts()]
         return self._columns.joined([self._columns.frame([]), *(pl.read_parquet(file) for file in files)])
 
     def ended(self) -> dict[int, str]:
@@ -103,43 +98,25 @@ class CampaignFolder:
         rows = self.rows()
         return dict(zip(rows["run"], rows["ended"], strict=True))
 
-    def forget_failed(self) -> None:
-        """Take away the rows of runs that failed, so that they are missing."""
-        import polars as pl
-
-        with storing(self.path):
-            rows = self.rows()
-            left = rows.filter(pl.col("ended") != FAILED)
-            if len(left) == len(rows):
-                return
-            before = self._parts()
-            if len(left):
-                kept = self._part(left["run"][0])
-                _write(kept, _parquet(left))
-                before = [part for part in before if part != kept]
-            for part in before:
-                part.unlink()
-            (self.path / SUMMARY).unlink(missing_ok=True)
-
     def finish(self, files: int) -> None:
-        """Make the table of all runs, and at most so many files of the series."""
+        """Make the table of all runs, and at most so many new files of the series."""
         with storing(self.path):
             join_series(self.path / SERIES, files)
-            if not self.is_over:
+            parts = self._parts()
+            if parts:
                 _write(self.path / SUMMARY, _parquet(self.rows()))
-            self._remove_parts()
+            for part in parts:
+                part.unlink()
+            if (self.path / PARTS).is_dir():
+                (self.path / PARTS).rmdir()
 
-    def _part(self, first_run: int) -> Path:
-        return self.path / PARTS / f"part-{first_run:08d}.parquet"
+    def _next_part(self) -> Path:
+        """A name after all that are there: where two have a row of a run, that of the later counts."""
+        last = max((int(part.stem.partition("-")[2]) for part in self._parts()), default=-1)
+        return self.path / PARTS / f"part-{last + 1:08d}.parquet"
 
     def _parts(self) -> list[Path]:
         return sorted((self.path / PARTS).glob("part-*.parquet"))
-
-    def _remove_parts(self) -> None:
-        for part in self._parts():
-            part.unlink()
-        if (self.path / PARTS).is_dir():
-            (self.path / PARTS).rmdir()
 
 
 def _parquet(frame: "pl.DataFrame") -> bytes:

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from swarmwire.deploy.campaign.outcomes import STOP_TIME
 from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.task import Row
 
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 
 KEYS = ("run", "point", "seed")
 ENDS = ("ended", "error", "ticks", "sim_time_s", "trajectory_sha256")
-STOP_TIME, STOPPED_BY = "stop_time_s", "stopped_by"
+STOPPED_BY = "stopped_by"
 MACHINE = ("timing_wall_s", "machine_cpu", "machine_host", "machine_worker")
 FIXED = {*KEYS, *ENDS, STOP_TIME, STOPPED_BY, *MACHINE}
 COUNTS, FATES = "counts.", "radio.fates."
@@ -42,10 +43,10 @@ class Columns:
         return pl.DataFrame([{name: self._cell(name, row.get(name)) for name in names} for row in rows], schema)
 
     def joined(self, frames: Iterable["pl.DataFrame"]) -> "pl.DataFrame":
-        """The tables of several pieces as one, sorted by run, each run once; what was never counted was 0."""
+        """The tables of several pieces as one, by run, of each run the last row; what was never counted was 0."""
         import polars as pl
 
-        whole = pl.concat(frames, how="diagonal").unique(subset="run", keep="first").sort("run")
+        whole = pl.concat(frames, how="diagonal").unique(subset="run", keep="last").sort("run")
         counts = sorted(name for name in whole.columns if name.startswith(COUNTS))
         zero = pl.when(pl.col("ended") != FAILED).then(pl.col(counts).fill_null(0)).otherwise(pl.col(counts))
         return whole.with_columns(zero if counts else []).select(*self._known, *counts, *MACHINE)

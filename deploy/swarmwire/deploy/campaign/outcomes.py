@@ -1,19 +1,14 @@
 """What can be asked of a campaign's runs: columns of `summary.parquet` that hold a number, or a time."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal
 
 from swarmwire.comms.fates import FATE_NAMES
-from swarmwire.comms.loading import resolve
 from swarmwire.deploy.campaign.row import LATENCIES, STATISTICS, TOTALS
-from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.own_metrics import own_metrics
-from swarmwire.metrics.registry import standard
+from swarmwire.deploy.measuring import measuring
+from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.world.scenario.scenario import Scenario
 
+STOP_TIME = "stop_time_s"
 OF_RADIO = {
     "sent": ("", "packets sent"),
     "intended": ("", "receivers that packets were meant for"),
@@ -27,18 +22,6 @@ LATENCY_HELP = {
 }
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """A column of `summary.parquet` that statistics can be made of."""
-
-    column: str
-    unit: str
-    kind: Literal[
-        "number", "time"
-    ]  # a time is right-censored at `sim_time_s` where it is null and the run did not fail
-    help: str
-
-
 def outcomes_of(scenarios: Iterable[Scenario]) -> tuple[Outcome, ...]:
     """The outcomes of runs of these scenarios, each once, in the order of the columns; BadInput for a bad metric."""
     found: dict[str, Outcome] = {}
@@ -50,7 +33,9 @@ def outcomes_of(scenarios: Iterable[Scenario]) -> tuple[Outcome, ...]:
 
 
 def _outcomes(scenario: Scenario) -> Iterator[Outcome]:
-    for metric in _measured(scenario):
+    if scenario.stops():
+        yield Outcome(STOP_TIME, "s", "time", "since when what ended the run had held")
+    for metric in measuring(scenario).metrics:
         if metric.kind == "time":
             yield Outcome(metric.name, metric.unit, "time", metric.help)
             continue
@@ -58,11 +43,6 @@ def _outcomes(scenario: Scenario) -> Iterator[Outcome]:
             yield Outcome(f"{metric.name}.{statistic}", metric.unit, "number", metric.help)
     if scenario.radio is not None:
         yield from _radio()
-
-
-def _measured(scenario: Scenario) -> list[Metric]:
-    specs = [resolve(spec, Path(scenario.source).parent) for spec in scenario.metrics]
-    return Metrics([*standard(), *own_metrics(specs, scenario.source)]).metrics
 
 
 def _radio() -> Iterator[Outcome]:

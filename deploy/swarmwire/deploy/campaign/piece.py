@@ -26,14 +26,11 @@ def run_piece(task: Task, worker: str = "") -> PieceResult:
     """
     clock = WallClock()
     began_ns = clock.now_ns()
-    try:
-        rows, series = _together(task)
-    except Interrupted:
-        raise
-    except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever it is, it is told in the row of whose it is
-        if len(task.runs) > 1:
-            return _joined([run_piece(half, worker) for half in task.halves()])
-        rows, series = [failed_row(_told(error, task))], None
+    rows, series, error = _tried(task)
+    if error and len(task.runs) > 1:
+        return _joined([run_piece(half, worker) for half in task.halves()])
+    if error:
+        rows = [failed_row(error)]
     wall_s = to_s(clock.now_ns() - began_ns) / len(rows)
     machines = {"timing_wall_s": wall_s, **_machine(), "machine_worker": worker}
     numbered = zip(task.runs, task.seeds, rows, strict=True)
@@ -46,6 +43,16 @@ def lost_piece(task: Task, why: str) -> PieceResult:
     """What is told of a task of one run whose workers died of it."""
     run, seed = task.runs[0], task.seeds[0]
     return PieceResult(({"run": run, "point": task.point, "seed": seed, **failed_row(why)},))
+
+
+def _tried(task: Task) -> tuple[list[Row], bytes | None, str]:
+    """As `_together`, and what was raised instead, or ""."""
+    try:
+        return *_together(task), ""
+    except Interrupted:
+        raise
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever it is, it is told in the row of whose it is
+        return [], None, _told(error, task)
 
 
 def _together(task: Task) -> tuple[list[Row], bytes | None]:
@@ -61,8 +68,8 @@ def _together(task: Task) -> tuple[list[Row], bytes | None]:
     finally:
         if out is not None and out.exists():
             out.replace(str(task.record_to))
-    result = simulation.result
-    rows = [row_of(arena, result) for arena in result.arenas]
+    times = {metric.name for metric in simulation.metrics.metrics if metric.kind == "time"}
+    rows = [row_of(arena, times) for arena in simulation.result.arenas]
     return rows, series.parquet(task.runs, [row["ticks"] for row in rows]) if task.series else None
 
 

@@ -6,15 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.loading import resolve
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.campaign.columns import FIXED
 from swarmwire.deploy.campaign.design import GRID, Point, points_of
-from swarmwire.deploy.campaign.outcomes import Outcome, outcomes_of
+from swarmwire.deploy.campaign.outcomes import outcomes_of
 from swarmwire.deploy.campaign.toml_value import toml_value
 from swarmwire.deploy.campaign.vary import Range, Vary
 from swarmwire.deploy.campaign.whole_numbers import whole_numbers
+from swarmwire.deploy.measuring import measuring
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
+from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.world.scenario.as_mapping import mapping_of
 from swarmwire.world.scenario.bodies import bodies_of, own_code_of
 from swarmwire.world.scenario.scenario import Scenario
@@ -52,7 +53,7 @@ class Plan:
 
     def at(self, point: Point) -> Scenario:
         """The scenario at a point."""
-        return _at(self.asked.varied, mapping_of(self.scenario), self.scenario.source, point)
+        return scenario_from(mapping_of(self.scenario), self.scenario.source, overrides_of(point))
 
     def vary(self) -> Mapping[str, Any]:
         """By path: the values in order, or between which numbers they were drawn."""
@@ -79,9 +80,15 @@ def planned(asked: Asked) -> Plan:
     if asked.pack is not None and asked.pack < 1:
         raise BadInput("--pack", "", f"expected at least 1, got {asked.pack}")
     mapping = mapping_of(scenario)
-    scenarios = [_at(asked.varied, mapping, scenario.source, point) for point in points]
-    code = [spec for at, point in zip(scenarios, points, strict=True) for spec in _checked(at, asked.varied, point)]
-    return Plan(asked, scenario, tuple(points), outcomes_of(scenarios), tuple(dict.fromkeys(code)))
+    scenarios, code = list[Scenario](), dict[str, None]()
+    for point in points:
+        try:
+            scenarios.append(scenario_from(mapping, scenario.source, overrides_of(point)))
+            code.update(dict.fromkeys(_code(scenarios[-1])))
+        except BadInput as error:
+            _refuse_alone(scenario, error)
+            raise _blamed(error, asked.varied, point) from None
+    return Plan(asked, scenario, tuple(points), outcomes_of(scenarios), tuple(code))
 
 
 def _scenario_of(asked: Asked) -> Scenario:
@@ -97,24 +104,22 @@ def overrides_of(point: Point) -> list[str]:
     return [f"{path}={toml_value(value)}" for path, value in point.items()]
 
 
-def _at(varied: Sequence[Vary], mapping: Mapping[str, Any], source: str, point: Point) -> Scenario:
-    try:
-        return scenario_from(mapping, source, overrides_of(point))
-    except BadInput as error:
-        raise _blamed(error, varied, point) from None
+def _code(scenario: Scenario) -> list[str]:
+    """The specs of users' classes that a scenario names; BadInput unless all of them are fit for it."""
+    agents = agent_specs(scenario)
+    check_agents(scenario, agents)
+    scenario_traces(scenario)
+    bodies = bodies_of(scenario, scenario.source)
+    return [*agents.values(), *own_code_of(bodies.values()), *measuring(scenario).code]
 
 
-def _checked(scenario: Scenario, varied: Sequence[Vary], point: Point) -> list[str]:
-    """The specs of users' classes that a point's scenario names, all of which are fit for it."""
+def _refuse_alone(scenario: Scenario, fault: BadInput) -> None:
+    """BadInput if the scenario has the same fault where nothing is varied."""
     try:
-        agents = agent_specs(scenario)
-        check_agents(scenario, agents)
-        scenario_traces(scenario)
-        bodies = bodies_of(scenario, scenario.source)
+        _code(scenario)
     except BadInput as error:
-        raise _blamed(error, varied, point) from None
-    metrics = [resolve(spec, Path(scenario.source).parent) for spec in scenario.metrics]
-    return [*agents.values(), *own_code_of(bodies.values()), *metrics]
+        if error.key == fault.key:
+            raise error from None
 
 
 def _blamed(error: BadInput, varied: Sequence[Vary], point: Point) -> BadInput:

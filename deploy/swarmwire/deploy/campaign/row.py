@@ -1,10 +1,11 @@
 """One run as a row of `summary.parquet`: what was measured of it, or why it failed."""
 
+from collections.abc import Collection
 from dataclasses import asdict
 from typing import Any
 
 from swarmwire.deploy.campaign.task import Row
-from swarmwire.deploy.result import ArenaResult, RadioResult, Result
+from swarmwire.deploy.result import ArenaResult, RadioResult
 
 FAILED = "failed"
 STATISTICS = ("final", "mean", "min", "max")
@@ -12,20 +13,25 @@ LATENCIES = ("latency_air_s", "latency_agent_s")
 TOTALS = ("sent", "intended", "in_range", "pdr")
 
 
-def row_of(arena: ArenaResult, result: Result) -> Row:
-    """What came of one arena, by column."""
+def row_of(arena: ArenaResult, times: Collection[str]) -> Row:
+    """What came of one arena, by column; of metrics that are `times` their last value alone."""
     row: Row = {
-        "ended": result.ended,
+        "ended": arena.ended,
         "error": None,
-        "ticks": result.ticks,
-        "sim_time_s": result.sim_time_s,
+        "ticks": arena.ticks,
+        "sim_time_s": arena.sim_time_s,
         "trajectory_sha256": arena.trajectory_sha256,
+        "stop_time_s": getattr(arena, "stop_time_s", None),
+        "stopped_by": getattr(arena, "stopped_by", None),
     }
     for name, value in arena.metrics.items():
-        row.update({f"{name}.{statistic}": of for statistic, of in asdict(value).items()})
+        if name in times:
+            row[name] = value.final
+        else:
+            row.update({f"{name}.{statistic}": of for statistic, of in asdict(value).items()})
     if arena.radio is not None:
         row.update(_radio(arena.radio))
-    row.update({f"counts.{name}": count for name, count in result.counts.items()})
+    row.update({f"counts.{name}": count for name, count in arena.counts.items()})
     return row
 
 

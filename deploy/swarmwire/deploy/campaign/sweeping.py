@@ -128,7 +128,7 @@ def begin_sweep(
     with closing(_executor(means, path, plan.asked.record_seeds)) as executor:
         folder = CampaignFolder(path, begin(plan, path, command))
         with folder.taken():
-            return _work(folder, executor, means.pack, watcher or NobodyWatches(), interrupt or Interrupt())
+            return _work(folder, {}, executor, means.pack, watcher or NobodyWatches(), interrupt or Interrupt())
 
 
 def resume_sweep(
@@ -151,9 +151,8 @@ def resume_sweep(
     folder = CampaignFolder(path, campaign)
     with closing(_executor(means, path, campaign.record_seeds)) as executor, folder.taken():
         folder.clear()
-        if retry_failed:
-            folder.forget_failed()
-        return _work(folder, executor, means.pack, watcher or NobodyWatches(), interrupt or Interrupt())
+        tried = {run: how for run, how in folder.ended().items() if not (retry_failed and how == FAILED)}
+        return _work(folder, tried, executor, means.pack, watcher or NobodyWatches(), interrupt or Interrupt())
 
 
 def _executor(means: Means, path: Path, record_seeds: Sequence[int]) -> Executor:
@@ -165,10 +164,15 @@ def _executor(means: Means, path: Path, record_seeds: Sequence[int]) -> Executor
 
 
 def _work(
-    folder: CampaignFolder, executor: Executor, pack: int | None, watcher: Watcher, interrupt: Interrupt
+    folder: CampaignFolder,
+    ended: dict[int, str],
+    executor: Executor,
+    pack: int | None,
+    watcher: Watcher,
+    interrupt: Interrupt,
 ) -> Sweep:
-    """Run what is missing; once nothing is, make the table of all runs."""
-    campaign, ended = folder.campaign, folder.ended()
+    """Do all runs but those that have `ended`, and how, already; then make the table of all runs."""
+    campaign = folder.campaign
     tasks = tasks_of(campaign, folder, ended, pack, executor.slots)
 
     def keep(_: Task, result: PieceResult) -> None:

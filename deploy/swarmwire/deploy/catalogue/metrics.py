@@ -56,7 +56,7 @@ def _metric(kind: type[Metric], mark: str, *facts: tuple[str, str]) -> Entry:
 def _measured(kind: type[Metric], mark: str) -> str:
     """When it is, and how a scenario lists it."""
     name, parameters = f'"{kind.name}"', parameters_of_dataclass(kind)
-    given = [f"{of.name} = {'…' if of.required else json.dumps(of.value)}" for of in parameters]
+    given = [f"{of.name} = {'…' if of.value is None else json.dumps(of.value)}" for of in parameters]
     table = f"{{ {', '.join([f'metric = {name}', *given])} }}"
     if mark == "standard":
         return "in every run" + (f"; with other parameters where metrics = [{table}] says so" if given else "")

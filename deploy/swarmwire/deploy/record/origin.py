@@ -5,7 +5,7 @@ A run that is killed leaves no summary; what stands here is enough to run it aga
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.record import machine
 from swarmwire.deploy.record.modules import changed_modules, module_digests
 from swarmwire.deploy.record.scenario_copy import CopiedFile, changed_files, copy_scenario
+from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.record.formats import RUN_FORMAT, refuse_other_format
+from swarmwire.metrics.record.metric_facts import MetricFacts, facts_of, read_facts
 from swarmwire.metrics.record.names import RUN_JSON
 from swarmwire.metrics.whole_file import write_whole
 from swarmwire.world.scenario.scenario import Scenario
@@ -31,6 +33,7 @@ class Origin:
     modules: Mapping[str, str]  # sha256 of the installed code, by module
     cpu: str
     versions: Mapping[str, str]
+    metrics: tuple[MetricFacts, ...] = ()  # that were measured; none: by a swarmwire that did not keep them
 
     def changes(self, folder: Path, code: Sequence[str]) -> list[str]:
         """What is not as it was when the run of this folder began, a line each; `code`: specs of users' classes."""
@@ -52,6 +55,7 @@ def origin_of(
     ticks: int,
     runners: int,
     realtime: float | None,
+    metrics: Sequence[Metric],
     folder: Path | None,
 ) -> Origin:
     """The origin of a run that is about to begin; put into its run folder, if it has one, with the copied files.
@@ -67,6 +71,7 @@ def origin_of(
         modules=module_digests(code),
         cpu=machine.cpu(),
         versions=machine.versions(),
+        metrics=tuple(facts_of(metric) for metric in metrics),
     )
     if folder:
         write_whole(folder / RUN_JSON, json.dumps({"format": RUN_FORMAT, **asdict(origin)}, indent=2) + "\n")
@@ -87,7 +92,7 @@ def read_origin(folder: Path) -> Origin:
     try:
         refuse_other_format(found, RUN_FORMAT, path)
         del found["format"]  # KeyError: every start of a run names one
-        return _origin(found)
+        return replace(_origin(found), metrics=tuple(read_facts(folder).values()))
     except (KeyError, TypeError, ValueError):
         raise BadInput(str(path), "", "expected what swarmwire writes at the start of a run") from None
 

@@ -70,10 +70,18 @@ class RunRecord:
         ticks: int,
         runners: int,
         realtime: float | None,
+        metrics: Metrics,
     ) -> Origin:
         """Put into the folder all that the run is made from; what that is."""
         origin = origin_of(
-            scenario, code, seeds=seeds, ticks=ticks, runners=runners, realtime=realtime, folder=self.folder
+            scenario,
+            code,
+            seeds=seeds,
+            ticks=ticks,
+            runners=runners,
+            realtime=realtime,
+            metrics=metrics.metrics,
+            folder=self.folder,
         )
         what = f"{scenario.name}, seeds {list(seeds)}, {ticks} ticks, {runners} runners"
         self.note(f"swarmwire {version('swarmwire-deploy')}: {what}")

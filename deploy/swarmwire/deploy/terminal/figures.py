@@ -24,6 +24,7 @@ class Figures:
 
     Attributes:
         done: ticks that are over.
+        running: arenas that have not stopped.
         fates: packets per intended receiver so far, by fate.
         events: the newest, in words, newest last.
     """
@@ -34,7 +35,7 @@ class Figures:
 
     def begin(self, static: Static) -> None:
         """Start afresh."""
-        self.static, self.done = static, 0
+        self.static, self.done, self.running = static, 0, static.arenas
         measured = [metric.name for metric in self._metrics.metrics]
         self.levels = tuple(name for name in SHOWN if name in measured)
         self.fates: IntArray = np.zeros(len(FATE_NAMES), np.int64)
@@ -48,6 +49,7 @@ class Figures:
     def see(self, truth: Truth) -> None:
         """Add what a tick brought."""
         self.done = truth.tick + 1
+        self.running = int(np.count_nonzero(truth.running))
         if truth.tally is not None:
             fates, in_range = truth.tally.fates, truth.tally.in_range
             # A sum takes ten times as long as an index, in every tick.
@@ -62,6 +64,12 @@ class Figures:
         now_ns = self._clock.now_ns()
         if now_ns - self._marks[-1][0] >= MARK_NS:
             self._marks.append((now_ns, self.done))
+
+    @property
+    def gone(self) -> str:
+        """How many arenas go on, in words; nothing while all do."""
+        arenas = self.static.arenas
+        return f", {self.running} of {arenas} arenas go on" if self.running < arenas else ""
 
     @property
     def time_s(self) -> float:

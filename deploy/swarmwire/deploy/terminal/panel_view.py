@@ -65,7 +65,7 @@ def _state(figures: Figures, controls: Controls) -> Text:
         asked = f"real time x {speed:g}"
     else:
         asked = "as fast as possible" if speed is None else f"at most {speed:g} x real time"
-    robots = f"{figures.static.robots} robots" + (" in each arena" if figures.static.arenas > 1 else "")
+    robots = f"{figures.static.robots} robots" + (" in each arena" if figures.static.arenas > 1 else "") + figures.gone
     return Text.assemble(state, "   ", asked, "   ", (robots, "dim"))
 
 

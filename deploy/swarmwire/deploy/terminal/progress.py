@@ -39,7 +39,9 @@ class ProgressLines:
             speed = f"{figures.time_s / wall_s if wall_s > 0 else 0.0:.1f} x real time"
             levels = [(name, figures.level(name)) for name in figures.levels] + [("delivery so far", figures.pdr)]
             known = "".join(f", {name} {value:.3g}" for name, value in levels if not math.isnan(value))
-            self._print(f"tick {figures.done}/{self._ticks}, {figures.time_s:.1f} s simulated, {speed}{known}")
+            self._print(
+                f"tick {figures.done}/{self._ticks}, {figures.time_s:.1f} s simulated, {speed}{known}{figures.gone}"
+            )
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """Nothing is left to say."""

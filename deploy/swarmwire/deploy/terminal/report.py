@@ -1,6 +1,6 @@
 """The summary as people read it in a terminal."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from swarmwire.metrics.metric import Metric
 
 BLOCKED = Fate.BLOCKED.name.lower()
+SHOWN = 6  # arenas that are named, at most
 WHOLE = 1000  # from here on numbers are shown without decimals, nor as powers of ten
 
 
@@ -29,13 +30,17 @@ def print_result(result: Result, metrics: "Iterable[Metric]", console: Console) 
     )
     speed = f"{result.sim_time_s:g} s in {result.wall_time_s:.2f} s: {result.realtime_factor:.1f} x real time"
     table.add_row("simulated", f"{speed} (start took {result.start_time_s:.2f} s), engine {result.engine}")
-    if result.ended != "duration":
+    if result.ended not in ("duration", "stopped"):
         table.add_row("ended", result.ended)
+    _add_stops(table, result)
     if len(result.arenas) > 1:
         table.add_row("shown below", f"the arena of seed {arena.seed}")
     _add_radio(table, arena)
     for name, value in arena.metrics.items():
-        if value.mean is not None:
+        if of[name].kind == "time":
+            late = f"not in {arena.sim_time_s:g} s"
+            table.add_row(name, late if value.final is None else f"at {_number(value.final)} s")
+        elif value.mean is not None:
             table.add_row(name, _in_words(of[name], value))
     for body, senses in result.global_senses.items():
         table.add_row("global senses", f"{body}: {', '.join(senses)}")
@@ -47,6 +52,24 @@ def print_result(result: Result, metrics: "Iterable[Metric]", console: Console) 
     _add_real_time(table, result)
     table.add_row("trajectory", f"{arena.trajectory_sha256[:16]}… (seed {arena.seed})")
     console.print(table)
+
+
+def _add_stops(table: Table, result: Result) -> None:
+    """Which arenas stopped, by what and since when it held, and which did not."""
+    for condition in dict.fromkeys(result.stop):
+        by = [arena for arena in result.arenas if arena.stopped_by == condition]
+        if by:
+            table.add_row(
+                "stopped", f"{condition}: {_few([f'seed {of.seed} since {of.stop_time_s:g} s' for of in by])}"
+            )
+    rest = [f"seed {arena.seed}" for arena in result.arenas if arena.stopped_by is None]
+    if result.stop and rest:
+        table.add_row("not stopped", f"{_few(rest)} in {result.sim_time_s:g} s: {' or '.join(result.stop)}")
+
+
+def _few(texts: Sequence[str]) -> str:
+    more = len(texts) - SHOWN
+    return ", ".join(texts[:SHOWN]) + (f" and {more} more" if more > 0 else "")
 
 
 def _add_real_time(table: Table, result: Result) -> None:

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from swarmwire.deploy.campaign.campaign import Campaign, read_campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
-from swarmwire.deploy.campaign.columns import STOP_TIME
+from swarmwire.deploy.campaign.outcomes import STOP_TIME
 from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.sweeping import Sweep
 

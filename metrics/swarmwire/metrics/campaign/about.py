@@ -28,7 +28,7 @@ class About:
     began_utc: str  # ISO 8601
     versions: Mapping[str, Any]  # of Python and packages
     cpu: str
-    modules: tuple[str, ...]  # import paths of the scenario's own code that no file holds
+    modules: Mapping[str, str]  # sha256 of the installed code, by module
     files: tuple[str, ...]  # that the scenario needs, below scenario/
     design: str  # one of DESIGNS
     seeds: tuple[int, ...]
@@ -101,8 +101,8 @@ def _about(fields: _Fields) -> About:
         began_utc=fields.text("began_utc"),
         versions=fields.get("versions", dict, "an object"),
         cpu=fields.text("cpu"),
-        modules=fields.texts("modules"),
-        files=fields.texts("files"),
+        modules=fields.get("modules", dict, "an object"),
+        files=tuple(of.text("path") for of in fields.objects("files")),
         design=fields.one_of("design", DESIGNS),
         seeds=_seeds(fields),
         vary=fields.get("vary", dict, "an object"),

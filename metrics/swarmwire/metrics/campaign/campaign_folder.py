@@ -1,12 +1,13 @@
 """A campaign's folder, read back: of one that is finished, that was ended, and that still goes on."""
 
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, FloatArray
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.about import About, Point, read_about
 from swarmwire.metrics.campaign.formats import ABOUT, PARTS, SUMMARY
@@ -35,6 +36,7 @@ class CampaignFolder:
         if not self.path.is_dir():
             raise BadInput(str(path), "", "expected a campaign's folder: there is none")
         self.about: About = read_about(self.path / ABOUT)
+        self._samples: dict[str, tuple[Sample, ...]] = {}
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -104,15 +106,27 @@ class CampaignFolder:
         outcome = self.outcome(column)
         if not 0 <= point < len(self.points):
             raise BadInput(str(self.path), "point", f"expected 0 to {len(self.points) - 1}, got {point}")
-        here = self._column("point") == point
-        well = here & (self._column("ended") != FAILED)
-        value, seed = self._numbers(outcome.column)[well], self._column("seed")[well].astype(np.int64)
-        observed = np.isfinite(value)
-        failed = int(np.count_nonzero(here)) - int(np.count_nonzero(well))
-        if outcome.kind == "time":
-            return Sample(np.where(observed, value, self._numbers(SIM_TIME)[well]), observed, seed, "time", failed)
-        undefined = int(np.count_nonzero(~observed))
-        return Sample(value[observed], observed[observed], seed[observed], "number", failed, undefined)
+        if outcome.column not in self._samples:
+            self._samples[outcome.column] = self._of_all_points(outcome)
+        return self._samples[outcome.column][point]
+
+    def _of_all_points(self, outcome: Outcome) -> tuple[Sample, ...]:
+        """Read once: a report asks for every outcome at every point."""
+        order = np.argsort(self._column("point"), kind="stable")
+        value, end_s = self._numbers(outcome.column)[order], self._numbers(SIM_TIME)[order]
+        seed, well = self._column("seed")[order].astype(np.int64), self._ended_well[order]
+        edges = np.searchsorted(self._column("point")[order], np.arange(len(self.points) + 1)).tolist()
+        return tuple(
+            _sample(outcome, value[here], end_s[here], seed[here], well[here])
+            for here in (slice(start, end) for start, end in pairwise(edges))
+        )
+
+    @cached_property
+    def _ended_well(self) -> BoolArray:
+        """Of each run (runs,) whether it did; comparing texts takes longer than a sample."""
+        import polars as pl
+
+        return self.runs.select(pl.col("ended") != FAILED).to_series().to_numpy()
 
     def _column(self, name: str) -> AnyArray:
         return self.runs[name].to_numpy()
@@ -136,3 +150,14 @@ class CampaignFolder:
         lacking = [name for name in NEEDED if name not in frame.columns]
         if lacking:
             raise BadInput(str(file), lacking[0], "expected this column of a campaign's table")
+
+
+def _sample(outcome: Outcome, value: FloatArray, end_s: FloatArray, seed: IntArray, well: BoolArray) -> Sample:
+    """Of all runs of a point, of which those that ended well have a part in it."""
+    failed = int(np.count_nonzero(~well))
+    value, end_s, seed = value[well], end_s[well], seed[well]
+    observed = np.isfinite(value)
+    if outcome.kind == "time":
+        return Sample(np.where(observed, value, end_s), observed, seed, "time", failed)
+    undefined = int(np.count_nonzero(~observed))
+    return Sample(value[observed], observed[observed], seed[observed], "number", failed, undefined)

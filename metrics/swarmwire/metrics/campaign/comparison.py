@@ -41,14 +41,19 @@ class Comparison:
 
 
 def compare(first: Selection, second: Selection, outcomes: Sequence[str] = (), level: float = LEVEL) -> Comparison:
-    """Compares the named outcomes, else times and the last values of metrics, at points that agree in what both vary.
+    """Compares the named outcomes at points that agree in what both vary.
 
-    BadInput if the two have no such outcome or no point in common.
+    Unless any is named: times, the last values of metrics and the delivery ratio, where either has a value. BadInput if
+    the two have no such outcome or no point in common.
     """
     pairs = point_pairs(first, second)
     rows = [
         _row(first, second, outcome, *pair, level) for outcome in _outcomes(first, second, outcomes) for pair in pairs
     ]
+    if not outcomes:
+        rows = [row for row in rows if row.first.n or row.second.n]
+    if not rows:
+        raise BadInput(f"{first.text}, {second.text}", "", "expected runs with a value: no run of either has one yet")
     return Comparison(first, second, shared_paths(first, second), tuple(rows), level)
 
 

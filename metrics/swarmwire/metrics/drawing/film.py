@@ -1,6 +1,7 @@
 """One arena of a run as it moved: what pictures and films of a run folder are drawn from."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Obstacle, Static
+from swarmwire.metrics.record.metric_facts import MetricFacts
 from swarmwire.metrics.record.tick_columns import MOVABLE
 from swarmwire.metrics.registry import DELIVERY
 
@@ -23,6 +25,11 @@ class Recorded(Protocol):
     @property
     def static(self) -> Static:
         """What did not change."""
+        ...
+
+    @property
+    def measured(self) -> Mapping[str, MetricFacts]:
+        """What each metric says of itself, by name."""
         ...
 
     def ticks(self, arena: int | None = None) -> "pl.DataFrame":
@@ -42,6 +49,9 @@ class Film:
     metrics: dict[str, FloatArray]  # (T,) each, NaN where undefined
     state: IntArray | None = None  # (T, n) places in `state_names`, NO_STATE for none; None if no robot has any
     state_names: tuple[str, ...] = ()
+    facts: Mapping[str, MetricFacts] = field(
+        default_factory=dict[str, MetricFacts]
+    )  # by name, of what the run measured
     movable: AnyArray | None = None  # (T, k, 3) where movable obstacles were; None: there are none
 
     def movable_at(self, index: int) -> tuple[Obstacle, ...]:
@@ -72,6 +82,7 @@ def film_of(recorded: Recorded, arena: int, where: str) -> Film:
         metrics=_metrics(frame, static.rate_hz),
         state=state,
         state_names=names,
+        facts=recorded.measured,
         movable=_stacked(frame, MOVABLE) if static.movable else None,
     )
 

@@ -56,7 +56,7 @@ class FilmFigure:
         figure.text(layout.left, top, title, fontsize=TITLE_PT, fontweight="bold", color=INK)
         self._time: Any = figure.text(layout.right, top, "", fontsize=TITLE_PT, color=INK, ha="right")
         add_legend(figure, entries, layout.left, layout.below_top(0.34), columns)
-        self._strip = MetricStrip(figure, layout, film.time_s, film.metrics, names) if names else None
+        self._strip = MetricStrip(figure, layout, film, names) if names else None
         pushed = [self._movable] if static.movable else []
         self._moving = [*pushed, *self._swarm.artists, self._time, *(self._strip.artists if self._strip else ())]
         self._still: Any = None  # pixels of what does not move

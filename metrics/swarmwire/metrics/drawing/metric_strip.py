@@ -8,6 +8,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.one_of import one_of
+from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.layout import Layout
 from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Look
 from swarmwire.metrics.drawing.metric_axes import is_count, limits, titled
@@ -38,14 +39,11 @@ def choose(metrics: Mapping[str, FloatArray], wanted: Sequence[str] | None) -> l
 class MetricStrip:
     """The plots, in the panel of a layout: on top of one another beside the arena, side by side below it."""
 
-    def __init__(
-        self, figure: Any, layout: Layout, time_s: FloatArray, metrics: Mapping[str, FloatArray], names: Sequence[str]
-    ) -> None:
+    def __init__(self, figure: Any, layout: Layout, film: Film, names: Sequence[str]) -> None:
         """Draw what does not move."""
-        self._every = max(1, len(time_s) // _MOST_POINTS)
-        self._time_s = time_s
+        every = max(1, len(film.time_s) // _MOST_POINTS)
         self._plots = [
-            _Plot(figure.add_axes(place), name, time_s, metrics[name], self._every, last)
+            _Plot(figure.add_axes(place), name, film, every, last)
             for name, (place, last) in zip(names, _places(layout, len(names)), strict=True)
         ]
 
@@ -61,14 +59,15 @@ class MetricStrip:
 
 
 class _Plot:
-    def __init__(self, axes: Any, name: str, time_s: FloatArray, value: FloatArray, every: int, last: bool) -> None:
+    def __init__(self, axes: Any, name: str, film: Film, every: int, last: bool) -> None:
+        time_s, value, facts = film.time_s, film.metrics[name], film.facts
         self._time_s, self._value, self._every = time_s, value, every
-        self._whole = is_count(name)
+        self._whole = is_count(name, facts)
         axes.set_facecolor("none")
         axes.spines[["top", "right", "left"]].set_visible(False)
         axes.spines["bottom"].set(color=FAINT, linewidth=0.7)
         axes.set_xlim(float(time_s[0]), max(float(time_s[-1]), float(time_s[0]) + 1e-9))
-        axes.set_ylim(*limits(name, value))
+        axes.set_ylim(*limits(name, value, facts))
         axes.grid(axis="y", color=GRID, linewidth=0.6)
         axes.set_axisbelow(True)
         axes.tick_params(labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
@@ -78,7 +77,7 @@ class _Plot:
             axes.set_xlabel("time in s", fontsize=SMALL_PT, color=SOFT, labelpad=1)
         else:
             axes.tick_params(labelbottom=False)
-        axes.set_title(titled(name), loc="left", fontsize=TEXT_PT, color=SOFT, pad=4)
+        axes.set_title(titled(name, facts), loc="left", fontsize=TEXT_PT, color=SOFT, pad=4)
         axes.plot(time_s[::every], value[::every], color=FAINT, lw=1.0, zorder=2)
         [self._past] = axes.plot([], [], color=CURVE, lw=1.4, zorder=3)
         [self._cursor] = axes.plot([], [], color=SOFT, lw=0.7, alpha=0.7, zorder=2.5)

@@ -1,14 +1,19 @@
 """Articulation: how many robots the radio graph hangs on."""
 
+# pyright: basic, reportUnknownMemberType=false
+
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment
 from swarmwire.metrics.sampled import Sampled
+
+NONE = -1
 
 
 @dataclass(frozen=True)
@@ -28,16 +33,68 @@ class Articulation(Sampled):
 
     def sample(self, static: Static) -> Measure:
         """A fresh measure; nothing is remembered."""
-        from networkx import Graph, articulation_points
+        return _articulation
 
-        def measure(moment: Moment) -> FloatArray | float:
-            edges = moment.truth.edges
-            if edges is None:
-                return np.nan
-            # No edge joins two arenas, so all can be searched as one graph.
-            graph = Graph(edges.tolist())
-            points = np.fromiter(articulation_points(graph), np.int64)
-            count = np.bincount(points // static.robots, minlength=static.arenas)
-            return np.where(moment.robots_alive > 0, count, np.nan)
 
-        return measure
+def _articulation(moment: Moment) -> FloatArray | float:
+    edges = moment.truth.edges
+    if edges is None:
+        return np.nan
+    # No edge joins two arenas, so all can be searched as one graph.
+    cuts = cut_vertices(edges, moment.alive.size).reshape(moment.alive.shape)
+    return np.where(moment.robots_alive > 0, np.count_nonzero(cuts, axis=1), np.nan)
+
+
+@njit(cache=True)
+def cut_vertices(edges: IntArray, nodes: int) -> BoolArray:
+    """Which nodes (nodes,) of the graph with these edges (e, 2) split their component if they are taken out."""
+    start, to = _neighbours(edges, nodes)
+    at = start[:-1].copy()  # the next neighbour to look at
+    above = np.full(nodes, NONE)  # in the tree of a search in depth
+    order, lowest = (
+        np.zeros(nodes, np.int64),
+        np.zeros(nodes, np.int64),
+    )  # when found; the first that its branch reaches
+    cuts, found = np.zeros(nodes, np.bool_), 0
+    for root in range(nodes):
+        if order[root]:
+            continue
+        found += 1
+        order[root], lowest[root], node, branches = found, found, root, 0
+        while node != NONE:
+            if at[node] < start[node + 1]:
+                other = to[at[node]]
+                at[node] += 1
+                if order[other]:
+                    lowest[node] = min(lowest[node], order[other])
+                else:
+                    found += 1
+                    order[other], lowest[other], above[other] = found, found, node
+                    branches += node == root
+                    node = other
+            else:
+                up = above[node]
+                if up != NONE:
+                    lowest[up] = min(lowest[up], lowest[node])
+                    if up != root and lowest[node] >= order[up]:
+                        cuts[up] = True
+                node = up
+        cuts[root] = branches > 1
+    return cuts
+
+
+@njit(cache=True)
+def _neighbours(edges, nodes):
+    """Those of node i are to[start[i] : start[i + 1]]."""
+    start, to = np.zeros(nodes + 1, np.int64), np.empty(2 * len(edges), np.int64)
+    for e in range(len(edges)):
+        for end in range(2):
+            start[edges[e, end] + 1] += 1
+    start = np.cumsum(start)
+    at = start[:-1].copy()
+    for e in range(len(edges)):
+        for end in range(2):
+            node = edges[e, end]
+            to[at[node]] = edges[e, 1 - end]
+            at[node] += 1
+    return start, to

@@ -1,9 +1,12 @@
 """Latency: how late packets are of late, on air and to the agent."""
 
+# pyright: basic, reportUnknownMemberType=false
+
 from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
@@ -37,13 +40,20 @@ class _Latency(OfWindow):
             if finished is None:
                 return np.nan
             arena, air_ns, agent_ns = latencies.of(finished, moment.truth.tick)
-            total_ns, heard = np.zeros((2, static.arenas), np.int64)
-            np.add.at(total_ns, arena, self.pick(air_ns, agent_ns))
-            np.add.at(heard, arena, 1)
-            total_ns, heard = window.add((total_ns, heard))
+            total_ns, heard = window.add(_sums(arena, self.pick(air_ns, agent_ns), static.arenas))
             return total_ns / np.where(heard > 0, heard * NS_PER_S, np.nan)
 
         return measure
+
+
+@njit(cache=True)
+def _sums(arena, latency_ns, arenas):
+    """Of each arena the sum of its packets' latencies, and how many they are, (2, arenas)."""
+    sums = np.zeros((2, arenas), np.int64)
+    for i in range(len(arena)):
+        sums[0, arena[i]] += latency_ns[i]
+        sums[1, arena[i]] += 1
+    return sums
 
 
 @dataclass(frozen=True)

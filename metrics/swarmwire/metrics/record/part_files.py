@@ -31,6 +31,25 @@ def parts_of(folder: Path, name: str) -> list[Path]:
     return sorted((folder / name).glob("part-*.parquet"))
 
 
+def scan_files(files: list[Path]) -> "pl.LazyFrame":
+    """The rows of a table's files, one or more, in order.
+
+    What only later files have, since it was not there to be told before, is null in the rows of those before, of lists
+    of a fixed length each item. Raises what polars raises of files that are damaged or of other types.
+    """
+    import polars as pl
+
+    first, schema = pl.read_parquet_schema(files[0]), pl.read_parquet_schema(files[-1])
+    later = {name: kind for name, kind in schema.items() if name not in first}
+    if not later:
+        return pl.scan_parquet(files)
+    table = pl.scan_parquet(files, schema=schema, missing_columns="insert")
+    lists = {name: kind for name, kind in later.items() if isinstance(kind, pl.Array)}
+    return table.with_columns(
+        pl.col(name).fill_null(pl.lit([None] * kind.size, dtype=kind)) for name, kind in lists.items()
+    )
+
+
 def write_file(frame: "pl.DataFrame", path: Path) -> None:
     """Write a frame under this name, all of it or nothing; OSError if the disk will not have it."""
     with written_aside(path) as aside:
@@ -39,14 +58,12 @@ def write_file(frame: "pl.DataFrame", path: Path) -> None:
 
 def join_parts(folder: Path, name: str) -> None:
     """Make one file of the parts, which go; where they end does not show in it. Reads them piece by piece."""
-    import polars as pl
-
     parts, whole = parts_of(folder, name), table_file(folder, name)
     if len(parts) == 1:
         parts[0].replace(whole)
     else:
         with written_aside(whole) as aside:
-            pl.scan_parquet(parts).sink_parquet(aside, **PARQUET)
+            scan_files(parts).sink_parquet(aside, **PARQUET)
         for part in parts:
             part.unlink()
     (folder / name).rmdir()

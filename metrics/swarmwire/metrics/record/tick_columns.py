@@ -20,6 +20,7 @@ COMMAND = ("command_forward_mps", "command_turn_radps")  # as applied
 SIDEWAYS = "command_left_mps"  # as applied; only where a robot can move so
 MOTION = (*POSE, *VELOCITY, *COMMAND, SIDEWAYS)  # lists with a number per robot, float32
 ROBOT_COLUMNS = (*POSE, *VELOCITY, *COMMAND, "alive", "state")  # lists with an item per robot, in every record
+VALUE = "value"  # a list with a number per robot, float64; only once a robot has told one
 MOVABLE = ("movable_x_m", "movable_y_m", "movable_heading_rad")  # lists with a number per movable obstacle, if any
 RADIO = ("sent", "heard", "in_range")  # packets; receivers; receivers: since the tick before
 KEYS = ("tick", "time_s", "arena", "seed")
@@ -37,7 +38,7 @@ def movable_columns(static: Static) -> tuple[str, ...]:
     return MOVABLE if static.movable else ()
 
 
-def tick_schema(static: Static, metrics: Sequence[str]) -> "dict[str, Any]":
+def tick_schema(static: Static, metrics: Sequence[str], *, with_value: bool = False) -> "dict[str, Any]":
     """The type of each column, for a run of these robots and movable obstacles with these metrics."""
     import polars as pl
 
@@ -51,6 +52,7 @@ def tick_schema(static: Static, metrics: Sequence[str]) -> "dict[str, Any]":
         **dict.fromkeys(motion, pl.Array(pl.Float32, robots)),
         "alive": pl.Array(pl.Boolean, robots),
         "state": pl.Array(pl.String, robots),
+        **({VALUE: pl.Array(pl.Float64, robots)} if with_value else {}),
         **dict.fromkeys(movable_columns(static), pl.Array(pl.Float32, static.movable)),
         **dict.fromkeys(metrics, pl.Float64),
         **dict.fromkeys(RADIO, pl.Int64),
@@ -76,6 +78,7 @@ class TickColumns:
         self._alive: AnyArray = np.empty(of_robots, np.bool_)
         self._state: AnyArray = np.empty(of_robots, np.uint32)
         self._states: tuple[str, ...] = ("",)
+        self._value: FloatArray | None = None  # made once it is needed, of_robots; NaN: none told
         self._measured: AnyArray = np.empty((ticks, len(metrics), static.arenas), np.float64)
         self._radio: AnyArray = np.full((ticks, len(RADIO), static.arenas), np.nan)  # which it stays without a radio
 
@@ -92,6 +95,10 @@ class TickColumns:
         self._alive[at] = truth.alive.reshape(shape)
         self._state[at] = truth.state.reshape(shape)
         self._states = truth.states  # it only grows
+        if truth.value is not None:
+            if self._value is None:
+                self._value = np.full(self._alive.shape, np.nan)
+            self._value[at] = truth.value.reshape(shape)
         self._measured[at] = measured
         if truth.tally is not None:
             self._radio[at] = truth.tally.sent, truth.tally.fates[:, Fate.HEARD], truth.tally.in_range
@@ -114,13 +121,15 @@ class TickColumns:
             "arena": np.tile(np.arange(arenas, dtype=np.int32), ticks),
             "seed": np.tile(np.array(self._static.seeds, np.int64), ticks),
         }
-        schema = tick_schema(self._static, self._metrics)
+        schema = tick_schema(self._static, self._metrics, with_value=self._value is not None)
         command = (*COMMAND, SIDEWAYS) if SIDEWAYS in schema else COMMAND
         for names, values in ((POSE, self._pose), (VELOCITY, self._velocity), (command, self._command)):
             for place, name in enumerate(names):
                 columns[name] = np.ascontiguousarray(values[:ticks, ..., place]).reshape(per_robot)
         columns["alive"] = self._alive[:ticks].reshape(per_robot)
         columns["state"] = pl.Series(self._states).gather(self._state[:ticks].reshape(-1)).reshape(per_robot)
+        if self._value is not None:
+            columns[VALUE] = pl.Series(self._value[:ticks].reshape(-1), nan_to_null=True).reshape(per_robot)
         for place, name in enumerate(movable_columns(self._static)):
             columns[name] = np.ascontiguousarray(self._movable[:ticks, ..., place]).reshape(ticks * arenas, -1)
         for names, values in ((self._metrics, self._measured), (RADIO, self._radio)):

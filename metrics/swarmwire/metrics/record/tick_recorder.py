@@ -13,6 +13,7 @@ from swarmwire.metrics.record.tick_columns import (
     BYTES_PER_ROBOT,
     KEYS,
     RADIO,
+    VALUE,
     TickColumns,
     movable_columns,
     robot_columns,
@@ -41,7 +42,7 @@ class TickRecorder:
         """Open the table; BadInput if a metric is named like another column."""
         self._names = [metric.name for metric in self._metrics.metrics]
         for name in self._names:
-            if name in (*KEYS, *robot_columns(static), *movable_columns(static), *RADIO):
+            if name in (*KEYS, *robot_columns(static), VALUE, *movable_columns(static), *RADIO):
                 raise BadInput("", f"metrics.{name}", "expected another name: ticks.parquet has a column of this name")
         self._static = static
         rows = static.arenas * static.robots

@@ -20,9 +20,9 @@ def share(value: float | None) -> str:
     return "–" if value is None or math.isnan(value) else f"{value:.1%}"
 
 
-def count(value: int, one: str, many: str = "") -> str:
-    """A count with what is counted, `one` of it or `many` (`one` with an s)."""
-    return f"{value:,} {one if value == 1 else many or f'{one}s'}"
+def counted(count: int, what: str, many: str = "") -> str:
+    """`1 run`, `1,200 runs`."""
+    return f"{count:,} {what if count == 1 else many or what + 's'}"
 
 
 def short(value: float, _place: int = 0) -> str:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from swarmwire.metrics.report.in_words import counted
+
 if TYPE_CHECKING:
     import polars as pl
 
@@ -27,7 +29,7 @@ class Lane:
     def title(self) -> str:
         """The kind, how often it happened, and to how many robots."""
         times = "" if len(self.spans) == 1 else f", {len(self.spans)} times"
-        return f"{self.words}{times} ({len(self.robots)} robots)" if self.robots else f"{self.words}{times}"
+        return f"{self.words}{times} ({counted(len(self.robots), 'robot')})" if self.robots else f"{self.words}{times}"
 
 
 def lanes_of(events: "pl.DataFrame") -> list[Lane]:

@@ -1,6 +1,7 @@
 """What is known of a run that is to be reported: its folder read, as far as there is something."""
 
 import json
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,6 +33,11 @@ class RunData:
     film: Film | str  # of the first arena, or why there is none
     lanes: list[Lane]  # its events
     events: "pl.DataFrame | None"
+
+    @property
+    def shown_name(self) -> str:
+        """The folder's name, as a command takes it from beside the folder."""
+        return shlex.quote(self.folder.path.resolve().name)
 
     @property
     def has_radio(self) -> bool:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from swarmwire.metrics.report.in_words import count, number
+from swarmwire.metrics.report.in_words import counted, number
 from swarmwire.metrics.report.run_data import RunData, read_run
 from swarmwire.metrics.report.run_sections.measured import measured
 from swarmwire.metrics.report.run_sections.radio import radio
@@ -25,6 +25,6 @@ def run_report(folder: Path) -> Report:
 
 def _about(run: RunData) -> str:
     static = run.static
-    seeds = f"seed {static.seeds[0]}" if static.arenas == 1 else count(static.arenas, "arena")
+    seeds = f"seed {static.seeds[0]}" if static.arenas == 1 else counted(static.arenas, "arena")
     time_s = "killed or going on" if run.summary is None else f"{number(run.summary['sim_time_s'])} s"
     return f"A run of {groups(static)}, {seeds}, {time_s}."

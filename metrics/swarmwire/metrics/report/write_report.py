@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.report.page import page
 from swarmwire.metrics.report.section import Report
 from swarmwire.metrics.whole_file import check_path, chosen_file
@@ -12,27 +13,24 @@ _SVG_HEAD = '<?xml version="1.0" encoding="utf-8"?>\n'
 
 
 def write_report(report: Report, to: Path) -> list[Path]:
-    """Write the page there and the figures to `figures/` beside it; the paths of all of them, the page first.
+    """Write the page there and the figures into a folder beside it; the paths of all of them, the page first.
 
+    Those of `report.html` go to `figures/`, those of `NAME.html` to `NAME-figures/`.
     BadInput for a path that cannot be.
     """
     check_path(to, (".html", ".htm"))
     text = page(report)
-    folder = to.parent / FIGURES
-    written = [to, *(folder / f"{figure.name}.svg" for figure in report.figures)]
-    if report.figures:
+    folder = to.parent / (FIGURES if to.name == PAGE else f"{to.stem}-{FIGURES}")
+    files = {folder / f"{figure.name}.svg": f"{_SVG_HEAD}{figure.svg}\n" for figure in report.figures}
+    if files:
         _make(folder)
-    for path, content in zip(
-        written, [text, *(_SVG_HEAD + figure.svg + "\n" for figure in report.figures)], strict=True
-    ):
+    for path, content in (files | {to: text}).items():
         with chosen_file(path) as aside:
             aside.write_text(content, encoding="utf-8")
-    return written
+    return [to, *files]
 
 
 def _make(folder: Path) -> None:
-    from swarmwire.comms.errors import BadInput
-
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:

@@ -19,7 +19,7 @@ from swarmwire.metrics.statistics.interval import LEVEL, Interval
 from swarmwire.metrics.statistics.point_sums import PointSums, point_sums, resampled_sums
 
 MORE_PARAMETERS = 2  # of a step than of a constant
-ROUNDING = 1e-12  # of sums of squares, relative to all squares
+ROUNDING = 1e-12  # relative, of values and of sums of squares
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,12 @@ def change_point(parameter: FloatArray, table: FloatArray, level: float = LEVEL)
     parameter, table = parameter[full], table[full]
     if len(parameter) < 2:
         return None
+    mean = float(np.nanmean(table))
+    table = table - mean  # squares of what is left keep their digits
     sums = point_sums(table)
     residual = _residuals(sums)
     split = int(np.argmin(residual))
-    gain = _gain(sums, float(residual[split]))
+    gain = _gain(sums, float(residual[split]), mean)
     if not gain > 0.0:
         return None
     places = 0.5 * (parameter[:-1] + parameter[1:])
@@ -65,8 +67,8 @@ def change_point(parameter: FloatArray, table: FloatArray, level: float = LEVEL)
         before=float(parameter[split + 1]),
         place=float(places[split]),
         place_interval=percentile_interval(resampled_place, seeds, level),
-        below=float(below[split]),
-        above=float(above[split]),
+        below=mean + float(below[split]),
+        above=mean + float(above[split]),
         effect=effect,
         effect_interval=percentile_interval(resampled_effect, seeds, level),
         standardised=effect / deviation if deviation > 0.0 else math.copysign(math.inf, effect),
@@ -98,14 +100,12 @@ def _residuals(sums: PointSums) -> FloatArray:
     return np.where(np.isfinite(left), np.maximum(left, 0.0), np.inf)
 
 
-def _gain(sums: PointSums, residual: float) -> float:
-    """BIC of a constant less that of the step; 0 if the constant leaves nothing to explain."""
-    n, squares = float(sums.count.sum()), float(sums.squares.sum())
-    constant = squares - float(sums.total.sum()) ** 2 / n
-    least = ROUNDING * squares
-    if constant <= least:
+def _gain(sums: PointSums, residual: float, mean: float) -> float:
+    """BIC of a constant less that of the step; 0 if the constant leaves nothing to explain but rounding of the mean."""
+    n, constant = float(sums.count.sum()), float(sums.squares.sum())
+    if constant <= n * (ROUNDING * mean) ** 2:
         return 0.0
-    return n * math.log(constant / max(residual, least)) - MORE_PARAMETERS * math.log(n)
+    return n * math.log(constant / max(residual, ROUNDING * constant)) - MORE_PARAMETERS * math.log(n)
 
 
 def _resampled(table: FloatArray, places: FloatArray) -> tuple[FloatArray, FloatArray]:

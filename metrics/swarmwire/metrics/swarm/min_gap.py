@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry.obstacles import to_nearest
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
@@ -68,29 +69,40 @@ def smallest_gap_m(
     """
     arenas, robots = order.shape
     gap_m = np.full(arenas, np.inf)
-    x, y, radius, span = np.empty(robots), np.empty(robots), np.empty(robots), np.empty((robots, 2))
+    # A torus goes on after its last robot with the first, which stand there once more.
+    room = 2 * robots if wrap_m[0] > 0.0 else robots
+    x, y, radius, robot = np.empty(room), np.empty(room), np.empty(room), np.empty(room, np.int64)
     largest_m = radius_m.max()
     for arena in range(arenas):
         first, n = arena * robots, 0
         sort_by_x(order[arena], pose[first : first + robots])
         for i in order[arena]:
             if alive[first + i]:
-                x[n], y[n], radius[n] = pose[first + i, 0], pose[first + i, 1], radius_m[i]
-                span[n] = span_m[i]
+                x[n], y[n], radius[n], robot[n] = pose[first + i, 0], pose[first + i, 1], radius_m[i], i
                 n += 1
+        places = n
+        if wrap_m[0] > 0.0:
+            x[n : 2 * n], y[n : 2 * n] = x[:n] + wrap_m[0], y[:n]
+            radius[n : 2 * n], robot[n : 2 * n] = radius[:n], robot[:n]
+            places = 2 * n
         best_m = np.inf
         for a in range(n):
-            for after in range(a + 1, a + n if wrap_m[0] > 0.0 else n):  # a torus goes on after the last
-                b = after if after < n else after - n
-                along_m, near_m = x[b] - x[a], best_m + radius[a] + radius[b]
-                if after >= n:
-                    along_m += wrap_m[0]
+            for b in range(a + 1, min(a + n, places)):
+                along_m = x[b] - x[a]
                 if along_m > best_m + radius[a] + largest_m:
                     break
                 across_m = y[b] - y[a]
-                across_m += to_nearest(across_m, wrap_m[1])
+                if wrap_m[1] > 0.0:
+                    across_m += to_nearest(across_m, wrap_m[1])
+                near_m = best_m + radius[a] + radius[b]
                 square = along_m * along_m + across_m * across_m
-                if near_m > 0.0 and square < near_m * near_m and span[a, 0] < span[b, 1] and span[b, 0] < span[a, 1]:
+                if square < near_m * near_m and near_m > 0.0 and _pass_not(span_m, robot[a], robot[b]):
                     best_m = np.sqrt(square) - max(radius[a], radius[b]) - min(radius[a], radius[b])
         gap_m[arena] = best_m if best_m < np.inf else np.nan
     return gap_m
+
+
+@borrowing()
+def _pass_not(span_m, i, j):
+    """Whether two robots are not wholly above one another."""
+    return span_m[i, 0] < span_m[j, 1] and span_m[j, 0] < span_m[i, 1]

@@ -38,7 +38,7 @@ def _near_pairs(pose, alive, reach_m, order, strips, wrap_m):
     farthest_m, half_m = reach_m.max(), 0.5 * wrap_m[0] if wrap_m[0] > 0.0 else np.inf
     start = strips.start
     for arena in range(arenas):
-        count, _ = fill(strips, order[arena], pose[arena], alive[arena], 2.0 * farthest_m, robots, wrap_m[1])
+        count, _, _ = fill(strips, order[arena], pose[arena], alive[arena], 2.0 * farthest_m, robots, wrap_m[1])
         for s in range(count):
             low, own = start[s], start[s + 1] - start[s]
             above = s + 1 if s + 1 < count or wrap_m[1] == 0.0 else 0

@@ -46,21 +46,23 @@ class NearestNeighbour(Metric):
 
 @njit(cache=True)
 def _mean_nearest_m(pose, alive, order, strips, wrap_m):
-    """From each robot strip by strip outwards, until the next ones are farther away than the nearest so far."""
+    """From each robot strip by strip outwards, until the sides of the next ones are farther than the nearest so far."""
     mean_m = np.full(len(order), np.nan)
     for arena in range(len(order)):
         n = np.sum(alive[arena])
-        count, height_m = fill(strips, order[arena], pose[arena], alive[arena], 0.0, int(np.sqrt(n)), wrap_m[1])
+        count, low_m, height_m = fill(strips, order[arena], pose[arena], alive[arena], 0.0, int(np.sqrt(n)), wrap_m[1])
         total_m = 0.0
         for a in range(n):
             own = strips.strip[a]
+            up_m = strips.y[a] - (low_m + own * height_m)  # above the lower side of its strip
             nearest = _nearest_square(strips, a, own, np.inf, wrap_m)
             for away in range(1, count // 2 + 1 if wrap_m[1] > 0.0 else count):
-                if (height_m * (away - 1)) ** 2 >= nearest:
+                between_m = (away - 1) * height_m
+                if between_m * between_m >= nearest:
                     break
-                for other in (own - away, own + away):
+                for other, to_m in ((own - away, up_m + between_m), (own + away, height_m - up_m + between_m)):
                     s = other % count if wrap_m[1] > 0.0 else other
-                    if 0 <= s < count:
+                    if 0 <= s < count and to_m * to_m < nearest:
                         nearest = _nearest_square(strips, a, s, nearest, wrap_m)
             total_m += np.sqrt(nearest)
         if n > 1:

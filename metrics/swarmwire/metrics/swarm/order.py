@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
@@ -33,6 +31,4 @@ class Order(Metric):
 
 
 def _order(moment: Moment) -> FloatArray:
-    heading_rad = moment.heading_rad
-    x, y = moment.sum_alive(np.cos(heading_rad)), moment.sum_alive(np.sin(heading_rad))
-    return agreement(x, y, moment.per_robot_alive, moment.robots_alive)
+    return agreement(*moment.direction, moment.alive, False)

@@ -39,8 +39,7 @@ class OrderLocal(Metric):
         neighbours = NearPairs(static, np.full(static.robots, 0.5 * self.range_m))
 
         def measure(moment: Moment) -> FloatArray:
-            heading_rad = moment.heading_rad
-            return _order_local(np.cos(heading_rad), np.sin(heading_rad), moment.alive, neighbours.of(moment))
+            return _order_local(*moment.direction, moment.alive, neighbours.of(moment))
 
         return measure
 

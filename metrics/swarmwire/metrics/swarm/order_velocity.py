@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
@@ -31,6 +29,4 @@ class OrderVelocity(Metric):
 
 
 def _order_velocity(moment: Moment) -> FloatArray:
-    vx, vy = moment.velocity[:, :, 0], moment.velocity[:, :, 1]
-    speeds = moment.sum_alive(np.hypot(vx, vy))
-    return agreement(moment.sum_alive(vx), moment.sum_alive(vy), speeds, moment.robots_alive)
+    return agreement(moment.velocity[:, :, 0], moment.velocity[:, :, 1], moment.alive, True)

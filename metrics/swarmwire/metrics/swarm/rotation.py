@@ -38,7 +38,7 @@ class Rotation(Metric):
 
         def measure(moment: Moment) -> FloatArray:
             away_m = from_centroid_m(moment.pose, moment.alive, wrap_m)
-            return _rotation(away_m, np.cos(moment.heading_rad), np.sin(moment.heading_rad), moment.alive)
+            return _rotation(away_m, *moment.direction, moment.alive)
 
         return measure
 

@@ -57,7 +57,7 @@ def sort_by_x(order, pose):
 
 @borrowing()
 def fill(strips, order, pose, alive, height_m, most, side_y_m):
-    """Sort the robots alive of an arena into strips; returns how many strips, and how high each is in m.
+    """Sort the robots alive of an arena into strips: returns how many, the y of the lowest side, and the height, in m.
 
     Each is at least `height_m` high, so that what is nearer along y lies in the same strip or in a neighbouring one;
     there are `most` at most. `order` is sorted by x in place; `side_y_m` is that of a torus, else 0.
@@ -89,7 +89,7 @@ def fill(strips, order, pose, alive, height_m, most, side_y_m):
             start[s + 1] += 1
             strips.robot[place], strips.strip[place] = i, s
             strips.x[place], strips.y[place] = pose[i, 0], pose[i, 1]
-    return count, span_m / count
+    return count, low_m, span_m / count
 
 
 @borrowing()

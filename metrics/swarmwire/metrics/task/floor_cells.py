@@ -73,12 +73,14 @@ def _mark(cells, width_m, height_m, torus, position_m, alive, sensing_m, seen):
             left, right = _span(x, sensing_m, width_m, nx, torus)
             below, above = _span(y, sensing_m, height_m, ny, torus)
             for j in range(below, above + 1):
-                up = (j + 0.5) * high_m - 0.5 * height_m - y
+                up, row, column = (j + 0.5) * high_m - 0.5 * height_m - y, cells[arena, j % ny], left % nx
                 for i in range(left, right + 1):
-                    along = (i + 0.5) * wide_m - 0.5 * width_m - x
-                    if along * along + up * up <= sensing_m * sensing_m and cells[arena, j % ny, i % nx] == FREE:
-                        cells[arena, j % ny, i % nx] = SEEN
-                        seen[arena] += 1
+                    if row[column] == FREE:
+                        along = (i + 0.5) * wide_m - 0.5 * width_m - x
+                        if along * along + up * up <= sensing_m * sensing_m:
+                            row[column] = SEEN
+                            seen[arena] += 1
+                    column = column + 1 if column + 1 < nx else 0
 
 
 @njit(cache=True)

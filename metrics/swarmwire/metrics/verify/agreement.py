@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from swarmwire.metrics.record.part_files import scan_files
 from swarmwire.metrics.verify.finding import State
 
 Verdict = tuple[State, str] | None  # None: they agree, or there is nothing to compare
@@ -14,7 +15,7 @@ def ticks_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdict
     """Every tick once in every arena, from 0 to the last; the last row's metrics are the final ones."""
     import polars as pl
 
-    table = pl.scan_parquet(files)
+    table = scan_files(files)
     arenas = 1 if summary is None else int(summary["arenas"])
     by_arena = table.group_by("arena").agg(pl.len().alias("rows"), pl.col("tick").n_unique().alias("ticks"))
     counted = by_arena.join(table.group_by("arena").agg(pl.col("tick").max().alias("last")), on="arena").collect()
@@ -49,7 +50,7 @@ def packets_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdi
     recorded: dict[str, Any] = {} if summary is None else summary.get("record", {}).get("packets", {})
     if summary is None or recorded.get("share") != 1.0 or recorded["dropped"] or summary["ended"] == "interrupted":
         return None
-    counted = pl.scan_parquet(files).group_by("arena", "fate").agg(pl.col("receivers").sum()).collect()
+    counted = scan_files(files).group_by("arena", "fate").agg(pl.col("receivers").sum()).collect()
     found = {(arena, fate): receivers for arena, fate, receivers in counted.iter_rows()}
     radios: list[dict[str, Any] | None] = per_arena(summary, "radio")
     for arena, radio in enumerate(radios):
@@ -67,7 +68,7 @@ def events_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdic
 
     if summary is None:
         return None
-    rows, events = pl.scan_parquet(files).select(pl.len()).collect().item(), summary["events"]
+    rows, events = scan_files(files).select(pl.len()).collect().item(), summary["events"]
     expected = sum(_arenas_of(event, arena_ticks(summary)) for event in events)
     if rows != expected:
         return State.DIFFERS, f"{rows} rows; the summary has {len(events)} events, {expected} rows by their arenas"

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.metrics.record.part_files import scan_files
 from swarmwire.metrics.verify.agreement import Verdict, per_arena
 from swarmwire.metrics.verify.finding import State
 
@@ -30,7 +31,7 @@ NOT_FINAL = FATE_NAMES[Fate.IN_FLIGHT]  # the summary counts packets too that ne
 
 def robots_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
     """As many receivers of each fate over all senders, and of fates that links have over all receivers too."""
-    table = _counted(files)
+    table = scan_files(files)
     for row in _sums(table, [f"{side}_{fate}" for side in ("as_sender", "as_receiver") for fate in LINK_FATES]):
         for fate in LINK_FATES:
             sent, got = row[f"as_sender_{fate}"], row[f"as_receiver_{fate}"]
@@ -50,7 +51,7 @@ def links_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdict
     """As many packets of each fate that only links have, over all links."""
     import polars as pl
 
-    found = _counted(files).group_by("arena", "fate").agg(pl.col("packets").sum()).collect()
+    found = scan_files(files).group_by("arena", "fate").agg(pl.col("packets").sum()).collect()
     return _compared({(arena, fate): packets for arena, fate, packets in found.iter_rows()}, LINK_FATES, summary)
 
 
@@ -60,14 +61,8 @@ def distances_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Ver
     if told.get("every") != 1 or told.get("unknown") != 0:
         return None
     heard = FATE_NAMES[Fate.HEARD]
-    totals = {(row["arena"], heard): row["heard"] for row in _sums(_counted(files), ["heard"])}
+    totals = {(row["arena"], heard): row["heard"] for row in _sums(scan_files(files), ["heard"])}
     return _compared(totals, (heard,), summary)
-
-
-def _counted(files: list[Path]) -> "pl.LazyFrame":
-    import polars as pl
-
-    return pl.scan_parquet(files)
 
 
 def _sums(table: "pl.LazyFrame", columns: list[str]) -> list[dict[str, Any]]:

@@ -4,13 +4,17 @@ from typing import TYPE_CHECKING, Any
 
 from swarmwire.comms.fates import FATE_NAMES
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.record.tick_columns import tick_schema
+from swarmwire.metrics.record.tick_columns import VALUE, tick_schema
 from swarmwire.metrics.run_folder import SCHEMAS
 
 if TYPE_CHECKING:
     import polars as pl
 
-LATER_COLUMNS = {"packets": ("to", "payload"), "events": ("part",)}  # which older records lack
+LATER_COLUMNS = {
+    "ticks": (VALUE,),
+    "packets": ("to", "payload"),
+    "events": ("part",),
+}  # which older records lack, or all in which nobody told a value
 MAY_BE_NULL = {
     "packets": ("receiver", "to", "rssi_dbm", "distance_m", "payload"),
     "radio_distances": ("pdr",),
@@ -33,7 +37,7 @@ def table_fault(name: str, table: "pl.LazyFrame", static: Static | None) -> str 
 def _schema(name: str, static: Static | None) -> "dict[str, Any]":
     if name in SCHEMAS:
         return SCHEMAS[name]()
-    return {} if static is None else tick_schema(static, ())
+    return {} if static is None else tick_schema(static, (), with_value=True)
 
 
 def _type_fault(there: "pl.Schema", expected: "dict[str, Any]", may_lack: tuple[str, ...]) -> str | None:

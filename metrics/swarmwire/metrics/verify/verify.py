@@ -7,6 +7,7 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.record.names import LOG, RECORDING, RUN_JSON, STATIC, SUMMARY
+from swarmwire.metrics.record.part_files import scan_files
 from swarmwire.metrics.record.tick_columns import ROBOT_COLUMNS
 from swarmwire.metrics.run_folder import SCHEMAS, RunFolder
 from swarmwire.metrics.verify.agreement import Verdict, events_agree, packets_agree, ticks_agree
@@ -96,7 +97,7 @@ def _fault(folder: RunFolder, name: str, files: list[Path]) -> str | None:
     except BadInput:  # which has a finding of its own
         static = None
     try:
-        return table_fault(name, pl.scan_parquet(files), static)
+        return table_fault(name, scan_files(files), static)
     except pl.exceptions.PolarsError as error:  # parts of different types
         return str(error).splitlines()[0]
 
@@ -111,7 +112,7 @@ def _reach(name: str, files: list[Path]) -> str:
     """How much a table holds, in words."""
     import polars as pl
 
-    table, megabytes = pl.scan_parquet(files), sum(file.stat().st_size for file in files) / 1e6
+    table, megabytes = scan_files(files), sum(file.stat().st_size for file in files) / 1e6
     rows = table.select(pl.len()).collect().item()
     text = f"{rows} rows, {megabytes:.1f} MB"
     if name == "ticks" and rows:

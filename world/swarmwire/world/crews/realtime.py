@@ -30,6 +30,7 @@ from swarmwire.comms.notes import Notes
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.values import Values
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
 from swarmwire.world.crews.roster import OnLoss, Roster
@@ -79,6 +80,7 @@ class RealTime(Roster[_Slot]):
         self._notes: list[Notes] = []
         self._leds: list[LedChanges] = []
         self._own: list[Actuations] = []
+        self._values: list[Values] = []
         self.late, self.watchdog_stops = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
         self.frames_dropped = self.packets_dropped = self.outcomes_dropped = 0
 
@@ -125,10 +127,10 @@ class RealTime(Roster[_Slot]):
         rows = np.arange(len(self._drive))
         linear_mps, angular_radps, lateral_mps = self._command
         sent, notes = Sent.joined(self._sent), self._latest_notes()
-        leds, own = LedChanges.joined(self._leds), Actuations.joined(self._own)
-        actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own)
+        leds, own, told = LedChanges.joined(self._leds), Actuations.joined(self._own), Values.joined(self._values)
+        actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own, told)
         self._drive, self._command = np.zeros_like(self._drive), np.zeros_like(self._command)
-        self._sent, self._notes, self._leds, self._own = [], [], [], []
+        self._sent, self._notes, self._leds, self._own, self._values = [], [], [], [], []
         return actions
 
     def _acted(self, slot: _Slot, frame: Frame) -> None:
@@ -149,6 +151,7 @@ class RealTime(Roster[_Slot]):
         self._notes.append(actions.notes)
         self._leds.append(actions.leds)
         self._own.append(actions.own)
+        self._values.append(actions.values)
 
     def _catch_up(self, slot: _Slot) -> Sequence[bytes]:
         return ()  # the next tick is soon

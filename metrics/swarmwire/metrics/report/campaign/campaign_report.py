@@ -13,7 +13,7 @@ from swarmwire.metrics.report.campaign.summary_section import summary_section
 from swarmwire.metrics.report.campaign.survival_section import survival_section
 from swarmwire.metrics.report.campaign.transition_section import transition_section
 from swarmwire.metrics.report.campaign.what_was_run import what_was_run
-from swarmwire.metrics.report.campaign.words import counted
+from swarmwire.metrics.report.in_words import counted
 from swarmwire.metrics.report.section import Report, Section
 
 

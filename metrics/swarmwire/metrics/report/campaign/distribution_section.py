@@ -20,7 +20,7 @@ def distribution_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Sec
     figures = [_figure(samples, outcome, each) for outcome in outcomes for each in levels]
     if not figures:
         return None
-    parts: list[str | Figure] = [_how_to_read(samples, outcomes)]
+    parts: list[str | Figure] = [_how_to_read(samples, outcomes, levels)]
     left_out = parameters[MOST_PARAMETERS:]
     if left_out:
         parts.append(
@@ -29,7 +29,7 @@ def distribution_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Sec
     return Section("Distributions", (*parts, *figures))
 
 
-def _how_to_read(samples: Samples, outcomes: tuple[Outcome, ...]) -> str:
+def _how_to_read(samples: Samples, outcomes: tuple[Outcome, ...], levels: list[Levels]) -> str:
     text = (
         f"Dots are runs; where groups have more than {MOST_POINTS}, the blue shape is their density. The box reaches "
         "from the lower to the upper quartile, the bar is the median."
@@ -38,6 +38,10 @@ def _how_to_read(samples: Samples, outcomes: tuple[Outcome, ...]) -> str:
         text += (
             " The dashed line is the time limit, the number above it the share of runs that reached it; a box that "
             "is open at the top has its upper quartile beyond."
+        )
+    if any(each.means for each in levels):
+        text += (
+            " Parameters of many values are put together into ranges, equally full, which figures call by their means."
         )
     return text
 
@@ -56,4 +60,4 @@ def _group(samples: Samples, outcome: Outcome, levels: Levels, level: int) -> Gr
     points = tuple(levels.points(level))
     sample = samples.sample(outcome, points)
     censored = sample.censored if len(sample) else 0.0
-    return Group(levels.labels[level], sample.value[sample.observed], censored, samples.quartiles(outcome, points))
+    return Group(levels.short[level], sample.value[sample.observed], censored, samples.quartiles(outcome, points))

@@ -1,7 +1,7 @@
 """The values of one parameter, in order, as groups of design points that share one."""
 
+import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TypeGuard
 
 import numpy as np
@@ -22,7 +22,12 @@ class Levels:
     labels: tuple[str, ...]  # (l,)
     number: FloatArray | None  # (l,) the value, or the mean of those put together; None: no numbers
     of_point: IntArray  # (points,) the level of each design point
-    together: bool = False  # whether a level is a range of values
+    means: tuple[str, ...] = ()  # (l,) if levels are ranges: the mean of each, which is shorter
+
+    @property
+    def short(self) -> tuple[str, ...]:
+        """Labels for axes: (l,)."""
+        return self.means or self.labels
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -48,9 +53,12 @@ def _of_numbers(path: str, values: FloatArray) -> Levels:
         return Levels(path, tuple(f"{value:.6g}" for value in distinct), distinct, of_point)
     edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, _BINS + 1)))
     of_point = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
-    labels = tuple(f"{low:.3g}–{high:.3g}" for low, high in pairwise(edges.tolist()))
-    means = np.array([values[of_point == level].mean() for level in range(len(labels))])
-    return Levels(path, labels, means, of_point, together=True)
+    of_point = np.unique(of_point, return_inverse=True)[1]  # a range may have been empty
+    ranges = [values[of_point == level] for level in range(int(of_point.max()) + 1)]
+    decimals = max(0, 1 - math.floor(math.log10(float(np.ptp(values)) / len(ranges))))
+    labels = tuple(f"{part.min():.{decimals}f}–{part.max():.{decimals}f}" for part in ranges)
+    means = np.array([part.mean() for part in ranges])
+    return Levels(path, labels, means, of_point, tuple(f"{mean:.2g}" for mean in means))
 
 
 def _is_number(value: Value) -> TypeGuard[float]:

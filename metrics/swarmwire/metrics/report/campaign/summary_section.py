@@ -108,11 +108,10 @@ def _figures(found: Summary, outcome: Outcome, rounding: Rounding) -> tuple[str,
         return beyond if censored and not math.isfinite(value) else rounding.text(value)
 
     low, high = found.q50_interval
-    interval = "–" if not censored and not math.isfinite(low) else f"{text(low)} to {text(high)}"
     return (
         text(found.q50),
         _span(text(found.q25), text(found.q75)),
-        _span(text(low), text(high)) if censored else interval,
+        _span(text(low), text(high)),
     )
 
 

@@ -39,7 +39,7 @@ def _figure(samples: Samples, outcome: Outcome, levels: Levels | None) -> Figure
     name = figure_name("survival", outcome.column, levels.path)
     last, count = len(levels) - 1, min(MOST_CURVES, len(levels))
     shown = [round(last * turn / (count - 1)) for turn in range(count)]
-    curves = [_curve(samples, outcome, levels.labels[level], tuple(levels.points(level))) for level in shown]
+    curves = [_curve(samples, outcome, levels.short[level], tuple(levels.points(level))) for level in shown]
     drawn = survival_curves(curves, f"share still waiting, by {levels.path}", title)
     some = f", {len(shown)} of its {len(levels)} values" if len(shown) < len(levels) else ""
     pooled = ", over all values of the others" if len(samples.folder.parameters) > 1 else ""

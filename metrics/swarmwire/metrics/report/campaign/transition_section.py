@@ -37,7 +37,8 @@ def transition_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Secti
         if len(numbers) == 1:
             figures.append(_response(samples, outcome, numbers[0], rows))
         for x, y in combinations(numbers, 2):
-            figures += _maps(samples, outcome, x, y, rows)
+            beside = slices_beside(folder, (x.path, y.path), names_apart=len(numbers) == 2)
+            figures += _maps(samples, outcome, x, y, beside, rows)
     return Section("Transitions", (_how_to_read(len(numbers)), *figures, _table(rows)))
 
 
@@ -48,11 +49,11 @@ def _how_to_read(numbers: int) -> str:
     )
     if numbers == 1:
         return (
-            "The line is the median; the darker band its 95 % interval, the lighter one from quartile to quartile; "
-            "a triangle is a median beyond the time limit. The upright line is the change point, with its 95 % "
-            f"interval: {change}"
+            "The line is the median, with its 95 % intervals; a band reaches from quartile to quartile; a triangle is "
+            "a median beyond the time limit. The upright line across is the change point, with its 95 % interval: "
+            f"{change}"
         )
-    others = " Numbers that a map does not show are at their middle value." if numbers > 2 else ""
+    others = " Other numbers of a grid are at their middle value, all else is taken together." if numbers > 2 else ""
     return (
         f"Each cell is the median of its runs. The red mark in a row is its change point: {change} The thin line is "
         f"its 95 % interval; a cell with > has its median beyond the time limit.{others}"
@@ -72,9 +73,11 @@ def _response(samples: Samples, outcome: Outcome, x: Levels, rows: list[_Row]) -
     return Figure(name, as_svg(figure, name), f"{sentence(outcome_title(outcome))} over `{x.path}`.")
 
 
-def _maps(samples: Samples, outcome: Outcome, x: Levels, y: Levels, rows: list[_Row]) -> list[Figure]:
+def _maps(
+    samples: Samples, outcome: Outcome, x: Levels, y: Levels, beside: list[Slice], rows: list[_Row]
+) -> list[Figure]:
     figures: list[Figure] = []
-    for number, each in enumerate(slices_beside(samples.folder, (x.path, y.path))):
+    for number, each in enumerate(beside):
         cells = [[each.cell((y, row), (x, column)) for column in range(len(x))] for row in range(len(y))]
         medians = np.array([[samples.quartiles(outcome, cell)[1] for cell in row] for row in cells])
         changes = [_change(samples, outcome, x, row) for row in cells]
@@ -97,7 +100,7 @@ def _map(
 ) -> Figure:
     name = figure_name("map", outcome.column, x.path, y.path, *([str(number)] if number else []))
     jumps = [None if change is None else _jump(change, x, np.arange(len(x), dtype=np.float64)) for change in changes]
-    figure = heat_map(medians, x.labels, y.labels, f"median {outcome_title(outcome)}", x.path, y.path, jumps)
+    figure = heat_map(medians, x.short, y.short, f"median {outcome_title(outcome)}", x.path, y.path, jumps)
     at = f", at {of.label}" if of.label else ""
     return Figure(name, as_svg(figure, name), f"{sentence(outcome_title(outcome))} over `{x.path}` and `{y.path}`{at}.")
 

@@ -1,10 +1,13 @@
 """The section that says what was run, how to run it again, and what failed."""
 
+import re
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 
 from swarmwire.metrics.campaign.about import About, Value
 from swarmwire.metrics.campaign.campaign_folder import FAILED, CampaignFolder
-from swarmwire.metrics.report.campaign.words import counted, listed, value_text
+from swarmwire.metrics.report.campaign.words import listed, value_text
+from swarmwire.metrics.report.in_words import counted
 from swarmwire.metrics.report.section import Listing, Section, Table
 
 _MOST_VALUES = 24  # of a parameter, named one by one
@@ -25,23 +28,35 @@ def what_was_run(folder: CampaignFolder) -> Section:
         ("settings for all", ", ".join(about.overrides) or "none"),
         ("a run lasts", f"{about.duration_s:g} s of simulated time, unless it stops before"),
         ("runs", _runs(folder, len(failed))),
-        ("begun", about.began_utc),
+        ("begun", _moment(about.began_utc)),
         ("versions", ", ".join(f"{name} {value_text(version)}" for name, version in about.versions.items())),
         ("CPU", listed(_machines(folder))),
     ]
-    name = folder.path.resolve().name
-    example = failed[0] if failed else folder.about.runs // 2
-    parts: list[str | Listing | Table] = [Table(("", ""), tuple(rows), "")]
-    parts.append(
-        f"The campaign was started by the first of these lines; the second repeats run {example}, bit for bit."
-    )
-    parts.append(Listing(f"{about.command}\nswarmwire repeat {name} --run {example}"))
+    parts = [Table(("", ""), tuple(rows), ""), *_commands(folder, failed), *_failures(folder)]
+    return Section("What was run", tuple(parts))
+
+
+def _commands(folder: CampaignFolder, failed: list[int]) -> list[str | Listing]:
+    """How it was run, how to run one of its runs again, and what is missing."""
+    name, runs = shlex.quote(folder.path.resolve().name), folder.about.runs
+    example = failed[0] if failed else runs // 2
+    parts: list[str | Listing] = [
+        f"The campaign was started by the first of these lines; the second repeats run {example}, bit for bit.",
+        Listing(f"{folder.about.command}\nswarmwire repeat {name} --run {example}"),
+    ]
     if not folder.finished:
         parts.append(
-            f"{counted(len(folder.missing), 'run')} of {about.runs:,} had not ended when this report was made, and "
-            "what follows is about the others. The first of these lines with `--resume` runs only what is missing."
+            f"{counted(len(folder.missing), 'run')} of {runs:,} had not ended when this report was made, and what "
+            "follows is about the others. This does what is missing:"
         )
-    return Section("What was run", (*parts, *_failures(folder)))
+        parts.append(Listing(f"swarmwire sweep --resume {name}"))
+    return parts
+
+
+def _moment(utc: str) -> str:
+    """ISO 8601 in its short form, as people read it; any other text as it is."""
+    found = re.fullmatch(r"(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)\d\dZ", utc)
+    return "{}-{}-{} {}:{} UTC".format(*found.groups()) if found else utc
 
 
 def _design(about: About) -> str:

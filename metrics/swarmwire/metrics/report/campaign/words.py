@@ -1,6 +1,6 @@
 """How outcomes, parameters and values are called in tables and figures."""
 
-from swarmwire.metrics.campaign.about import Point, Value
+from swarmwire.metrics.campaign.about import Value
 from swarmwire.metrics.campaign.outcome import Outcome
 
 _ENDINGS = {
@@ -47,16 +47,6 @@ def value_text(value: Value) -> str:
     return "" if value is None else value
 
 
-def point_text(point: Point) -> str:
-    """A design point in one line: `radio.loss` 0.2, `robots.flock.count` 10."""
-    return ", ".join(f"`{path}` {value_text(value)}" for path, value in point.items())
-
-
 def listed(words: list[str], last: str = "and") -> str:
     """`a, b and c`."""
     return f" {last} ".join(filter(None, (", ".join(words[:-1]), words[-1]))) if words else ""
-
-
-def counted(count: int, what: str, many: str = "") -> str:
-    """`1 run`, `1,200 runs`."""
-    return f"{count:,} {what if count == 1 else many or what + 's'}"

@@ -4,12 +4,13 @@ from typing import Any
 
 from swarmwire.metrics.drawing.looks import INK, SMALL_PT, SOFT, TEXT_PT, Look
 from swarmwire.metrics.drawing.plain_axes import plain_axes
+from swarmwire.metrics.report.in_words import short
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 
 HEIGHT_IN, FOOT_IN = 2.25, 0.37
 ACCENT = "#c2502e"  # what is to be seen first: told from the curves' blue by those who cannot tell red from green
 LETTERS_PT = SMALL_PT + 0.5
-_LEFT_IN, _RIGHT_IN, _HEAD_IN = 0.42, 0.08, 0.3
+_LEFT_IN, _RIGHT_IN, _HEAD_IN = 0.46, 0.08, 0.3
 
 
 def column_axes(
@@ -26,6 +27,7 @@ def column_axes(
     place = (_LEFT_IN / COLUMN_IN, foot_in / height_in, width / COLUMN_IN, height / height_in)
     axes = plain_axes(figure, place, "")
     axes.tick_params(which="both", labelsize=LETTERS_PT, labelcolor=INK, pad=2.5)
+    axes.yaxis.set_major_formatter(short)
     said: Look = {"fontsize": TEXT_PT + 0.5, "color": INK, "ha": "left", "va": "top"}
     figure.text(0.06 / COLUMN_IN, 1.0 - 0.06 / height_in, title, **said)
     axes.set_xlabel(x_label, fontsize=TEXT_PT, color=SOFT, labelpad=3)

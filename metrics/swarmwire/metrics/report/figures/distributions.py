@@ -31,12 +31,12 @@ class Group:
 
 
 def distributions(groups: Sequence[Group], title: str, x_label: str, limit: float | None = None) -> Any:
-    """The figure. `limit`: up to where a censored value was followed, None where nothing is censored."""
+    """The figure of at least one group. `limit`: up to where censored values were followed, None if nothing is."""
     labels = [group.label for group in groups]
     figure, axes = column_axes(title, x_label, foot_in=room_below_in(labels))
-    everything = np.concatenate([group.values for group in groups] or [np.empty(0)])
+    everything = np.concatenate([group.values for group in groups])
     log = fits_log(everything if limit is None else np.append(everything, limit))
-    shapes = max(map(_runs, groups), default=0) > MOST_POINTS
+    shapes = max(map(_runs, groups)) > MOST_POINTS
     for place, group in enumerate(groups):
         if shapes and len(group.values) >= _FEWEST_IN_SHAPE:
             _draw_shape(axes, place, group.values, log)

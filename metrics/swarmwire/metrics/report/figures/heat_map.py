@@ -10,10 +10,11 @@ from swarmwire.metrics.drawing.looks import FAINT, INK, SOFT, TEXT_PT, Look
 from swarmwire.metrics.report.figures.category_axis import room_below_in, set_categories
 from swarmwire.metrics.report.figures.column_axes import LETTERS_PT, column_axes
 from swarmwire.metrics.report.figures.response_curve import Jump
+from swarmwire.metrics.report.in_words import short
 
 _COLORS = "cividis"  # as ordered for those who cannot tell red from green, and in print without colours
 _ROW_IN, _LEAST_IN, _MOST_IN, _HEAD_IN = 0.2, 1.0, 2.6, 0.42
-_MOST_WRITTEN = 8  # columns whose values can be written into their cells
+_MOST_WRITTEN = 7  # columns and rows of cells into which values are written
 _BEYOND, _NONE = "#f1e9f5", "#ffffff"
 
 
@@ -46,11 +47,12 @@ def heat_map(
     shown = np.ma.masked_invalid(np.where(np.isposinf(values), greatest + 1.0 + abs(greatest), values))
     edges = np.arange(len(x_labels) + 1) - 0.5, np.arange(rows + 1) - 0.5
     axes.pcolormesh(*edges, shown, cmap=colors, norm=norm, edgecolors="white", linewidth=0.4)
-    if len(x_labels) <= _MOST_WRITTEN:
+    written = max(len(x_labels), rows) <= _MOST_WRITTEN
+    if written:
         _write_values(axes, values, norm)
     else:
         _mark_beyond(axes, values)
-    _draw_jumps(axes, jumps, 0.0 if len(x_labels) > _MOST_WRITTEN else 0.38)
+    _draw_jumps(axes, jumps, 0.38 if written else 0.0)
     set_categories(axes, x_labels)
     axes.set_xlim(-0.5, len(x_labels) - 0.5)
     every = max(1, -(-rows // 12))
@@ -67,7 +69,13 @@ def _write_values(axes: Any, values: FloatArray, norm: Any) -> None:
         if np.isnan(value):
             continue
         light = not np.isfinite(value) or norm(value) > 0.55
-        axes.text(column, row, f"{value:.3g}" if np.isfinite(value) else ">", color=INK if light else "white", **middle)
+        axes.text(
+            column,
+            row,
+            short(float(f"{value:.3g}")) if np.isfinite(value) else ">",
+            color=INK if light else "white",
+            **middle,
+        )
 
 
 def _mark_beyond(axes: Any, values: FloatArray) -> None:
@@ -96,3 +104,4 @@ def _draw_bar(figure: Any, axes: Any, colors: Any, norm: Any) -> None:
     bar.outline.set(edgecolor=FAINT, linewidth=0.5)
     beside.tick_params(labelsize=LETTERS_PT, labelcolor=INK, length=0, pad=2)
     beside.locator_params(nbins=5)
+    beside.yaxis.set_major_formatter(short)

@@ -49,8 +49,10 @@ def response_curve(responses: Sequence[Response], title: str, x_label: str, limi
         if response.jump is not None:
             _draw_jump(axes, response.jump, ACCENT if alone else color, written=alone)
         if alone:
-            _fill(axes, response.x, response.q25, response.q75, limit, color, 0.12)
-        _fill(axes, response.x, response.low, response.high, limit, color, 0.3 if alone else 0.2)
+            low, high = _within(response.q25, limit), _within(response.q75, limit)
+            axes.fill_between(response.x, low, high, color=color, alpha=0.18, lw=0)
+        low, high = _within(response.low, limit), _within(response.high, limit)
+        axes.vlines(response.x, low, high, color=color, lw=1.0, zorder=3)
         _draw_medians(axes, response, limit, color)
     if fits_log(responses[0].x):
         set_log(axes.xaxis)
@@ -62,13 +64,9 @@ def response_curve(responses: Sequence[Response], title: str, x_label: str, limi
     return figure
 
 
-def _fill(
-    axes: Any, x: FloatArray, low: FloatArray, high: FloatArray, limit: float | None, color: Any, alpha: float
-) -> None:
-    """A band, which ends at the limit where it lies beyond."""
-    top = np.nan if limit is None else limit
-    edges = (np.where(np.isposinf(edge), top, edge) for edge in (low, high))
-    axes.fill_between(x, *edges, color=color, alpha=alpha, lw=0)
+def _within(edge: FloatArray, limit: float | None) -> FloatArray:
+    """What lies beyond the limit, at the limit."""
+    return np.where(np.isposinf(edge), np.nan if limit is None else limit, edge)
 
 
 def _draw_medians(axes: Any, response: Response, limit: float | None, color: Any) -> None:

@@ -9,7 +9,7 @@ from swarmwire.comms.truth import Static
 from swarmwire.metrics.torus import whole_path
 
 MOST_PATHS = 1000
-MOST_POINTS = 40_000  # of all paths together: half a megabyte of a figure
+MOST_POINTS = 30_000  # of all paths together: half a megabyte of a figure
 _LEAST_TICKS = 24
 
 

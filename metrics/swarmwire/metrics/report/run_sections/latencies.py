@@ -26,8 +26,8 @@ def latencies(run: RunData) -> Figure | str:
     acts = acts_at_ns(final, receiver.to_numpy(), run.static)
     figure = latency_histogram((final - sent) / NS_PER_S, (acts - sent) / NS_PER_S)
     caption = (
-        "Latency of packets that were heard: from sending to hearing, and to the first tick at which the receiver acts. "
-        "Lines are p50, p90 (dashed) and p99 (dotted)."
+        "Latency of packets that were heard: from sending to hearing, and to the first tick at which the receiver "
+        "acts. Lines are p50, p90 (dashed) and p99 (dotted)."
     )
     recorded = run.record("packets").get("share", 1.0)
     if recorded < 1.0:

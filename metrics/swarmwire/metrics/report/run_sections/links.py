@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.fates import FATE_NAMES, Fate
-from swarmwire.metrics.report.in_words import count, share
+from swarmwire.metrics.report.in_words import counted, share
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_figures.link_histogram import link_histogram
 from swarmwire.metrics.report.run_figures.link_matrix import link_matrix
@@ -31,14 +31,14 @@ def links(run: RunData) -> Figure | str:
         return "Delivery by link: nobody was in range of anybody."
     pdr = np.divide(heard, in_range, out=np.full(heard.shape, np.nan), where=in_range > 0)
     if run.static.robots <= MOST_SQUARES:
-        caption = "Delivery ratio of each link: heard, of the packets for which the receiver was in range and sight."
+        caption = "Delivery ratio of each link: heard, of the packets on air while the receiver was in range and sight."
         return Figure(NAME, as_svg(link_matrix(run.static, pdr), NAME), caption)
     told = pdr[in_range >= LEAST_PACKETS]
     if not len(told):
         return f"Delivery by link: no link had {LEAST_PACKETS} packets in range."
     caption = (
-        f"Delivery ratios of the {count(len(told), 'link')} with at least {LEAST_PACKETS} packets in range; the dashed "
-        f"line is their median, {share(float(np.median(told)))}."
+        f"Delivery ratios of the {counted(len(told), 'link')} with at least {LEAST_PACKETS} packets in range; "
+        f"the dashed line is their median, {share(float(np.median(told)))}."
     )
     return Figure(NAME, as_svg(link_histogram(told), NAME), caption)
 
@@ -52,7 +52,8 @@ def _counted(run: RunData) -> "pl.DataFrame | str":
         return table
     packets = run.packets(("sender", "receiver", "fate"))
     if isinstance(packets, str):
-        return "neither `radio_links` nor `packets` was recorded." if "recorded" in packets else packets
+        recorded = [name for name in ("radio_links", "packets") if run.folder.files(name)]
+        return f"{table} {packets}" if recorded else "neither `radio_links` nor `packets` was recorded."
     return packets.group_by("sender", "receiver", "fate").agg(pl.len().alias("packets"))
 
 

@@ -84,7 +84,7 @@ def _arenas(run: RunData) -> list[str | Table]:
     ]
 
 
-_ARENA_HEAD = ("ended", "time in s", "packets sent", "delivery", "trajectory")
+_ARENA_HEAD = ("ended", "time in s", "stopped since s", "packets sent", "delivery", "trajectory")
 
 
 def _arena_row(run: RunData) -> Callable[[int], tuple[str, ...]]:
@@ -97,7 +97,7 @@ def _arena_row(run: RunData) -> Callable[[int], tuple[str, ...]]:
         radio = run.of_arena("radio", arena)
         told = (f"{radio['sent']:,}", share(radio["pdr"])) if radio else ("–", "–")
         end = ends[arena] if arena < len(ends) else run.summary or {}
-        ended = (str(end.get("ended", "–")), number(end.get("sim_time_s")))
+        ended = (str(end.get("ended", "–")), number(end.get("sim_time_s")), number(end.get("stop_time_s")))
         return (str(run.static.seeds[arena]), *ended, *told, f"{hashes[arena][:16]}…")
 
     return row

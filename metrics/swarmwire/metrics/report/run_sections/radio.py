@@ -1,5 +1,6 @@
 """What the radio did: delivery over distance, latencies, links, and what became of packets."""
 
+import shlex
 from typing import Any
 
 from swarmwire.metrics.report.in_words import share
@@ -24,9 +25,13 @@ def radio(run: RunData) -> Section:
     missing = [part for part in drawn if isinstance(part, str)]
     if missing and run.started:
         missing.append("A repetition records it, and is the same run:")
-        again = Listing(f"swarmwire repeat {run.folder.path} --packets all --links --out {run.folder.path}-again")
+        again = Listing(f"swarmwire repeat {run.shown_name} --packets all --links --out {_again(run)}")
         return Section(TITLE, (*said, *figures, *missing, again, *fates(run)))
     return Section(TITLE, (*said, *figures, *missing, *fates(run)))
+
+
+def _again(run: RunData) -> str:
+    return shlex.quote(f"{run.folder.path.resolve().name}-again")
 
 
 def _account(radio: dict[str, Any], arenas: int) -> str:

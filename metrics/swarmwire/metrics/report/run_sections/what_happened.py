@@ -8,8 +8,8 @@ from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.metric_axes import titled
 from swarmwire.metrics.registry import DELIVERY, METRICS
 from swarmwire.metrics.report.in_words import number
-from swarmwire.metrics.report.lanes import Lane
-from swarmwire.metrics.report.run_data import RunData
+from swarmwire.metrics.report.lanes import Lane, Span
+from swarmwire.metrics.report.run_data import ARENA, RunData
 from swarmwire.metrics.report.run_figures.small_panels import MOST_PANELS, small_panels
 from swarmwire.metrics.report.run_figures.timeline import Curve, timeline
 from swarmwire.metrics.report.run_sections.where import where
@@ -41,8 +41,9 @@ def what_happened(run: RunData) -> Section:
     parts: list[Any] = []
     main = curves(film, MAIN)
     if main:
-        figure = timeline(film.time_s, main, run.lanes[:_MOST_LANES])
-        parts.append(Figure("timeline", as_svg(figure, "timeline"), _caption(main, run.lanes)))
+        lanes = [*_moments(run, film), *run.lanes]
+        figure = timeline(film.time_s, main, lanes[:_MOST_LANES])
+        parts.append(Figure("timeline", as_svg(figure, "timeline"), _caption(main, lanes)))
     parts += where(run)
     others = curves(film, second(film))
     if others:
@@ -52,8 +53,9 @@ def what_happened(run: RunData) -> Section:
 
 
 def second(film: Film) -> list[str]:
-    """The metrics for small panels: those that the scenario names, then some of the standard."""
+    """The metrics for small panels: those that the scenario names but times, then some of the standard."""
     listed = [name for name in film.metrics if name not in METRICS or not METRICS[name].standard]
+    listed = [name for name in listed if name not in METRICS or METRICS[name].kind != "time"]
     changing = [name for name in SECOND if name in film.metrics and np.unique(film.metrics[name]).size > 1]
     return [name for name in (*listed, *changing) if name not in MAIN]
 
@@ -65,6 +67,18 @@ def curves(film: Film, names: tuple[str, ...] | list[str]) -> list[Curve]:
         for name in names
         if name in film.metrics and np.isfinite(film.metrics[name]).any()
     ]
+
+
+def _moments(run: RunData, film: Film) -> list[Lane]:
+    """Since when what stopped the arena had held, and when what the metrics that are times wait for came about."""
+    ends: list[dict[str, Any]] = (run.summary or {}).get("by_arena") or [{}]
+    moments: dict[str, float] = {}
+    if ends[ARENA].get("stopped_by"):
+        moments[f"stop: {ends[ARENA]['stopped_by']}, since"] = float(ends[ARENA]["stop_time_s"])
+    for name, value in film.metrics.items():
+        if name in METRICS and METRICS[name].kind == "time" and np.isfinite(value[-1]):
+            moments[f"{name.removesuffix('_s')}:"] = float(value[-1])
+    return [Lane(f"{words} {number(at_s)} s", [Span(at_s, None)]) for words, at_s in moments.items()]
 
 
 def _caption(main: list[Curve], lanes: list[Lane]) -> str:

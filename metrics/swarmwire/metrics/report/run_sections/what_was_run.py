@@ -4,14 +4,14 @@ from typing import Any
 
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.film import Film
-from swarmwire.metrics.report.in_words import count, number
+from swarmwire.metrics.report.in_words import counted, number
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.section import Listing, Section, Table
 
 _MOST_LINES = 300  # of the scenario
 _ENDED = {
     "duration": "with its duration",
-    "stopped": "by its stop condition",
+    "stopped": "stopped",
     "interrupted": "interrupted (Ctrl-C)",
     "left": "left by the program that stepped it",
     "failed": "failed",
@@ -29,11 +29,11 @@ def what_was_run(run: RunData) -> Section:
     return Section(
         "What was run",
         (
-            Table(("", ""), tuple(facts), "The run at a glance."),
+            Table(("", ""), tuple(facts), ""),
             *_not_as_it_should_be(run),
             *_hash(run),
             again,
-            *([Listing(f"swarmwire repeat {run.folder.path}")] if run.started else []),
+            *([Listing(f"swarmwire repeat {run.shown_name}")] if run.started else []),
         ),
     )
 
@@ -44,7 +44,7 @@ def scenario_text(run: RunData) -> list[Section]:
     if not lines:
         return []
     rest = len(lines) - _MOST_LINES
-    cut = (f"{count(rest, 'more line')} in `scenario.toml`.",) if rest > 0 else ()
+    cut = (f"{counted(rest, 'more line')} in `scenario.toml`.",) if rest > 0 else ()
     return [Section("The scenario", (Listing("\n".join(lines[:_MOST_LINES])), *cut))]
 
 
@@ -70,8 +70,8 @@ def groups(static: Static) -> str:
 def _arena(static: Static) -> str:
     size = " × ".join(f"{side:g}" for side in static.arena_size_m)
     around = {"walls": "walls around", "open": "open", "torus": "a torus"}[static.boundary]
-    things = [count(len(static.obstacles[0]), "obstacle")] if static.obstacles[0] else []
-    things += [count(len(static.lights[0]), "light")] if static.lights and static.lights[0] else []
+    things = [counted(len(static.obstacles[0]), "obstacle")] if static.obstacles[0] else []
+    things += [counted(len(static.lights[0]), "light")] if static.lights and static.lights[0] else []
     return ", ".join([f"{size} m", around, *things])
 
 
@@ -83,14 +83,15 @@ def _course(run: RunData) -> list[tuple[str, str]]:
         wanted = f" of {number(asked / run.static.rate_hz)} s" if isinstance(asked, int) else ""
         return [("ended", f"no summary: it was killed, or goes on; {reached}{wanted}")]
     runners = summary.get("runners", 0)
-    crew = "agents in the world's process" if not runners else f"agents in {count(runners, 'process', 'processes')}"
+    crew = "agents in the world's process" if not runners else f"agents in {counted(runners, 'process', 'processes')}"
     return [
         ("engine", str(summary.get("engine", "–"))),
         ("mode", f"{summary.get('mode', '–')}, {crew}"),
+        *([("stops at", "; ".join(summary["stop"]))] if summary.get("stop") else []),
         ("ended", _ended(summary)),
         (
             "simulated",
-            f"{number(summary['sim_time_s'])} s, {count(summary['ticks'], 'tick')} at {run.static.rate_hz} Hz",
+            f"{number(summary['sim_time_s'])} s, {counted(summary['ticks'], 'tick')} at {run.static.rate_hz} Hz",
         ),
         ("took", _took(summary)),
     ]
@@ -99,9 +100,11 @@ def _course(run: RunData) -> list[tuple[str, str]]:
 def _ended(summary: dict[str, Any]) -> str:
     how = str(_ENDED.get(summary["ended"], summary["ended"]))
     arenas: list[dict[str, Any]] = summary.get("by_arena") or []
-    stopped = sum(arena.get("ended") == "stopped" for arena in arenas)
+    stopped = [arena for arena in arenas if arena.get("stopped_by")]
     if len(arenas) > 1 and stopped:
-        how += f"; {stopped} of {len(arenas)} arenas stopped before"
+        how += f"; {len(stopped)} of {len(arenas)} arenas by what they stop at"
+    elif stopped:
+        how += f": {stopped[0]['stopped_by']}, since {number(stopped[0]['stop_time_s'])} s"
     return f"{how}: {summary['error']}" if summary.get("error") else how
 
 

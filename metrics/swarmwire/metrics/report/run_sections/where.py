@@ -1,6 +1,6 @@
 """Where the robots went."""
 
-from swarmwire.metrics.report.in_words import count, number
+from swarmwire.metrics.report.in_words import counted, number
 from swarmwire.metrics.report.run_data import ARENA, RunData
 from swarmwire.metrics.report.run_figures.paths import Paths, paths_of
 from swarmwire.metrics.report.run_figures.trajectories import trajectories
@@ -28,7 +28,7 @@ def where(run: RunData) -> list[Figure]:
 def _left_out(paths: Paths, ticks: int, robots: int) -> str:
     said = ""
     if len(paths.robots) < robots:
-        said += f" The ways of {len(paths.robots):,} of {count(robots, 'robot')} are drawn."
+        said += f" The ways of {len(paths.robots):,} of {counted(robots, 'robot')} are drawn."
     if len(paths.ticks) < ticks:
         said += f" Of {ticks:,} ticks {len(paths.ticks):,} are drawn, evenly spread."
     return said

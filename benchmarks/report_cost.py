@@ -1,0 +1,97 @@
+"""What a report of a large campaign takes: time and memory of the command, in a process of its own."""
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+from itertools import product
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from benchmarks.lines import print_line, spread
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.draws import derive_key, purpose, uniform
+
+LOSSES = tuple(place / 20 for place in range(10))
+COUNTS = (5, 10, 20, 40, 80)
+LIMIT_S = 600.0
+METRICS = ("order", "largest_component", "min_gap", "collisions", "target_best", "target_mean", "components")
+TIMES = ("aggregation_time_s", "stop_time_s")
+
+
+def report_cost(name: str, repeats: int, *, seeds: int) -> None:
+    """Seconds from the call to the end, imports included, and the most memory that the process held."""
+    clock = WallClock()
+    taken_s, most_mb, size_mb = list[float](), list[float](), 0.0
+    with TemporaryDirectory() as folder:
+        runs = _write_campaign(Path(folder), seeds)
+        for _ in range(repeats):
+            start_ns = clock.now_ns()
+            process = subprocess.Popen(
+                [sys.executable, "-m", "swarmwire.deploy", "report", folder], stdout=subprocess.DEVNULL
+            )
+            _, status, usage = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+            if process.returncode != 0:
+                raise RuntimeError("no report was made: its cost says nothing")
+            taken_s.append((clock.now_ns() - start_ns) / 1e9)
+            most_mb.append(usage.ru_maxrss / 1e3)
+        size_mb = Path(folder, "report.html").stat().st_size / 1e6
+    config = {"points": len(LOSSES) * len(COUNTS), "runs": runs, "outcomes": len(METRICS) + len(TIMES) + 1}
+    told = {**config, "page_mb": round(size_mb, 1)}
+    print_line(name, statistics.median(taken_s), "s", {**told, **spread(taken_s)})
+    print_line(f"{name}-memory", statistics.median(most_mb), "MB", {**told, **spread(most_mb)})
+
+
+def _write_campaign(folder: Path, seeds: int) -> int:
+    """Write a campaign with made-up outcomes over loss and number of robots; the number of its runs."""
+    points: list[tuple[float, int]] = list(product(LOSSES, COUNTS))
+    run = np.arange(len(points) * seeds)
+    point, seed = run // seeds, run % seeds + 1
+    loss, count = (np.array(values, dtype=np.float64)[point] for values in zip(*points, strict=True))
+    pdr = np.clip(1.0 - loss + 0.02 * _drawn(run, "pdr"), 0.0, 1.0)
+    columns: dict[str, Any] = {"run": run, "point": point, "seed": seed, "radio.loss": loss}
+    columns |= {"robots.flock.count": count.astype(np.int64), "ended": ["duration"] * len(run)}
+    columns |= {"sim_time_s": np.full(len(run), LIMIT_S), "radio.pdr": pdr}
+    for place, metric in enumerate(METRICS):
+        columns[f"{metric}.final"] = (1 + place) / (1.0 + np.exp(20.0 * loss - 4.0)) + 0.1 * _drawn(run, metric)
+    for time in TIMES:
+        time_s = -100.0 * (1.0 + 8.0 * loss) * (20.0 / count) ** 0.5 * np.log(1.0 - _drawn(run, time))
+        columns[time] = [value if value < LIMIT_S else None for value in time_s.tolist()]
+    pl.DataFrame(columns).write_parquet(folder / "summary.parquet")
+    (folder / "campaign.json").write_text(json.dumps(_about(points, seeds)), encoding="utf-8")
+    return len(run)
+
+
+def _drawn(run: IntArray, what: str) -> FloatArray:
+    return uniform(derive_key("report-cost"), purpose(what), 0, run, 0)
+
+
+def _about(points: list[tuple[float, int]], seeds: int) -> dict[str, Any]:
+    numbers = [*(f"{metric}.final" for metric in METRICS), "radio.pdr"]
+    outcomes = [{"column": column, "unit": "", "kind": "number", "help": "made up"} for column in numbers]
+    outcomes += [{"column": column, "unit": "s", "kind": "time", "help": "made up"} for column in TIMES]
+    return {
+        "format": 1,
+        "name": "made up",
+        "scenario": "made up",
+        "command": "none",
+        "began_utc": "",
+        "versions": {},
+        "cpu": "",
+        "modules": [],
+        "files": [],
+        "design": "grid",
+        "seeds": list(range(1, seeds + 1)),
+        "vary": {"radio.loss": list(LOSSES), "robots.flock.count": list(COUNTS)},
+        "points": [{"radio.loss": loss, "robots.flock.count": count} for loss, count in points],
+        "overrides": [],
+        "duration_s": LIMIT_S,
+        "outcomes": outcomes,
+    }

@@ -1,0 +1,58 @@
+"""`swarmwire report`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarmwire.comms.errors import BadInput
+
+if TYPE_CHECKING:
+    from swarmwire.metrics.report.section import Report
+
+
+def report_command(
+    folder: Annotated[Path, typer.Argument(help="The folder of a campaign or of a run.", metavar="DIR")],
+    outcome: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Of a campaign: a column, or a metric for its last value. Repeatable. Default: eight at most.",
+            metavar="NAME",
+        ),
+    ] = None,
+    to: Annotated[
+        Path | None,
+        typer.Option(help="The page; figures go to a folder beside it. Default: report.html in DIR.", metavar="FILE"),
+    ] = None,
+) -> None:
+    """Make a report of a campaign or of a run: one page that needs nothing else, and its figures as SVG beside it.
+
+    Also of what is not finished. Unless outcomes are named they are times, last values of metrics and the delivery
+    ratio, of those that differ between runs; tables that are folded hold the others. For example:
+
+      swarmwire report campaigns/loss --outcome aggregation_time_s --outcome order
+    """
+    # Imported here: matplotlib and scipy take a second, which --help should not.
+    from swarmwire.metrics.report.write_report import PAGE, write_report
+
+    written = write_report(_report(folder, outcome or []), to or folder / PAGE)
+    typer.echo(f"written: {written[0]}")
+    if len(written) > 1:
+        typer.echo(f"written: {written[1].parent} ({len(written) - 1} figures)")
+
+
+def _report(folder: Path, outcomes: list[str]) -> "Report":
+    """Of whatever the folder holds; BadInput where it is neither a campaign nor a run."""
+    from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+    from swarmwire.metrics.campaign.formats import ABOUT
+    from swarmwire.metrics.record.names import STATIC
+    from swarmwire.metrics.report.campaign.campaign_report import campaign_report
+    from swarmwire.metrics.report.run_report import run_report
+
+    if (folder / ABOUT).exists():
+        return campaign_report(CampaignFolder(folder), outcomes)
+    if not (folder / STATIC).exists():
+        raise BadInput(str(folder), "", f"expected the folder of a campaign ({ABOUT}) or of a run ({STATIC})")
+    if outcomes:
+        raise BadInput("--outcome", outcomes[0], "expected a campaign: a run has all its metrics in its report")
+    return run_report(folder)

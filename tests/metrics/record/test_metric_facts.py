@@ -1,0 +1,39 @@
+"""What metrics say of themselves is kept with a run, and drawn from there."""
+
+import json
+from dataclasses import asdict
+from math import inf
+
+import numpy as np
+import pytest
+
+from swarmwire.metrics.drawing.metric_axes import is_count, limits, titled
+from swarmwire.metrics.record.metric_facts import MetricFacts, facts_of, read_facts
+from swarmwire.metrics.registry import METRICS
+
+OWN = MetricFacts("gas", "what it smells of", "ppm", "count", (0.0, None))
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_what_is_kept_of_a_metric_comes_back(tmp_path, name):
+    facts = facts_of(METRICS[name])
+    (tmp_path / "run.json").write_text(json.dumps({"metrics": [asdict(facts), asdict(OWN)]}, allow_nan=False))
+    assert read_facts(tmp_path) == {name: facts, "gas": OWN}
+    least, largest = METRICS[name].bounds
+    assert facts.bounds == (None if least == -inf else least, largest)
+
+
+@pytest.mark.parametrize("text", [None, "{", "[]", "{}", '{"metrics": 3}', '{"metrics": [{"name": "gas"}]}'])
+def test_where_nothing_was_kept_nothing_is_known(tmp_path, text):
+    if text is not None:
+        (tmp_path / "run.json").write_text(text)
+    assert read_facts(tmp_path) == {}
+
+
+def test_an_axis_is_that_of_what_the_metric_said():
+    facts = {"gas": OWN, "share": MetricFacts("share", "", "", "level", (0.0, 1.0))}
+    assert (titled("gas", facts), titled("gas")) == ("gas (ppm)", "gas")
+    assert (is_count("gas", facts), is_count("gas")) == (True, False)
+    assert limits("share", np.array([0.4]), facts) == limits("order", np.array([0.4])) == (-0.03, 1.05)
+    assert limits("share", np.array([0.4]))[1] < 0.5
+    assert (titled("min_gap"), is_count("collisions")) == ("min gap (m)", True)

@@ -1,0 +1,53 @@
+import numpy as np
+
+from swarmwire.comms.values import NO_VALUES, Values
+from swarmwire.world.told_values import ToldValues
+
+ALIVE = np.ones(4, np.bool_)
+
+
+def told(*numbers: tuple[int, float]) -> Values:
+    rows, value = zip(*numbers, strict=True)
+    return Values(np.array(rows, np.int64), np.array(value, np.float64))
+
+
+def shown(values: ToldValues) -> list[float | None]:
+    assert values.value is not None
+    return [None if np.isnan(value) else float(value) for value in values.value]
+
+
+def test_a_number_holds_until_the_next_is_told() -> None:
+    values = ToldValues()
+    values.take(NO_VALUES, ALIVE)
+    assert values.value is None
+    values.take(told((1, 2.5), (3, -1.0)), ALIVE)
+    values.take(told((3, 0.0)), ALIVE)
+    values.take(NO_VALUES, ALIVE)
+    assert shown(values) == [None, 2.5, None, 0.0]
+
+
+def test_of_two_numbers_of_a_robot_the_later_counts() -> None:
+    values = ToldValues()
+    values.take(Values.joined([told((2, 1.0)), NO_VALUES, told((0, 5.0), (2, 2.0))]), ALIVE)
+    assert shown(values) == [5.0, None, 2.0, None]
+
+
+def test_the_dead_tell_nothing_and_the_revived_start_afresh() -> None:
+    values, dead = ToldValues(), ALIVE.copy()
+    dead[2] = False
+    values.forget(~dead)
+    values.take(told((2, 1.0)), dead)
+    assert values.value is None
+    values.take(told((2, 1.0), (3, 1.0)), dead)
+    assert shown(values) == [None, None, None, 1.0]
+    values.forget(np.arange(4) == 3)
+    assert shown(values) == [None] * 4
+
+
+def test_what_was_shown_is_not_written_to() -> None:
+    values = ToldValues()
+    values.take(told((1, 1.0)), ALIVE)
+    before = values.value
+    values.take(told((1, 2.0)), ALIVE)
+    assert before is not None
+    assert before[1] == 1.0
