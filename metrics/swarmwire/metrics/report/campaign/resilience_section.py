@@ -9,6 +9,7 @@ from swarmwire.metrics.report.campaign.levels import Levels, levels_of
 from swarmwire.metrics.report.campaign.samples import Samples
 from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence
 from swarmwire.metrics.report.figures.resilience_curve import FittedShape, resilience_curve
+from swarmwire.metrics.report.in_words import number
 from swarmwire.metrics.report.section import Figure, Section, Table
 from swarmwire.metrics.report.svg import as_svg
 from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means
@@ -95,7 +96,7 @@ def _figure(outcome: Outcome, levels: Levels, left: FloatArray, fits: Degradatio
     name = figure_name("resilience", outcome.column, levels.path)
     drawn = resilience_curve(share[full], means, low, high, shapes, title, levels.path)
     if fits.told:
-        verdict = f"{fits.better.form} by AIC, {abs(fits.linear.aic - fits.exponential.aic):.1f} lower"
+        verdict = f"{fits.better.form} by AIC, {number(abs(fits.linear.aic - fits.exponential.aic))} lower"
     else:
         verdict = "AIC does not tell the two shapes apart"
     caption = f"{sentence(outcome_title(outcome))} over `{levels.path}`: {verdict}."

@@ -16,6 +16,7 @@ class Slice:
     """Some of the design points."""
 
     label: str  # the values that they share: "robots.flock.count 20", "" for all points
+    short: str  # the values alone
     points: frozenset[int]
 
     def cell(self, *at: tuple[Levels, int]) -> tuple[int, ...]:
@@ -32,7 +33,7 @@ def slices_beside(folder: CampaignFolder, shown: Sequence[str], *, names_apart: 
     Numbers of other designs are taken together, and so are names unless `names_apart` and their combinations are
     MOST_SLICES at most.
     """
-    whole = Slice("", frozenset(range(len(folder.points))))
+    whole = Slice("", "", frozenset(range(len(folder.points))))
     others = [levels_of(path, folder.points) for path in folder.parameters if path not in shown]
     others = [levels for levels in others if len(levels) > 1]
     if folder.about.design != "grid":
@@ -44,6 +45,7 @@ def slices_beside(folder: CampaignFolder, shown: Sequence[str], *, names_apart: 
     return [
         Slice(
             ", ".join(f"{levels.path} {levels.labels[at]}" for levels, at in zip(others, place, strict=True)),
+            ", ".join(levels.labels[at] for levels, at in zip(others, place, strict=True)),
             frozenset(whole.cell(*zip(others, place, strict=True))),
         )
         for place in product(*choices)

@@ -12,7 +12,7 @@ from swarmwire.metrics.report.campaign.levels import Levels, levels_of
 from swarmwire.metrics.report.campaign.rounding import rounding_of
 from swarmwire.metrics.report.campaign.samples import Samples
 from swarmwire.metrics.report.campaign.slices import Slice, slices_beside
-from swarmwire.metrics.report.campaign.words import outcome_title, sentence
+from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence
 from swarmwire.metrics.report.figures.heat_map import heat_map
 from swarmwire.metrics.report.figures.response_curve import Jump, Response, response_curve
 from swarmwire.metrics.report.section import Figure, Section, Table
@@ -67,10 +67,18 @@ def _response(samples: Samples, outcome: Outcome, x: Levels, rows: list[_Row]) -
         cells = [each.cell((x, level)) for level in range(len(x))]
         change = _change(samples, outcome, x, cells)
         rows.append(_words(outcome, x, each.label, change))
-        responses.append(_medians(samples, outcome, x, cells, each.label, change))
+        responses.append(_medians(samples, outcome, x, cells, each.short, change))
     name = figure_name("response", outcome.column, x.path)
     figure = response_curve(responses, outcome_title(outcome), x.path, samples.limit(outcome))
-    return Figure(name, as_svg(figure, name), f"{sentence(outcome_title(outcome))} over `{x.path}`.")
+    return Figure(
+        name, as_svg(figure, name), f"{sentence(outcome_title(outcome))} over `{x.path}`{_by(samples, x, slices)}."
+    )
+
+
+def _by(samples: Samples, x: Levels, slices: list[Slice]) -> str:
+    """What tells several curves apart."""
+    beside = [f"`{path}`" for path in samples.folder.parameters if path != x.path]
+    return f" by {listed(beside)}; broken upright lines are change points" if len(slices) > 1 else ""
 
 
 def _maps(

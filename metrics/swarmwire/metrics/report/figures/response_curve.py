@@ -12,6 +12,8 @@ from swarmwire.metrics.report.figures.column_axes import ACCENT, LETTERS_PT, col
 from swarmwire.metrics.report.figures.log_axis import fits_log, set_log
 from swarmwire.metrics.report.figures.ordered_colors import ordered_colors
 
+_APART = 0.012  # of the axis, between the points of several responses
+
 
 @dataclass(frozen=True)
 class Jump:
@@ -42,18 +44,23 @@ def response_curve(responses: Sequence[Response], title: str, x_label: str, limi
     `limit`: up to where a censored value was followed, None where nothing is censored.
     """
     figure, axes = column_axes(title, x_label)
-    alone = len(responses) == 1
+    alone, span = len(responses) == 1, float(np.ptp(responses[0].x))
     if limit is not None:
         axes.axhline(limit, color=SOFT, lw=0.7, ls="--", zorder=1)
-    for response, color in zip(responses, [CURVE] if alone else ordered_colors(len(responses)), strict=True):
-        if response.jump is not None:
-            _draw_jump(axes, response.jump, ACCENT if alone else color, written=alone)
+    colors = [CURVE] if alone else ordered_colors(len(responses))
+    for place, (response, color) in enumerate(zip(responses, colors, strict=True)):
+        # Beside one another, so that none hides another's interval.
+        x = response.x + _APART * span * (place - 0.5 * (len(responses) - 1))
+        if response.jump is not None and alone:
+            _draw_jump(axes, response.jump)
+        elif response.jump is not None:
+            axes.axvline(response.jump.at, color=color, lw=0.9, ls=(place, (3, len(responses))), zorder=1)
         if alone:
             low, high = _within(response.q25, limit), _within(response.q75, limit)
-            axes.fill_between(response.x, low, high, color=color, alpha=0.18, lw=0)
+            axes.fill_between(x, low, high, color=color, alpha=0.18, lw=0)
         low, high = _within(response.low, limit), _within(response.high, limit)
-        axes.vlines(response.x, low, high, color=color, lw=1.0, zorder=3)
-        _draw_medians(axes, response, limit, color)
+        axes.vlines(x, low, high, color=color, lw=1.0, zorder=3)
+        _draw_medians(axes, x, response, limit, color)
     if fits_log(responses[0].x):
         set_log(axes.xaxis)
     reached = [quartile for response in responses for quartile in (response.q25, response.q75)]
@@ -69,20 +76,19 @@ def _within(edge: FloatArray, limit: float | None) -> FloatArray:
     return np.where(np.isposinf(edge), np.nan if limit is None else limit, edge)
 
 
-def _draw_medians(axes: Any, response: Response, limit: float | None, color: Any) -> None:
+def _draw_medians(axes: Any, x: FloatArray, response: Response, limit: float | None, color: Any) -> None:
     known = np.isfinite(response.median)
     # NaN where the median is censored: the line breaks there.
     medians = np.where(known, response.median, np.nan)
-    axes.plot(response.x, medians, "o-", color=color, lw=1.3, ms=3, zorder=4, label=response.label)
+    axes.plot(x, medians, "o-", color=color, lw=1.3, ms=3, zorder=4, label=response.label)
     beyond = np.isposinf(response.median)
     if limit is not None and beyond.any():
         mark: Look = {"ms": 4, "mfc": "white", "mec": INK, "mew": 0.8, "zorder": 5, "clip_on": False, "ls": ""}
-        axes.plot(response.x[beyond], np.full(int(beyond.sum()), limit), "^", **mark)
+        axes.plot(x[beyond], np.full(int(beyond.sum()), limit), "^", **mark)
 
 
-def _draw_jump(axes: Any, jump: Jump, color: Any, *, written: bool) -> None:
-    axes.axvspan(jump.low, jump.high, color=color, alpha=0.12, lw=0, zorder=0)
-    axes.axvline(jump.at, color=color, lw=1.0, zorder=1)
-    if written:
-        at: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "va": "top", "color": color}
-        axes.annotate(f"{jump.at:.3g}", (jump.at, 1.0), (3, 7), fontsize=LETTERS_PT, **at)
+def _draw_jump(axes: Any, jump: Jump) -> None:
+    axes.axvspan(jump.low, jump.high, color=ACCENT, alpha=0.12, lw=0, zorder=0)
+    axes.axvline(jump.at, color=ACCENT, lw=1.0, zorder=1)
+    at: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "va": "top", "color": ACCENT}
+    axes.annotate(f"{jump.at:.3g}", (jump.at, 1.0), (3, 7), fontsize=LETTERS_PT, **at)
