@@ -12,6 +12,7 @@ from functools import partial
 from benchmarks.agent_overhead import agent_overhead
 from benchmarks.air import CASES as AIRS
 from benchmarks.air import air_cost, air_scaling
+from benchmarks.campaign import campaign
 from benchmarks.first_compile import CASES as COMPILES
 from benchmarks.first_compile import first_compile
 from benchmarks.metrics_share import metrics_share
@@ -35,6 +36,7 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     "view-cost-radio": partial(view_cost, robots=1000, ticks=600, neighbours=D1),
     **dict.fromkeys(AIRS, air_cost),
     "air-scaling": air_scaling,
+    "campaign-1000x10": campaign,
     "processes-100": partial(processes, robots=100, ticks=300),
     **dict.fromkeys(COMPILES, first_compile),
     "report-10000": partial(report_cost, seeds=200),

@@ -55,6 +55,9 @@ TARGETS = {
     "air-disk-1000": Target(100, "1,000 robots over a disk, 9 in range"),
     "air-wifi-80": Target(80, "80 robots in one spot over `wifi-a-6M`, 128 bytes"),
     "air-scaling": most(1.5, "the first with 100, 1,000 and 10,000 robots: the dearest link over the cheapest"),
+    "campaign-1000x10": most(
+        25, "1,000 runs of 10 robots x 600 ticks with radio and metrics, from the call to the table, on 2 cores"
+    ),
     "processes-100": Target(3, "100 e-pucks flocking, a process each, 11.4 packets heard per robot and tick"),
     "processes-100-start": most(6, "from the call to the first tick, imports left out"),
     "processes-100-uss": most(15, "memory that a runner does not share with others"),

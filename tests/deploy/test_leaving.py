@@ -251,10 +251,14 @@ def test_in_an_arena_that_left_nobody_lives_moves_sends_or_is_told_anything(tmp_
         assert np.array_equal(truth.pose[rows], last.pose[rows])
         assert all((group.rows >= 7).all() for group in truth.senses.values())
         assert not truth.contact_onsets[0].any()
-        assert truth.edges is not None and (truth.edges >= 7).all()
-        assert truth.tally is not None and not truth.tally.sent[0] and not truth.tally.fates[0].any()
-        assert truth.finished is not None and (truth.finished.arena > 0).all()
-        assert truth.departed is not None and (truth.departed.arena > 0).all()
+        edges, tally, finished, departed = truth.edges, truth.tally, truth.finished, truth.departed
+        assert edges is not None
+        assert tally is not None
+        assert finished is not None
+        assert departed is not None
+        assert (edges >= 7).all()
+        assert tally.intended[0] == tally.fates[0].sum() == 0
+        assert all((told.arena > 0).all() for told in (finished, departed))
         assert not any(event.changed[rows].any() for event in truth.events)
 
 

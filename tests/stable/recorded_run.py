@@ -14,6 +14,13 @@ from tests.stable.sources import ROOT
 SCENARIO = ROOT / "scenarios" / "drones.toml"  # drones move sideways, so that there is a column for that
 BOX = '{ shape = "box", at = [3.0, 2.0], size_m = [0.2, 0.2], movable = true, mass_kg = 0.1 }'
 OVERRIDES = ("duration_s=0.3", "robots.drones.count=3", "robots.floor.count=2", f"arena.obstacles=[{BOX}]")
+TELLING = """
+from swarmwire.agent import Agent
+
+class Telling(Agent):
+    def step(self, robot):
+        robot.note(value=1.0)
+"""  # so that there is a column for that
 
 
 @cache
@@ -21,7 +28,9 @@ def recorded() -> dict[str, Any]:
     """What each JSON file holds, and of each table the columns with their types."""
     with TemporaryDirectory() as folder:
         record = Recording(packets=1.0, links=True, rrd=False)
-        run(SCENARIO, overrides=OVERRIDES, out=Path(folder) / "run", record=record)
+        (Path(folder) / "telling.py").write_text(TELLING, encoding="utf-8")
+        agent = f"robots.floor.agent={folder}/telling.py:Telling", "robots.floor.params={}"
+        run(SCENARIO, overrides=[*OVERRIDES, *agent], out=Path(folder) / "run", record=record)
         found: dict[str, Any] = {}
         for path in sorted((Path(folder) / "run").iterdir()):
             if path.suffix == ".json":

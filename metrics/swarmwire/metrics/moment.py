@@ -46,7 +46,7 @@ class Moment:
         edges = truth.edges
         self.components = None if edges is None else Components(*components_of(edges, self.alive))
         # Arenas that left would cost as much as those that have not; and a mask costs numpy as much as the sum.
-        self._few: IntArray | None = None if truth.running.all() else np.flatnonzero(truth.running)
+        self._few: IntArray | None = None if everyone or truth.running.all() else np.flatnonzero(truth.running)
         counted = self.alive if self._few is None else self.alive[self._few]
         self._counted = True if everyone or counted.all() else counted
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.grid import MOST_CELLS_PER_SIDE, Grid, build, cell_of
+from swarmwire.comms.geometry.grid import MOST_CELLS_PER_SIDE, Grid, build, cell_of, is_empty
 
 SIDES = st.floats(0.1, 50.0)
 
@@ -38,17 +38,19 @@ def test_points_on_the_lines_between_cells_find_one_another(reach_m: float) -> N
     assert not np.any(near & ((np.abs(i[:, None] - i) > 1) | (np.abs(j[:, None] - j) > 1)))
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 4), st.integers(0, 20))
-def test_every_robot_is_in_the_one_cell_of_its_place_and_arena(seed: int, arenas: int, robots: int) -> None:
-    random = np.random.default_rng(seed)
+@given(st.integers(0, 2**32 - 1), st.lists(st.booleans(), min_size=1, max_size=4), st.integers(0, 20))
+def test_robots_of_running_arenas_are_in_the_one_cell_of_their_place(seed: int, are: list[bool], robots: int) -> None:
+    random, arenas, running = np.random.default_rng(seed), len(are), np.array(are)
     x, y = random.uniform(-3.0, 3.0, (2, arenas * robots))
-    grid = build(x, y, arenas, (4.0, 3.0), 0.7)
+    grid = build(x, y, arenas, (4.0, 3.0), 0.7, None if running.all() else running)
     i, j = cells_of(grid, x, y)
     arena = np.arange(arenas * robots) // max(robots, 1)
     cell = (arena * grid.ny + j) * grid.nx + i
-    assert sorted(grid.order.tolist()) == list(range(arenas * robots))
+    here = np.repeat(running, robots)
+    assert sorted(grid.order.tolist()) == np.flatnonzero(here).tolist()
+    assert [is_empty(grid, a) for a in range(arenas)] == [not (running[a] and robots) for a in range(arenas)]
     for c in range(arenas * grid.ny * grid.nx):
-        assert grid.order[grid.start[c] : grid.start[c + 1]].tolist() == np.flatnonzero(cell == c).tolist()
+        assert grid.order[grid.start[c] : grid.start[c + 1]].tolist() == np.flatnonzero((cell == c) & here).tolist()
 
 
 def test_a_tiny_reach_does_not_make_a_huge_table() -> None:

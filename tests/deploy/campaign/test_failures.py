@@ -1,7 +1,5 @@
 """What fails is a row that says why, and stops nothing else."""
 
-import os
-import signal
 import sys
 
 import pytest
@@ -55,37 +53,20 @@ def test_a_metric_of_ones_own_that_raises_is_a_failed_row(tmp_path, scenario, he
     assert "no number" in rows_in(tmp_path / "c")[1]["error"]
 
 
-@pytest.mark.parametrize(
-    ("how", "told"), [("kill", "the worker died, signal 9"), ("exit", "the worker ended, exit code 3")]
-)
-def test_a_seed_of_which_workers_die_is_a_failed_row(tmp_path, stumbling, how, told):
+def tasks_of(scenario, *seeds, overrides=()):
+    return [Task(str(scenario), overrides, 0, (seed,), (seed,)) for seed in seeds]
+
+
+def test_a_worker_that_dies_is_replaced_and_a_seed_of_which_they_die_is_a_failed_row(stumbling):
     executor, rows = LocalExecutor(1), []
-    task = Task(str(stumbling), (f'robots.pair.params.how="{how}"',), 0, (7,), (DEADLY,))
+    tasks = tasks_of(stumbling, 1, DEADLY, 4, overrides=('robots.pair.params.how="kill"',))
     try:
-        assert execute([task], executor, lambda _, result: rows.extend(result.rows))
+        assert execute(tasks, executor, lambda _, result: rows.extend(result.rows))
+        assert len(executor.pids) == 1
     finally:
         executor.close()
-    assert rows == [{"run": 7, "point": 0, "seed": DEADLY, "ended": "failed", "error": told}]
-
-
-def tasks_of(scenario, *seeds):
-    return [Task(str(scenario), (), 0, (seed,), (seed,)) for seed in seeds]
-
-
-def test_a_worker_that_is_killed_is_replaced_and_its_piece_done_elsewhere(scenario):
-    executor, rows = LocalExecutor(1), []
-
-    def keep(task, result):
-        rows.extend(result.rows)
-        if len(rows) == 1:
-            os.kill(executor.pids[0], signal.SIGKILL)
-
-    try:
-        assert execute(tasks_of(scenario, 1, 2, 3), executor, keep)
-    finally:
-        executor.close()
-    assert [row["ended"] for row in rows] == ["duration"] * 3
-    assert executor.pids == []
+    assert [(row["seed"], row["ended"]) for row in rows] == [(1, "duration"), (DEADLY, "failed"), (4, "duration")]
+    assert rows[1] == {"run": 2, "point": 0, "seed": DEADLY, "ended": "failed", "error": "the worker died, signal 9"}
 
 
 def test_workers_that_cannot_start_are_one_line(scenario, monkeypatch):

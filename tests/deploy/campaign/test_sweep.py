@@ -119,3 +119,23 @@ def test_drawn_designs_say_between_which_values(tmp_path, scenario, here):
     campaign = read_campaign(tmp_path / "c")
     assert campaign.vary == {"radio.loss": {"from": 0.0, "to": 0.5}}
     assert [row["radio.loss"] for row in rows_in(tmp_path / "c")] == [point["radio.loss"] for point in campaign.points]
+
+
+def test_arenas_that_stop_and_times_of_metrics_are_the_same_packed_and_alone(tmp_path, scenario, here):
+    ends = ['stop={metric="order", at_least=0.8, hold_s=0.1}', 'metrics=["aggregation_time_s"]', "duration_s=1.0"]
+    for name, pack in (("packed", 6), ("alone", 1)):
+        sweep(scenario, seeds=6, out=tmp_path / name, overrides=ends, pack=pack)
+    rows = rows_in(tmp_path / "packed")
+    assert rows == rows_in(tmp_path / "alone")
+    assert series_in(tmp_path / "packed").equals(series_in(tmp_path / "alone"), null_equal=True)
+    assert {row["ended"] for row in rows} == {"stopped", "duration"}
+    for row in rows:
+        assert (row["stop_time_s"] is not None) == (row["ended"] == "stopped") == (row["stopped_by"] is not None)
+        assert (row["ended"] == "duration") == (row["ticks"] == 10)
+    lengths = series_in(tmp_path / "packed").group_by("run").len().sort("run")["len"].to_list()
+    assert lengths == [row["ticks"] for row in rows]
+    times = {of.column: of.kind for of in read_campaign(tmp_path / "packed").outcomes if of.kind == "time"}
+    assert times == {"stop_time_s": "time", "aggregation_time_s": "time"}
+    assert list(rows[0])[3:10] == [
+        "ended", "error", "ticks", "sim_time_s", "trajectory_sha256", "stop_time_s", "stopped_by"
+    ]  # fmt: skip

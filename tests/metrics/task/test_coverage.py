@@ -105,7 +105,7 @@ def test_it_only_rises_whoever_dies_and_the_dead_cover_nothing():
 def test_a_large_sensing_range_covers_all_at_once():
     for boundary in ("walls", "torus"):
         of = replace(static(1), boundary=boundary)
-        assert shares(of, [[(1.0, 1.0)]], sensing_m=30.0).tolist() == [[1.0]]
+        assert shares(of, [[(1.0, 1.0)]], sensing_m=1e6).tolist() == [[1.0]]
 
 
 def test_cells_of_fixed_obstacles_are_not_free_and_those_of_movable_ones_are():

@@ -49,6 +49,26 @@ def test_an_arena_moves_bit_for_bit_alike_alone_and_beside_others(make: Make) ->
         assert np.array_equal(onsets[arena], of_it[0])
 
 
+@pytest.mark.parametrize("make", EVERY)
+def test_an_arena_that_leaves_stays_as_it_is_and_the_others_go_on_as_alone(make: Make) -> None:
+    poses = [clear_of_obstacles(packed(40, SIDE_M, R, seed)) for seed in range(3)]
+    n = min(len(pose) for pose in poses)
+    engine = made(make, [pose[:n] for pose in poses], (SIDE_M, SIDE_M), obstacles=OBSTACLES)
+    ends: list[FloatArray] = []
+    for over in (1, 0):
+        together, _ = wander(engine, 10, over)
+        ends.append(together[-1][over, :, :-1])
+        engine.leave(np.arange(3) == over)
+    together, onsets = wander(engine, 30, 2)
+    assert not onsets[:2].any()
+    for over, end in zip((1, 0), ends, strict=True):
+        assert np.array_equal(together[-1][over, :, :-1], end)
+    other = made(make, poses[2][:n], (SIDE_M, SIDE_M), obstacles=OBSTACLES)
+    alone = [wander(other, ticks, seed) for ticks, seed in ((10, 1), (10, 0), (30, 2))]
+    assert np.array_equal(np.array(together)[:, 2], np.array(alone[-1][0])[:, 0])
+    assert onsets[2].tolist() == alone[-1][1][0].tolist()
+
+
 @pytest.mark.parametrize("make", FLOOR)
 def test_a_crowd_that_is_turned_or_shifted_moves_alike(make: Make) -> None:
     """To rounding, which grows with each contact: so for a second and a half."""

@@ -86,6 +86,19 @@ def test_some_readings_are_there_and_some_are_lost(told: list[dict[str, Any]], n
         assert len(np.unique(later)) > 1
 
 
+@pytest.mark.parametrize("over", [0, 1])
+def test_an_arena_senses_the_same_once_another_has_left(tmp_path: Path, told: list[dict[str, Any]], over: int) -> None:
+    of, kept = world(tmp_path, (1, 2)), slice(0, 9) if over else slice(9, 18)
+    for tick, expected in enumerate(told):
+        if tick == 5:
+            of.leave(np.arange(2) == over)
+        senses = of.sense(tick)["a"]
+        assert senses.rows.tolist() == list(range(18) if tick < 5 else range(18)[kept])
+        for field, values in senses.fields.items():
+            np.testing.assert_array_equal(values[-9:] if over == 0 else values[:9], expected[field][kept])
+        moved(of, tick)
+
+
 def test_an_arena_alone_senses_what_it_senses_among_others(tmp_path: Path, told: list[dict[str, Any]]) -> None:
     alone = world(tmp_path, (2,))
     for tick in range(13):

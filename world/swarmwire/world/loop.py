@@ -28,7 +28,6 @@ class Loop:
 
     Attributes:
         ticks_done: ticks so far.
-        arena_ticks: (arenas,) ticks that each arena took part in.
     """
 
     def __init__(
@@ -43,11 +42,11 @@ class Loop:
         """`judge` is asked after each tick, once observers saw it; without one no arena is over before the run is."""
         self.world, self.air, self.crew, self.observers = world, air, crew, observers
         self.ticks_done = 0
-        self.arena_ticks: IntArray = np.zeros(world.static.arenas, np.int64)
         self._judge = judge
+        self._running, self._left_after = world.running.copy(), np.zeros(world.static.arenas, np.int64)
         self._events = Events(events, world.static, world.keys, air.radio if air else None)
         self._mailbox = Mailbox(world.static)
-        self._to_nobody, self._without_radio = np.zeros_like(self.arena_ticks), np.zeros_like(self.arena_ticks)
+        self._to_nobody, self._without_radio = np.zeros_like(self._left_after), np.zeros_like(self._left_after)
         self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
         self._stranded: Tally | None = None  # in arenas that left: no observer has seen that they did
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
@@ -59,7 +58,7 @@ class Loop:
 
         `hold` returns when the tick that it is given may begin; it changes when a tick begins, never what is in it.
         """
-        while self.ticks_done < ticks and self.world.running.any():
+        while self.ticks_done < ticks and self._running.any():
             hold(self.ticks_done)
             if stopped():
                 return
@@ -79,7 +78,6 @@ class Loop:
         actions = self.crew.act(tick, senses, packets, outcomes)
 
         pose, velocity, movable, alive = world.pose, world.velocity, world.movable, world.alive.copy()
-        running = world.running.copy()
         if self.air:
             self.air.hold(pose, alive)
             self.air.send(start_ns, tick, self._addressable(actions.sent))
@@ -87,14 +85,14 @@ class Loop:
             np.add.at(self._without_radio, actions.sent.sender // world.static.robots, 1)
         onsets = world.move(actions)
         command = world.command
-        self._hash.add(pose, velocity, command, heard, running)
+        self._hash.add(pose, velocity, command, heard)
         edges = self.air.edges(pose, alive) if self.air else None
         tally, finished = (news.tally, news.finished) if news else (None, None)
         self._open = None
         truth = Truth(
             tick=tick,
             time_ns=start_ns,
-            running=running,
+            running=self._running,
             alive=alive,
             pose=pose,
             velocity=velocity,
@@ -115,10 +113,9 @@ class Loop:
         for observer in self.observers:
             observer.see(truth)
         self.ticks_done += 1
-        self.arena_ticks += running
         over = self._judge.over() if self._judge else None
         if over is not None:
-            self._leave(over & running)
+            self._leave(over & self._running)
         return truth
 
     def end(self) -> Tally | None:
@@ -129,6 +126,11 @@ class Loop:
         for more in (self._stranded, self._open):
             last = last if more is None else last + more
         return last
+
+    @property
+    def arena_ticks(self) -> IntArray:
+        """Ticks that each arena took part in, (arenas,)."""
+        return np.where(self._running, self.ticks_done, self._left_after)
 
     def hexdigests(self) -> list[str]:
         """`trajectory_sha256` of each arena so far."""
@@ -154,6 +156,9 @@ class Loop:
         """These arenas (arenas,) take no part in the ticks to come."""
         if not over.any():
             return
+        self._running = self._running & ~over  # observers may keep what they were shown
+        self._left_after[over] = self.ticks_done
+        self._hash.close(over)
         self.world.leave(over)
         if self.air:
             stranded = self.air.leave(over)

@@ -1,7 +1,5 @@
 """What robots are at, as their agents name it: kept for observers, without any effect on the run."""
 
-from typing import cast
-
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
@@ -49,7 +47,7 @@ class States:
         """The place here of names[local], (k,), as named in these arenas (k,), new ones in the order of first use."""
         known = {name: place for place, name in enumerate(self.names)}
         place: IntArray = np.array([known.get(name, -1) for name in names], np.int64)[local]
-        for at in cast("list[int]", np.flatnonzero((place < 0) | ~self._named[arena, place]).tolist()):
+        for at in np.flatnonzero((place < 0) | ~self._named[arena, place]).tolist():
             place[at] = self._place(int(arena[at]), names[int(local[at])])
         return place
 

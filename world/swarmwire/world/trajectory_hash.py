@@ -17,24 +17,23 @@ class TrajectoryHash:
     def __init__(self, arenas: int, robots: int) -> None:
         self._robots = robots
         self._hashes = [hashlib.sha256() for _ in range(arenas)]
+        self._open = list(range(arenas))
         self._first_row = [arena * robots for arena in range(arenas + 1)]
 
-    def add(
-        self, pose: FloatArray, velocity: FloatArray, command: FloatArray, heard: Heard, running: BoolArray
-    ) -> None:
-        """One tick of the arenas that are `running` (arenas,); in the others nothing is heard.
-
-        Tables are (rows, 3), a row per robot of all arenas, `heard` is sorted by receiver.
-        """
-        arenas, tables = np.flatnonzero(running), [pose, velocity, command]
-        if len(arenas) < len(running):
-            tables = [table.reshape(len(running), -1, 3)[arenas].reshape(-1, 3) for table in tables]
-        hashes = [self._hashes[arena] for arena in arenas.tolist()]
+    def add(self, pose: FloatArray, velocity: FloatArray, command: FloatArray, heard: Heard) -> None:
+        """One tick; tables are (rows, 3), a row per robot of all arenas, `heard` is sorted by receiver."""
+        tables, hashes = [pose, velocity, command], [self._hashes[arena] for arena in self._open]
+        if len(hashes) < len(self._hashes):
+            tables = [table.reshape(len(self._hashes), -1, 3)[self._open].reshape(-1, 3) for table in tables]
         self._add(np.concatenate(tables, axis=1), self._first_row[: len(hashes) + 1], hashes)
         if len(heard):
             first = np.searchsorted(heard.receiver, self._first_row)
             packets = _packets(heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, first, self._robots)
-            self._add(packets, [*first[arenas].tolist(), len(packets)], hashes)
+            self._add(packets, [*first[self._open].tolist(), len(packets)], hashes)
+
+    def close(self, arenas: BoolArray) -> None:
+        """Nothing more goes into the hashes of these arenas (arenas,): nothing is heard there from now on."""
+        self._open = [arena for arena in self._open if not arenas[arena]]
 
     def _add(self, table: AnyArray, first: list[int], hashes: "list[hashlib._Hash]") -> None:
         """The rows first[k] to first[k + 1] - 1 of a table go into hash k."""

@@ -21,8 +21,8 @@ def row_of(arena: ArenaResult, times: Collection[str]) -> Row:
         "ticks": arena.ticks,
         "sim_time_s": arena.sim_time_s,
         "trajectory_sha256": arena.trajectory_sha256,
-        "stop_time_s": getattr(arena, "stop_time_s", None),
-        "stopped_by": getattr(arena, "stopped_by", None),
+        "stop_time_s": arena.stop_time_s,
+        "stopped_by": arena.stopped_by,
     }
     for name, value in arena.metrics.items():
         if name in times:

@@ -2,6 +2,7 @@
 
 import math
 
+from swarmwire.metrics.campaign.campaign_folder import FAILED
 from swarmwire.metrics.campaign.comparison import Comparison, Row
 from swarmwire.metrics.campaign.point_values import point_text
 from swarmwire.metrics.campaign.selection import Selection
@@ -79,6 +80,6 @@ def _state(of: Selection) -> str:
     campaign = of.campaign
     runs = campaign.runs.filter(campaign.runs["point"].is_in(of.points))
     asked = len(of.points) * len(campaign.about.seeds)
-    failed = int((runs["ended"] == "failed").sum())
+    failed = int((runs["ended"] == FAILED).sum())
     parts = [f"{len(runs)} runs" if len(runs) == asked else f"not finished: {len(runs)} of {asked} runs"]
     return ", ".join([*parts, f"{failed} failed"] if failed else parts)

@@ -16,6 +16,7 @@ from swarmwire.metrics.moment import Moment, components_of
 from swarmwire.metrics.swarm.close_pairs import OfClosePairs
 
 NOT_YET = -1
+ROUNDING = 1e-9  # 0.28 x 25 is a little more than 7 in floats
 
 
 @dataclass(frozen=True)
@@ -52,9 +53,6 @@ class AggregationTime(OfClosePairs):
             return found_s
 
         return measure
-
-
-ROUNDING = 1e-9  # 0.28 x 25 is a little more than 7 in floats
 
 
 @njit(cache=True)

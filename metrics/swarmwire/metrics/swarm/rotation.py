@@ -14,6 +14,8 @@ from swarmwire.metrics.moment import Moment
 from swarmwire.metrics.swarm.centroid import from_centroid_m
 from swarmwire.metrics.torus import sides_m
 
+AT_THE_CENTROID_M = 1e-9  # nearer is rounding, and has no direction
+
 
 @dataclass(frozen=True)
 class Rotation(Metric):
@@ -41,9 +43,6 @@ class Rotation(Metric):
             return _rotation(away_m, *moment.direction, moment.alive)
 
         return measure
-
-
-AT_THE_CENTROID_M = 1e-9  # nearer is rounding, and has no direction
 
 
 @njit(cache=True)

@@ -2,7 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from math import ceil
+from math import ceil, hypot
 
 import numpy as np
 from numba import njit
@@ -36,7 +36,8 @@ class FloorCells:
             raise BadInput("", "cell_m", expected)
         self.cells: AnyArray = np.full((static.arenas, ny, nx), FREE, np.uint8)
         self._floor = width_m, height_m, static.boundary == "torus"
-        self._sensing_m = sensing_m
+        # Nothing on a torus is further away than its diagonal, so that no more images need be looked at.
+        self._sensing_m = min(sensing_m, hypot(width_m, height_m)) if static.boundary == "torus" else sensing_m
         obstacles = obstacle_arrays(tuple(map(static.fixed, range(static.arenas))))
         _take(self.cells, *self._floor, obstacles)
         self.free: IntArray = np.count_nonzero(self.cells, axis=(1, 2))

@@ -72,5 +72,5 @@ class Engine(Protocol):
         ...
 
     def leave(self, over: BoolArray) -> None:
-        """Nothing in these arenas (arenas,) moves or touches any more: their rows stay as they are."""
+        """Nothing in these arenas (arenas,) moves any more, or begins to touch: `state` and `travel_m` stay there."""
         ...
