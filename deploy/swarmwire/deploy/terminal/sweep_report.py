@@ -10,9 +10,9 @@ from rich.text import Text
 
 from swarmwire.deploy.campaign.campaign import Campaign, read_campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
-from swarmwire.deploy.campaign.outcomes import STOP_TIME
 from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.sweeping import Sweep
+from swarmwire.metrics.campaign.statistic import FINAL
 
 if TYPE_CHECKING:
     import polars as pl
@@ -46,14 +46,14 @@ def print_sweep(sweep: Sweep, console: Console, program: Path) -> None:
 def _table(campaign: Campaign, rows: "pl.DataFrame") -> Table:
     import polars as pl
 
-    title = f"{campaign.name}: {len(campaign.points)} points x {len(campaign.seeds)} seeds"
+    title = f"{campaign.name}: medians over {len(campaign.seeds)} seeds"
     table = Table(title=Text(title), title_justify="left", title_style="bold")
     outcomes = _outcomes(campaign, rows)
     for path in campaign.vary:
         table.add_column(Text(path), style="cyan")
     table.add_column("failed", justify="right")
     for column in outcomes:
-        table.add_column(Text(f"{column}, median"), justify="right", overflow="fold")
+        table.add_column(Text(column.removesuffix(FINAL)), justify="right", overflow="fold")
     for number, point in enumerate(campaign.points[:MOST_POINTS]):
         of_point = rows.filter(pl.col("point") == number)
         failed = int((of_point["ended"] == FAILED).sum())
@@ -64,10 +64,10 @@ def _table(campaign: Campaign, rows: "pl.DataFrame") -> Table:
 
 def _outcomes(campaign: Campaign, rows: "pl.DataFrame") -> Sequence[str]:
     """The first outcomes that have any value: times, and of other metrics what they were at the end."""
-    columns = [of.column for of in campaign.outcomes if of.kind == "time" or of.column.endswith(".final")]
-    first = [column for column in (STOP_TIME, *columns) if column in rows.columns and rows[column].count()]
+    columns = [of.column for of in campaign.outcomes if of.kind == "time" or of.column.endswith(FINAL)]
+    first = [column for column in columns if column in rows.columns and rows[column].count()]
     pdr = ["radio.pdr"] if "radio.pdr" in rows.columns and rows["radio.pdr"].count() else []
-    return [*dict.fromkeys(first)][: MOST_OUTCOMES - len(pdr)] + pdr
+    return first[: MOST_OUTCOMES - len(pdr)] + pdr
 
 
 def _median(rows: "pl.DataFrame", campaign: Campaign, column: str) -> str:
