@@ -21,7 +21,7 @@ def tasks_of(
         recorded = [run for run in missing if campaign.seed_of(run) in campaign.record_seeds]
         together = [run for run in missing if campaign.seed_of(run) not in campaign.record_seeds]
         tasks += [_task(campaign, folder, point, [run], recorded=True) for run in recorded]
-        tasks += [_task(campaign, folder, point, runs, recorded=False) for runs in _shares(together, size)]
+        tasks += [_task(campaign, folder, point, runs, recorded=False) for runs in shares(together, size)]
     return tasks
 
 
@@ -31,7 +31,7 @@ def usual_pack(points: int, seeds: int, workers: int) -> int:
     return max(1, -(-seeds // packs))
 
 
-def _shares(runs: Sequence[int], size: int) -> Iterator[Sequence[int]]:
+def shares(runs: Sequence[int], size: int) -> Iterator[Sequence[int]]:
     """Shares of at most this size, which differ by one run at most."""
     count = -(-len(runs) // size)
     for share in range(count):
