@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 TRIALS, SEEDS, CHECK_SEEDS = 100, "20", "50"
 BATCH, SAMPLER, SAMPLER_SEED = 4, "tpe", 1
-DEFAULTS = {"trials": TRIALS, "batch": BATCH, "sampler": SAMPLER, "sampler_seed": SAMPLER_SEED}
+DEFAULTS: dict[str, Any] = {"trials": TRIALS, "batch": BATCH, "sampler": SAMPLER, "sampler_seed": SAMPLER_SEED}
 
 
 def tune_command(

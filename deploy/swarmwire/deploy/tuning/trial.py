@@ -8,6 +8,8 @@ from swarmwire.deploy.tuning.search import Parameter
 
 State = Literal["running", "complete", "failed"]  # running: under way, or it was when the tuning was ended
 
+WHEN = "in tick "  # so begins the line below a traceback that says when in the run it was
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -41,6 +43,8 @@ class Trial:
 
     @property
     def why(self) -> str:
-        """The last line of its error."""
+        """Its error in a line: what was raised, without where."""
         lines = self.outcome.error.strip().splitlines()
+        if len(lines) > 1 and lines[-1].startswith(WHEN):
+            return f"{lines[-2]}, {lines[-1]}"
         return lines[-1] if lines else ""
