@@ -30,7 +30,7 @@ def report_cost(name: str, repeats: int, *, seeds: int) -> None:
     clock = WallClock()
     taken_s, most_mb, size_mb = list[float](), list[float](), 0.0
     with TemporaryDirectory() as folder:
-        runs = _write_campaign(Path(folder), seeds)
+        runs = write_campaign(Path(folder), seeds)
         for _ in range(repeats):
             start_ns = clock.now_ns()
             process = subprocess.Popen(
@@ -49,7 +49,7 @@ def report_cost(name: str, repeats: int, *, seeds: int) -> None:
     print_line(f"{name}-memory", statistics.median(most_mb), "MB", {**told, **spread(most_mb)})
 
 
-def _write_campaign(folder: Path, seeds: int) -> int:
+def write_campaign(folder: Path, seeds: int) -> int:
     """Write a campaign with made-up outcomes over loss and number of robots; the number of its runs."""
     points: list[tuple[float, int]] = list(product(LOSSES, COUNTS))
     run = np.arange(len(points) * seeds)
@@ -85,7 +85,7 @@ def _about(points: list[tuple[float, int]], seeds: int) -> dict[str, Any]:
         "began_utc": "",
         "versions": {},
         "cpu": "",
-        "modules": [],
+        "modules": {},
         "files": [],
         "design": "grid",
         "seeds": list(range(1, seeds + 1)),

@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+from benchmarks.report_cost import write_campaign
 from benchmarks.table import rows
 from benchmarks.targets import TARGETS, Target, most
+from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 
 PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
 
@@ -29,3 +31,10 @@ def test_the_page_has_a_measured_row_for_every_target():
         line.split("`")[1] for line in lines if line.startswith("| `") and ("| met |" in line or "**missed**" in line)
     }
     assert set(TARGETS) - measured == set()
+
+
+def test_the_campaign_that_is_made_up_is_one(tmp_path):
+    assert write_campaign(tmp_path, 20) == 1000
+    campaign = CampaignFolder(tmp_path)
+    assert (campaign.finished, len(campaign.points), len(campaign.outcomes)) == (True, 50, 10)
+    assert campaign.sample("stop_time_s", 45).censored > 0.0

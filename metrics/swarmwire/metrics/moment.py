@@ -11,6 +11,8 @@ from numba import njit
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static, Truth
 
+ROUNDING = 1e-9  # 0.28 x 25 is a little more than 7 in floats
+
 
 @dataclass(frozen=True)
 class Components:
@@ -64,6 +66,10 @@ class Moment:
     def direction(self) -> tuple[FloatArray, FloatArray]:
         """Cosines and sines of the headings, (arenas, robots) each, of the dead too."""
         return _direction(self.pose)
+
+    def robots_for(self, share: float) -> FloatArray:
+        """How many robots such a share of those alive is, rounded up, at least one, (arenas,)."""
+        return np.maximum(np.ceil(share * self.robots_alive - ROUNDING), 1.0)
 
     def sum_alive(self, values: FloatArray) -> FloatArray:
         """The sum of `values` (arenas, robots) over the robots alive of each arena, (arenas,)."""

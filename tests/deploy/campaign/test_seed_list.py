@@ -1,7 +1,7 @@
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.seed_list import seed_list
+from swarmwire.deploy.campaign.seed_list import chosen_seeds, seed_list
 
 
 def test_seeds_are_a_number_a_range_or_a_list():
@@ -9,6 +9,11 @@ def test_seeds_are_a_number_a_range_or_a_list():
     assert seed_list("4:7") == (4, 5, 6)
     assert seed_list("7,1,5") == seed_list([7, 1, 5]) == (7, 1, 5)
     assert seed_list("5,") == (5,)
+
+
+def test_of_seeds_that_are_chosen_a_number_is_one():
+    assert chosen_seeds("7", "--record-seeds") == (7,)
+    assert chosen_seeds("2:4", "--record-seeds") == chosen_seeds([2, 3], "--record-seeds") == (2, 3)
 
 
 @pytest.mark.parametrize(

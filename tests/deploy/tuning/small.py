@@ -12,7 +12,7 @@ from swarmwire.deploy.campaign.task import PieceResult, Row, Task
 from swarmwire.deploy.campaign.watcher import NobodyWatches
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.tuning.plan import TuningAsked, TuningPlan, planned_tuning
-from swarmwire.deploy.tuning.run_tuning import Onlookers, Tuned, begin_tune, resume_tune
+from swarmwire.deploy.tuning.run_tuning import Onlookers, begin_tune, resume_tune
 from swarmwire.deploy.tuning.search import asked_search
 from swarmwire.deploy.tuning.seeds import fresh_seeds
 from swarmwire.world.scenario.as_mapping import mapping_of
@@ -123,13 +123,13 @@ class Looking:
         return Onlookers(self, NobodyWatches(), self.interrupt)
 
 
-def tuned(scenario: Path, folder: Path, *searched: str, until: int | None = None, **said: Any) -> Tuned:
-    """A tuning, ended after so many trials if that is said."""
+def tuned(scenario: Path, folder: Path, *searched: str, until: int | None = None, **said: Any) -> Any:
+    """What came of a tuning (`Tuned`), ended after so many trials if that is said."""
     plan = plan_of(scenario, *searched, **said)
     return begin_tune(plan, folder, "tune", None, Looking(until).onlookers())
 
 
-def gone_on_with(folder: Path, trials: int | None = None, until: int | None = None) -> Tuned:
+def gone_on_with(folder: Path, trials: int | None = None, until: int | None = None) -> Any:
     """The same tuning, resumed."""
     return resume_tune(folder, None, Looking(until).onlookers(), trials=trials)
 

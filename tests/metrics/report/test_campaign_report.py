@@ -1,5 +1,7 @@
 """The report of a campaign, of every kind of design, has what it should, with the right numbers."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -121,6 +123,20 @@ def test_failed_and_missing_runs_are_told_with_what_to_do(tmp_path):
     assert "swarmwire repeat made-up --run 3" in listings
     assert "swarmwire sweep --resume made-up" in listings
     assert [row[1] for row in shown.table("radio.loss", "n")] == ["4", "4", "6", "5"]
+
+
+def test_ranges_that_points_were_drawn_from_are_told(tmp_path):
+    folder = ordinary(tmp_path, design="random")
+    about = json.loads((folder / "campaign.json").read_text())
+    told = {
+        "vary": {"radio.loss": {"from": 0, "to": 0.6}},
+        "began_utc": "20260102T030405Z",
+        "overrides": ["a=1", "b=2"],
+    }
+    (folder / "campaign.json").write_text(json.dumps(about | told))
+    _, shown = of(folder)
+    for row in (["radio.loss", "from 0 to 0.6"], ["begun", "2026-01-02 03:04 UTC"], ["settings for all", "a=1, b=2"]):
+        assert row in shown.tables[0]
 
 
 def test_before_any_run_has_ended_there_is_a_report_all_the_same(tmp_path):

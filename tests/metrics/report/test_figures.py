@@ -41,9 +41,10 @@ def test_distributions(groups, limit):
     "values", [[0.5, 0.5, 0.5], [np.nan, 1.0, np.inf], [np.nan] * 3, [np.inf] * 3, [1.0, 100.0, 5000.0]]
 )
 @pytest.mark.parametrize("limit", [None, 9000.0])
-def test_responses(values, limit):
+@pytest.mark.parametrize("x", [[0.0, 1.0, 2.0], [0.01, 1.0, 200.0]])
+def test_responses(values, limit, x):
     values = np.array(values)
-    response = Response("a", np.array([0.0, 1.0, 2.0]), values, values, values, values, values, Jump(0.5, 0.5, 1.5))
+    response = Response("a", np.array(x), values, values, values, values, values, Jump(0.5, 0.5, 1.5))
     assert as_svg(response_curve([response], "what", "x", limit), "a")
     assert as_svg(response_curve([response, response], "what", "x", limit), "a")
 

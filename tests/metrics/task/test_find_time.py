@@ -9,10 +9,10 @@ from tests.metrics.truths import static, truth
 LIGHTS = [[Light(2.0, 0.0, 1.0), Light(-3.0, 0.0, 1.0)], [Light(0.0, 0.0, 1.0)], []]
 
 
-def found(x_m, alive=None, within_m=0.5, lights=LIGHTS):
-    """The metric in each tick, of robots at x (ticks, rows) in arenas of two."""
-    of = static(2, arenas=len(x_m[0]) // 2, lights=lights)
-    metrics, told = Metrics([FindTime(within_m=within_m)]), []
+def found(x_m, alive=None, within_m=0.5, lights=LIGHTS, share=0.0, robots=2):
+    """The metric in each tick, of robots at x (ticks, rows) in arenas of so many."""
+    of = static(robots, arenas=len(x_m[0]) // robots, lights=lights)
+    metrics, told = Metrics([FindTime(within_m=within_m, share=share)]), []
     metrics.begin(of)
     for tick, at in enumerate(x_m):
         pose = np.zeros((len(at), 3))
@@ -52,3 +52,11 @@ def test_the_distance_is_a_parameter():
 
 def test_without_lights_nothing_is_found():
     assert np.isnan(found([[0, 0]], lights=[])[0]).all()
+
+
+def test_of_a_share_of_the_robots_alive_as_many_must_be_there_at_once():
+    x_m = [[2, 0, 0, 0, 0], [0, 2, 2, 0, 0], [2, 2, 2, 0, 0]]
+    ticks = [found(x_m, lights=LIGHTS[:1], share=share, robots=5)[0] for share in (0.2, 0.4, 0.6)]
+    assert [told[-1] for told in ticks] == [[0.0], [0.1], [0.2]]
+    three_alive = [[True, True, False, True, False]] * 3
+    assert found(x_m, three_alive, lights=LIGHTS[:1], share=0.6, robots=5)[0][-1] == [0.2]

@@ -37,6 +37,7 @@ class Campaign:
     overrides: tuple[str, ...]  # of all points, which the scenario in the folder has in it
     point_overrides: tuple[tuple[str, ...], ...]  # of each point, for the scenario in the folder
     duration_s: float
+    robots: int  # in an arena, at the point that has most
     outcomes: tuple[Outcome, ...]
     series: bool  # whether each tick's metrics are kept
     record_seeds: tuple[int, ...]  # whose runs have run folders

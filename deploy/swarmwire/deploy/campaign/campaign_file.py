@@ -9,7 +9,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.one_of import one_of
 from swarmwire.deploy.campaign.design import GRID
 from swarmwire.deploy.campaign.plan import Asked
-from swarmwire.deploy.campaign.seed_list import seed_list
+from swarmwire.deploy.campaign.seed_list import chosen_seeds, seed_list
 from swarmwire.deploy.campaign.vary import vary_from
 
 FORMAT = 1
@@ -79,7 +79,7 @@ def asked_in(path: Path, table: Mapping[str, Any]) -> Asked:
         name=table.get("name"),
         pack=table.get("pack"),
         series=table.get("series", True),
-        record_seeds=seed_list(recorded, f"{where}: record_seeds") if recorded else (),
+        record_seeds=chosen_seeds(recorded, f"{where}: record_seeds") if recorded else (),
     )
 
 

@@ -61,6 +61,7 @@ def campaign_of(plan: Plan, scenario_folder: Path, command: str) -> Campaign:
         overrides=asked.overrides,
         point_overrides=point_overrides,
         duration_s=scenario.duration_s,
+        robots=plan.robots,
         outcomes=plan.outcomes,
         series=asked.series,
         record_seeds=asked.record_seeds,

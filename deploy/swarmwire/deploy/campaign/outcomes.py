@@ -1,14 +1,17 @@
 """What can be asked of a campaign's runs: columns of `summary.parquet` that hold a number, or a time."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from swarmwire.comms.fates import FATE_NAMES
 from swarmwire.deploy.campaign.row import LATENCIES, STATISTICS, TOTALS
-from swarmwire.deploy.measuring import measuring
+from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.world.scenario.scenario import Scenario
 
 STOP_TIME = "stop_time_s"
+STOPPED = "when this began to hold: {}"
+OF_PACKETS = "radio."  # how such columns begin
 OF_RADIO = {
     "sent": ("", "packets sent"),
     "intended": ("", "receivers that packets were meant for"),
@@ -23,24 +26,32 @@ LATENCY_HELP = {
 
 
 def outcomes_of(scenarios: Iterable[Scenario]) -> tuple[Outcome, ...]:
-    """The outcomes of runs of these scenarios, each once, in the order of the columns; BadInput for a bad metric."""
+    """The outcomes of runs of these scenarios, each once, in the order of the columns; BadInput for a bad metric.
+
+    Times come first, then what the scenarios list, then what is measured in every run, and what became of packets.
+    """
     found: dict[str, Outcome] = {}
     for scenario in scenarios:
         for outcome in _outcomes(scenario):
-            found.setdefault(outcome.column, outcome)
-    metrics = [outcome for outcome in found.values() if not outcome.column.startswith("radio.")]
-    return (*metrics, *(outcome for outcome in found.values() if outcome.column.startswith("radio.")))
+            before = found.setdefault(outcome.column, outcome)
+            if before.column == STOP_TIME and before.help != outcome.help:  # what stops is varied
+                found[STOP_TIME] = replace(before, help=STOPPED.format("what is to stop the run"))
+    return tuple(sorted(found.values(), key=_rank))
+
+
+def _rank(outcome: Outcome) -> tuple[bool, bool, bool]:
+    return outcome.kind != "time", outcome.column.startswith(OF_PACKETS), not outcome.listed
 
 
 def _outcomes(scenario: Scenario) -> Iterator[Outcome]:
-    if scenario.stops():
-        yield Outcome(STOP_TIME, "s", "time", "since when what ended the run had held")
+    if stops := conditions(scenario):
+        yield Outcome(STOP_TIME, "s", "time", STOPPED.format(" or ".join(map(str, stops))))
     for metric in measuring(scenario).metrics:
         if metric.kind == "time":
-            yield Outcome(metric.name, metric.unit, "time", metric.help)
+            yield Outcome(metric.name, metric.unit, "time", metric.help, not metric.standard)
             continue
         for statistic in STATISTICS:
-            yield Outcome(f"{metric.name}.{statistic}", metric.unit, "number", metric.help)
+            yield Outcome(f"{metric.name}.{statistic}", metric.unit, "number", metric.help, not metric.standard)
     if scenario.radio is not None:
         yield from _radio()
 
@@ -48,9 +59,9 @@ def _outcomes(scenario: Scenario) -> Iterator[Outcome]:
 def _radio() -> Iterator[Outcome]:
     for name in TOTALS:
         unit, text = OF_RADIO[name]
-        yield Outcome(f"radio.{name}", unit, "number", text)
+        yield Outcome(f"{OF_PACKETS}{name}", unit, "number", text)
     for name in LATENCIES:
         for percentile in PERCENTILES:
-            yield Outcome(f"radio.{name}.{percentile}", "s", "number", LATENCY_HELP[name])
+            yield Outcome(f"{OF_PACKETS}{name}.{percentile}", "s", "number", LATENCY_HELP[name])
     for fate in FATE_NAMES:
-        yield Outcome(f"radio.fates.{fate}", "", "number", f"receivers whose packet's fate was {fate}")
+        yield Outcome(f"{OF_PACKETS}fates.{fate}", "", "number", f"receivers whose packet's fate was {fate}")

@@ -7,6 +7,7 @@ from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
 from swarmwire.deploy.campaign.task import Task
 
 USUAL_PACK = 50  # arenas in a world: more gain little, and a piece is lost as a whole where a campaign is killed
+MOST_ROBOTS = 5_000  # in a world of several arenas: from there on packing gains nothing, and memory is dear
 ROUNDS = 2  # tasks for each worker at least, so that none is idle for long at the end
 
 
@@ -15,7 +16,7 @@ def tasks_of(
 ) -> list[Task]:
     """A task for each pack of runs that are not `done`; those that are recorded in full are on their own."""
     seeds, tasks = len(campaign.seeds), list[Task]()
-    size = pack or campaign.pack or usual_pack(len(campaign.points), seeds, workers)
+    size = pack or campaign.pack or usual_pack(campaign, workers)
     for point in range(len(campaign.points)):
         missing = [run for run in range(point * seeds, (point + 1) * seeds) if run not in done]
         recorded = [run for run in missing if campaign.seed_of(run) in campaign.record_seeds]
@@ -25,9 +26,15 @@ def tasks_of(
     return tasks
 
 
-def usual_pack(points: int, seeds: int, workers: int) -> int:
+def usual_pack(campaign: Campaign, workers: int) -> int:
     """How many arenas a world has where nobody says."""
-    packs = max(-(-seeds // USUAL_PACK), -(-ROUNDS * workers // points))  # of each point
+    return pack_for(len(campaign.points), len(campaign.seeds), campaign.robots, workers)
+
+
+def pack_for(points: int, seeds: int, robots: int, workers: int) -> int:
+    """The same, of so many points with so many seeds each, and at most so many robots in an arena."""
+    most = max(1, min(USUAL_PACK, MOST_ROBOTS // robots))
+    packs = max(-(-seeds // most), -(-ROUNDS * workers // points))  # of each point
     return max(1, -(-seeds // packs))
 
 

@@ -50,6 +50,7 @@ class Plan:
     points: tuple[Point, ...]
     outcomes: tuple[Outcome, ...]
     code: tuple[str, ...]  # the specs of users' classes, of all points
+    robots: int  # in an arena, at the point that has most
 
     def at(self, point: Point) -> Scenario:
         """The scenario at a point."""
@@ -88,7 +89,8 @@ def planned(asked: Asked) -> Plan:
         except BadInput as error:
             _refuse_alone(scenario, error)
             raise _blamed(error, asked.varied, point) from None
-    return Plan(asked, scenario, tuple(points), outcomes_of(scenarios), tuple(code))
+    robots = max(len(at.robot_names()) for at in scenarios)
+    return Plan(asked, scenario, tuple(points), outcomes_of(scenarios), tuple(code), robots)
 
 
 def _scenario_of(asked: Asked) -> Scenario:

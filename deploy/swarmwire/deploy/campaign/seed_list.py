@@ -23,6 +23,11 @@ def seed_list(given: str | int | Sequence[int], said: str = "--seeds") -> tuple[
     return tuple(seeds)
 
 
+def chosen_seeds(given: str | Sequence[int], said: str) -> tuple[int, ...]:
+    """Some seeds of many: as `seed_list`, but a number alone is that seed."""
+    return seed_list(f"{given}," if isinstance(given, str) and given.strip().isdecimal() else given, said)
+
+
 def _range_of(given: str | int) -> range | list[int]:
     if isinstance(given, int) or given.strip().isdecimal():
         return range(1, min(int(given), MOST_SEEDS + 1) + 1)

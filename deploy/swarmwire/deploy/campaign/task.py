@@ -27,10 +27,6 @@ class Task:
             replace(self, runs=self.runs[middle:], seeds=self.seeds[middle:]),
         )
 
-    def alone(self, place: int) -> "Task":
-        """The run at this place as a task of its own."""
-        return replace(self, runs=(self.runs[place],), seeds=(self.seeds[place],))
-
 
 @dataclass(frozen=True)
 class PieceResult:

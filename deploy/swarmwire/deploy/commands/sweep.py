@@ -59,7 +59,7 @@ def sweep_command(
     ] = None,
     series: Annotated[bool, typer.Option(help="Keep the metrics of each tick.")] = True,
     record_seeds: Annotated[
-        str | None, typer.Option(help="Seeds whose runs get full run folders, as for --seeds.", metavar="SEEDS")
+        str | None, typer.Option(help="Seeds whose runs get full run folders: 7, 1:3 or 1,7.", metavar="SEEDS")
     ] = None,
     resume: Annotated[
         Path | None, typer.Option(help="Do only what is missing of the campaign in this folder.", metavar="DIR")
@@ -81,7 +81,7 @@ def sweep_command(
     was run; 130: interrupted.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.deploy.campaign.seed_list import seed_list
+    from swarmwire.deploy.campaign.seed_list import chosen_seeds
     from swarmwire.deploy.campaign.sweeping import Means
     from swarmwire.deploy.interrupt import Interrupt
     from swarmwire.deploy.terminal.sweep_progress import sweep_progress
@@ -93,7 +93,7 @@ def sweep_command(
         "design_seed": design_seed,
         "name": name,
         "pack": pack,
-        "record_seeds": None if record_seeds is None else seed_list(record_seeds, "--record-seeds"),
+        "record_seeds": None if record_seeds is None else chosen_seeds(record_seeds, "--record-seeds"),
         "series": None if series else False,
     }
     plan = _plan(source, vary or [], seeds, overrides or [], {key: of for key, of in said.items() if of is not None})

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from swarmwire.deploy.campaign.execution import execute
 from swarmwire.deploy.campaign.executor import Executor
-from swarmwire.deploy.campaign.pieces import shares, usual_pack
+from swarmwire.deploy.campaign.pieces import pack_for, shares
 from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.task import PieceResult, Row, Task
 from swarmwire.deploy.tuning.goal import Goal, sample_of
@@ -81,7 +81,7 @@ class TrialsRun:
 
     def _tasks(self, trials: Sequence[Trial]) -> list[Task]:
         tuning = self.tuning
-        size = usual_pack(len(trials), len(tuning.seeds), self.executor.slots)
+        size = pack_for(len(trials), len(tuning.seeds), tuning.robots, self.executor.slots)
         return [
             Task(
                 scenario=str(scenario_file(self.folder)),

@@ -34,6 +34,7 @@ class Tuning:
     overrides: tuple[str, ...]  # of all trials, which the scenario in the folder has in it
     searches: tuple[Search, ...]
     goal: Goal
+    robots: int  # in an arena, at most, at either end of any range
     seeds: tuple[int, ...]  # the same in every trial
     check_seeds: tuple[int, ...]
     trials: int

@@ -56,6 +56,7 @@ def _tuning_of(plan: TuningPlan, scenario_folder: Path, command: str) -> Tuning:
         overrides=asked.overrides,
         searches=tuple(searches),
         goal=plan.goal,
+        robots=max(ends.robots for ends in plan.ends),
         seeds=asked.seeds,
         check_seeds=asked.check_seeds,
         trials=asked.trials,

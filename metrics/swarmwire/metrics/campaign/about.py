@@ -134,4 +134,5 @@ def _points(fields: _Fields) -> tuple[Point, ...]:
 
 
 def _outcome(of: _Fields) -> Outcome:
-    return Outcome(of.text("column"), of.text("unit"), of.one_of("kind", KINDS), of.text("help"))
+    listed = "listed" in of.found and of.get("listed", bool, "true or false")
+    return Outcome(of.text("column"), of.text("unit"), of.one_of("kind", KINDS), of.text("help"), listed)

@@ -16,3 +16,4 @@ class Outcome:
     unit: str  # "" if it has none
     kind: Kind
     help: str  # one line
+    listed: bool = False  # of a metric that the scenario asks for, beside those of every run

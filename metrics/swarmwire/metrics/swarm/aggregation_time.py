@@ -16,7 +16,6 @@ from swarmwire.metrics.moment import Moment, components_of
 from swarmwire.metrics.swarm.close_pairs import OfClosePairs
 
 NOT_YET = -1
-ROUNDING = 1e-9  # 0.28 x 25 is a little more than 7 in floats
 
 
 @dataclass(frozen=True)
@@ -48,8 +47,7 @@ class AggregationTime(OfClosePairs):
         def measure(moment: Moment) -> FloatArray:
             if np.isnan(found_s).any():
                 _, largest = components_of(pairs.of(moment), moment.alive)
-                enough = largest >= np.maximum(np.ceil(self.share * moment.robots_alive - ROUNDING), 1.0)
-                _follow(enough, moment.truth.time_ns, hold_ns, since_ns, found_s)
+                _follow(largest >= moment.robots_for(self.share), moment.truth.time_ns, hold_ns, since_ns, found_s)
             return found_s
 
         return measure

@@ -1,4 +1,4 @@
-"""Find time: when the first robot found the target, the nearest light."""
+"""Find time: when the first robot, or a share of them, was at the target, the nearest light."""
 
 from dataclasses import dataclass
 
@@ -15,18 +15,21 @@ from swarmwire.metrics.task.light_distance import light_distance
 
 @dataclass(frozen=True)
 class FindTime(Metric):
-    """First time in s at which `target_best` <= `within_m`: a robot alive has its centre so near to a light.
+    """First time in s at which ceil(`share` x N) of the N robots alive, at least one, are within `within_m` of a light.
 
-    0 if one stands there at the start. It stays, whatever becomes of the robot. NaN until then, and without lights.
+    Of their centres, each to the light nearest to it. 0 if they stand there at the start. It stays, whatever becomes of
+    the robots. NaN until then, and without lights. Half of them within 0.5 m is a success in J. Pugh, A. Martinoli,
+    Inspiring and modeling multi-robot search with particle swarm optimization, IEEE SIS 2007 (from memory).
     """
 
     name = "find_time_s"
-    help = "first time that the centre of a robot alive is within within_m of a light, in s"
+    help = "first time that a share of the robots alive, at least one, is within within_m of a light, in s"
     unit = "s"
     kind = "time"
     bounds = (0.0, None)
 
     within_m: float = parameter(0.5, help="who is no further from a light has found it", unit="m", at_least=0.0)
+    share: float = parameter(0.0, help="of the robots alive, that must be there at once", at_least=0.0, at_most=1.0)
 
     def begin(self, static: Static) -> Measure:
         """A fresh measure, which keeps when it happened."""
@@ -36,8 +39,8 @@ class FindTime(Metric):
         def measure(moment: Moment) -> FloatArray:
             open_ = np.isnan(found_s)
             if distance_m is not None and open_.any():
-                there = np.any(distance_m(moment) <= self.within_m, axis=1, where=moment.alive)
-                found_s[open_ & there] = to_s(moment.truth.time_ns)
+                there = np.sum(distance_m(moment) <= self.within_m, axis=1, where=moment.alive)
+                found_s[open_ & (there >= moment.robots_for(self.share))] = to_s(moment.truth.time_ns)
             return found_s
 
         return measure

@@ -52,7 +52,7 @@ def _is_usual(outcome: Outcome) -> bool:
     return outcome.kind == "time" or outcome.column.endswith(".final") or outcome.column in PREFERRED
 
 
-def _rank(outcome: Outcome) -> tuple[bool, int]:
-    """Times first, and within each kind those that are preferred; the others stay in the campaign's order."""
+def _rank(outcome: Outcome) -> tuple[bool, bool, int]:
+    """Times first, then what the scenario lists, then what is preferred; the others stay in the campaign's order."""
     place = PREFERRED.index(outcome.column) if outcome.column in PREFERRED else len(PREFERRED)
-    return outcome.kind != "time", place
+    return outcome.kind != "time", not outcome.listed, place

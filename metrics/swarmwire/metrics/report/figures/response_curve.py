@@ -44,13 +44,12 @@ def response_curve(responses: Sequence[Response], title: str, x_label: str, limi
     `limit`: up to where a censored value was followed, None where nothing is censored.
     """
     figure, axes = column_axes(title, x_label)
-    alone, span = len(responses) == 1, float(np.ptp(responses[0].x))
+    alone, log = len(responses) == 1, fits_log(responses[0].x)
     if limit is not None:
         axes.axhline(limit, color=SOFT, lw=0.7, ls="--", zorder=1)
     colors = [CURVE] if alone else ordered_colors(len(responses))
     for place, (response, color) in enumerate(zip(responses, colors, strict=True)):
-        # Beside one another, so that none hides another's interval.
-        x = response.x + _APART * span * (place - 0.5 * (len(responses) - 1))
+        x = _aside(response.x, place - 0.5 * (len(responses) - 1), log=log)
         if response.jump is not None and alone:
             _draw_jump(axes, response.jump)
         elif response.jump is not None:
@@ -61,7 +60,7 @@ def response_curve(responses: Sequence[Response], title: str, x_label: str, limi
         low, high = _within(response.low, limit), _within(response.high, limit)
         axes.vlines(x, low, high, color=color, lw=1.0, zorder=3)
         _draw_medians(axes, x, response, limit, color)
-    if fits_log(responses[0].x):
+    if log:
         set_log(axes.xaxis)
     reached = [quartile for response in responses for quartile in (response.q25, response.q75)]
     if fits_log(np.concatenate(reached + ([] if limit is None else [np.array([limit])]))):
@@ -69,6 +68,13 @@ def response_curve(responses: Sequence[Response], title: str, x_label: str, limi
     if not alone:
         plain_legend(axes, loc="best")
     return figure
+
+
+def _aside(x: FloatArray, places: float, *, log: bool) -> FloatArray:
+    """Beside one another, so that none hides another's interval."""
+    along = np.log(x) if log else x
+    moved: FloatArray = along + _APART * places * np.ptp(along)
+    return np.exp(moved) if log else moved
 
 
 def _within(edge: FloatArray, limit: float | None) -> FloatArray:

@@ -1,0 +1,58 @@
+"""How the missing runs of a campaign are packed."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.deploy.campaign.campaign import Campaign
+from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
+from swarmwire.deploy.campaign.pieces import tasks_of, usual_pack
+
+
+class Made(SimpleNamespace):
+    """What packing asks of a campaign."""
+
+    point_of, seed_of, runs = Campaign.point_of, Campaign.seed_of, Campaign.runs
+
+
+def made(points, seeds, robots=10, recorded=()):
+    return Made(
+        points=[{}] * points,
+        seeds=tuple(range(1, seeds + 1)),
+        robots=robots,
+        point_overrides=[(f"a={point}",) for point in range(points)],
+        series=True,
+        record_seeds=recorded,
+        pack=None,
+        columns=lambda: None,
+    )
+
+
+def packed(campaign, done=(), pack=None, workers=2):
+    return tasks_of(campaign, CampaignFolder(Path("c"), campaign), done, pack, workers)
+
+
+@given(st.integers(1, 5), st.integers(1, 130), st.integers(1, 8), st.sets(st.integers(0, 100)))
+def test_each_missing_run_is_in_one_task_of_its_point(points, seeds, workers, done):
+    campaign = made(points, seeds, recorded=(1,))
+    tasks = packed(campaign, done, workers=workers)
+    runs = sorted(run for task in tasks for run in task.runs)
+    assert runs == [run for run in range(campaign.runs) if run not in done]
+    for task in tasks:
+        assert {campaign.point_of(run) for run in task.runs} == {task.point}
+        assert task.overrides == (f"a={task.point}",)
+        assert task.seeds == tuple(run % seeds + 1 for run in task.runs)
+        assert (task.record_to is not None) == (task.seeds == (1,) or 1 in task.seeds)
+        assert len(task.runs) == 1 or task.record_to is None
+
+
+def test_packs_are_about_50_and_fewer_where_workers_would_be_idle():
+    assert usual_pack(made(9, 200), 2) == 50
+    assert usual_pack(made(9, 120), 2) == 40
+    assert usual_pack(made(1, 60), 2) == 15
+    assert usual_pack(made(1, 3), 8) == 1
+    assert usual_pack(made(9, 200, robots=1000), 2) == 5
+    assert usual_pack(made(9, 200, robots=100_000), 2) == 1
+    assert {len(task.runs) for task in packed(made(2, 30), pack=7)} == {6}
