@@ -69,6 +69,19 @@ def test_a_worker_that_dies_is_replaced_and_a_seed_of_which_they_die_is_a_failed
     assert rows[1] == {"run": 2, "point": 0, "seed": DEADLY, "ended": "failed", "error": "the worker died, signal 9"}
 
 
+def test_an_agent_that_asks_for_input_gets_none_and_takes_no_task(scenario):
+    agent = "from swarmwire.agent import Agent\nclass Asking(Agent):\n    def step(self, robot): input('go on? ')\n"
+    (scenario.parent / "asking.py").write_text(agent)
+    executor, rows = LocalExecutor(1), []
+    tasks = tasks_of(scenario, 1, 2, overrides=('robots.pair.agent="asking.py:Asking"',))
+    try:
+        assert execute(tasks, executor, lambda _, result: rows.extend(result.rows))
+    finally:
+        executor.close()
+    assert [row["ended"] for row in rows] == ["failed", "failed"]
+    assert "EOFError" in rows[0]["error"]
+
+
 def test_workers_that_cannot_start_are_one_line(scenario, monkeypatch):
     monkeypatch.setattr(sys, "executable", "/bin/false")
     executor = LocalExecutor(2)

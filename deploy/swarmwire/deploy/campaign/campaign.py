@@ -10,6 +10,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.columns import Columns
 from swarmwire.deploy.campaign.design import Point
 from swarmwire.deploy.record.scenario_copy import CopiedFile
+from swarmwire.metrics.campaign.about import read_about
 from swarmwire.metrics.campaign.formats import ABOUT, CAMPAIGN_FORMAT
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.record.formats import refuse_other_format
@@ -73,15 +74,39 @@ def read_campaign(folder: Path) -> Campaign:
         found: Any = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         expected = f"expected a campaign's folder, with its {ABOUT}: {error.strerror}"
+        if (folder / SCENARIO_FOLDER).is_dir():
+            expected += "; if it was ended before its first run, take the folder away and begin again"
         raise BadInput(str(folder), "", expected) from None
-    except ValueError:  # no JSON, or no UTF-8
+    except (ValueError, RecursionError):  # no JSON, or no UTF-8
         found = None
     try:
         refuse_other_format(found, CAMPAIGN_FORMAT, path)
         del found["format"]  # KeyError: every campaign names one
-        return _campaign(found)
+        campaign = _campaign(found)
     except (KeyError, TypeError, ValueError):
         raise BadInput(str(path), "", "expected what swarmwire writes at the start of a campaign") from None
+    read_about(path)  # the reader of reports knows what stands there
+    _check(campaign, str(path))
+    return campaign
+
+
+def _check(campaign: Campaign, where: str) -> None:
+    """BadInput for what only those who run a campaign need of it."""
+    overrides, pack = campaign.point_overrides, campaign.pack
+    texts: Any = [text for of_point in overrides for text in of_point]
+    good = {
+        "point_overrides": len(overrides) == len(campaign.points) and all(isinstance(text, str) for text in texts),
+        "robots": _is_count(campaign.robots),
+        "pack": pack is None or _is_count(pack),
+        "record_seeds": set(campaign.record_seeds) <= set(campaign.seeds),
+    }
+    for key, is_good in good.items():
+        if not is_good:
+            raise BadInput(where, key, "expected what swarmwire writes at the start of a campaign")
+
+
+def _is_count(value: object) -> bool:
+    return type(value) is int and value >= 1
 
 
 def _campaign(found: dict[str, Any]) -> Campaign:

@@ -16,10 +16,11 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, Campaign
 from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.series_files import join_series, series_part, sort_out_series
-from swarmwire.deploy.campaign.storage import storing
+from swarmwire.deploy.campaign.storage import MEND, read_whole, storing
 from swarmwire.deploy.campaign.taken import taken
 from swarmwire.deploy.campaign.task import PieceResult, Row
 from swarmwire.metrics.campaign.formats import PARTS, SERIES, SUMMARY
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 RUNS = "runs"
+NUMBER = "[0-9]" * 8
 
 
 class CampaignFolder:
@@ -78,12 +80,11 @@ class CampaignFolder:
             _write(self._next_part(), _parquet(self._columns.frame(rows)))
 
     def rows(self) -> "pl.DataFrame":
-        """All rows that are there, by run."""
-        import polars as pl
-
+        """All rows that are there, by run; BadInput names a file that is damaged, or of another campaign."""
         whole = self.path / SUMMARY
         files = [*([whole] if whole.exists() else []), *self._parts()]
-        return self._columns.joined([self._columns.frame([]), *(pl.read_parquet(file) for file in files)])
+        none = self._columns.frame([])
+        return self._columns.joined([none, *(_table(file, none.schema, self.campaign.runs) for file in files)])
 
     def ended(self) -> dict[int, str]:
         """By run that has a row: how it ended."""
@@ -99,7 +100,7 @@ class CampaignFolder:
                 _write(self.path / SUMMARY, _parquet(self.rows()))
             for part in parts:
                 part.unlink()
-            if (self.path / PARTS).is_dir():
+            if (self.path / PARTS).is_dir() and not any((self.path / PARTS).iterdir()):
                 (self.path / PARTS).rmdir()
 
     def _next_part(self) -> Path:
@@ -108,7 +109,17 @@ class CampaignFolder:
         return self.path / PARTS / f"part-{last + 1:08d}.parquet"
 
     def _parts(self) -> list[Path]:
-        return sorted((self.path / PARTS).glob("part-*.parquet"))
+        return sorted((self.path / PARTS).glob(f"part-{NUMBER}.parquet"))
+
+
+def _table(file: Path, schema: "pl.Schema", runs: int) -> "pl.DataFrame":
+    frame = read_whole(file)
+    for name, kind in schema.items():
+        if frame.schema.get(name) != kind:
+            raise BadInput(str(file), name, f"expected this column of the campaign's table, as {kind}; {MEND}")
+    if not frame["run"].is_between(0, runs - 1).all():
+        raise BadInput(str(file), "run", f"expected runs from 0 to {runs - 1}; {MEND}")
+    return frame
 
 
 def _parquet(frame: "pl.DataFrame") -> bytes:

@@ -3,6 +3,7 @@
 from collections.abc import Collection
 from pathlib import Path
 
+from swarmwire.deploy.campaign.storage import read_whole
 from swarmwire.metrics.record.part_files import PARQUET
 from swarmwire.metrics.whole_file import written_aside
 
@@ -14,12 +15,10 @@ def series_part(folder: Path, run: int) -> Path:
 
 def sort_out_series(folder: Path, done: Collection[int]) -> None:
     """Take away parts of pieces whose rows were never written (runs that are not in `done`), or that were joined."""
-    import polars as pl
-
     parts, files = _parts(folder), list(folder.glob("worker-*.parquet"))
     if not parts:
         return
-    joined: set[int] = {run for file in files for run in pl.read_parquet(file, columns=["run"])["run"].unique()}
+    joined: set[int] = {run for file in files for run in _runs(file)}
     for part in parts:
         run = int(part.stem.partition("-")[2])
         if run not in done or run in joined:
@@ -31,6 +30,8 @@ def join_series(folder: Path, files: int) -> None:
     import polars as pl
 
     parts = _parts(folder)
+    for part in parts:
+        _runs(part)  # damaged files are told by their name, before anything is joined
     first, count = len(list(folder.glob("worker-*.parquet"))), min(files, len(parts))
     for number in range(count):
         share = parts[len(parts) * number // count : len(parts) * (number + 1) // count]
@@ -40,5 +41,10 @@ def join_series(folder: Path, files: int) -> None:
             part.unlink()
 
 
+def _runs(file: Path) -> set[int]:
+    """Whose series it holds; BadInput if it is damaged."""
+    return set(read_whole(file, ["run"], "without the file their tables stay, but not their series")["run"])
+
+
 def _parts(folder: Path) -> list[Path]:
-    return sorted(folder.glob("part-*.parquet"))
+    return sorted(folder.glob("part-" + "[0-9]" * 8 + ".parquet"))

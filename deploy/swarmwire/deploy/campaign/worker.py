@@ -8,6 +8,7 @@ import os
 import sys
 from queue import SimpleQueue
 from threading import Thread
+from typing import BinaryIO
 
 from swarmwire.deploy.campaign.messages import receive, send
 from swarmwire.deploy.campaign.piece import run_piece
@@ -17,18 +18,19 @@ from swarmwire.deploy.campaign.task import Task, result_message, task_from
 def main(arguments: list[str]) -> None:
     """`name`: say that it is ready, then work until standard input ends."""
     (name,) = arguments
-    results = os.fdopen(os.dup(1), "wb")
+    given, results = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)  # an agent that asks for input must not take tasks, or wait
     os.dup2(2, 1)  # what agents print is for people
     tasks = SimpleQueue[Task]()
-    Thread(target=_listen, args=(tasks,), daemon=True).start()
+    Thread(target=_listen, args=(given, tasks), daemon=True).start()
     send(results, {"ready": name})
     while True:
         send(results, result_message(run_piece(tasks.get(), name)))
 
 
-def _listen(tasks: SimpleQueue[Task]) -> None:
+def _listen(given: BinaryIO, tasks: SimpleQueue[Task]) -> None:
     """Take in tasks; end this process, whatever it is at, when nobody is there to give more."""
-    while (message := receive(sys.stdin.buffer)) is not None:
+    while (message := receive(given)) is not None:
         tasks.put(task_from(message))
     os._exit(0)
 

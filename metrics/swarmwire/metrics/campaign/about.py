@@ -50,7 +50,7 @@ def read_about(path: Path) -> About:
         found: object = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise BadInput(str(path.parent), path.name, "expected a campaign's folder: the file is missing") from None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise BadInput(str(path), "", f"expected what a campaign was asked for: {error}") from error
     refuse_other_format(found, CAMPAIGN_FORMAT, path)
     return _about(_Fields(found, str(path)))
