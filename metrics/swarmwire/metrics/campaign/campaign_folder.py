@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.about import About, Point, read_about
-from swarmwire.metrics.campaign.formats import ABOUT, PARTS, SUMMARY
+from swarmwire.metrics.campaign.formats import ABOUT, FAILED, PARTS, SUMMARY
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.campaign.statistic import Statistic, find_outcome, find_statistic
 from swarmwire.metrics.statistics.sample import Sample
@@ -18,7 +18,6 @@ from swarmwire.metrics.statistics.sample import Sample
 if TYPE_CHECKING:
     import polars as pl
 
-FAILED = "failed"  # in the column `ended`
 SIM_TIME = "sim_time_s"
 CHANGES_UNDERFOOT = 3  # times that the parts of a campaign that goes on may be joined while they are read
 NEEDED = ("run", "point", "seed", "ended", SIM_TIME)
@@ -72,7 +71,7 @@ class CampaignFolder:
                 reason = str(error).splitlines()[0]
                 raise BadInput(str(self.path), "", f"expected whole Parquet files: {reason}") from error
             for file, frame in zip(files, frames, strict=True):
-                self._check_columns(file, frame)
+                _check_columns(file, frame)
             if not frames:
                 return pl.DataFrame(schema=dict.fromkeys(NEEDED, pl.Int64) | {"ended": pl.String, SIM_TIME: pl.Float64})
             return pl.concat(frames, how="diagonal_relaxed").unique("run", keep="last").sort("run")
@@ -146,10 +145,11 @@ class CampaignFolder:
         found = sorted(part for part in parts if not part.name.startswith("."))  # what is being written starts so
         return [whole, *found] if whole.exists() else found
 
-    def _check_columns(self, file: Path, frame: "pl.DataFrame") -> None:
-        lacking = [name for name in NEEDED if name not in frame.columns]
-        if lacking:
-            raise BadInput(str(file), lacking[0], "expected this column of a campaign's table")
+
+def _check_columns(file: Path, frame: "pl.DataFrame") -> None:
+    lacking = [name for name in NEEDED if name not in frame.columns]
+    if lacking:
+        raise BadInput(str(file), lacking[0], "expected this column of a campaign's table")
 
 
 def _sample(outcome: Outcome, value: FloatArray, end_s: FloatArray, seed: IntArray, well: BoolArray) -> Sample:
