@@ -53,5 +53,5 @@ def _wall_s(scene: dict[str, Any], name: str, seeds: int, pack: int | None) -> f
         )
         wall_s = to_s(clock.now_ns() - began_ns)
     if done.failed or not done.is_over:
-        raise RuntimeError(f"{done.failed} of {done.runs} runs failed")
+        raise RuntimeError(f"{done.done} of {done.runs} runs are done, {done.failed} of these failed")
     return wall_s
