@@ -8,25 +8,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-<<<<<<< HEAD
-from swarmwire.deploy.campaign.campaign import Campaign, read_campaign
-from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
-from swarmwire.deploy.campaign.row import FAILED
-from swarmwire.deploy.campaign.sweeping import Sweep
-from swarmwire.metrics.campaign.statistic import FINAL
-
-if TYPE_CHECKING:
-    import polars as pl
-=======
 from swarmwire.deploy.campaign.outcomes import STOP_TIME
 from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.sweeping import Sweep
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.campaign.outcome import FINAL, PDR, Outcome
 from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.texts import number_text, quantile_text
->>>>>>> i8-fuzz
 
 MOST_POINTS = 20  # that are shown
 MOST_OUTCOMES = 4
@@ -53,54 +42,29 @@ def print_sweep(sweep: Sweep, console: Console, program: Path) -> None:
     console.print(f"again: {program} repeat {folder} --run {min(17, sweep.runs - 1)}", soft_wrap=True)
 
 
-<<<<<<< HEAD
-def _table(campaign: Campaign, rows: "pl.DataFrame") -> Table:
-    import polars as pl
-
-    title = f"{campaign.name}: medians over {len(campaign.seeds)} seeds"
-=======
 def _table(folder: CampaignFolder) -> Table:
     about, outcomes = folder.about, _outcomes(folder)
-    title = f"{about.name}: {len(about.points)} points x {len(about.seeds)} seeds"
->>>>>>> i8-fuzz
+    title = f"{about.name}: medians over {len(about.seeds)} seeds"
     table = Table(title=Text(title), title_justify="left", title_style="bold")
     for path in folder.parameters:
         table.add_column(Text(path), style="cyan")
     table.add_column("failed", justify="right")
-<<<<<<< HEAD
-    for column in outcomes:
-        table.add_column(Text(column.removesuffix(FINAL)), justify="right", overflow="fold")
-    for number, point in enumerate(campaign.points[:MOST_POINTS]):
-        of_point = rows.filter(pl.col("point") == number)
-        failed = int((of_point["ended"] == FAILED).sum())
-        medians = [_median(of_point.filter(pl.col("ended") != FAILED), campaign, column) for column in outcomes]
-        table.add_row(*(Text(str(value)) for value in point.values()), str(failed), *medians)
-=======
     for outcome in outcomes:
-        table.add_column(Text(f"{outcome.column}, median"), justify="right", overflow="fold")
+        table.add_column(Text(outcome.column.removesuffix(FINAL)), justify="right", overflow="fold")
     failed = folder.runs.filter(folder.runs["ended"] == FAILED)["point"].to_list()
     for number, point in enumerate(about.points[:MOST_POINTS]):
         medians = [_median(folder.sample(outcome.column, number)) for outcome in outcomes]
         table.add_row(*(Text(str(value)) for value in point.values()), str(failed.count(number)), *medians)
->>>>>>> i8-fuzz
     return table
 
 
 def _outcomes(folder: CampaignFolder) -> Sequence[Outcome]:
-    """The first outcomes that have any value: times, and of other metrics what they were at the end."""
-<<<<<<< HEAD
-    columns = [of.column for of in campaign.outcomes if of.kind == "time" or of.column.endswith(FINAL)]
-    first = [column for column in columns if column in rows.columns and rows[column].count()]
-    pdr = ["radio.pdr"] if "radio.pdr" in rows.columns and rows["radio.pdr"].count() else []
-    return first[: MOST_OUTCOMES - len(pdr)] + pdr
-=======
+    """The first usual ones that have any value: when runs stopped, what comes then, and last the delivery ratio."""
     runs = folder.runs
-    known = {of.column: of for of in folder.outcomes if of.column in runs.columns and runs[of.column].count()}
-    columns = [of.column for of in known.values() if of.kind == "time" or of.column.endswith(".final")]
-    first = [STOP_TIME, *columns] if STOP_TIME in known else columns
-    pdr = [known["radio.pdr"]] if "radio.pdr" in known else []
-    return [known[column] for column in dict.fromkeys(first)][: MOST_OUTCOMES - len(pdr)] + pdr
->>>>>>> i8-fuzz
+    usual = [of for of in folder.outcomes if of.is_usual and of.column in runs.columns and runs[of.column].count()]
+    first = sorted((of for of in usual if of.column != PDR), key=lambda of: of.column != STOP_TIME)
+    pdr = [of for of in usual if of.column == PDR]
+    return first[: MOST_OUTCOMES - len(pdr)] + pdr
 
 
 def _median(sample: Sample) -> str:
