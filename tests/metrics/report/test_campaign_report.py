@@ -139,6 +139,11 @@ def test_ranges_that_points_were_drawn_from_are_told(tmp_path):
         assert row in shown.tables[0]
 
 
+def test_seeds_are_told_to_the_last_digit(tmp_path):
+    _, shown = of(ordinary(tmp_path, seeds=(20240501, 7)), ["order"])
+    assert ["seeds", "20240501, 7"] in shown.tables[0]
+
+
 def test_before_any_run_has_ended_there_is_a_report_all_the_same(tmp_path):
     sections, _ = of(ordinary(tmp_path, missing=range(24), parts=1))
     assert list(sections) == ["What was run", "Methods"]
