@@ -11,6 +11,7 @@ from math import isinf
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import zenoh
 
 from swarmwire.comms.clock import Clock
@@ -61,6 +62,7 @@ class Published:
         if not 0 <= self._arena < static.arenas:
             raise BadInput("live view", "arena", f"expected 0 to {static.arenas - 1}")
         self._selected = selected_robot(static, self._selected, "live view")
+        self._arenas = static.arenas
         self._sampling = Sampling(static, self._arena, self._selected)
         self._since, self._rate = Since(), Rate(FRAMES_PER_S)
         self._watched = False
@@ -108,9 +110,11 @@ class Published:
 
     def _put(self, now_ns: int) -> None:
         """Hand what has not been shown to the sender; at the end it may be busy for a while."""
-        glimpse = self._sampling.glimpse(*self._since.take(), self._metrics.values, now_ns)
+        latest = self._metrics.latest
+        measured = self._metrics.metrics
+        values = np.array([latest[of.name] for of in measured]).reshape(len(measured), self._arenas)
         try:
-            self._frames.put(glimpse, timeout=LEAVE_S)
+            self._frames.put(self._sampling.glimpse(*self._since.take(), values, now_ns), timeout=LEAVE_S)
         except queue.Full:
             self.left_out += 1
         else:
