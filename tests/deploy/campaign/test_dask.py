@@ -93,7 +93,9 @@ def test_chosen_seeds_are_recorded_on_this_machine(tmp_path, reference, two_work
 def test_an_agent_that_kills_its_process_ends_no_worker(tmp_path, reference, two_workers):
     kill = ['robots.pair.params.how="kill"']
     done = sweep(reference / "two.toml", seeds=3, out=tmp_path / "c", on=two_workers.on, overrides=kill, pack=3)
-    assert [row["error"] for row in rows_in(tmp_path / "c") if row["error"]] == ["the worker died, signal 9"] * done.failed
+    assert [row["error"] for row in rows_in(tmp_path / "c") if row["error"]] == [
+        "the worker died, signal 9"
+    ] * done.failed
     assert done.failed == 1
     assert all(worker.is_running() for worker in two_workers.workers)
 
@@ -153,7 +155,9 @@ def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
             "--on", there.on,
         )  # fmt: skip
     assert (code, caplog.text) == (1, "")
-    told = f"error: {there.on}: .*the scheduler has gone away.*; what is done stays: --resume {folder}, here or --on local"
+    told = (
+        f"error: {there.on}: .*the scheduler has gone away.*; what is done stays: --resume {folder}, here or --on local"
+    )
     assert [line for line in errors.splitlines() if "waiting" not in line] == [errors.splitlines()[-1]]
     assert re.fullmatch(told, errors.splitlines()[-1])
     assert 1 <= len(rows_in(folder)) < 8
