@@ -6,6 +6,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.report.campaign.figure_name import figure_name
 from swarmwire.metrics.report.campaign.levels import Levels, levels_of
+from swarmwire.metrics.report.campaign.rounding import Rounding
 from swarmwire.metrics.report.campaign.samples import Samples
 from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence
 from swarmwire.metrics.report.figures.resilience_curve import FittedShape, resilience_curve
@@ -109,7 +110,7 @@ def _figure(outcome: Outcome, levels: Levels, left: FloatArray, fits: Degradatio
 
 def _words(outcome: Outcome, levels: Levels, fits: Degradation, fit: Fit) -> tuple[str, ...]:
     better = ("better" if fits.told else "no worse") if fit is fits.better else ""
-    low, high = fit.b_interval
-    numbers = (f"{fit.a:.3f}", f"{fit.b:.3f}", f"{low:.3f} to {high:.3f}", f"{fit.r_squared:.3f}", f"{fit.aic:.1f}")
-    shown = (text.replace("-", "−") if "nan" not in text else "–" for text in numbers)
+    three, one = Rounding(3).text, Rounding(1).text
+    slope = " to ".join(map(three, fit.b_interval)) if np.isfinite(fit.b_interval).all() else "–"
+    shown = three(fit.a), three(fit.b), slope, three(fit.r_squared), one(fit.aic)
     return (outcome.column, levels.path, fit.form, *shown, better)
