@@ -1,5 +1,6 @@
 """A campaign's folder, read back: of one that is finished, that was ended, and that still goes on."""
 
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +14,7 @@ from swarmwire.metrics.campaign.about import About, Point, read_about
 from swarmwire.metrics.campaign.formats import ABOUT, FAILED, PARTS, SUMMARY
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.campaign.statistic import Statistic, find_outcome, find_statistic
-from swarmwire.metrics.statistics.sample import Sample
+from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
 
 if TYPE_CHECKING:
     import polars as pl
@@ -157,7 +158,6 @@ def _sample(outcome: Outcome, value: FloatArray, end_s: FloatArray, seed: IntArr
     failed = int(np.count_nonzero(~well))
     value, end_s, seed = value[well], end_s[well], seed[well]
     observed = np.isfinite(value)
-    if outcome.kind == "time":
-        return Sample(np.where(observed, value, end_s), observed, seed, "time", failed)
-    undefined = int(np.count_nonzero(~observed))
-    return Sample(value[observed], observed[observed], seed[observed], "number", failed, undefined)
+    is_time = outcome.kind == "time"
+    of = time_sample(np.where(observed, value, end_s), observed, seed) if is_time else number_sample(value, seed)
+    return replace(of, failed=failed)
