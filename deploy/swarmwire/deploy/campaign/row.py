@@ -1,7 +1,6 @@
 """One run as a row of `summary.parquet`: what was measured of it, or why it failed."""
 
 from collections.abc import Collection
-from dataclasses import asdict
 from typing import Any
 
 from swarmwire.deploy.campaign.task import Row
@@ -28,7 +27,7 @@ def row_of(arena: ArenaResult, times: Collection[str]) -> Row:
         if name in times:
             row[name] = value.final
         else:
-            row.update({f"{name}.{statistic}": of for statistic, of in asdict(value).items()})
+            row.update({f"{name}.{statistic}": of for statistic, of in vars(value).items()})
     if arena.radio is not None:
         row.update(_radio(arena.radio))
     row.update({f"counts.{name}": count for name, count in arena.counts.items()})
@@ -44,7 +43,7 @@ def _radio(radio: RadioResult) -> dict[str, Any]:
     latencies = {
         f"radio.{of}.{percentile}": value
         for of in LATENCIES
-        for percentile, value in asdict(getattr(radio, of)).items()
+        for percentile, value in vars(getattr(radio, of)).items()
     }
     fates = {f"radio.fates.{name}": count for name, count in radio.fates.items()}
     return {**{f"radio.{name}": getattr(radio, name) for name in TOTALS}, **latencies, **fates}
