@@ -30,19 +30,14 @@ def tasks_of(
 
 def usual_pack(campaign: Campaign, workers: int) -> int:
     """How many arenas a world has where nobody says."""
-<<<<<<< HEAD
-    return pack_for(len(campaign.points), len(campaign.seeds), campaign.robots, workers)
+    most = max(LONG_PACK, int(PACK_S / campaign.duration_s))
+    return pack_for(len(campaign.points), len(campaign.seeds), campaign.robots, workers, most)
 
 
-def pack_for(points: int, seeds: int, robots: int, workers: int) -> int:
-    """The same, of so many points with so many seeds each, and at most so many robots in an arena."""
-    most = max(1, min(USUAL_PACK, MOST_ROBOTS // robots))
+def pack_for(points: int, seeds: int, robots: int, workers: int, most: int = LONG_PACK) -> int:
+    """The same, of so many points with so many seeds each, at most so many robots in an arena, and `most` arenas."""
+    most = max(1, min(USUAL_PACK, most, MOST_ROBOTS // robots))
     packs = max(-(-seeds // most), -(-ROUNDS * workers // points))  # of each point
-=======
-    usual = min(USUAL_PACK, max(LONG_PACK, int(PACK_S / campaign.duration_s)))
-    seeds, most = len(campaign.seeds), max(1, min(usual, MOST_ROBOTS // campaign.robots))
-    packs = max(-(-seeds // most), -(-ROUNDS * workers // len(campaign.points)))  # of each point
->>>>>>> i8-perf
     return max(1, -(-seeds // packs))
 
 
