@@ -25,6 +25,7 @@ CAMPAIGN = Campaign(
     overrides=("duration_s=20",),
     point_overrides=((), ()),
     duration_s=20,
+    robots=3,
     outcomes=(Outcome("order.final", "", "number", "order"), Outcome("found_s", "s", "time", "first find")),
     series=True,
     record_seeds=(),

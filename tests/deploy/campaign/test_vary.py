@@ -22,6 +22,8 @@ def test_a_range_is_even_and_in_decimals_as_people_write_them():
 
 def test_a_range_in_equal_ratios():
     assert values("a=1:10000:5:log") == [1.0, 10.0, 100.0, 1000.0, 10000.0]
+    assert values("a=1e-300:1e300:3:log") == [1e-300, 1.0, 1e300]
+    assert values("a=1e-999999999:2:3") == [0.0, 1.0, 2.0]
 
 
 @given(st.integers(-1000, 1000), st.integers(1, 1000), st.integers(2, 50))
@@ -52,7 +54,7 @@ def test_tables_and_lists_of_a_file_say_the_same():
 @pytest.mark.parametrize(
     "text",
     ["radio.loss", "=1", "a.=1", "a=", "a=0:1:x", "a=0:", "a=0:1:2:3", "a=0:1:2:log:3", "a=1:2:0", "a=1:1:2",
-     "a=0:1:2:log", "a=1,1", "a=1:2:1000000000"],
+     "a=0:1:2:log", "a=1,1", "a=1:2:1000000000", "a=0:1e400:3", "a=0:1e999999999:3", "a=1:inf:3"],
 )  # fmt: skip
 def test_what_is_none_of_it_is_refused_by_its_name(text):
     with pytest.raises(BadInput) as refused:

@@ -1,7 +1,7 @@
 """The report of a single run tells what its folder holds, whatever is missing."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import polars as pl
@@ -9,6 +9,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Happened
+from swarmwire.metrics.record.metric_facts import MetricFacts
 from swarmwire.metrics.report.in_words import number
 from swarmwire.metrics.report.lanes import Span
 from swarmwire.metrics.report.run_data import read_run
@@ -193,6 +194,25 @@ def test_what_stopped_a_run_and_the_times_that_metrics_wait_for_are_marked(tmp_p
     about = table(report, "")
     assert about["stops at"] == ("order at least 0.1 for 1 s",)
     assert about["ended"] == ("stopped: order at least 0.1 for 1 s, since 0.7 s",)
+
+
+def test_of_a_metric_of_the_users_own_what_the_run_kept_of_it_counts(tmp_path):
+    of = static(3)
+    folder = run_folder(tmp_path, of, wandering(of, 20), summary=False)
+    gas = MetricFacts("gas", "what it smells of", "ppm", "count", (0.0, None))
+    found = MetricFacts("gas_found", "when it did", "s", "time", (0.0, None))
+    started = json.loads((folder / "run.json").read_text())
+    (folder / "run.json").write_text(json.dumps({**started, "metrics": [asdict(gas), asdict(found)]}))
+    file = folder / "ticks.parquet"
+    own = (pl.col("tick") * 2.0).alias("gas"), pl.when(pl.col("tick") > 9).then(1.0).alias("gas_found")
+    pl.read_parquet(file).with_columns(*own).write_parquet(file)
+    metrics = table(run_report(folder), "Metrics over")
+    assert metrics["gas"] == ("38", "1.9", "0", "2", "ppm", "what it smells of; adds up")
+    assert metrics["gas_found"][-1] == "when it did; a time"
+    film = read_run(folder).film
+    assert not isinstance(film, str)
+    [shown] = [curve for curve in what_happened.curves(film, what_happened.second(film)) if "gas" in curve.name]
+    assert shown.title == "gas (ppm)"
 
 
 def test_what_is_no_run_folder_is_refused(tmp_path):

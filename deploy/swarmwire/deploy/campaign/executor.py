@@ -1,7 +1,8 @@
 """Who works on the tasks of a campaign: the interface, and executors by name.
 
-`--on local` is a pool of worker processes of this machine. Others come by entry points of the group
-`swarmwire.executors`: a name is what stands before `://` in `--on`, and leads to a function like `open_executor` below.
+`--on local` is a pool of worker processes of this machine, `--on dask://HOST:PORT` a dask cluster. Others come by entry
+points of the group `swarmwire.executors`: a name is what stands before `://` in `--on`, and leads to a function like
+`open_executor` below.
 """
 
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from swarmwire.deploy.campaign.task import PieceResult, Task
 
 GROUP = "swarmwire.executors"
 LOCAL = "local"
+DASK = "dask"
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Executor(Protocol):
 
     @property
     def records(self) -> bool:
-        """Whether workers can write run folders at paths of this machine (`Task.record_to`)."""
+        """Whether workers can write run folders at paths of this machine; else they get no `Task.record_to`."""
         ...
 
     def submit(self, task: Task) -> None:
@@ -70,8 +72,21 @@ def open_executor(on: str, workers: int | None, scenario: Path) -> Executor:
         from swarmwire.deploy.campaign.local_executor import LocalExecutor
 
         return LocalExecutor(workers)
+    if name == DASK:
+        return _open_dask(on, workers, scenario)
     others = {point.name: point for point in entry_points(group=GROUP)}
     if name not in others:
-        raise BadInput("--on", "", f"expected {one_of([LOCAL, *others], name)}; got {on!r}")
+        raise BadInput("--on", "", f"expected {one_of([LOCAL, DASK, *others], name)}; got {on!r}")
     opener = cast("OpenExecutor", others[name].load())
     return opener(on, workers, scenario)
+
+
+def _open_dask(on: str, workers: int | None, scenario: Path) -> Executor:
+    try:
+        from swarmwire.deploy.campaign.dask_executor import DaskExecutor
+    except ModuleNotFoundError as error:
+        if error.name not in ("dask", "distributed"):
+            raise
+        expected = f'expected the package {error.name}, which dask:// needs: pip install "swarmwire[cluster]"'
+        raise BadInput("--on", "", expected) from None
+    return DaskExecutor(on, workers, scenario)

@@ -1,14 +1,16 @@
 """What can be asked of a campaign's runs: columns of `summary.parquet` that hold a number, or a time."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from swarmwire.comms.fates import FATE_NAMES
 from swarmwire.deploy.campaign.row import LATENCIES, STATISTICS, TOTALS
-from swarmwire.deploy.measuring import measuring
+from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.world.scenario.scenario import Scenario
 
 STOP_TIME = "stop_time_s"
+STOPPED = "when this began to hold: {}"
 OF_PACKETS = "radio."  # how such columns begin
 OF_RADIO = {
     "sent": ("", "packets sent"),
@@ -31,7 +33,9 @@ def outcomes_of(scenarios: Iterable[Scenario]) -> tuple[Outcome, ...]:
     found: dict[str, Outcome] = {}
     for scenario in scenarios:
         for outcome in _outcomes(scenario):
-            found.setdefault(outcome.column, outcome)
+            before = found.setdefault(outcome.column, outcome)
+            if before.column == STOP_TIME and before.help != outcome.help:  # what stops is varied
+                found[STOP_TIME] = replace(before, help=STOPPED.format("what is to stop the run"))
     return tuple(sorted(found.values(), key=_rank))
 
 
@@ -40,8 +44,8 @@ def _rank(outcome: Outcome) -> tuple[bool, bool, bool]:
 
 
 def _outcomes(scenario: Scenario) -> Iterator[Outcome]:
-    if scenario.stops():
-        yield Outcome(STOP_TIME, "s", "time", "since when what ended the run had held")
+    if stops := conditions(scenario):
+        yield Outcome(STOP_TIME, "s", "time", STOPPED.format(" or ".join(map(str, stops))))
     for metric in measuring(scenario).metrics:
         if metric.kind == "time":
             yield Outcome(metric.name, metric.unit, "time", metric.help, not metric.standard)

@@ -24,19 +24,24 @@ def tasks_of(
         recorded = [run for run in missing if campaign.seed_of(run) in campaign.record_seeds]
         together = [run for run in missing if campaign.seed_of(run) not in campaign.record_seeds]
         tasks += [_task(campaign, folder, point, [run], recorded=True) for run in recorded]
-        tasks += [_task(campaign, folder, point, runs, recorded=False) for runs in _shares(together, size)]
+        tasks += [_task(campaign, folder, point, runs, recorded=False) for runs in shares(together, size)]
     return tasks
 
 
 def usual_pack(campaign: Campaign, workers: int) -> int:
     """How many arenas a world has where nobody says."""
-    usual = min(USUAL_PACK, max(LONG_PACK, int(PACK_S / campaign.duration_s)))
-    seeds, most = len(campaign.seeds), max(1, min(usual, MOST_ROBOTS // campaign.robots))
-    packs = max(-(-seeds // most), -(-ROUNDS * workers // len(campaign.points)))  # of each point
+    most = max(LONG_PACK, int(PACK_S / campaign.duration_s))
+    return pack_for(len(campaign.points), len(campaign.seeds), campaign.robots, workers, most)
+
+
+def pack_for(points: int, seeds: int, robots: int, workers: int, most: int = LONG_PACK) -> int:
+    """The same, of so many points with so many seeds each, at most so many robots in an arena, and `most` arenas."""
+    most = max(1, min(USUAL_PACK, most, MOST_ROBOTS // robots))
+    packs = max(-(-seeds // most), -(-ROUNDS * workers // points))  # of each point
     return max(1, -(-seeds // packs))
 
 
-def _shares(runs: Sequence[int], size: int) -> Iterator[Sequence[int]]:
+def shares(runs: Sequence[int], size: int) -> Iterator[Sequence[int]]:
     """Shares of at most this size, which differ by one run at most."""
     count = -(-len(runs) // size)
     for share in range(count):

@@ -1,17 +1,16 @@
 """Run a campaign, or what is missing of it: many seeds at each point of a design, kept as a table of all runs."""
 
-from collections.abc import Mapping, Sequence
-from contextlib import closing
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, read_campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
 from swarmwire.deploy.campaign.campaign_start import begin, default_folder
 from swarmwire.deploy.campaign.design import GRID
-from swarmwire.deploy.campaign.execution import execute
+from swarmwire.deploy.campaign.execution import Keep, execute
 from swarmwire.deploy.campaign.executor import LOCAL, Executor, open_executor
 from swarmwire.deploy.campaign.pieces import tasks_of
 from swarmwire.deploy.campaign.plan import Asked, Plan, planned
@@ -32,6 +31,7 @@ class Means:
     on: str = LOCAL  # executor
     workers: int | None = None  # None: one for each core
     pack: int | None = None  # arenas in a world; None: as the campaign says
+    executor: Executor | None = None  # one that is open, and stays so, instead of `on` and `workers`
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def begin_sweep(
     interrupt: Interrupt | None = None,
 ) -> Sweep:
     """Make the folder of a campaign that was checked, and run it; `command` is kept with it."""
-    with closing(_executor(means, path, plan.asked.record_seeds)) as executor:
+    with _executor(means, path) as executor:
         folder = CampaignFolder(path, begin(plan, path, command))
         with folder.taken():
             return _work(folder, {}, executor, means.pack, watcher or NobodyWatches(), interrupt or Interrupt())
@@ -149,18 +149,19 @@ def resume_sweep(
     if not anyway:
         check_code(campaign, path)
     folder = CampaignFolder(path, campaign)
-    with closing(_executor(means, path, campaign.record_seeds)) as executor, folder.taken():
+    with _executor(means, path) as executor, folder.taken():
         folder.clear()
         tried = {run: how for run, how in folder.ended().items() if not (retry_failed and how == FAILED)}
         return _work(folder, tried, executor, means.pack, watcher or NobodyWatches(), interrupt or Interrupt())
 
 
-def _executor(means: Means, path: Path, record_seeds: Sequence[int]) -> Executor:
-    executor = open_executor(means.on, means.workers, path / SCENARIO_FOLDER)
-    if record_seeds and not executor.records:
-        executor.close()
-        raise BadInput("--record-seeds", "", f"expected --on {LOCAL}: others cannot write into this machine's folders")
-    return executor
+@contextmanager
+def _executor(means: Means, path: Path) -> Generator[Executor]:
+    if means.executor is not None:
+        yield means.executor
+        return
+    with closing(open_executor(means.on, means.workers, path / SCENARIO_FOLDER)) as executor:
+        yield executor
 
 
 def _work(
@@ -173,7 +174,8 @@ def _work(
 ) -> Sweep:
     """Do all runs but those that have `ended`, and how, already; then make the table of all runs."""
     campaign = folder.campaign
-    tasks = tasks_of(campaign, folder, ended, pack, executor.slots)
+    slots = executor.slots  # as they are now: workers may come and go
+    tasks = tasks_of(campaign, folder, ended, pack, slots)
 
     def keep(_: Task, result: PieceResult) -> None:
         folder.keep(result)
@@ -183,11 +185,23 @@ def _work(
     watcher.begin(campaign, len(ended), _failed(ended))
     try:
         with interrupt:
-            if execute(tasks, executor, keep, lambda: interrupt.asked):
-                folder.finish(executor.slots)
+            if _done(tasks, executor, keep, lambda: interrupt.asked):
+                folder.finish(max(1, slots))
     finally:
         watcher.end()
     return Sweep(folder.path, campaign.runs, len(ended), _failed(ended))
+
+
+def _done(tasks: Sequence[Task], executor: Executor, keep: Keep, stopped: Callable[[], bool]) -> bool:
+    """As `execute`; runs with run folders by workers of this machine, at the end, where the executor's cannot."""
+    here = [task for task in tasks if task.record_to is not None and not executor.records]
+    there = [task for task in tasks if task not in here] if here else tasks
+    if not execute(there, executor, keep, stopped):
+        return False
+    if not here:
+        return True
+    with closing(open_executor(LOCAL, None, Path(here[0].scenario).parent)) as local:
+        return execute(here, local, keep, stopped)
 
 
 def _failed(ended: Mapping[int, str]) -> int:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
+from math import isinf
 from typing import Any, cast
 
 from swarmwire.comms.errors import BadInput
@@ -31,8 +32,8 @@ class Range:
         """The number at a share of the way, from 0 to 1."""
         if not self.log or share in (0, 1):
             return float(self.first + (self.last - self.first) * share)
-        ratio = float(self.last / self.first)
-        return float(f"{float(self.first) * ratio ** float(share):.12g}")  # 10.0, not 9.999999999999998
+        first, last, part = float(self.first), float(self.last), float(share)
+        return float(f"{first ** (1.0 - part) * last**part:.12g}")  # 10.0, not 9.999999999999998
 
     def values(self) -> list[float]:
         """All of them, with a count; the first and the last among them."""
@@ -117,9 +118,10 @@ def _value(text: str) -> Any:
 
 
 def _number(text: str) -> Fraction | None:
-    """As it stands there, so that a step of 0.1 is a tenth."""
+    """As it stands there, so that a step of 0.1 is a tenth; None for what no float can be, such as 1e400."""
     try:
-        return None if "/" in text else Fraction(text)
+        near = float(text)  # first: as a fraction 1e999999999 would fill the memory
+        return None if isinf(near) else Fraction(text) if near else Fraction(0)
     except (ValueError, OverflowError):
         return None
 

@@ -1,12 +1,12 @@
 """Metrics over time in panels on top of one another, with what happened in lanes above them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.looks import CURVE, SMALL_PT, SOFT
-from swarmwire.metrics.drawing.metric_axes import is_count, limits
+from swarmwire.metrics.drawing.metric_axes import UNKNOWN, Facts, is_count, limits
 from swarmwire.metrics.drawing.plain_axes import plain_axes
 from swarmwire.metrics.report.in_words import short
 from swarmwire.metrics.report.lanes import Lane
@@ -24,10 +24,11 @@ _MOST_LINES = 24
 class Curve:
     """A metric of one arena over time."""
 
-    name: str  # as metrics have it: what is known of its bounds and kind goes by it
+    name: str  # as metrics have it
     title: str
     value: FloatArray  # (T,) NaN: undefined
     whole: bool = False  # a number of things: it jumps, and stays in between
+    facts: Facts = field(default_factory=lambda: UNKNOWN)  # in which its bounds and kind stand
 
 
 def timeline(time_s: FloatArray, curves: Sequence[Curve], lanes: Sequence[Lane]) -> Any:
@@ -58,11 +59,11 @@ def timeline(time_s: FloatArray, curves: Sequence[Curve], lanes: Sequence[Lane])
 
 def draw_curve(axes: Any, time_s: FloatArray, curve: Curve) -> None:
     """The curve on axes of its own, which have no limits across yet."""
-    kept = thinned(curve.value)
-    steps = "steps-post" if curve.whole or is_count(curve.name) else "default"
+    kept, whole = thinned(curve.value), curve.whole or is_count(curve.name, curve.facts)
+    steps = "steps-post" if whole else "default"
     axes.plot(time_s[kept], curve.value[kept], color=CURVE, lw=1.0, drawstyle=steps)
-    axes.set_ylim(*limits(curve.name, curve.value))
-    axes.locator_params(axis="y", nbins=3, integer=curve.whole or is_count(curve.name))
+    axes.set_ylim(*limits(curve.name, curve.value, curve.facts))
+    axes.locator_params(axis="y", nbins=3, integer=whole)
     axes.yaxis.set_major_formatter(short)
 
 

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.metric_axes import is_count
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.drawing.metric_axes import is_count, told_of
+from swarmwire.metrics.record.metric_facts import MetricFacts
+from swarmwire.metrics.registry import DELIVERY
 from swarmwire.metrics.report.in_words import number, share
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.section import Section, Table
@@ -18,11 +19,11 @@ _KINDS = {"level": "", "count": "adds up", "time": "a time"}
 
 def measured(run: RunData) -> Section:
     """The section: a row per metric of the first arena; of several arenas one per arena, too, and across them."""
-    values = of_metrics(run)
+    values, facts = of_metrics(run), run.folder.measured
     if not values:
         return Section("Metrics", ("No metric was recorded.",))
     rows = tuple(
-        (name, *(number(found[key]) for key in STATISTICS), *_about(name))
+        (name, *(number(found[key]) for key in STATISTICS), *_about(told_of(name, facts)))
         for name, found in values.items()
         if any(found[key] is not None for key in STATISTICS)
     )
@@ -45,7 +46,11 @@ def of_metrics(run: RunData) -> dict[str, dict[str, float | None]]:
         return summed
     if isinstance(run.film, str):
         return {}
-    return {name: _statistics(value, is_count(name)) for name, value in run.film.metrics.items() if name in METRICS}
+    return {
+        name: _statistics(value, is_count(name, run.film.facts))
+        for name, value in run.film.metrics.items()
+        if name != DELIVERY
+    }
 
 
 def _statistics(value: FloatArray, adds_up: bool) -> dict[str, float | None]:
@@ -58,12 +63,9 @@ def _statistics(value: FloatArray, adds_up: bool) -> dict[str, float | None]:
     return {"final": final, "mean": float(each.mean()), "min": float(each.min()), "max": float(each.max())}
 
 
-def _about(name: str) -> tuple[str, str]:
-    if name not in METRICS:
-        return "", "the user's own"
-    kind = METRICS[name]
-    told = f"{kind.help}; {_KINDS[kind.kind]}" if _KINDS[kind.kind] else kind.help
-    return kind.unit, told
+def _about(of: MetricFacts) -> tuple[str, str]:
+    """Its unit, and what it is."""
+    return of.unit, "; ".join(filter(None, (of.help or "the user's own", _KINDS.get(of.kind))))
 
 
 def _arenas(run: RunData) -> list[str | Table]:

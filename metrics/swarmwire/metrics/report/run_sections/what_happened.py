@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.metrics.drawing.film import Film
-from swarmwire.metrics.drawing.metric_axes import titled
+from swarmwire.metrics.drawing.metric_axes import Facts, titled, told_of
 from swarmwire.metrics.registry import DELIVERY, METRICS
 from swarmwire.metrics.report.in_words import number
 from swarmwire.metrics.report.lanes import Lane, Span
@@ -55,7 +55,7 @@ def what_happened(run: RunData) -> Section:
 def second(film: Film) -> list[str]:
     """The metrics for small panels: those that the scenario names but times, then some of the standard."""
     listed = [name for name in film.metrics if name not in METRICS or not METRICS[name].standard]
-    listed = [name for name in listed if name not in METRICS or METRICS[name].kind != "time"]
+    listed = [name for name in listed if not _is_time(name, film.facts)]
     changing = [name for name in SECOND if name in film.metrics and np.unique(film.metrics[name]).size > 1]
     return [name for name in (*listed, *changing) if name not in MAIN]
 
@@ -63,10 +63,14 @@ def second(film: Film) -> list[str]:
 def curves(film: Film, names: tuple[str, ...] | list[str]) -> list[Curve]:
     """The metrics of these names that ever had a value."""
     return [
-        Curve(name, _TITLES.get(name, titled(name)), film.metrics[name], name in _WHOLE)
+        Curve(name, _TITLES.get(name, titled(name, film.facts)), film.metrics[name], name in _WHOLE, film.facts)
         for name in names
         if name in film.metrics and np.isfinite(film.metrics[name]).any()
     ]
+
+
+def _is_time(name: str, facts: Facts) -> bool:
+    return told_of(name, facts).kind == "time"
 
 
 def _moments(run: RunData, film: Film) -> list[Lane]:
@@ -76,7 +80,7 @@ def _moments(run: RunData, film: Film) -> list[Lane]:
     if ends[ARENA].get("stopped_by"):
         moments[f"stop: {ends[ARENA]['stopped_by']}, since"] = float(ends[ARENA]["stop_time_s"])
     for name, value in film.metrics.items():
-        if name in METRICS and METRICS[name].kind == "time" and np.isfinite(value[-1]):
+        if _is_time(name, film.facts) and np.isfinite(value[-1]):
             moments[f"{name.removesuffix('_s')}:"] = float(value[-1])
     return [Lane(f"{words} {number(at_s)} s", [Span(at_s, None)]) for words, at_s in moments.items()]
 
