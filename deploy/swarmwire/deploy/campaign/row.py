@@ -41,9 +41,7 @@ def failed_row(error: str) -> Row:
 
 def _radio(radio: RadioResult) -> dict[str, Any]:
     latencies = {
-        f"radio.{of}.{percentile}": value
-        for of in LATENCIES
-        for percentile, value in vars(getattr(radio, of)).items()
+        f"radio.{of}.{percentile}": value for of in LATENCIES for percentile, value in vars(getattr(radio, of)).items()
     }
     fates = {f"radio.fates.{name}": count for name, count in radio.fates.items()}
     return {**{f"radio.{name}": getattr(radio, name) for name in TOTALS}, **latencies, **fates}
