@@ -4,7 +4,7 @@ from collections.abc import Collection
 from typing import Any
 
 from swarmwire.deploy.campaign.task import Row
-from swarmwire.deploy.result import ArenaResult, RadioResult
+from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult
 
 FAILED = "failed"
 STATISTICS = ("final", "mean", "min", "max")
@@ -40,10 +40,9 @@ def failed_row(error: str) -> Row:
 
 
 def _radio(radio: RadioResult) -> dict[str, Any]:
-    latencies = {
-        f"radio.{of}.{percentile}": value
-        for of in LATENCIES
-        for percentile, value in vars(getattr(radio, of)).items()
-    }
+    latencies: dict[str, Any] = {}
+    for of in LATENCIES:
+        percentiles: Percentiles = getattr(radio, of)
+        latencies |= {f"radio.{of}.{percentile}": value for percentile, value in vars(percentiles).items()}
     fates = {f"radio.fates.{name}": count for name, count in radio.fates.items()}
     return {**{f"radio.{name}": getattr(radio, name) for name in TOTALS}, **latencies, **fates}

@@ -14,7 +14,7 @@ from swarmwire.comms.parameters import limits_of
 
 TABLE = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True)
 # Their keys have their help from `parameter`; pydantic would search all modules of the process for sources of each.
-MADE_TABLE = ConfigDict(**{**TABLE, "use_attribute_docstrings": False})
+MADE_TABLE: ConfigDict = {**TABLE, "use_attribute_docstrings": False}
 UNFIT = "unfit"  # the type of a fault that a table's form finds, whose context names the key
 
 
