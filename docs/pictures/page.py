@@ -21,7 +21,9 @@ def main(page: Path, heading: str, picture: Path, width_px: int, height_px: int)
         frame = Path(folder) / "frame.html"
         size = f"width:{width_px}px;height:{height_px}px"
         style = f"position:fixed;top:0;left:0;border:0;{size}"
-        frame.write_text(f'<!doctype html><iframe style="{style}" src="{page.resolve().as_uri()}#{heading}"></iframe>', "utf-8")
+        frame.write_text(
+            f'<!doctype html><iframe style="{style}" src="{page.resolve().as_uri()}#{heading}"></iframe>', "utf-8"
+        )
         shot = Path(folder) / "shot.png"
         window = f"--window-size={max(width_px, LEAST_PX)},{height_px}"
         command = ["chromium", *QUIET, f"--user-data-dir={folder}/profile", window, f"--screenshot={shot}"]

@@ -21,6 +21,7 @@ from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
 from swarmwire.deploy.commands.sweep import sweep_command
+from swarmwire.deploy.commands.tune import tune_command
 from swarmwire.deploy.commands.verify import verify_command
 from swarmwire.deploy.commands.view import view_command
 
@@ -33,6 +34,7 @@ app = typer.Typer(
 )
 app.command("run")(run_command)
 app.command("sweep")(sweep_command)
+app.command("tune")(tune_command)
 app.command("repeat")(repeat_command)
 app.command("check")(check_command)
 app.command("draw")(draw_command)

@@ -7,8 +7,9 @@ import polars as pl
 import pytest
 
 from swarmwire.deploy import RunFolder, run, sweep
+from swarmwire.deploy.campaign import sweeping
 from swarmwire.deploy.campaign.campaign import read_campaign
-from tests.deploy.campaign.small import rows_in, scenario_in, series_in
+from tests.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
 
 VARY = {"radio.loss": "0:0.8:2", "robots.pair.count": [2, 3]}
 
@@ -112,6 +113,31 @@ def test_chosen_seeds_are_recorded_in_full(tmp_path, scenario, here):
     assert (recorded.path / "run.rrd").exists()
     assert recorded.summary is not None
     assert recorded.summary["trajectory_sha256"] == [rows_in(tmp_path / "c")[4]["trajectory_sha256"]]
+
+
+def test_where_workers_cannot_write_here_recorded_runs_are_done_on_this_machine_at_the_end(
+    tmp_path, scenario, monkeypatch
+):
+    done_by, there, local = list[tuple[str, int]](), InThisProcess(), InThisProcess()
+    there.records = False
+    for name, executor in (("there", there), ("local", local)):
+        monkeypatch.setattr(executor, "submit", noting(executor.submit, name, done_by))
+    monkeypatch.setattr(sweeping, "open_executor", lambda on, *_: local if on == "local" else there)
+    sweep(scenario, seeds=3, out=tmp_path / "c", record_seeds=[2], pack=1, on="there://")
+    assert done_by == [("there", 1), ("there", 3), ("local", 2)]
+    assert (there.closed, local.closed) == (True, True)
+    assert [path.name for path in (tmp_path / "c" / "runs").iterdir()] == ["run-000001"]
+    assert [row["ended"] for row in rows_in(tmp_path / "c")] == ["duration"] * 3
+
+
+def noting(submit, name, done_by):
+    """`submit` that notes each task's seed."""
+
+    def submit_noted(task):
+        done_by.extend((name, seed) for seed in task.seeds)
+        submit(task)
+
+    return submit_noted
 
 
 def test_drawn_designs_say_between_which_values(tmp_path, scenario, here):

@@ -9,8 +9,6 @@
 Each file is written aside and renamed, so that what has its name is whole.
 """
 
-import fcntl
-import os
 import shutil
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -23,6 +21,7 @@ from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, Campaign
 from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.series_files import join_series, series_part, sort_out_series
 from swarmwire.deploy.campaign.storage import MEND, read_whole, storing
+from swarmwire.deploy.campaign.taken import taken
 from swarmwire.deploy.campaign.task import PieceResult, Row
 from swarmwire.metrics.campaign.formats import PARTS, SERIES, SUMMARY
 from swarmwire.metrics.record.names import SCENARIO
@@ -59,14 +58,8 @@ class CampaignFolder:
     @contextmanager
     def taken(self) -> Generator[None]:
         """Keep the folder for this process while the block lasts; BadInput if another process has it."""
-        descriptor = os.open(self.path, os.O_RDONLY)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # let go by the system, however we end
+        with taken(self.path, "campaign"):
             yield
-        except BlockingIOError:
-            raise BadInput(str(self.path), "", "another process is at work on this campaign") from None
-        finally:
-            os.close(descriptor)
 
     def clear(self) -> None:
         """Take away what a killed campaign left half done."""

@@ -44,7 +44,7 @@ def campaign_of(plan: Plan, scenario_folder: Path, command: str) -> Campaign:
     """The campaign of a plan, with its scenario and all its files copied into this folder, which is empty."""
     asked, scenario = plan.asked, plan.scenario
     copies = Copies(scenario_folder)
-    point_overrides = tuple(tuple(_overrides(plan, point, copies)) for point in plan.points)
+    point_overrides = tuple(tuple(copied_overrides(plan, point, copies)) for point in plan.points)
     return Campaign(
         name=asked.name or scenario.name,
         scenario=scenario.name,
@@ -69,7 +69,7 @@ def campaign_of(plan: Plan, scenario_folder: Path, command: str) -> Campaign:
     )
 
 
-def _overrides(plan: Plan, point: Point, copies: Copies) -> list[str]:
+def copied_overrides(plan: Plan, point: Point, copies: Copies) -> list[str]:
     """The values of a point for the copied scenario: a file that one names is named, and copied, as there."""
     if not any(isinstance(value, str | list) for value in point.values()):
         return overrides_of(point)

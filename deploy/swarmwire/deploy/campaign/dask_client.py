@@ -41,7 +41,7 @@ class Client(Protocol):
 
 def address_of(on: str) -> str:
     """HOST:PORT of `dask://HOST:PORT`, where the port may be left out; BadInput if it has another form."""
-    found = re.fullmatch(r"([^\s:/]+|\[[0-9a-fA-F:]+\])(?::(\d{1,5}))?/?", on.removeprefix(SCHEME))
+    found = re.fullmatch(SCHEME + r"([^\s:/]+|\[[0-9a-fA-F:]+\])(?::(\d{1,5}))?/?", on)
     if found is None or int(found[2] or 0) >= 2**16:
         raise BadInput("--on", "", f"expected {SCHEME}HOST:PORT of a dask scheduler, got {on!r}")
     return f"{found[1]}:{found[2] or USUAL_PORT}"

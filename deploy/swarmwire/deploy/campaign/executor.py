@@ -42,7 +42,7 @@ class Executor(Protocol):
 
     @property
     def records(self) -> bool:
-        """Whether workers can write run folders at paths of this machine (`Task.record_to`): else it gets no such task."""
+        """Whether workers can write run folders at paths of this machine; else they get no `Task.record_to`."""
         ...
 
     def submit(self, task: Task) -> None:

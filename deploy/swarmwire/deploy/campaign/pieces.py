@@ -22,18 +22,23 @@ def tasks_of(
         recorded = [run for run in missing if campaign.seed_of(run) in campaign.record_seeds]
         together = [run for run in missing if campaign.seed_of(run) not in campaign.record_seeds]
         tasks += [_task(campaign, folder, point, [run], recorded=True) for run in recorded]
-        tasks += [_task(campaign, folder, point, runs, recorded=False) for runs in _shares(together, size)]
+        tasks += [_task(campaign, folder, point, runs, recorded=False) for runs in shares(together, size)]
     return tasks
 
 
 def usual_pack(campaign: Campaign, workers: int) -> int:
     """How many arenas a world has where nobody says."""
-    seeds, most = len(campaign.seeds), max(1, min(USUAL_PACK, MOST_ROBOTS // campaign.robots))
-    packs = max(-(-seeds // most), -(-ROUNDS * workers // len(campaign.points)))  # of each point
+    return pack_for(len(campaign.points), len(campaign.seeds), campaign.robots, workers)
+
+
+def pack_for(points: int, seeds: int, robots: int, workers: int) -> int:
+    """The same, of so many points with so many seeds each, and at most so many robots in an arena."""
+    most = max(1, min(USUAL_PACK, MOST_ROBOTS // robots))
+    packs = max(-(-seeds // most), -(-ROUNDS * workers // points))  # of each point
     return max(1, -(-seeds // packs))
 
 
-def _shares(runs: Sequence[int], size: int) -> Iterator[Sequence[int]]:
+def shares(runs: Sequence[int], size: int) -> Iterator[Sequence[int]]:
     """Shares of at most this size, which differ by one run at most."""
     count = -(-len(runs) // size)
     for share in range(count):

@@ -71,7 +71,7 @@ def planned(asked: Asked) -> Plan:
     scenario = _scenario_of(asked)
     for vary in asked.varied:
         if vary.path in FIXED or vary.path == "format":
-            raise vary.refused(f"expected another path: {vary.path} is not varied by --vary")
+            raise vary.refused(f"expected another path: {vary.path} cannot vary")
     points = points_of(asked.design, asked.varied, asked.points, asked.design_seed, whole_numbers(scenario))
     if len(points) * len(asked.seeds) > MOST_RUNS:
         raise BadInput("--seeds", "", f"expected at most {MOST_RUNS} runs, got {len(points) * len(asked.seeds)}")

@@ -1,8 +1,9 @@
 """Whether a campaign that was begun can be gone on with: by the same code, from the same files, as the same design."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, Campaign
@@ -10,19 +11,43 @@ from swarmwire.deploy.campaign.campaign_start import campaign_of
 from swarmwire.deploy.campaign.plan import Plan
 from swarmwire.deploy.record import machine
 from swarmwire.deploy.record.modules import changed_modules, module_digests
-from swarmwire.deploy.record.scenario_copy import changed_files
+from swarmwire.deploy.record.scenario_copy import CopiedFile, changed_files
 
 SAME = ("files", "overrides", "design", "seeds", "vary", "points")  # of a plan and of the campaign that it goes on with
 
 
-def check_files(campaign: Campaign, folder: Path) -> None:
+class Begun(Protocol):
+    """Something with a folder that was begun before, a campaign or a tuning."""
+
+    @property
+    def files(self) -> tuple[CopiedFile, ...]:
+        """In the folder of the scenario."""
+        ...
+
+    @property
+    def modules(self) -> Mapping[str, str]:
+        """sha256 of the installed code, by module."""
+        ...
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Of Python and packages."""
+        ...
+
+    @property
+    def cpu(self) -> str:
+        """The CPU's model."""
+        ...
+
+
+def check_files(campaign: Begun, folder: Path) -> None:
     """BadInput if what the runs are made from is not as it was."""
     changed = changed_files(campaign.files, folder / SCENARIO_FOLDER)
     if changed:
         raise BadInput(f"--resume {folder}", "", f"{SCENARIO_FOLDER}/{changed[0]}")
 
 
-def check_code(campaign: Campaign, folder: Path) -> None:
+def check_code(campaign: Begun, folder: Path) -> None:
     """BadInput if code, versions or CPU are not those that the campaign began with."""
     changed = code_changes(campaign)
     if changed:
@@ -31,7 +56,7 @@ def check_code(campaign: Campaign, folder: Path) -> None:
         raise BadInput(f"--resume {folder}", "", expected)
 
 
-def code_changes(campaign: Campaign) -> list[str]:
+def code_changes(campaign: Begun) -> list[str]:
     """What is not as it was when the campaign began, a line each."""
     versions, code = machine.versions(), [f"{module}:" for module in campaign.modules]
     changed = [name for name in campaign.versions if campaign.versions[name] != versions.get(name)]

@@ -14,19 +14,19 @@ MEND = "without the file --resume runs again what it held"
 
 
 class StorageFailed(SwarmwireError):
-    """A campaign's folder cannot be written any more."""
+    """The folder of a campaign or of a tuning cannot be written any more."""
 
 
 @contextmanager
-def storing(folder: Path) -> Generator[None]:
-    """Turn what a disk refuses in the block into StorageFailed."""
+def storing(folder: Path, command: str = "sweep") -> Generator[None]:
+    """Turn what a disk refuses in the block into StorageFailed; `command` is what goes on with the folder."""
     import polars as pl
 
     try:
         yield
     except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        text = f"{folder}: cannot be written: {why}; what is done stays: swarmwire sweep --resume {folder}"
+        text = f"{folder}: cannot be written: {why}; what is done stays: swarmwire {command} --resume {folder}"
         raise StorageFailed(text) from error
 
 

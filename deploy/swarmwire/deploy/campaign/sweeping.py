@@ -1,7 +1,7 @@
 """Run a campaign, or what is missing of it: many seeds at each point of a design, kept as a table of all runs."""
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ class Means:
     on: str = LOCAL  # executor
     workers: int | None = None  # None: one for each core
     pack: int | None = None  # arenas in a world; None: as the campaign says
+    executor: Executor | None = None  # one that is open, and stays so, instead of `on` and `workers`
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ def begin_sweep(
     interrupt: Interrupt | None = None,
 ) -> Sweep:
     """Make the folder of a campaign that was checked, and run it; `command` is kept with it."""
-    with closing(_executor(means, path)) as executor:
+    with _executor(means, path) as executor:
         folder = CampaignFolder(path, begin(plan, path, command))
         with folder.taken():
             return _work(folder, {}, executor, means.pack, watcher or NobodyWatches(), interrupt or Interrupt())
@@ -148,14 +149,19 @@ def resume_sweep(
     if not anyway:
         check_code(campaign, path)
     folder = CampaignFolder(path, campaign)
-    with closing(_executor(means, path)) as executor, folder.taken():
+    with _executor(means, path) as executor, folder.taken():
         folder.clear()
         tried = {run: how for run, how in folder.ended().items() if not (retry_failed and how == FAILED)}
         return _work(folder, tried, executor, means.pack, watcher or NobodyWatches(), interrupt or Interrupt())
 
 
-def _executor(means: Means, path: Path) -> Executor:
-    return open_executor(means.on, means.workers, path / SCENARIO_FOLDER)
+@contextmanager
+def _executor(means: Means, path: Path) -> Generator[Executor]:
+    if means.executor is not None:
+        yield means.executor
+        return
+    with closing(open_executor(means.on, means.workers, path / SCENARIO_FOLDER)) as executor:
+        yield executor
 
 
 def _work(

@@ -60,10 +60,9 @@ def _table(folder: CampaignFolder) -> Table:
 
 def _outcomes(folder: CampaignFolder) -> Sequence[Outcome]:
     """The first outcomes that have any value: times, and of other metrics what they were at the end."""
-    runs = folder.runs
-    some = [of for of in folder.outcomes if of.column in runs.columns and runs[of.column].count()]
-    first = [of for of in some if of.kind == "time" or of.column.endswith(FINAL)]
-    pdr = [of for of in some if of.column == "radio.pdr"]
+    there = [of for of in folder.outcomes if of.column in folder.runs.columns and folder.runs[of.column].count()]
+    first = [of for of in there if of.kind == "time" or of.column.endswith(FINAL)]
+    pdr = [of for of in there if of.column == "radio.pdr"]
     return first[: MOST_OUTCOMES - len(pdr)] + pdr
 
 

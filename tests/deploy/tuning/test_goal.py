@@ -1,0 +1,80 @@
+"""What a goal makes of the runs of a trial: also of times that were not reached."""
+
+import math
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.tuning.goal import goal_of, sample_of
+from swarmwire.metrics.campaign.outcome import Outcome
+
+ORDER = Outcome("order.final", "", "number", "")
+TIME = Outcome("aggregation_time_s", "s", "time", "")
+LIMIT_S = 60.0
+
+
+def reached(goal, values, end_s=LIMIT_S):
+    found = goal_of(goal, (ORDER, TIME), LIMIT_S)
+    rows = [{"seed": seed, "sim_time_s": end_s, found.outcome.column: value} for seed, value in enumerate(values)]
+    return found.reached(sample_of(rows, found.outcome))
+
+
+@pytest.mark.parametrize(
+    ("goal", "value"),
+    [("max order", 3.0), ("max order.final.q25", 2.0), ("min order.final.q75", 4.0), ("max order.final.mean", 4.0)],
+)
+def test_of_numbers_it_is_the_statistic(goal, value):
+    assert reached(goal, [1.0, 2.0, 3.0, 4.0, 10.0]) == (value, value, 0.0, 0)
+
+
+def test_of_times_it_is_kaplan_and_meiers_and_their_mean_is_up_to_the_limit():
+    times = [10.0, 20.0, 30.0, 40.0, None]
+    assert reached("min aggregation_time_s", times).value == 30.0
+    assert reached("min aggregation_time_s.q25", times).value == 20.0
+    assert reached("min aggregation_time_s.mean", times).value == pytest.approx((10 + 20 + 30 + 40 + 60) / 5)
+    assert reached("min aggregation_time_s.censored", times).value == pytest.approx(0.2)
+
+
+def test_a_quantile_that_was_not_reached_lies_beyond_the_limit_the_more_the_more_runs_did_not():
+    values = []
+    for missing in range(6):
+        found = reached("min aggregation_time_s.q50", [59.0] * (5 - missing) + [None] * missing)
+        assert math.isnan(found.statistic) == (missing >= 3)
+        assert found.censored == pytest.approx(missing / 5)
+        values.append(found.value)
+    assert values == pytest.approx([59.0, 59.0, 59.0, 96.0, 108.0, 120.0])
+
+
+def test_runs_that_ended_early_are_no_better_than_those_that_did_not():
+    early = reached("min aggregation_time_s", [None, None, None], end_s=5.0)
+    assert early.value == 120.0
+    assert reached("min aggregation_time_s.mean", [None, None, None], end_s=5.0).value == LIMIT_S
+
+
+def test_what_is_undefined_is_counted_and_nothing_has_no_value():
+    assert reached("max order", [1.0, None, 3.0]) == (2.0, 2.0, 0.0, 1)
+    assert np.isnan(reached("max order", [None, math.nan]).value)
+
+
+def test_which_way_is_better():
+    least, most = (goal_of(f"{way} order", (ORDER,), LIMIT_S) for way in ("min", "max"))
+    assert least.better(1.0, 2.0)
+    assert most.better(2.0, 1.0)
+    assert not least.better(1.0, 1.0)
+    assert (least.text, most.text) == ("min order.final.q50", "max order.final.q50")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("order", 'expected "min OUTCOME.STAT"'),
+        ("least order", 'expected "min OUTCOME.STAT"'),
+        ("min", 'expected "min OUTCOME.STAT"'),
+        ("min ordr.final", "ordr.final: expected one of .*did you mean order.final"),
+        ("min order.final.censored", "expected a time"),
+    ],
+)
+def test_another_goal_is_refused(text, told):
+    with pytest.raises(BadInput, match=f"^--goal: .*{told}"):
+        goal_of(text, (ORDER, TIME), LIMIT_S)
