@@ -150,6 +150,12 @@ class CampaignFolder:
         lacking = [name for name in NEEDED if name not in frame.columns]
         if lacking:
             raise BadInput(str(file), lacking[0], "expected this column of a campaign's table")
+        for name in (SIM_TIME, *(outcome.column for outcome in self.outcomes)):
+            kind = frame.schema.get(name)
+            if kind is not None and not (kind.is_numeric() or frame[name].is_null().all()):
+                raise BadInput(str(file), name, "expected a column of numbers")
+        if frame["ended"].null_count():
+            raise BadInput(str(file), "ended", "expected how each run ended")
 
 
 def _sample(outcome: Outcome, value: FloatArray, end_s: FloatArray, seed: IntArray, well: BoolArray) -> Sample:
