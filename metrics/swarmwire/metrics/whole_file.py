@@ -3,11 +3,14 @@
 Against a killed process and a full disk; there is no sync to disk for a power cut.
 """
 
+import errno
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from swarmwire.comms.errors import BadInput
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @contextmanager
@@ -33,13 +36,22 @@ def write_whole(path: Path, text: str) -> None:
 
 @contextmanager
 def chosen_file(to: Path) -> Generator[Path]:
-    """As `written_aside`, for a path that a person chose: BadInput if nothing can be written there."""
+    """As `written_aside`, for a path that a person chose: BadInput if nothing can be written there, or not so much."""
     with ExitStack() as stack:
         try:
             aside = stack.enter_context(written_aside(to))
         except OSError as error:
-            raise BadInput(str(to), "", f"expected a file that can be written: {error.strerror}") from None
-        yield aside
+            raise _not_written(to, error) from None
+        try:
+            yield aside
+        except OSError as error:
+            if error.errno in NO_ROOM:
+                raise _not_written(to, error) from None
+            raise
+
+
+def _not_written(to: Path, error: OSError) -> BadInput:
+    return BadInput(str(to), "", f"expected a file that can be written: {error.strerror}")
 
 
 def check_path(to: Path, suffixes: tuple[str, ...]) -> None:

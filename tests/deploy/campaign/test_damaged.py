@@ -8,6 +8,7 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaign.run_again import CampaignRun
+from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from tests.deploy.campaign.small import rows_in, series_in
 from tests.deploy.campaign.test_resume import ASKED, Killed, dying_at
 
@@ -112,3 +113,21 @@ def test_a_summary_beside_unreadable_others_is_kept(whole):
     (whole / "parts" / "part-00000000.parquet").write_bytes(b"")
     refused(resume, whole)
     assert (whole / "summary.parquet").read_bytes() == before
+
+
+def test_a_package_that_is_no_more_has_changed(whole):
+    about = whole / "campaign.json"
+    found = json.loads(about.read_text())
+    about.write_text(json.dumps({**found, "modules": {**found["modules"], "gone_away": "0"}}))
+    assert "module gone_away has changed since" in refused(resume, whole)
+    assert CampaignRun(whole, 0).again().changes == ("module gone_away has changed since",)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [("order.final", "much", "expected a column of numbers"), ("ended", None, "expected how each run ended")],
+)
+def test_reports_refuse_a_table_of_other_types_by_its_column(whole, name, value, told):
+    table = whole / "summary.parquet"
+    pl.read_parquet(table).with_columns(pl.lit(value, pl.String).alias(name)).write_parquet(table)
+    assert refused(lambda: CampaignFolder(whole).runs) == f"{table}: {name}: {told}"

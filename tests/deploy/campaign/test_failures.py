@@ -82,6 +82,25 @@ def test_an_agent_that_asks_for_input_gets_none_and_takes_no_task(scenario):
     assert "EOFError" in rows[0]["error"]
 
 
+def test_an_error_that_no_file_can_hold_is_told_as_far_as_it_can(tmp_path, scenario, here):
+    agent = (
+        "from swarmwire.agent import Agent\nclass Odd(Agent):\n    def step(self, robot): raise OSError('a\\udc80b')\n"
+    )
+    (tmp_path / "odd.py").write_text(agent)
+    sweep(scenario, seeds=1, out=tmp_path / "c", overrides=['robots.pair.agent="odd.py:Odd"'])
+    assert "OSError: a?b" in rows_in(tmp_path / "c")[0]["error"]
+
+
+def test_an_agent_that_calls_itself_for_ever_fails_alike_in_any_pack(tmp_path, scenario, here):
+    agent = "from swarmwire.agent import Agent\nclass Deep(Agent):\n    def step(self, robot): self.step(robot)\n"
+    (tmp_path / "deep.py").write_text(agent)
+    for pack in (1, 2):
+        overrides = ['robots.pair.agent="deep.py:Deep"']
+        sweep(scenario, seeds=2, out=tmp_path / f"packed{pack}", overrides=overrides, pack=pack)
+    assert "RecursionError" in rows_in(tmp_path / "packed1")[0]["error"]
+    assert rows_in(tmp_path / "packed1") == rows_in(tmp_path / "packed2")
+
+
 def test_workers_that_cannot_start_are_one_line(scenario, monkeypatch):
     monkeypatch.setattr(sys, "executable", "/bin/false")
     executor = LocalExecutor(2)

@@ -108,6 +108,13 @@ def test_quartiles_of_times_beyond_the_limit_say_so(tmp_path):
     assert "Transitions" not in sections
 
 
+def test_a_limit_is_never_rounded_up_to_what_nobody_watched(tmp_path):
+    times = {"found_s": lambda point, _: None if point["who"] == "never" else 2.0}
+    folder = write_campaign(tmp_path / "a", {"who": ["soon", "never"]}, range(4), numbers={}, times=times, limit_s=2.6)
+    _, shown = of(folder)
+    assert [row[3] for row in shown.table("who", "n")][-1] == "> 2.6 s"
+
+
 def test_without_times_nothing_is_said_of_survival(tmp_path):
     sections, shown = of(ordinary(tmp_path, times={}))
     assert "Survival" not in sections

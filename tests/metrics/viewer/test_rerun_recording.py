@@ -386,3 +386,17 @@ def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("swarmwire.metrics.viewer.extra.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r"run\.rrd: needs rerun-sdk: install swarmwire-metrics\[view\]"):
         RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
+
+
+def test_where_there_is_no_room_it_fails_at_once_and_leaves_no_file(tmp_path):
+    resource = pytest.importorskip("resource", reason="needs limits as Unix has them")
+    recording = RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (25_000, before[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            recording.begin(static())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    recording.end(None)
+    assert list(tmp_path.iterdir()) == []

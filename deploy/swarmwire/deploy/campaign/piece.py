@@ -9,6 +9,7 @@ import shutil
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from re import sub
 
 from swarmwire.comms.clock import WallClock, to_s
 from swarmwire.comms.errors import Interrupted
@@ -83,8 +84,10 @@ def _beside(folder: Path) -> Path:
 
 
 def _told(error: BaseException, task: Task) -> str:
-    """What was raised, as text that does not depend on where the campaign's folder lies."""
+    """What was raised, as text that does not depend on where the campaign's folder lies, nor on how deep we are."""
     text = str(error) or type(error).__name__
+    text = text.encode("utf-8", "replace").decode("utf-8")  # a file's name may hold what is no letter
+    text = sub(r"line repeated \d+ more times", "line repeated many times", text)
     return text.replace(str(Path(task.scenario).parent), "scenario")
 
 

@@ -33,7 +33,10 @@ def _outermost(module: str) -> str:
 
 
 def _origin(module: str) -> Path | None:
-    file: str | None = getattr(importlib.import_module(module), "__file__", None)
+    try:
+        file: str | None = getattr(importlib.import_module(module), "__file__", None)
+    except ImportError:  # it was there when the run began, and is no more
+        return None
     return Path(file) if file else None
 
 

@@ -17,6 +17,7 @@ from swarmwire.metrics.viewer.plotted import Measured
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selected import selected_robot
 
+ROOM_BYTES = 1_000_000  # for what is written before the first tick
 SEND_BYTES = 3_000_000  # each time costs half a kilobyte and more per entity, whatever it holds
 
 
@@ -94,7 +95,13 @@ class RerunRecording:
             self._limit.restart()
 
     def _connect(self, layout: Any) -> None:
-        """Lead the stream to where it goes."""
+        """Lead the stream to where it goes; OSError if there is no room: rerun would wait for ever for its writer."""
+        assert self._path is not None  # who has no path leads elsewhere
+        try:
+            self._path.write_bytes(bytes(ROOM_BYTES))
+        except OSError:
+            self._path.unlink(missing_ok=True)
+            raise
         self._rec.save(self._path, default_blueprint=layout)
 
     def end(self, last: Tally | None) -> dict[str, Any]:

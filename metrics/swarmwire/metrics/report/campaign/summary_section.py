@@ -12,6 +12,7 @@ from swarmwire.metrics.report.campaign.samples import Samples
 from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence, short_value
 from swarmwire.metrics.report.section import Section, Table
 from swarmwire.metrics.statistics.summary import Summary
+from swarmwire.metrics.statistics.texts import number_text
 
 MOST_POINTS = 60  # beyond which tables are by the values of each parameter
 _MOST_OPEN_ROWS = 20  # of tables after the first that are not folded
@@ -101,7 +102,8 @@ def _other_table(
 
 def _figures(found: Summary, outcome: Outcome, rounding: Rounding) -> tuple[str, str, str]:
     """Median, quartiles and the median's interval."""
-    beyond = f"> {rounding.text(found.limit)}{' ' + outcome.unit if outcome.unit else ''}"
+    # With digits of its own: rounded as the quartiles are, 2.6 s may read > 3 s, which nobody knows.
+    beyond = f"> {number_text(found.limit)}{' ' + outcome.unit if outcome.unit else ''}"
     censored = outcome.kind == "time" and found.n > 0
 
     def text(value: float) -> str:
