@@ -10,7 +10,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.own_metrics import own_kind
 
-GROUP = "swarmwire.metrics"
+GROUP = "swarmwire.metrics"  # of entry points
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Reads what a campaign wrote, finished or not, and refuses what is none."""
 
 import json
+from typing import get_args
 
 import numpy as np
 import polars as pl
@@ -8,6 +9,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.metrics.campaign.statistic import Stat
 from tests.metrics.campaign.campaigns import write_campaign
 
 
@@ -99,6 +101,12 @@ def test_a_number_that_was_not_to_be_measured_is_undefined(tmp_path):
 )
 def test_statistics_go_by_column_and_stat(tmp_path, name, means):
     assert CampaignFolder(write_campaign(tmp_path / "a")).statistic(name).name == means
+
+
+@pytest.mark.parametrize("stat", get_args(Stat))
+def test_a_time_has_every_statistic(tmp_path, stat):
+    found = CampaignFolder(write_campaign(tmp_path / "a")).statistic(f"aggregation_time_s.{stat}")
+    assert (found.outcome.kind, found.stat) == ("time", stat)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from swarmwire.metrics.statistics.degradation import degradation, relative_to_unharmed
+from swarmwire.metrics.statistics.degradation import Fit, degradation, relative_to_unharmed
+from swarmwire.metrics.statistics.interval import UNKNOWN
 
 SHARE = np.linspace(0.0, 0.9, 10)
 
@@ -25,6 +26,12 @@ def test_the_lower_aic_is_that_of_the_true_form(seed):
     assert line.told
     assert exponential.told
     assert line.better.r_squared > 0.9
+
+
+def test_a_fit_says_what_is_left_at_a_stress():
+    of = {"a_interval": UNKNOWN, "b_interval": UNKNOWN, "r_squared": 1.0, "aic": 0.0}
+    assert Fit("linear", 1.0, -0.5, **of).at(np.array([0.0, 0.4])).tolist() == pytest.approx([1.0, 0.8])
+    assert Fit("exponential", 2.0, -1.0, **of).at(np.array([0.5])).tolist() == pytest.approx([2 * math.exp(-0.5)])
 
 
 def test_the_line_is_that_of_least_squares():

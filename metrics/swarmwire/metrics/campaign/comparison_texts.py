@@ -8,6 +8,7 @@ from swarmwire.metrics.campaign.point_values import point_text
 from swarmwire.metrics.campaign.selection import Selection
 from swarmwire.metrics.statistics.texts import interval_text, number_text, quartiles_text
 
+# Heads of a comparison's table.
 COLUMNS = ("outcome", "at", "A", "B", "B - A", "interval", "delta", "p", "pairs")
 MEANINGS = {
     "Wilcoxon signed-rank": (

@@ -2,7 +2,7 @@
 
 CAMPAIGN_FORMAT = 1  # of campaign.json and of the tables beside it
 
-ABOUT = "campaign.json"
+ABOUT = "campaign.json"  # what was asked for, written first
 SUMMARY = "summary.parquet"  # a row per run, once all have ended
 PARTS = "parts"  # the same rows before that, in pieces
 FAILED = "failed"  # in the column `ended`

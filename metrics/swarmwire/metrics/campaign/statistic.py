@@ -7,7 +7,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.one_of import one_of
 from swarmwire.metrics.campaign.outcome import FINAL, Outcome
 
-Stat = Literal["q25", "q50", "q75", "mean", "censored"]
+Stat = Literal["q25", "q50", "q75", "mean", "censored"]  # quartiles, mean, and the share that was cut off
 STATS: tuple[Stat, ...] = get_args(Stat)
 USUAL: Stat = "q50"
 

@@ -3,7 +3,7 @@
 SUMMARY = "summary.json"  # written last: where it is, the run is over
 RUN_JSON = "run.json"  # from what the run was made, written first
 SCENARIO = "scenario.toml"  # as run, with overrides and seed
-STATIC = "static.json"
+STATIC = "static.json"  # arena, bodies and names: what does not change
 RECORDING = "run.rrd"  # for the viewer
 DIGESTS = "trajectory.digests"  # of each tick's state, for a repetition
 INPUTS = "inputs/actions.frames"  # what came from outside

@@ -7,7 +7,7 @@ from swarmwire.metrics.report.page import page
 from swarmwire.metrics.report.section import Report
 from swarmwire.metrics.whole_file import check_path, chosen_file
 
-PAGE = "report.html"
+PAGE = "report.html"  # in the folder that it is of
 FIGURES = "figures"
 _SVG_HEAD = '<?xml version="1.0" encoding="utf-8"?>\n'
 

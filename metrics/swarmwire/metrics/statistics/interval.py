@@ -12,4 +12,4 @@ class Interval(NamedTuple):
     high: float
 
 
-UNKNOWN = Interval(float("nan"), float("nan"))
+UNKNOWN = Interval(float("nan"), float("nan"))  # of too few runs

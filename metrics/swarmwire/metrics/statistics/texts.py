@@ -5,7 +5,7 @@ import math
 from swarmwire.metrics.statistics.interval import Interval
 from swarmwire.metrics.statistics.summary import Summary
 
-UNKNOWN_TEXT = "–"
+UNKNOWN_TEXT = "–"  # in place of a number
 
 
 def number_text(value: float, sign: bool = False) -> str:
