@@ -33,7 +33,7 @@ def group(values, censored=0.0, quartiles=None):
     ],
 )
 @pytest.mark.parametrize("limit", [None, 10.0])
-def test_distributions(groups, limit):
+def test_distributions_are_drawn_whether_values_differ_or_are_there_at_all(groups, limit):
     assert as_svg(distributions(groups, "what", "x", limit), "a")
 
 
@@ -42,7 +42,7 @@ def test_distributions(groups, limit):
 )
 @pytest.mark.parametrize("limit", [None, 9000.0])
 @pytest.mark.parametrize("x", [[0.0, 1.0, 2.0], [0.01, 1.0, 200.0]])
-def test_responses(values, limit, x):
+def test_responses_are_drawn_with_and_without_a_limit_and_side_by_side(values, limit, x):
     values = np.array(values)
     response = Response("a", np.array(x), values, values, values, values, values, Jump(0.5, 0.5, 1.5))
     assert as_svg(response_curve([response], "what", "x", limit), "a")
@@ -51,7 +51,7 @@ def test_responses(values, limit, x):
 
 @pytest.mark.parametrize("value", [0.0, np.nan, np.inf, -3.0])
 @pytest.mark.parametrize("columns", [1, 3, 12])
-def test_maps(value, columns):
+def test_maps_are_drawn_of_equal_of_no_and_of_censored_medians(value, columns):
     values = np.full((2, columns), value)
     labels = [str(place) for place in range(columns)]
     jumps = [None, Jump(0.5, 0.0, 1.0)]
@@ -66,7 +66,7 @@ def test_survival_of_nobody_of_all_and_of_thousands():
         assert len(as_svg(survival_curves(curves, "what", "x"), "a")) < 60_000
 
 
-def test_resilience_and_scaling():
+def test_resilience_and_scaling_are_drawn_of_a_few_points():
     share = np.array([0.0, 0.5])
     shapes = [FittedShape("linear", share, 1.0 - share, better=True)]
     assert as_svg(resilience_curve(share, 1.0 - share, share, share, shapes, "what", "x"), "a")

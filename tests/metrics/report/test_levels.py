@@ -17,7 +17,7 @@ def test_numbers_are_in_ascending_order_and_names_as_they_were_asked_for():
 def test_true_and_lists_are_names():
     points = tuple({"x": value} for value in (True, [1, 2.5], None, True))
     levels = levels_of("x", points)
-    assert (levels.labels, levels.number) == (("true", "[1, 2.5]", ""), None)
+    assert (levels.labels, levels.number) == (("true", "[1, 2.5]", "null"), None)
 
 
 def test_as_many_values_as_can_be_shown_stay_apart():

@@ -4,14 +4,14 @@ import pytest
 
 from swarmwire.metrics.report.page import page
 from swarmwire.metrics.report.section import Figure, Listing, Report, Section, Table
-from swarmwire.metrics.report.svg import COLUMN_IN, WIDE_IN, as_svg, blank_figure
+from swarmwire.metrics.report.svg import COLUMN_IN, as_svg, blank_figure
 from tests.metrics.report.pages import Page, check_alone
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
 
 
-def drawn(name, width_in=COLUMN_IN):
-    figure = blank_figure(width_in, 1.0)
+def drawn(name):
+    figure = blank_figure(COLUMN_IN, 1.0)
     axes = figure.add_axes((0.1, 0.2, 0.8, 0.7))
     axes.plot([1, 2, 3], [1, 3, 2], "o-")
     axes.fill_between([1, 2], [1, 2])
@@ -76,11 +76,6 @@ def test_a_table_without_names_of_columns_has_no_head():
     shown = report(Table(("", ""), (("a", "b"),), ""))
     assert "thead" not in shown.tags
     assert shown.tables == [[["a", "b"]]]
-
-
-def test_wide_figures_take_the_whole_width():
-    text = report(Figure("a", drawn("a"), ""), Figure("b", drawn("b", WIDE_IN), "")).text
-    assert text.count('<figure class="wide">') == text.count("<figure>") == 1
 
 
 def test_equal_figures_are_equal_texts_and_different_names_never_meet():

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.metrics.swarm.centroids import away_m
 from tests.metrics.swarm.swarms import mixed, moved, said, stand, swarms
-from tests.metrics.swarm.test_cohesion import away_m
 
 RADIUS_M = stand((0, 0)).of.groups[0].body.radius_m
 

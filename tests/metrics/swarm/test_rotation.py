@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 
+from tests.metrics.swarm.centroids import away_m
 from tests.metrics.swarm.swarms import moved, said, stand, swarms
-from tests.metrics.swarm.test_cohesion import away_m
 
 
 def ring(robots, heading_offset_rad, at=(0.0, 0.0)):

@@ -81,7 +81,7 @@ def first_cards(client: Client, on: str, patience_s: float, say: Say) -> dict[st
             raise ClusterFailed(f"{on}: no worker came within {patience_s:g} s: dask worker HOST:PORT") from None
     cards: dict[str, Any] = client.run(about, workers=present(client), on_error="return")
     for address, card in cards.items():
-        if isinstance(card, ImportError):
+        if isinstance(card, Exception) and "No module named" in str(card):  # of whatever kind, as dask hands it on
             raise ClusterFailed(f"worker {address} lacks this swarmwire, or its extra cluster: {card}")
         if isinstance(card, Exception) and not isinstance(card, OSError):  # that one has gone away meanwhile
             raise ClusterFailed(f"worker {address}: {card}")

@@ -195,8 +195,7 @@ def _work(
 def _done(tasks: Sequence[Task], executor: Executor, keep: Keep, stopped: Callable[[], bool]) -> bool:
     """As `execute`; runs with run folders by workers of this machine, at the end, where the executor's cannot."""
     here = [task for task in tasks if task.record_to is not None and not executor.records]
-    there = [task for task in tasks if task not in here] if here else tasks
-    if not execute(there, executor, keep, stopped):
+    if not execute([task for task in tasks if task.record_to is None or executor.records], executor, keep, stopped):
         return False
     if not here:
         return True

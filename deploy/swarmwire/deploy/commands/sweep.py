@@ -53,7 +53,10 @@ def sweep_command(
     on: Annotated[
         str, typer.Option(help="Who works: local, or another executor, such as dask://host:8786.", metavar="EXECUTOR")
     ] = "local",
-    workers: Annotated[int | None, typer.Option(help="Worker processes. Default: one for each core.")] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Worker processes, or threads of a cluster at most. Default: one for each core; all."),
+    ] = None,
     pack: Annotated[
         int | None, typer.Option(help="Arenas in one world at most; 1: none together. Default: about 50.")
     ] = None,
@@ -77,8 +80,8 @@ def sweep_command(
     Seeds are the same at every point. A run that fails is a row with its error. Ctrl-C, or a kill, loses what is under
     way alone: --resume DIR does what is missing.
 
-    Exit code 0: all runs have rows; 1: the folder cannot be written, or no worker can start; 2: refused before anything
-    was run; 130: interrupted.
+    Exit code 0: all runs have rows; 1: the folder cannot be written, no worker can start, or the cluster is gone; 2:
+    refused before anything was run; 130: interrupted.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.campaign.seed_list import chosen_seeds

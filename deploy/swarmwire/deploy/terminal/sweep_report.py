@@ -11,8 +11,8 @@ from rich.text import Text
 from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.sweeping import Sweep
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.campaign.outcome import Outcome
-from swarmwire.metrics.campaign.statistic import FINAL
+from swarmwire.metrics.campaign.outcome import FINAL, PDR, Outcome
+from swarmwire.metrics.campaign.point_values import value_text
 from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.texts import number_text, quantile_text
@@ -54,15 +54,15 @@ def _table(folder: CampaignFolder) -> Table:
     failed = folder.runs.filter(folder.runs["ended"] == FAILED)["point"].to_list()
     for number, point in enumerate(about.points[:MOST_POINTS]):
         medians = [_median(folder.sample(outcome.column, number)) for outcome in outcomes]
-        table.add_row(*(Text(str(value)) for value in point.values()), str(failed.count(number)), *medians)
+        table.add_row(*(Text(value_text(value)) for value in point.values()), str(failed.count(number)), *medians)
     return table
 
 
 def _outcomes(folder: CampaignFolder) -> Sequence[Outcome]:
-    """The first outcomes that have any value: times, and of other metrics what they were at the end."""
-    there = [of for of in folder.outcomes if of.column in folder.runs.columns and folder.runs[of.column].count()]
-    first = [of for of in there if of.kind == "time" or of.column.endswith(FINAL)]
-    pdr = [of for of in there if of.column == "radio.pdr"]
+    """The first usual ones that have any value, and last the delivery ratio."""
+    runs = folder.runs
+    usual = [of for of in folder.outcomes if of.is_usual and of.column in runs.columns and runs[of.column].count()]
+    first, pdr = [of for of in usual if of.column != PDR], [of for of in usual if of.column == PDR]
     return first[: MOST_OUTCOMES - len(pdr)] + pdr
 
 

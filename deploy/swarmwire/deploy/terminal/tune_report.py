@@ -44,9 +44,9 @@ def print_tuned(tuned: Tuned, console: Console, program: Path) -> None:
 
 
 def _print_interrupted(tuned: Tuned, console: Console, program: Path) -> None:
-    total = tuned.tuning.trials
-    what = "the check" if len(tuned.trials) == total else f"{len(tuned.trials)} of {total} trials are done"
-    console.print(f"interrupted: {what}" if what[0].isdigit() else f"interrupted during {what}", soft_wrap=True)
+    total, done = tuned.tuning.trials, len(tuned.trials)
+    where = f"interrupted: {done} of {total} trials are done" if done < total else "interrupted during the check"
+    console.print(where, soft_wrap=True)
     if tuned.best is not None:
         parameters = ", ".join(f"{path}={parameter_text(value)}" for path, value in tuned.best.parameters.items())
         text = f"best so far: {statistic_text(tuned.best, tuned.tuning.goal)} with {parameters}"

@@ -1,5 +1,7 @@
 """A campaign's folder, read back: of one that is finished, that was ended, and that still goes on."""
 
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -10,15 +12,14 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.about import About, Point, read_about
-from swarmwire.metrics.campaign.formats import ABOUT, PARTS, SUMMARY
+from swarmwire.metrics.campaign.formats import ABOUT, FAILED, PARTS, SUMMARY
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.campaign.statistic import Statistic, find_outcome, find_statistic
-from swarmwire.metrics.statistics.sample import Sample
+from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
 
 if TYPE_CHECKING:
     import polars as pl
 
-FAILED = "failed"  # in the column `ended`
 SIM_TIME = "sim_time_s"
 CHANGES_UNDERFOOT = 3  # times that the parts of a campaign that goes on may be joined while they are read
 NEEDED = ("run", "point", "seed", "ended", SIM_TIME)
@@ -72,7 +73,7 @@ class CampaignFolder:
                 reason = str(error).splitlines()[0]
                 raise BadInput(str(self.path), "", f"expected whole Parquet files: {reason}") from error
             for file, frame in zip(files, frames, strict=True):
-                self._check_columns(file, frame)
+                _check_columns(file, frame, self.outcomes)
             if not frames:
                 return pl.DataFrame(schema=dict.fromkeys(NEEDED, pl.Int64) | {"ended": pl.String, SIM_TIME: pl.Float64})
             return pl.concat(frames, how="diagonal_relaxed").unique("run", keep="last").sort("run")
@@ -146,16 +147,17 @@ class CampaignFolder:
         found = sorted(part for part in parts if not part.name.startswith("."))  # what is being written starts so
         return [whole, *found] if whole.exists() else found
 
-    def _check_columns(self, file: Path, frame: "pl.DataFrame") -> None:
-        lacking = [name for name in NEEDED if name not in frame.columns]
-        if lacking:
-            raise BadInput(str(file), lacking[0], "expected this column of a campaign's table")
-        for name in (SIM_TIME, *(outcome.column for outcome in self.outcomes)):
-            kind = frame.schema.get(name)
-            if kind is not None and not (kind.is_numeric() or frame[name].is_null().all()):
-                raise BadInput(str(file), name, "expected a column of numbers")
-        if frame["ended"].null_count():
-            raise BadInput(str(file), "ended", "expected how each run ended")
+
+def _check_columns(file: Path, frame: "pl.DataFrame", outcomes: Iterable[Outcome]) -> None:
+    lacking = [name for name in NEEDED if name not in frame.columns]
+    if lacking:
+        raise BadInput(str(file), lacking[0], "expected this column of a campaign's table")
+    for name in (SIM_TIME, *(outcome.column for outcome in outcomes)):
+        kind = frame.schema.get(name)
+        if kind is not None and not (kind.is_numeric() or frame[name].is_null().all()):
+            raise BadInput(str(file), name, "expected a column of numbers")
+    if frame["ended"].null_count():
+        raise BadInput(str(file), "ended", "expected how each run ended")
 
 
 def _sample(outcome: Outcome, value: FloatArray, end_s: FloatArray, seed: IntArray, well: BoolArray) -> Sample:
@@ -163,7 +165,6 @@ def _sample(outcome: Outcome, value: FloatArray, end_s: FloatArray, seed: IntArr
     failed = int(np.count_nonzero(~well))
     value, end_s, seed = value[well], end_s[well], seed[well]
     observed = np.isfinite(value)
-    if outcome.kind == "time":
-        return Sample(np.where(observed, value, end_s), observed, seed, "time", failed)
-    undefined = int(np.count_nonzero(~observed))
-    return Sample(value[observed], observed[observed], seed[observed], "number", failed, undefined)
+    is_time = outcome.kind == "time"
+    of = time_sample(np.where(observed, value, end_s), observed, seed) if is_time else number_sample(value, seed)
+    return replace(of, failed=failed)

@@ -9,12 +9,10 @@ from swarmwire.metrics.campaign.about import Point
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.campaign.point_pairs import point_pairs, shared_paths
 from swarmwire.metrics.campaign.selection import Selection
-from swarmwire.metrics.campaign.statistic import FINAL, find_outcome
+from swarmwire.metrics.campaign.statistic import find_outcome
 from swarmwire.metrics.statistics.difference import Difference, difference
 from swarmwire.metrics.statistics.interval import LEVEL
 from swarmwire.metrics.statistics.summary import Summary, summary
-
-USUAL = ("radio.pdr",)  # beside times and the last values of metrics, unless outcomes are named
 
 
 @dataclass(frozen=True)
@@ -79,5 +77,4 @@ def _outcomes(first: Selection, second: Selection, names: Sequence[str]) -> list
         raise BadInput(f"{first.text}, {second.text}", "", expected)
     if names:
         return [find_outcome(name, common) for name in names]
-    usual = [of for of in common if of.kind == "time" or of.column.endswith(FINAL) or of.column in USUAL]
-    return usual or common
+    return [outcome for outcome in common if outcome.is_usual] or common

@@ -2,8 +2,8 @@
 
 import math
 
-from swarmwire.metrics.campaign.campaign_folder import FAILED
 from swarmwire.metrics.campaign.comparison import Comparison, Row
+from swarmwire.metrics.campaign.formats import FAILED
 from swarmwire.metrics.campaign.point_values import point_text
 from swarmwire.metrics.campaign.selection import Selection
 from swarmwire.metrics.statistics.texts import interval_text, number_text, quartiles_text

@@ -6,6 +6,8 @@ from typing import get_args
 from swarmwire.metrics.statistics.sample import Kind
 
 KINDS: tuple[str, ...] = get_args(Kind)
+FINAL = ".final"  # how columns end that hold the last value of a metric, which its bare name means
+PDR = "radio.pdr"  # the column of the delivery ratio
 
 
 @dataclass(frozen=True)
@@ -17,3 +19,8 @@ class Outcome:
     kind: Kind
     help: str  # one line
     listed: bool = False  # of a metric that the scenario asks for, beside those of every run
+
+    @property
+    def is_usual(self) -> bool:
+        """Whether it is told of where none is named: a time, the last value of a metric, or the delivery ratio."""
+        return self.kind == "time" or self.column.endswith(FINAL) or self.column == PDR

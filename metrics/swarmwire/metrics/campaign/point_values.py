@@ -33,14 +33,14 @@ def value_from(text: str) -> Value:
     return found["value"] if len(found) == 1 else text
 
 
-def value_text(value: Value) -> str:
-    """A value as a person reads it.
+def value_text(value: Value, digits: int = 9) -> str:
+    """A value as a person reads it: so many digits of a number that need not be whole.
 
     >>> value_text(0.30000000000000004), value_text("discs"), value_text([1, 2])
     ('0.3', 'discs', '[1, 2]')
     """
     if isinstance(value, float):
-        return f"{value:.9g}"
+        return f"{value:.{digits}g}"
     return value if isinstance(value, str) else json.dumps(value)
 
 

@@ -5,12 +5,11 @@ from typing import Literal, NamedTuple, get_args
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.one_of import one_of
-from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.campaign.outcome import FINAL, Outcome
 
 Stat = Literal["q25", "q50", "q75", "mean", "censored"]
 STATS: tuple[Stat, ...] = get_args(Stat)
 USUAL: Stat = "q50"
-FINAL = ".final"  # what the bare name of a metric means
 
 
 class Statistic(NamedTuple):

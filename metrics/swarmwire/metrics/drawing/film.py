@@ -49,9 +49,8 @@ class Film:
     metrics: dict[str, FloatArray]  # (T,) each, NaN where undefined
     state: IntArray | None = None  # (T, n) places in `state_names`, NO_STATE for none; None if no robot has any
     state_names: tuple[str, ...] = ()
-    facts: Mapping[str, MetricFacts] = field(
-        default_factory=dict[str, MetricFacts]
-    )  # by name, of what the run measured
+    # By name, of what the run measured.
+    facts: Mapping[str, MetricFacts] = field(default_factory=dict[str, MetricFacts])
     movable: AnyArray | None = None  # (T, k, 3) where movable obstacles were; None: there are none
 
     def movable_at(self, index: int) -> tuple[Obstacle, ...]:

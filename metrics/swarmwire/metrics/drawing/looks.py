@@ -18,6 +18,7 @@ LINK = "#7d8aa5"
 MOVABLE_DASHES = (0, (2.5, 1.5))
 DEAD: Color = (176, 180, 188)
 CURVE = "#2f6fae"
+ACCENT = "#c2502e"  # what is to be seen first: told from the curves' blue by those who see no red or no green, too
 STATE_COLORS: tuple[Color, ...] = (
     (76, 120, 168),
     (245, 133, 24),

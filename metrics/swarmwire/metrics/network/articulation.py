@@ -11,6 +11,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.neighbours import neighbours_of
 from swarmwire.metrics.sampled import Sampled
 
 NONE = -1
@@ -48,13 +49,11 @@ def _articulation(moment: Moment) -> FloatArray | float:
 @njit(cache=True)
 def cut_vertices(edges: IntArray, nodes: int) -> BoolArray:
     """Which nodes (nodes,) of the graph with these edges (e, 2) split their component if they are taken out."""
-    start, to = _neighbours(edges, nodes)
+    start, to = neighbours_of(edges, nodes)
     at = start[:-1].copy()  # the next neighbour to look at
     above = np.full(nodes, NONE)  # in the tree of a search in depth
-    order, lowest = (
-        np.zeros(nodes, np.int64),
-        np.zeros(nodes, np.int64),
-    )  # when found; the first that its branch reaches
+    order = np.zeros(nodes, np.int64)  # when found
+    lowest = np.zeros(nodes, np.int64)  # the first that its branch reaches
     cuts, found = np.zeros(nodes, np.bool_), 0
     for root in range(nodes):
         if order[root]:
@@ -81,20 +80,3 @@ def cut_vertices(edges: IntArray, nodes: int) -> BoolArray:
                 node = up
         cuts[root] = branches > 1
     return cuts
-
-
-@njit(cache=True)
-def _neighbours(edges, nodes):
-    """Those of node i are to[start[i] : start[i + 1]]."""
-    start, to = np.zeros(nodes + 1, np.int64), np.empty(2 * len(edges), np.int64)
-    for e in range(len(edges)):
-        for end in range(2):
-            start[edges[e, end] + 1] += 1
-    start = np.cumsum(start)
-    at = start[:-1].copy()
-    for e in range(len(edges)):
-        for end in range(2):
-            node = edges[e, end]
-            to[at[node]] = edges[e, 1 - end]
-            at[node] += 1
-    return start, to

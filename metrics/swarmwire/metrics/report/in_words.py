@@ -31,3 +31,12 @@ def short(value: float, _place: int = 0) -> str:
         if abs(value) >= power:
             return f"{value / power:g}{letter}".replace("-", "−")
     return f"{value:.6g}".replace("-", "−")
+
+
+def shortened(text: str, most: int) -> str:
+    """A text of so many letters at most: the end of a longer one is left out.
+
+    >>> shortened("kinematic", 9), shortened("kinematic", 5)
+    ('kinematic', 'kine…')
+    """
+    return text if len(text) <= most else f"{text[: most - 1]}…"

@@ -7,10 +7,7 @@ from typing import Any
 
 from swarmwire.metrics.drawing.extra import need_report_extra
 from swarmwire.metrics.report.section import Figure, Listing, Report, Section, Table
-from swarmwire.metrics.report.svg import COLUMN_IN
 
-_POINTS = 72.0  # an inch
-_SVG_WIDTH = re.compile(r'<svg\b[^>]*?\swidth="([\d.]+)pt"')
 _NUMBER = re.compile(r"^\s*[-−+<>≥≤]?\s*\d|^[–-]?$")
 _CODE = re.compile(r"`([^`]*)`")
 
@@ -54,10 +51,8 @@ def _figure(figure: Figure) -> dict[str, Any]:
     """The element goes into the page as it is, with its caption for those who cannot see it."""
     from markupsafe import Markup, escape
 
-    width = _SVG_WIDTH.search(figure.svg)
-    wide = width is not None and float(width[1]) > 1.2 * COLUMN_IN * _POINTS
     spoken = f'<svg role="img" aria-label="{escape(figure.caption.replace("`", ""))}" '
-    return {"svg": Markup(figure.svg.replace("<svg ", spoken, 1)), "caption": figure.caption, "wide": wide}
+    return {"svg": Markup(figure.svg.replace("<svg ", spoken, 1)), "caption": figure.caption}
 
 
 def _numeric_columns(table: Table) -> list[bool]:

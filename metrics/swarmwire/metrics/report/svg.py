@@ -8,7 +8,6 @@ from swarmwire.metrics.drawing.canvas import new_figure
 from swarmwire.metrics.drawing.looks import LONG_SIDE_IN
 
 COLUMN_IN = 3.4  # width of a figure that stands beside another, and in a paper's column
-WIDE_IN = 7.0  # of one that needs the whole page
 
 _DPI_SIZE_PX = 1280  # only what is drawn as pixels within a figure depends on it
 _HEAD = re.compile(r"^.*?(?=<svg\b)", re.DOTALL)

@@ -8,7 +8,6 @@ in 4 % with 5. What changes gradually has a step, too: it stands where two level
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,13 +73,6 @@ def change_point(parameter: FloatArray, table: FloatArray, level: float = LEVEL)
         standardised=effect / deviation if deviation > 0.0 else math.copysign(math.inf, effect),
         gain=gain,
     )
-
-
-def change_line(
-    parameter: FloatArray, tables: Sequence[FloatArray], level: float = LEVEL
-) -> tuple[ChangePoint | None, ...]:
-    """The step along a parameter for each row of a map: a table (points, seeds) for each value of the other one."""
-    return tuple(change_point(parameter, table, level) for table in tables)
 
 
 def _levels(sums: PointSums) -> tuple[FloatArray, FloatArray]:

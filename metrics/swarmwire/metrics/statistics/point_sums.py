@@ -16,10 +16,6 @@ class PointSums:
     total: FloatArray
     squares: FloatArray
 
-    def mean(self) -> FloatArray:
-        """Of each point; NaN where no run was drawn."""
-        return self.total / np.where(self.count > 0.0, self.count, np.nan)
-
 
 def point_sums(table: FloatArray) -> PointSums:
     """Of a table (points, seeds), NaN where a run has no value."""

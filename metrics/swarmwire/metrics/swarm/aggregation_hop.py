@@ -11,6 +11,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.neighbours import neighbours_of
 from swarmwire.metrics.swarm.close_pairs import OfClosePairs
 
 
@@ -46,7 +47,7 @@ class AggregationHop(OfClosePairs):
 def _largest_flock(pairs, alive):
     """The robots in the largest flock of each arena, (arenas,)."""
     arenas, robots = alive.shape
-    start, close = _lists(pairs, arenas * robots)
+    start, close = neighbours_of(pairs, arenas * robots)
     largest, in_flock = np.zeros(arenas), np.zeros(arenas * robots, np.bool_)
     for arena in range(arenas):
         for i in range(robots):
@@ -58,19 +59,3 @@ def _largest_flock(pairs, alive):
                     in_flock[other] = True
                 largest[arena] = max(largest[arena], 1 + len(others))
     return largest
-
-
-@njit(cache=True)
-def _lists(pairs, rows):
-    """Whom each row is paired with: `close[start[row] : start[row + 1]]`."""
-    start, close = np.zeros(rows + 1, np.int64), np.empty(2 * len(pairs), np.int64)
-    for k in range(len(pairs)):
-        start[pairs[k, 0]] += 1
-        start[pairs[k, 1]] += 1
-    for row in range(rows):
-        start[row + 1] += start[row]
-    for k in range(len(pairs)):
-        for i, j in ((pairs[k, 0], pairs[k, 1]), (pairs[k, 1], pairs[k, 0])):
-            start[i] -= 1
-            close[start[i]] = j
-    return start, close

@@ -18,7 +18,7 @@ from swarmwire.metrics.torus import sides_m
 
 @dataclass(frozen=True)
 class Dispersion(Metric):
-    """sum |x_i - c|^2 / (4 r^2) over the robots alive: their second moment about their centroid c, in diameters.
+    """sum |x_i - c|^2 / (4 r^2) over the robots alive: second moment about their centroid c, in squared diameters.
 
     The least is that of the densest packing, near a hexagonal one, of as many discs: 6 for 7 of them, 48 for 19. It
     grows with the square of their number even so: compare it with that, or runs with equally many robots. r is the

@@ -3,7 +3,7 @@
 Only their form is known here: which metrics there are, with which parameters, is found where the run is put together.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import ConfigDict, Discriminator, Field, StringConstraints, Tag, model_validator
 from pydantic_core import PydanticCustomError
@@ -13,7 +13,7 @@ from swarmwire.world.scenario.tables import Table
 
 Name = Annotated[str, StringConstraints(min_length=1)]
 Comparison = Literal["at_least", "at_most", "above", "below"]
-COMPARISONS: tuple[Comparison, ...] = ("at_least", "at_most", "above", "below")
+COMPARISONS: tuple[Comparison, ...] = get_args(Comparison)
 
 
 class MetricTable(Table):

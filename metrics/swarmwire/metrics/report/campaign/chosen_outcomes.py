@@ -39,17 +39,14 @@ def choose_outcomes(samples: Samples, names: Sequence[str]) -> ChosenOutcomes:
     there = [outcome for outcome in known if outcome not in never]
     constant = tuple(outcome for outcome in there if outcome not in asked and not _varies(samples, outcome))
     vary = [outcome for outcome in there if outcome not in constant]
-    shown = asked or tuple(sorted(filter(_is_usual, vary), key=_rank)[:MOST]) or tuple(vary[:MOST])
+    usual = sorted((outcome for outcome in vary if outcome.is_usual), key=_rank)
+    shown = asked or tuple((usual or vary)[:MOST])
     return ChosenOutcomes(shown, tuple(outcome for outcome in vary if outcome not in shown), constant, never)
 
 
 def _varies(samples: Samples, outcome: Outcome) -> bool:
     sample = samples.all(outcome)
     return bool(sample.value.min() < sample.value.max() or not sample.observed.all())
-
-
-def _is_usual(outcome: Outcome) -> bool:
-    return outcome.kind == "time" or outcome.column.endswith(".final") or outcome.column in PREFERRED
 
 
 def _rank(outcome: Outcome) -> tuple[bool, bool, int]:

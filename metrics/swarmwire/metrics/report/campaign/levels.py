@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.metrics.campaign.about import Point, Value
-from swarmwire.metrics.report.campaign.words import value_text
+from swarmwire.metrics.report.campaign.words import short_value
 
 MOST_LEVELS = 16  # of numbers, beyond which they are put together
 _BINS = 8
@@ -42,7 +42,7 @@ def levels_of(path: str, points: tuple[Point, ...]) -> Levels:
     values = [point[path] for point in points]
     if all(_is_number(value) for value in values):
         return _of_numbers(path, np.array(values, dtype=np.float64))
-    texts = [value_text(value) for value in values]
+    texts = [short_value(value) for value in values]
     labels = tuple(dict.fromkeys(texts))
     return Levels(path, labels, None, np.array([labels.index(text) for text in texts]))
 

@@ -6,6 +6,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.report.campaign.figure_name import figure_name
 from swarmwire.metrics.report.campaign.levels import Levels, levels_of
+from swarmwire.metrics.report.campaign.rounding import Rounding
 from swarmwire.metrics.report.campaign.samples import Samples
 from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence
 from swarmwire.metrics.report.figures.resilience_curve import FittedShape, resilience_curve
@@ -35,11 +36,11 @@ def resilience_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Secti
             left = _what_is_left(samples, outcome, levels)
             if left is None:
                 continue
-            means = np.array([row[np.isfinite(row)].mean() for row in left if np.isfinite(row).any()])
             fits = degradation(_numbers(levels), left)
             if fits is None:
                 continue
-            if means[-1] >= means[0]:
+            present = _present(left)
+            if present[-1].mean() >= present[0].mean():
                 growing.append(f"`{outcome.column}`")
                 continue
             figures.append(_figure(outcome, levels, left, fits))
@@ -78,13 +79,17 @@ def _what_is_left(samples: Samples, outcome: Outcome, levels: Levels) -> FloatAr
     return left if np.isfinite(left).any() else None
 
 
+def _present(left: FloatArray) -> list[FloatArray]:
+    """The values of each level that has any."""
+    rows = [row[np.isfinite(row)] for row in left]
+    return [row for row in rows if len(row)]
+
+
 def _figure(outcome: Outcome, levels: Levels, left: FloatArray, fits: Degradation) -> Figure:
     share = _numbers(levels)
-    there = [row[np.isfinite(row)] for row in left]
-    full = np.array([len(row) > 0 for row in there])
-    some = [row for row in there if len(row)]
-    means = np.array([row.mean() for row in some])
-    intervals = np.array([percentile_interval(resampled_means(row), len(row)) for row in some])
+    full, present = np.isfinite(left).any(axis=1), _present(left)
+    means = np.array([row.mean() for row in present])
+    intervals = np.array([percentile_interval(resampled_means(row), len(row)) for row in present])
     low, high = np.where(np.isnan(intervals), means[:, None], intervals).T
     grid = np.linspace(0.0, float(share[-1]), _GRID)
     shapes = [
@@ -105,7 +110,7 @@ def _figure(outcome: Outcome, levels: Levels, left: FloatArray, fits: Degradatio
 
 def _words(outcome: Outcome, levels: Levels, fits: Degradation, fit: Fit) -> tuple[str, ...]:
     better = ("better" if fits.told else "no worse") if fit is fits.better else ""
-    low, high = fit.b_interval
-    numbers = (f"{fit.a:.3f}", f"{fit.b:.3f}", f"{low:.3f} to {high:.3f}", f"{fit.r_squared:.3f}", f"{fit.aic:.1f}")
-    shown = (text.replace("-", "−") if "nan" not in text else "–" for text in numbers)
+    three, one = Rounding(3).text, Rounding(1).text
+    slope = " to ".join(map(three, fit.b_interval)) if np.isfinite(fit.b_interval).all() else "–"
+    shown = three(fit.a), three(fit.b), slope, three(fit.r_squared), one(fit.aic)
     return (outcome.column, levels.path, fit.form, *shown, better)

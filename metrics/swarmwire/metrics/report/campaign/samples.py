@@ -1,16 +1,20 @@
 """Samples of a campaign and what they come to, of one design point or of several together, worked out once."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray
+from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.statistics.by_seed import by_seed
 from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.summary import Summary, summary
+
+_NOTHING = Sample(np.empty(0), np.empty(0, np.bool_), np.empty(0, np.int64))
 
 
 class Samples:
@@ -44,11 +48,13 @@ class Samples:
 
         A time that was cut off counts as the time until then.
         """
-        return self._table(rows, lambda point: self._of_point(outcome.column, point).value, outcome)
+        return _side_by_side([[self._of_point(outcome.column, point) for point in points] for points in rows])
 
     def reached(self, outcome: Outcome, rows: Sequence[tuple[int, ...]]) -> BoolArray:
         """Of the same shape: whether the value was observed, not cut off."""
-        return self._table(rows, lambda point: self._of_point(outcome.column, point).observed, outcome) == 1.0
+        found = [[self._of_point(outcome.column, point) for point in points] for points in rows]
+        whether = [[replace(sample, value=sample.observed.astype(np.float64)) for sample in row] for row in found]
+        return _side_by_side(whether) == 1.0
 
     def summary(self, outcome: Outcome, points: tuple[int, ...]) -> Summary:
         """What these runs come to."""
@@ -71,17 +77,12 @@ class Samples:
         cut_off = sample.value[~sample.observed]
         return float(cut_off.max()) if len(cut_off) else None
 
-    def _table(
-        self, rows: Sequence[tuple[int, ...]], of_point: Callable[[int], AnyArray], outcome: Outcome
-    ) -> FloatArray:
-        seeds = self.folder.about.seeds
-        place = {seed: column for column, seed in enumerate(seeds)}
-        table = np.full((len(rows), max(map(len, rows), default=0) * len(seeds)), np.nan)
-        for row, points in enumerate(rows):
-            for turn, point in enumerate(points):
-                seed = self._of_point(outcome.column, point).seed.tolist()
-                table[row, [turn * len(seeds) + place[each] for each in seed]] = of_point(point)
-        return table
-
     def _new_summary(self, outcome: Outcome, points: tuple[int, ...]) -> Summary:
         return summary(self.sample(outcome, points))
+
+
+def _side_by_side(rows: Sequence[Sequence[Sample]]) -> FloatArray:
+    """Values (rows, runs): those of the first point of each row seed by seed, then those of the second, and so on."""
+    turns = max(map(len, rows), default=0)
+    blocks = [by_seed([row[turn] if turn < len(row) else _NOTHING for row in rows]) for turn in range(turns)]
+    return np.concatenate([np.empty((len(rows), 0)), *blocks], axis=1)

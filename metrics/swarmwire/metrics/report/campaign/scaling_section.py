@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.report.campaign.figure_name import figure_name
 from swarmwire.metrics.report.campaign.levels import Levels, levels_of
-from swarmwire.metrics.report.campaign.rounding import rounding_of
+from swarmwire.metrics.report.campaign.rounding import Rounding, rounding_of
 from swarmwire.metrics.report.campaign.samples import Samples
 from swarmwire.metrics.report.campaign.words import outcome_title
 from swarmwire.metrics.report.figures.scaling_curve import scaling_curve
@@ -57,14 +57,10 @@ def _parts(samples: Samples, outcome: Outcome, levels: Levels) -> list[Figure | 
 def _table(outcome: Outcome, levels: Levels, means: list[float], found: Scaling) -> Table:
     rounded = rounding_of(means).text
     rows = tuple(
-        (label, rounded(mean), *(_three(value) for value in values))
+        (label, rounded(mean), *map(Rounding(3).text, values))
         for label, mean, *values in zip(
             levels.labels, means, found.speed_up, found.efficiency, found.serial_fraction, strict=True
         )
     )
     header = (levels.path, f"mean time in {outcome.unit}", "speed-up", "efficiency", "serial fraction")
     return Table(header, rows, f"Scaling of {outcome_title(outcome)}")
-
-
-def _three(value: float) -> str:
-    return f"{value:.3f}".replace("-", "−") if np.isfinite(value) else "–"

@@ -9,7 +9,7 @@ from swarmwire.metrics.report.campaign.chosen_outcomes import ChosenOutcomes
 from swarmwire.metrics.report.campaign.levels import levels_of
 from swarmwire.metrics.report.campaign.rounding import Rounding, rounding_of
 from swarmwire.metrics.report.campaign.samples import Samples
-from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence, value_text
+from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence, short_value
 from swarmwire.metrics.report.section import Section, Table
 from swarmwire.metrics.statistics.summary import Summary
 from swarmwire.metrics.statistics.texts import number_text
@@ -51,7 +51,7 @@ def _groups(samples: Samples) -> tuple[tuple[str, ...], list[_Group]]:
     points, parameters = samples.folder.points, samples.folder.parameters
     if len(points) <= MOST_POINTS:
         rows = [
-            _Group(tuple(value_text(point[path]) for path in parameters), (number,))
+            _Group(tuple(short_value(point[path]) for path in parameters), (number,))
             for number, point in enumerate(points)
         ]
         return parameters, rows

@@ -14,9 +14,8 @@ MOST_CURVES = 6
 _MOST_PARAMETERS = 2
 
 
-def survival_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Section | None:
-    """The section; None if no outcome is a time."""
-    times = [outcome for outcome in outcomes if outcome.kind == "time"]
+def survival_section(samples: Samples, times: tuple[Outcome, ...]) -> Section | None:
+    """The section; None if there is no time."""
     levels = [levels_of(path, samples.folder.points) for path in samples.folder.parameters[:_MOST_PARAMETERS]]
     levels = [each for each in levels if len(each) > 1] or [None]
     figures = [_figure(samples, outcome, each) for outcome in times for each in levels]

@@ -5,9 +5,10 @@ import shlex
 from collections.abc import Iterable, Mapping, Sequence
 
 from swarmwire.metrics.campaign.about import About, Value
-from swarmwire.metrics.campaign.campaign_folder import FAILED, CampaignFolder
-from swarmwire.metrics.report.campaign.words import listed, value_text
-from swarmwire.metrics.report.in_words import counted
+from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.metrics.campaign.formats import FAILED
+from swarmwire.metrics.report.campaign.words import listed, short_value
+from swarmwire.metrics.report.in_words import counted, shortened
 from swarmwire.metrics.report.section import Listing, Section, Table
 
 _MOST_VALUES = 24  # of a parameter, named one by one
@@ -29,7 +30,7 @@ def what_was_run(folder: CampaignFolder) -> Section:
         ("a run lasts", f"{about.duration_s:g} s of simulated time, unless it stops before"),
         ("runs", _runs(folder, len(failed))),
         ("begun", _moment(about.began_utc)),
-        ("versions", ", ".join(f"{name} {value_text(version)}" for name, version in about.versions.items())),
+        ("versions", ", ".join(f"{name} {short_value(version)}" for name, version in about.versions.items())),
         ("CPU", listed(_machines(folder))),
     ]
     parts = [Table(("", ""), tuple(rows), ""), *_commands(folder, failed), *_failures(folder)]
@@ -69,8 +70,8 @@ def _design(about: About) -> str:
 
 def _values(wanted: Sequence[Value] | Mapping[str, Value]) -> str:
     if isinstance(wanted, Mapping):
-        return f"from {value_text(wanted['from'])} to {value_text(wanted['to'])}"
-    values = list(map(value_text, wanted))
+        return f"from {short_value(wanted['from'])} to {short_value(wanted['to'])}"
+    values = list(map(short_value, wanted))
     if len(values) <= _MOST_VALUES:
         return ", ".join(values)
     return f"{', '.join(values[:3])}, … {values[-1]} ({len(values):,} values)"
@@ -111,17 +112,12 @@ def _failures(folder: CampaignFolder) -> list[str | Table]:
         .sort("count", "first", descending=[True, False])
     )
     rows = [
-        (_short(error), str(count), str(first), _points(points))
+        (shortened(" ".join(error.split()), _LONGEST_ERROR), str(count), str(first), _points(points))
         for error, count, first, points in groups.select("error", "count", "first", "points").head(_MOST_ERRORS).rows()
     ]
     more = f" {counted(len(groups) - len(rows), 'rarer error')} left out." if len(groups) > len(rows) else ""
     caption = f"Runs that failed, by their error. They have no part in what follows.{more}"
     return [Table(("error", "runs", "first run", "design points"), tuple(rows), caption)]
-
-
-def _short(error: str) -> str:
-    line = " ".join(error.split())
-    return line if len(line) <= _LONGEST_ERROR else f"{line[: _LONGEST_ERROR - 1]}…"
 
 
 def _points(points: list[int]) -> str:

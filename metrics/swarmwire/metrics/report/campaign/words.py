@@ -2,6 +2,7 @@
 
 from swarmwire.metrics.campaign.about import Value
 from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.campaign.point_values import value_text
 
 _ENDINGS = {
     "final": " at the end",
@@ -36,17 +37,11 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def value_text(value: Value) -> str:
-    """A parameter's value as short as it can be said, of numbers the first six digits."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, int | float):
-        return f"{value:.6g}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(value_text, value)) + "]"
-    return "" if value is None else value
+def short_value(value: Value) -> str:
+    """A parameter's value; six digits of a number that need not be whole."""
+    return value_text(value, 6)
 
 
-def listed(words: list[str], last: str = "and") -> str:
+def listed(words: list[str]) -> str:
     """`a, b and c`."""
-    return f" {last} ".join(filter(None, (", ".join(words[:-1]), words[-1]))) if words else ""
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1]))) if words else ""

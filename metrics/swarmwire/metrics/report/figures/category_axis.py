@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from swarmwire.metrics.report.figures.column_axes import FOOT_IN
+from swarmwire.metrics.report.in_words import shortened
 
 _LETTERS = 44  # that fit below a column's figure side by side
 _FEWEST = 5  # groups for which there is room, so that two do not look like barrels
@@ -27,7 +28,7 @@ def set_categories(axes: Any, labels: Sequence[str]) -> None:
         axes.set_xticks(range(0, len(labels), every), labels[::every])
         return
     every = -(-len(labels) // _MOST_TURNED)
-    short = [label if len(label) <= _LONGEST else f"{label[: _LONGEST - 1]}…" for label in labels[::every]]
+    short = [shortened(label, _LONGEST) for label in labels[::every]]
     axes.set_xticks(range(0, len(labels), every), short, rotation=30, ha="right", rotation_mode="anchor")
 
 

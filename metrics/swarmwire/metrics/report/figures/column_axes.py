@@ -8,7 +8,6 @@ from swarmwire.metrics.report.in_words import short
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 
 HEIGHT_IN, FOOT_IN = 2.25, 0.37
-ACCENT = "#c2502e"  # what is to be seen first: told from the curves' blue by those who cannot tell red from green
 LETTERS_PT = SMALL_PT + 0.5
 _LEFT_IN, _RIGHT_IN, _HEAD_IN = 0.46, 0.08, 0.3
 

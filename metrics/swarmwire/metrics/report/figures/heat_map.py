@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.looks import FAINT, INK, SOFT, TEXT_PT, Look
+from swarmwire.metrics.drawing.looks import ACCENT, FAINT, INK, SOFT, TEXT_PT, Look
 from swarmwire.metrics.report.figures.category_axis import room_below_in, set_categories
 from swarmwire.metrics.report.figures.column_axes import LETTERS_PT, column_axes
 from swarmwire.metrics.report.figures.response_curve import Jump
-from swarmwire.metrics.report.in_words import short
+from swarmwire.metrics.report.in_words import short, shortened
 
 _COLORS = "cividis"  # as ordered for those who cannot tell red from green, and in print without colours
 _ROW_IN, _LEAST_IN, _MOST_IN, _HEAD_IN = 0.2, 1.0, 2.6, 0.42
@@ -56,7 +56,7 @@ def heat_map(
     set_categories(axes, x_labels)
     axes.set_xlim(-0.5, len(x_labels) - 0.5)
     every = max(1, -(-rows // 12))
-    axes.set_yticks(range(0, rows, every), [label[:7] for label in y_labels[::every]])
+    axes.set_yticks(range(0, rows, every), [shortened(label, 7) for label in y_labels[::every]])
     axes.set_ylim(-0.5, rows - 0.5)
     axes.set_title(y_label, loc="left", fontsize=TEXT_PT, color=SOFT, pad=2, x=-0.12)
     _draw_bar(figure, axes, colors, norm)
@@ -92,7 +92,7 @@ def _draw_jumps(axes: Any, jumps: Sequence[Jump | None], above: float) -> None:
         axes.plot([jump.low, jump.high], [row + above] * 2, color="white", lw=2.6, **outlined)
         axes.plot([jump.low, jump.high], [row + above] * 2, color=INK, lw=1.0, **outlined)
         axes.plot([jump.at] * 2, [row - 0.5, row + 0.5], color="white", lw=3.4, **outlined)
-        axes.plot([jump.at] * 2, [row - 0.5, row + 0.5], color="#d9381e", lw=1.8, zorder=6, solid_capstyle="butt")
+        axes.plot([jump.at] * 2, [row - 0.5, row + 0.5], color=ACCENT, lw=1.8, zorder=6, solid_capstyle="butt")
 
 
 def _draw_bar(figure: Any, axes: Any, colors: Any, norm: Any) -> None:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.looks import CURVE, INK, SOFT, Look
-from swarmwire.metrics.report.figures.column_axes import ACCENT, column_axes, plain_legend
+from swarmwire.metrics.drawing.looks import ACCENT, CURVE, INK, SOFT, Look
+from swarmwire.metrics.report.figures.column_axes import column_axes, plain_legend
 
 
 @dataclass(frozen=True)

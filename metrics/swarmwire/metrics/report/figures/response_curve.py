@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.looks import CURVE, INK, SOFT, Look
-from swarmwire.metrics.report.figures.column_axes import ACCENT, LETTERS_PT, column_axes, plain_legend
+from swarmwire.metrics.drawing.looks import ACCENT, CURVE, INK, SOFT, Look
+from swarmwire.metrics.report.figures.column_axes import LETTERS_PT, column_axes, plain_legend
 from swarmwire.metrics.report.figures.log_axis import fits_log, set_log
 from swarmwire.metrics.report.figures.ordered_colors import ordered_colors
 

@@ -10,11 +10,10 @@ from swarmwire.metrics.report.figures.column_axes import column_axes
 from swarmwire.metrics.report.figures.log_axis import fits_log, set_log
 
 
-def scaling_curve(robots: FloatArray, value: FloatArray, title: str, level: float | None = None) -> Any:
+def scaling_curve(robots: FloatArray, value: FloatArray, title: str, level: float) -> Any:
     """The figure of a value (k,) over numbers of robots (k,); `level`: what it would be if robots cost nothing."""
     figure, axes = column_axes(title, "robots")
-    if level is not None:
-        axes.axhline(level, color=SOFT, lw=0.7, ls="--", zorder=1)
+    axes.axhline(level, color=SOFT, lw=0.7, ls="--", zorder=1)
     known = np.isfinite(value)
     axes.plot(robots[known], value[known], "o-", color=CURVE, lw=1.3, ms=3.6)
     if fits_log(robots):

@@ -7,10 +7,10 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.looks import CURVE, INK, LINK, SMALL_PT, SOFT
 from swarmwire.metrics.drawing.plain_axes import plain_axes
+from swarmwire.metrics.network.radio_tally import PERCENTS
 from swarmwire.metrics.report.in_words import number
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 
-PERCENTS = (50.0, 90.0, 99.0)
 _BINS = 48
 _WIDE = 30.0  # of the latest over the earliest, from which on the axis is logarithmic
 _LATEST = 99.9  # percent: where the axis ends, since a single packet may be very late

@@ -7,6 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.looks import FLOOR, INK, PAPER, SMALL_PT, SOFT
+from swarmwire.metrics.report.in_words import shortened
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 
 MOST_NAMED = 14  # robots, of which each has its name beside the matrix, and its percents in it
@@ -52,9 +53,7 @@ def _names(static: Static) -> tuple[dict[float, str], bool]:
         names: dict[float, str] = dict(enumerate(static.robot_names))
     else:
         names = {0.5 * (group.start + group.stop - 1): group.name for group in static.groups}
-    names = {
-        place: name if len(name) <= MOST_LETTERS else f"{name[: MOST_LETTERS - 1]}…" for place, name in names.items()
-    }
+    names = {place: shortened(name, MOST_LETTERS) for place, name in names.items()}
     return names, sum(len(name) + 1 for name in names.values()) > _LETTERS_ACROSS
 
 

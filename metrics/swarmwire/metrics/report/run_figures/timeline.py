@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.looks import CURVE, SMALL_PT, SOFT
+from swarmwire.metrics.drawing.looks import ACCENT, CURVE, SMALL_PT, SOFT
 from swarmwire.metrics.drawing.metric_axes import UNKNOWN, Facts, is_count, limits
 from swarmwire.metrics.drawing.plain_axes import plain_axes
 from swarmwire.metrics.report.in_words import short
 from swarmwire.metrics.report.lanes import Lane
-from swarmwire.metrics.report.run_figures.event_lanes import EVENT, LANE_IN, draw_lanes
+from swarmwire.metrics.report.run_figures.event_lanes import LANE_IN, draw_lanes
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 from swarmwire.metrics.report.thinned import thinned
 
@@ -73,6 +73,6 @@ def _mark(axes: Any, lanes: Sequence[Lane], end_s: float) -> None:
     if len(spans) > _MOST_LINES:
         return
     for span in spans:
-        axes.axvline(span.from_s, color=EVENT, lw=0.6, alpha=0.6, zorder=0.5)
+        axes.axvline(span.from_s, color=ACCENT, lw=0.6, alpha=0.6, zorder=0.5)
         if span.until_s is not None and len(spans) <= _MOST_SHADED:
-            axes.axvspan(span.from_s, min(span.until_s, end_s), color=EVENT, alpha=0.08, lw=0, zorder=0.4)
+            axes.axvspan(span.from_s, min(span.until_s, end_s), color=ACCENT, alpha=0.08, lw=0, zorder=0.4)

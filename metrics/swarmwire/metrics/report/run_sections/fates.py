@@ -3,6 +3,7 @@
 from typing import Any
 
 from swarmwire.comms.fates import Fate
+from swarmwire.metrics.network.radio_tally import PERCENTS
 from swarmwire.metrics.report.in_words import number, share
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.section import Table
@@ -34,7 +35,7 @@ def _fates(arenas: list[dict[str, Any]]) -> Table:
 
 
 def _latencies(radio: dict[str, Any], arenas: int) -> Table:
-    percents = ("p50", "p90", "p99")
+    percents = tuple(f"p{percent:g}" for percent in PERCENTS)
     rows = tuple(
         (name, *(_ms(radio[key][percent]) for percent in percents)) for key, name in _LATENCIES.items() if key in radio
     )
