@@ -17,11 +17,12 @@ class Made(SimpleNamespace):
     point_of, seed_of, runs = Campaign.point_of, Campaign.seed_of, Campaign.runs
 
 
-def made(points, seeds, robots=10, recorded=()):
+def made(points, seeds, robots=10, recorded=(), duration_s=60.0):
     return Made(
         points=[{}] * points,
         seeds=tuple(range(1, seeds + 1)),
         robots=robots,
+        duration_s=duration_s,
         point_overrides=[(f"a={point}",) for point in range(points)],
         series=True,
         record_seeds=recorded,
@@ -48,9 +49,12 @@ def test_each_missing_run_is_in_one_task_of_its_point(points, seeds, workers, do
         assert len(task.runs) == 1 or task.record_to is None
 
 
-def test_packs_are_about_50_and_fewer_where_workers_would_be_idle():
-    assert usual_pack(made(9, 200), 2) == 50
-    assert usual_pack(made(9, 120), 2) == 40
+def test_packs_are_large_and_smaller_where_workers_would_be_idle_or_pieces_long():
+    assert usual_pack(made(9, 200), 2) == 200
+    assert usual_pack(made(9, 1000), 2) == 250
+    assert usual_pack(made(9, 300), 2) == 150
+    assert usual_pack(made(9, 200, duration_s=300.0), 2) == 100
+    assert usual_pack(made(9, 200, duration_s=36_000.0), 2) == 50
     assert usual_pack(made(1, 60), 2) == 15
     assert usual_pack(made(1, 3), 8) == 1
     assert usual_pack(made(9, 200, robots=1000), 2) == 5

@@ -6,7 +6,9 @@ from swarmwire.deploy.campaign.campaign import Campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
 from swarmwire.deploy.campaign.task import Task
 
-USUAL_PACK = 50  # arenas in a world: more gain little, and a piece is lost as a whole where a campaign is killed
+USUAL_PACK = 250  # arenas in a world: of ten robots each, 125 cost a tenth more per run, 50 half as much again
+LONG_PACK = 50  # of runs so long that a piece, lost as a whole where a campaign is killed, would be much work
+PACK_S = 30_000  # simulated, over all arenas: beyond, a pack has fewer than the usual, down to that of long runs
 MOST_ROBOTS = 5_000  # in a world of several arenas: from there on packing gains nothing, and memory is dear
 ROUNDS = 2  # tasks for each worker at least, so that none is idle for long at the end
 
@@ -28,12 +30,13 @@ def tasks_of(
 
 def usual_pack(campaign: Campaign, workers: int) -> int:
     """How many arenas a world has where nobody says."""
-    return pack_for(len(campaign.points), len(campaign.seeds), campaign.robots, workers)
+    most = max(LONG_PACK, int(PACK_S / campaign.duration_s))
+    return pack_for(len(campaign.points), len(campaign.seeds), campaign.robots, workers, most)
 
 
-def pack_for(points: int, seeds: int, robots: int, workers: int) -> int:
-    """The same, of so many points with so many seeds each, and at most so many robots in an arena."""
-    most = max(1, min(USUAL_PACK, MOST_ROBOTS // robots))
+def pack_for(points: int, seeds: int, robots: int, workers: int, most: int = LONG_PACK) -> int:
+    """The same, of so many points with so many seeds each, at most so many robots in an arena, and `most` arenas."""
+    most = max(1, min(USUAL_PACK, most, MOST_ROBOTS // robots))
     packs = max(-(-seeds // most), -(-ROUNDS * workers // points))  # of each point
     return max(1, -(-seeds // packs))
 

@@ -1,11 +1,10 @@
 """One run as a row of `summary.parquet`: what was measured of it, or why it failed."""
 
 from collections.abc import Collection
-from dataclasses import asdict
 from typing import Any
 
 from swarmwire.deploy.campaign.task import Row
-from swarmwire.deploy.result import ArenaResult, RadioResult
+from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult
 
 FAILED = "failed"
 STATISTICS = ("final", "mean", "min", "max")
@@ -28,7 +27,7 @@ def row_of(arena: ArenaResult, times: Collection[str]) -> Row:
         if name in times:
             row[name] = value.final
         else:
-            row.update({f"{name}.{statistic}": of for statistic, of in asdict(value).items()})
+            row.update({f"{name}.{statistic}": of for statistic, of in vars(value).items()})
     if arena.radio is not None:
         row.update(_radio(arena.radio))
     row.update({f"counts.{name}": count for name, count in arena.counts.items()})
@@ -41,10 +40,9 @@ def failed_row(error: str) -> Row:
 
 
 def _radio(radio: RadioResult) -> dict[str, Any]:
-    latencies = {
-        f"radio.{of}.{percentile}": value
-        for of in LATENCIES
-        for percentile, value in asdict(getattr(radio, of)).items()
-    }
+    latencies: dict[str, Any] = {}
+    for of in LATENCIES:
+        percentiles: Percentiles = getattr(radio, of)
+        latencies |= {f"radio.{of}.{percentile}": value for percentile, value in vars(percentiles).items()}
     fates = {f"radio.fates.{name}": count for name, count in radio.fates.items()}
     return {**{f"radio.{name}": getattr(radio, name) for name in TOTALS}, **latencies, **fates}

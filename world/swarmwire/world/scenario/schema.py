@@ -13,6 +13,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import limits_of
 
 TABLE = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True)
+# Their keys have their help from `parameter`; pydantic would search all modules of the process for sources of each.
+MADE_TABLE: ConfigDict = {**TABLE, "use_attribute_docstrings": False}
 UNFIT = "unfit"  # the type of a fault that a table's form finds, whose context names the key
 
 
@@ -76,7 +78,7 @@ def table_of(kind: type[Any]) -> type[BaseModel]:
     kind = written_form(kind)
     hints = get_type_hints(kind)
     columns: dict[str, Any] = {of.name: (_hint(hints[of.name], of), _field(of)) for of in fields(kind)}
-    return pydantic.create_model(kind.__name__, __config__=TABLE, __doc__=kind.__doc__, **columns)
+    return pydantic.create_model(kind.__name__, __config__=MADE_TABLE, __doc__=kind.__doc__, **columns)
 
 
 def _hint(hint: Any, of: "Field[Any]") -> Any:
