@@ -1,5 +1,6 @@
 """A campaign's folder, read back: of one that is finished, that was ended, and that still goes on."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
@@ -72,7 +73,7 @@ class CampaignFolder:
                 reason = str(error).splitlines()[0]
                 raise BadInput(str(self.path), "", f"expected whole Parquet files: {reason}") from error
             for file, frame in zip(files, frames, strict=True):
-                self._check_columns(file, frame)
+                _check_columns(file, frame, self.outcomes)
             if not frames:
                 return pl.DataFrame(schema=dict.fromkeys(NEEDED, pl.Int64) | {"ended": pl.String, SIM_TIME: pl.Float64})
             return pl.concat(frames, how="diagonal_relaxed").unique("run", keep="last").sort("run")
@@ -146,16 +147,17 @@ class CampaignFolder:
         found = sorted(part for part in parts if not part.name.startswith("."))  # what is being written starts so
         return [whole, *found] if whole.exists() else found
 
-    def _check_columns(self, file: Path, frame: "pl.DataFrame") -> None:
-        lacking = [name for name in NEEDED if name not in frame.columns]
-        if lacking:
-            raise BadInput(str(file), lacking[0], "expected this column of a campaign's table")
-        for name in (SIM_TIME, *(outcome.column for outcome in self.outcomes)):
-            kind = frame.schema.get(name)
-            if kind is not None and not (kind.is_numeric() or frame[name].is_null().all()):
-                raise BadInput(str(file), name, "expected a column of numbers")
-        if frame["ended"].null_count():
-            raise BadInput(str(file), "ended", "expected how each run ended")
+
+def _check_columns(file: Path, frame: "pl.DataFrame", outcomes: Iterable[Outcome]) -> None:
+    lacking = [name for name in NEEDED if name not in frame.columns]
+    if lacking:
+        raise BadInput(str(file), lacking[0], "expected this column of a campaign's table")
+    for name in (SIM_TIME, *(outcome.column for outcome in outcomes)):
+        kind = frame.schema.get(name)
+        if kind is not None and not (kind.is_numeric() or frame[name].is_null().all()):
+            raise BadInput(str(file), name, "expected a column of numbers")
+    if frame["ended"].null_count():
+        raise BadInput(str(file), "ended", "expected how each run ended")
 
 
 def _sample(outcome: Outcome, value: FloatArray, end_s: FloatArray, seed: IntArray, well: BoolArray) -> Sample:
