@@ -121,20 +121,25 @@ class Turn:
         """
         if state is None and value is None:
             raise ValueError("note(…): expected a state, a value, or both")
+        given = None if value is None else self._told(rows, value)
         if state is not None:
             if self._state is None:
                 self._state = np.full(self.n, -1)
             self._state[rows] = self._states.setdefault(checked_state(state), len(self._states))
-        if value is not None:
-            given = np.asarray(value, np.float64)
-            if given.ndim and given.shape != (self.n,):
-                raise ValueError(f"note(value=…): expected one number or {self.n}, got the shape {given.shape}")
-            given = np.broadcast_to(given, self.n)[rows]
-            if not np.isfinite(given).all():
-                raise ValueError(f"note(value=…): expected finite numbers, got {value!r}")
+        if given is not None:
             if self._value is None:
                 self._value = np.full(self.n, np.nan)
             self._value[rows] = given
+
+    def _told(self, rows: BoolArray | slice, value: ArrayLike) -> FloatArray:
+        """The numbers of these rows, fit to be told; else ValueError."""
+        given = np.asarray(value, np.float64)
+        if given.ndim and given.shape != (self.n,):
+            raise ValueError(f"note(value=…): expected one number or {self.n}, got the shape {given.shape}")
+        given = np.broadcast_to(given, self.n)[rows]
+        if not np.isfinite(given).all():
+            raise ValueError(f"note(value=…): expected finite numbers, got {value!r}")
+        return given
 
     def leds(self, which: int | None) -> IntArray:
         """The colours to switch an LED of each body to, or all, (n, leds), to write into; NotFitted if it has none."""

@@ -6,6 +6,10 @@ SwarmwireError
 ├── OwnCodeFailed       the user's sensor, actuator or metric raised (exit code 1)
 ├── RunnerLost          a runner's process or link is gone (exit code 1)
 ├── RunGone             the run that a view is to follow does not answer (exit code 1); in deploy
+├── WorkersFailed       workers of a campaign cannot start here; in deploy, as the next three (exit code 1)
+├── ClusterFailed       the cluster that was to run a campaign is gone
+├── StorageFailed       a campaign's folder cannot be written: what is done stays
+├── NothingFound        a tuning in which every trial failed
 ├── NoGraphics          this machine has nothing to draw with (exit code 1); in metrics
 ├── RecordFailed        a table of the run folder cannot be written: the run goes on without it
 ├── Interrupted         somebody asked for the end of the run (exit code 130)

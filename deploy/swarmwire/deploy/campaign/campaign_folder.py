@@ -18,12 +18,11 @@ from typing import TYPE_CHECKING
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, Campaign
-from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.series_files import join_series, series_part, sort_out_series
 from swarmwire.deploy.campaign.storage import MEND, read_whole, storing
 from swarmwire.deploy.campaign.taken import taken
 from swarmwire.deploy.campaign.task import PieceResult, Row
-from swarmwire.metrics.campaign.formats import PARTS, SERIES, SUMMARY
+from swarmwire.metrics.campaign.formats import FAILED, PARTS, SERIES, SUMMARY
 from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.metrics.record.part_files import PARQUET
 from swarmwire.metrics.whole_file import written_aside

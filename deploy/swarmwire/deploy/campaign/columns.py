@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from swarmwire.deploy.campaign.outcomes import STOP_TIME
-from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.task import Row
+from swarmwire.metrics.campaign.formats import FAILED
 
 if TYPE_CHECKING:
     import polars as pl

@@ -5,8 +5,8 @@ from typing import Any
 
 from swarmwire.deploy.campaign.task import Row
 from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult
+from swarmwire.metrics.campaign.formats import FAILED
 
-FAILED = "failed"
 STATISTICS = ("final", "mean", "min", "max")
 LATENCIES = ("latency_air_s", "latency_agent_s")
 TOTALS = ("sent", "intended", "in_range", "pdr")

@@ -15,12 +15,12 @@ from swarmwire.deploy.campaign.executor import LOCAL, Executor, open_executor
 from swarmwire.deploy.campaign.pieces import tasks_of
 from swarmwire.deploy.campaign.plan import Asked, Plan, planned
 from swarmwire.deploy.campaign.resumption import check_code, check_files, check_same
-from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.seed_list import seed_list
 from swarmwire.deploy.campaign.task import PieceResult, Task
 from swarmwire.deploy.campaign.vary import vary_from
 from swarmwire.deploy.campaign.watcher import NobodyWatches, Watcher
 from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.metrics.campaign.formats import FAILED
 from swarmwire.world.scenario.scenario import Scenario
 
 

@@ -5,9 +5,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from swarmwire.comms.clock import Clock, WallClock, to_s
 from swarmwire.deploy.campaign.campaign import Campaign
-from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.task import PieceResult
 from swarmwire.deploy.campaign.watcher import Watcher
+from swarmwire.metrics.campaign.formats import FAILED
 
 SHARE = 0.1  # a line each time that so much more is done
 

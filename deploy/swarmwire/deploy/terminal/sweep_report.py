@@ -8,9 +8,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.sweeping import Sweep
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.metrics.campaign.formats import FAILED
 from swarmwire.metrics.campaign.outcome import FINAL, PDR, Outcome
 from swarmwire.metrics.campaign.point_values import value_text
 from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier

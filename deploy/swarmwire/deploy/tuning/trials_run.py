@@ -9,7 +9,6 @@ from typing import Protocol
 from swarmwire.deploy.campaign.execution import execute
 from swarmwire.deploy.campaign.executor import Executor
 from swarmwire.deploy.campaign.pieces import pack_for, shares
-from swarmwire.deploy.campaign.row import FAILED
 from swarmwire.deploy.campaign.task import PieceResult, Row, Task
 from swarmwire.deploy.tuning.goal import Goal, sample_of
 from swarmwire.deploy.tuning.proposals import proposals
@@ -17,6 +16,7 @@ from swarmwire.deploy.tuning.study_file import StudyFile
 from swarmwire.deploy.tuning.trial import Outcome, Trial
 from swarmwire.deploy.tuning.trials_table import write_trials
 from swarmwire.deploy.tuning.tuning import Tuning, scenario_file
+from swarmwire.metrics.campaign.formats import FAILED
 
 
 class TrialsWatcher(Protocol):

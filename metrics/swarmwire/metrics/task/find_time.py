@@ -18,8 +18,7 @@ class FindTime(Metric):
     """First time in s at which ceil(`share` x N) of the N robots alive, at least one, are within `within_m` of a light.
 
     Of their centres, each to the light nearest to it. 0 if they stand there at the start. It stays, whatever becomes of
-    the robots. NaN until then, and without lights. Half of them within 0.5 m is a success in J. Pugh, A. Martinoli,
-    Inspiring and modeling multi-robot search with particle swarm optimization, IEEE SIS 2007 (from memory).
+    the robots. NaN until then, and without lights.
     """
 
     name = "find_time_s"
