@@ -6,8 +6,10 @@ SwarmwireError
 ├── OwnCodeFailed       the user's sensor, actuator or metric raised (exit code 1)
 ├── RunnerLost          a runner's process or link is gone (exit code 1)
 ├── RunGone             the run that a view is to follow does not answer (exit code 1); in deploy
-├── WorkersFailed       workers of a campaign cannot start here; in deploy, as the next three (exit code 1)
+├── WorkersFailed       workers of a campaign cannot start here; in deploy, as the next five (exit code 1)
 ├── ClusterFailed       the cluster that was to run a campaign is gone
+├── CannotStart         a worker of a cluster cannot start a process that works
+├── NotWanted           nobody waits for this task any more: it is not begun
 ├── StorageFailed       a campaign's folder cannot be written: what is done stays
 ├── NothingFound        a tuning in which every trial failed
 ├── NoGraphics          this machine has nothing to draw with (exit code 1); in metrics
