@@ -9,7 +9,7 @@ for name in flocking-loss pso-loss; do
     .ci/uv run --no-sync swarmwire report "campaigns/$name" --to "docs/reports/$name.html"
 done
 if command -v chromium >/dev/null; then
-    .ci/uv run --no-sync python -m docs.pictures.page docs/reports/flocking-loss.html docs/reports/flocking-loss.png 1280 1450
-    .ci/uv run --no-sync python -m docs.pictures.page docs/reports/pso-loss.html docs/reports/pso-loss.png 1280 1450
+    .ci/uv run --no-sync python -m docs.pictures.page "docs/reports/flocking-loss.html#part-3" docs/reports/flocking-loss.png 1280 1250
+    .ci/uv run --no-sync python -m docs.pictures.page "docs/reports/pso-loss.html#part-3" docs/reports/pso-loss.png 1280 1250
     .ci/uv run --no-sync python -m docs.pictures.page docs/reports/flocking-loss.html docs/reports/flocking-loss-phone.png 390 2400
 fi

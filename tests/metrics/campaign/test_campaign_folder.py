@@ -184,3 +184,13 @@ def test_a_damaged_table_is_refused_when_it_is_read(tmp_path):
     pl.DataFrame({"run": [0]}).write_parquet(folder / "summary.parquet")
     with pytest.raises(BadInput, match="point: expected this column"):
         _ = CampaignFolder(folder).runs
+
+
+def test_a_time_that_must_hold_is_watched_for_so_much_less_than_the_run(tmp_path):
+    folder = write_campaign(tmp_path / "a")
+    outcomes = json.loads((folder / "campaign.json").read_text())["outcomes"]
+    held = [of | {"hold_s": 5.0} if of["column"] == "aggregation_time_s" else of for of in outcomes]
+    before = CampaignFolder(folder).sample("aggregation_time_s", 2)
+    after = CampaignFolder(rewritten(folder, outcomes=held)).sample("aggregation_time_s", 2)
+    assert not before.observed.all()
+    np.testing.assert_array_equal(after.value, before.value - np.where(before.observed, 0.0, 5.0))

@@ -127,8 +127,8 @@ def test_failed_and_missing_runs_are_told_with_what_to_do(tmp_path):
     assert ["runs", "19 done, 3 failed, 2 missing"] in shown.tables[0]
     assert shown.table("error", "runs") == [["the agent of flock-0 failed", "3", "3", "0, 3"]]
     listings = "\n".join(shown.said)
-    assert "swarmwire repeat made-up --run 3" in listings
-    assert "swarmwire sweep --resume made-up" in listings
+    assert f"swarmwire repeat {folder} --run 3" in listings
+    assert f"swarmwire sweep --resume {folder}" in listings
     assert [row[1] for row in shown.table("radio.loss", "n")] == ["4", "4", "6", "5"]
 
 

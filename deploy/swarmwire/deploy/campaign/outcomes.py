@@ -34,7 +34,9 @@ def outcomes_of(scenarios: Iterable[Scenario]) -> tuple[Outcome, ...]:
     for scenario in scenarios:
         for outcome in _outcomes(scenario):
             before = found.setdefault(outcome.column, outcome)
-            if before.column == STOP_TIME and before.help != outcome.help:  # what stops is varied
+            if before.hold_s < outcome.hold_s:  # it is varied: what all runs can tell of
+                found[outcome.column] = before = replace(before, hold_s=outcome.hold_s)
+            if before.column == STOP_TIME and before.help != outcome.help:
                 found[STOP_TIME] = replace(before, help=STOPPED.format("what is to stop the run"))
     return tuple(sorted(found.values(), key=_rank))
 
@@ -45,10 +47,12 @@ def _rank(outcome: Outcome) -> tuple[bool, bool, bool]:
 
 def _outcomes(scenario: Scenario) -> Iterator[Outcome]:
     if stops := conditions(scenario):
-        yield Outcome(STOP_TIME, "s", "time", STOPPED.format(" or ".join(map(str, stops))))
+        hold_s = max(stop.hold_s for stop in stops)
+        yield Outcome(STOP_TIME, "s", "time", STOPPED.format(" or ".join(map(str, stops))), hold_s=hold_s)
     for metric in measuring(scenario).metrics:
         if metric.kind == "time":
-            yield Outcome(metric.name, metric.unit, "time", metric.help, not metric.standard)
+            hold_s = float(getattr(metric, "hold_s", 0.0))
+            yield Outcome(metric.name, metric.unit, "time", metric.help, not metric.standard, hold_s)
             continue
         for statistic in STATISTICS:
             yield Outcome(f"{metric.name}.{statistic}", metric.unit, "number", metric.help, not metric.standard)

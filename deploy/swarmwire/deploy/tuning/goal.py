@@ -64,8 +64,10 @@ class Goal:
             return sample.censored
         if sample.kind == "time":
             curve = kaplan_meier(sample)
+            if self.stat != "mean":
+                return curve.quantile(SHARES[self.stat])
             # Of min(time, limit): every trial's mean is then up to the same time.
-            return curve.restricted_mean(self.limit_s) if self.stat == "mean" else curve.quantile(SHARES[self.stat])
+            return curve.restricted_mean(float(self.outcome.watched_s(np.array(self.limit_s))))
         if self.stat == "mean":
             return float(sample.value.mean())
         return float(np.quantile(sample.value, SHARES[self.stat]))
@@ -87,7 +89,7 @@ def sample_of(rows: Sequence[Row], outcome: Outcome) -> Sample:
     there = np.isfinite(found)
     if outcome.kind == "time":
         end_s = np.array([row["sim_time_s"] for row in rows], np.float64)
-        return Sample(np.where(there, found, end_s), there, seed, "time")
+        return Sample(np.where(there, found, outcome.watched_s(end_s)), there, seed, "time")
     return Sample(found[there], there[there], seed[there], undefined=int(np.count_nonzero(~there)))
 
 

@@ -135,4 +135,5 @@ def _points(fields: _Fields) -> tuple[Point, ...]:
 
 def _outcome(of: _Fields) -> Outcome:
     listed = "listed" in of.found and of.get("listed", bool, "true or false")
-    return Outcome(of.text("column"), of.text("unit"), of.one_of("kind", KINDS), of.text("help"), listed)
+    hold_s = float(of.get("hold_s", (int, float), "a number of s")) if "hold_s" in of.found else 0.0
+    return Outcome(of.text("column"), of.text("unit"), of.one_of("kind", KINDS), of.text("help"), listed, hold_s)

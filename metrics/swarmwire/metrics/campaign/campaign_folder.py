@@ -165,6 +165,8 @@ def _sample(outcome: Outcome, value: FloatArray, end_s: FloatArray, seed: IntArr
     failed = int(np.count_nonzero(~well))
     value, end_s, seed = value[well], end_s[well], seed[well]
     observed = np.isfinite(value)
-    is_time = outcome.kind == "time"
-    of = time_sample(np.where(observed, value, end_s), observed, seed) if is_time else number_sample(value, seed)
+    if outcome.kind == "time":
+        of = time_sample(np.where(observed, value, outcome.watched_s(end_s)), observed, seed)
+    else:
+        of = number_sample(value, seed)
     return replace(of, failed=failed)

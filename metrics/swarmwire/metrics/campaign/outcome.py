@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from typing import get_args
 
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.statistics.sample import Kind
 
 KINDS: tuple[str, ...] = get_args(Kind)
@@ -19,6 +22,11 @@ class Outcome:
     kind: Kind
     help: str  # one line
     listed: bool = False  # of a metric that the scenario asks for, beside those of every run
+    hold_s: float = 0.0  # of a time that is known only once something has held so long since
+
+    def watched_s(self, end_s: FloatArray) -> FloatArray:
+        """Up to when runs that ended at `end_s` tell of this time: what began later had no time left to hold."""
+        return np.maximum(end_s - self.hold_s, 0.0)
 
     @property
     def is_usual(self) -> bool:

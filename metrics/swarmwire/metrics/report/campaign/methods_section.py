@@ -14,7 +14,8 @@ _ALWAYS = (
 )
 _OF_SECTIONS = {
     "times": (
-        "Times. A run that ended before something happened is right-censored at its end. Quartiles of times are "
+        "Times. A run that ended before something happened is right-censored at its end, or earlier by as long as "
+        "something must hold to count, since what began later could not be known. Quartiles of times are "
         "those of Kaplan and Meier's estimate (Journal of the American Statistical Association 53, 1958), their "
         "intervals Brookmeyer and Crowley's (Biometrics 38, 1982) with the log-log band; where the estimate does "
         "not come down to a quartile it is beyond the limit, and so said (>). Ticks on curves are censored runs."

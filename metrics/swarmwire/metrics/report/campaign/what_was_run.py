@@ -15,6 +15,7 @@ _MOST_VALUES = 24  # of a parameter, named one by one
 _MOST_ERRORS = 20
 _LONGEST_ERROR = 240
 _MOST_POINTS = 6
+_DURATION = "duration_s"  # the path of how long a run lasts
 
 
 def what_was_run(folder: CampaignFolder) -> Section:
@@ -27,7 +28,7 @@ def what_was_run(folder: CampaignFolder) -> Section:
         *((path, _values(wanted)) for path, wanted in about.vary.items()),
         ("seeds", _seeds(about.seeds)),
         ("settings for all", ", ".join(about.overrides) or "none"),
-        ("a run lasts", f"{about.duration_s:g} s of simulated time, unless it stops before"),
+        *([] if _DURATION in about.vary else [("a run lasts", f"{about.duration_s:g} s, unless it stops before")]),
         ("runs", _runs(folder, len(failed))),
         ("begun", _moment(about.began_utc)),
         ("versions", ", ".join(f"{name} {short_value(version)}" for name, version in about.versions.items())),
@@ -39,7 +40,7 @@ def what_was_run(folder: CampaignFolder) -> Section:
 
 def _commands(folder: CampaignFolder, failed: list[int]) -> list[str | Listing]:
     """How it was run, how to run one of its runs again, and what is missing."""
-    name, runs = shlex.quote(folder.path.resolve().name), folder.about.runs
+    name, runs = shlex.quote(str(folder.path)), folder.about.runs
     example = failed[0] if failed else runs // 2
     parts: list[str | Listing] = [
         f"The campaign was started by the first of these lines; the second repeats run {example}, bit for bit.",
