@@ -98,7 +98,10 @@ def test_a_campaigns_file_is_refused_by_its_key(tmp_path, scenario, typed, line,
         (["two.toml", "--seeds", "2", "--design", "list"], "--design: .*empty"),
         (["no.toml", "--seeds", "2"], "no.toml: expected a readable file"),
         (["--resume", "nowhere"], "nowhere: expected a campaign's folder"),
-        (["--resume", "nowhere", "--seeds", "3"], "SCENARIO: is missing: expected the scenario that"),
+        (
+            ["--resume", "nowhere", "--seeds", "3"],
+            "SCENARIO: expected the scenario of --vary, --seeds and --set; a --resume takes none of these",
+        ),
         (["two.toml", "--seeds", "2", "--record-seeds", "9"], "--record-seeds: expected seeds of the campaign"),
     ],
 )

@@ -132,7 +132,9 @@ def _plan(
 
     if source is None:
         if vary or seeds or overrides:
-            raise BadInput("SCENARIO", "", "is missing: expected the scenario that --vary, --seeds and --set are about")
+            raise BadInput(
+                "SCENARIO", "", "expected the scenario of --vary, --seeds and --set; a --resume takes none of these"
+            )
         return None
     table = campaign_table(source)
     varied = tuple(vary_of(text) for text in vary)

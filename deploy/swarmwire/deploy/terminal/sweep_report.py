@@ -36,7 +36,8 @@ def print_sweep(sweep: Sweep, console: Console, program: Path) -> None:
         failed = next(row for row in campaign.runs.iter_rows(named=True) if row["ended"] == FAILED)
         why = failed["error"].strip().splitlines()[-1]
         console.print(f"failed: {sweep.failed} of {sweep.runs} runs, such as run {failed['run']}: {why}", markup=False)
-        console.print(f"once they can do better: {program} sweep --resume {folder} --retry-failed", soft_wrap=True)
+        console.print(f"if the machine was at fault: {program} sweep --resume {folder} --retry-failed", soft_wrap=True)
+        console.print("if the scenario's files were: a new campaign, once they are mended; this one keeps its copies")
     console.print(f"written: {folder}", soft_wrap=True)
     console.print(f"look at it: {program} report {folder}", soft_wrap=True)
     console.print(f"again: {program} repeat {folder} --run {min(17, sweep.runs - 1)}", soft_wrap=True)

@@ -12,7 +12,8 @@ from swarmwire.metrics.statistics.texts import interval_text, number_text, quart
 COLUMNS = ("outcome", "at", "A", "B", "B - A", "interval", "delta", "p", "pairs")
 MEANINGS = {
     "Wilcoxon signed-rank": (
-        "B - A of numbers in pairs: the median of the differences seed by seed; p: Wilcoxon's signed-rank test."
+        "B - A of numbers in pairs: the median of the differences seed by seed, of pairs alone (A, B: of all runs); "
+        "p: Wilcoxon's signed-rank test."
     ),
     "Mann-Whitney": "B - A of numbers without pairs: the difference of the medians; p: the test of Mann and Whitney.",
     "paired Gehan": (

@@ -18,7 +18,9 @@ _OF_SECTIONS = {
         "something must hold to count, since what began later could not be known. Quartiles of times are "
         "those of Kaplan and Meier's estimate (Journal of the American Statistical Association 53, 1958), their "
         "intervals Brookmeyer and Crowley's (Biometrics 38, 1982) with the log-log band; where the estimate does "
-        "not come down to a quartile it is beyond the limit, and so said (>). Ticks on curves are censored runs."
+        "not come down to a quartile it is beyond the limit, and so said (>). Ticks on curves are censored runs. "
+        "Where runs stop early, values at the end and sums are of runs of different lengths: what stopped them is "
+        "selected."
     ),
     "Transitions": (
         "Change points. Of all ways to divide the ordered values of a parameter in two, the one with the least sum "
