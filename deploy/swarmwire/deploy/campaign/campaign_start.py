@@ -1,25 +1,23 @@
 """The folder of a campaign that is about to begin: its scenario with all files, and `campaign.json`."""
 
 from collections.abc import Mapping
-from itertools import chain, count
 from pathlib import Path
 from typing import Any, cast
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, Campaign
+from swarmwire.deploy.campaign.campaign import Campaign
 from swarmwire.deploy.campaign.design import Point
+from swarmwire.deploy.campaign.fresh_folder import fresh_folder
 from swarmwire.deploy.campaign.plan import Plan, overrides_of
 from swarmwire.deploy.record import machine
 from swarmwire.deploy.record.modules import module_digests
+from swarmwire.deploy.record.new_folder import stamped_folder
 from swarmwire.deploy.record.scenario_copy import Copies, copied_mapping, copy_scenario
 
 
 def default_folder(scenario: str) -> Path:
-    """campaigns/<scenario>-<UTC>, with a number behind it if another campaign has taken that in the same second."""
-    wanted = Path("campaigns") / f"{scenario}-{WallClock().utc_stamp()}"
-    numbered = (wanted.with_name(f"{wanted.name}-{number}") for number in count(2))
-    return next(folder for folder in chain([wanted], numbered) if not folder.exists())
+    """campaigns/<scenario>-<UTC>, as `stamped_folder` has it."""
+    return stamped_folder(Path("campaigns") / scenario)
 
 
 def begin(plan: Plan, folder: Path, command: str) -> Campaign:
@@ -27,16 +25,9 @@ def begin(plan: Plan, folder: Path, command: str) -> Campaign:
 
     BadInput unless the folder is new or empty, and can be made.
     """
-    scenario_folder = folder / SCENARIO_FOLDER
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if any(folder.iterdir()):
-            raise BadInput("--out", str(folder), "expected a new or empty folder; to go on with a campaign: --resume")
-        scenario_folder.mkdir()  # of several campaigns that found it empty, the system lets one alone make it
+    with fresh_folder(folder, "campaign") as scenario_folder:
         campaign = campaign_of(plan, scenario_folder, command)
         campaign.write(folder)
-    except OSError as error:
-        raise BadInput("--out", str(folder), f"expected a folder that can be written: {error.strerror}") from error
     return campaign
 
 

@@ -67,7 +67,7 @@ class SpareProcesses:
         process = self._taken(campaign) or SpareProcess(name)
         try:
             message = process.done(task, wanted)
-        except BaseException:
+        except BaseException:  # whatever it was, nobody knows what the process is at; it goes on to the caller
             process.end()
             raise
         if "lost" in message:

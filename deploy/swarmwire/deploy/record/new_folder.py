@@ -9,9 +9,14 @@ from swarmwire.metrics.record.names import LOG
 
 
 def default_folder(scenario: str, seeds: tuple[int, ...]) -> Path:
-    """runs/<scenario>-s<seed>-<UTC>, with a number behind it if another run has taken that in the same second."""
+    """runs/<scenario>-s<seed>-<UTC>, as `stamped_folder` has it."""
     seed = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]}to{seeds[-1]}"
-    wanted = Path("runs") / f"{scenario}-s{seed}-{WallClock().utc_stamp()}"
+    return stamped_folder(Path("runs") / f"{scenario}-s{seed}")
+
+
+def stamped_folder(name: Path) -> Path:
+    """<name>-<UTC>, with a number behind it if somebody has taken that in the same second."""
+    wanted = name.with_name(f"{name.name}-{WallClock().utc_stamp()}")
     numbered = (wanted.with_name(f"{wanted.name}-{number}") for number in count(2))
     return next(folder for folder in chain([wanted], numbered) if not folder.exists())
 

@@ -1,16 +1,15 @@
 """The folder of a tuning that is about to begin: its scenario with all files, and `tuning.json`."""
 
 from dataclasses import replace
-from itertools import chain, count
 from pathlib import Path
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER
 from swarmwire.deploy.campaign.campaign_start import copied_overrides
+from swarmwire.deploy.campaign.fresh_folder import fresh_folder
 from swarmwire.deploy.campaign.plan import Plan
 from swarmwire.deploy.record import machine
 from swarmwire.deploy.record.modules import module_digests
+from swarmwire.deploy.record.new_folder import stamped_folder
 from swarmwire.deploy.record.scenario_copy import Copies, copy_scenario
 from swarmwire.deploy.tuning.plan import TuningPlan
 from swarmwire.deploy.tuning.search import Search
@@ -18,10 +17,8 @@ from swarmwire.deploy.tuning.tuning import Tuning
 
 
 def default_tuning_folder(scenario: str) -> Path:
-    """tunings/<scenario>-<UTC>, with a number behind it if another has taken that in the same second."""
-    wanted = Path("tunings") / f"{scenario}-{WallClock().utc_stamp()}"
-    numbered = (wanted.with_name(f"{wanted.name}-{number}") for number in count(2))
-    return next(folder for folder in chain([wanted], numbered) if not folder.exists())
+    """tunings/<scenario>-<UTC>, as `stamped_folder` has it."""
+    return stamped_folder(Path("tunings") / scenario)
 
 
 def begin_tuning(plan: TuningPlan, folder: Path, command: str) -> Tuning:
@@ -29,16 +26,9 @@ def begin_tuning(plan: TuningPlan, folder: Path, command: str) -> Tuning:
 
     BadInput unless the folder is new or empty, and can be made.
     """
-    scenario_folder = folder / SCENARIO_FOLDER
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if any(folder.iterdir()):
-            raise BadInput("--out", str(folder), "expected a new or empty folder; to go on with a tuning: --resume")
-        scenario_folder.mkdir()  # of several that found it empty, the system lets one alone make it
+    with fresh_folder(folder, "tuning") as scenario_folder:
         tuning = _tuning_of(plan, scenario_folder, command)
         tuning.write(folder)
-    except OSError as error:
-        raise BadInput("--out", str(folder), f"expected a folder that can be written: {error.strerror}") from error
     return tuning
 
 
