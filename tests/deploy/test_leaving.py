@@ -136,7 +136,7 @@ class Stops:
 
 def judged(simulation: Simulation, over: Mapping[int, int] = OVER) -> Result:
     """The result of a simulation some of whose arenas are over early."""
-    simulation._judge = Stops(simulation.static.seeds, over)  # pyright: ignore[reportPrivateUsage]
+    simulation.judge = Stops(simulation.static.seeds, over)
     with simulation:
         simulation.run()
     return simulation.result
@@ -285,7 +285,7 @@ def test_a_record_holds_of_an_arena_what_it_holds_of_one_alone(tmp_path: Path) -
     assert RunFolder(tmp_path / "together").ticks().height == 11 + TICKS + 6
     assert [found.part for found in verify(tmp_path / "together") if not found.good] == []
     rerun = RepeatedRun(tmp_path / "together")
-    rerun.simulation._judge = Stops((3, 5, 1), OVER)  # pyright: ignore[reportPrivateUsage]
+    rerun.simulation.judge = Stops((3, 5, 1), OVER)
     repeated = rerun.run()
     assert (repeated.same, repeated.compared) == (True, TICKS)
     assert repeated.result.arenas == result.arenas

@@ -67,6 +67,7 @@ class Simulation:
         code: the specs of all classes of users': agents, own senses, actuators and metrics.
         inputs: of a run that is repeated, what came into it from outside.
         interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
+        judge: says which arenas are over, by the scenario's stop conditions; another may take its place before the run.
         controls: pause, step, speed and end of `run`, for other threads.
     """
 
@@ -95,7 +96,7 @@ class Simulation:
         self.metrics = Metrics(measures.metrics)
         stops = conditions(self.scenario)
         self._stop = StopJudge(self.metrics, stops) if stops else None
-        self._judge: Judge | None = self._stop
+        self.judge: Judge | None = self._stop
         self.code = tuple(dict.fromkeys([*self.agents.values(), *own_code(self.world.static), *measures.code]))
         self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else _ticks(self.scenario)
@@ -178,7 +179,7 @@ class Simulation:
                 acting,
                 self._watching,
                 self.scenario.events,
-                self._judge,
+                self.judge,
             )
             crew.start()
             for observer in self._watching:

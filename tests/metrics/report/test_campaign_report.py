@@ -170,7 +170,7 @@ def test_what_does_not_vary_or_never_came_is_left_out_and_named(tmp_path):
     }
     _, shown = of(ordinary(tmp_path, numbers=numbers, times={"never_s": lambda *_: None}))
     said = " ".join(shown.said)
-    assert "The same in all runs, and so left out: components.final ." in said
+    assert "The same in all runs that have a value, and so left out: components.final ." in said
     assert "Never there in any run, and so left out: gap_m.final and never_s ." in said
 
 
