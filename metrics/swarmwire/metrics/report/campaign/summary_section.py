@@ -38,7 +38,10 @@ def summary_section(samples: Samples, chosen: ChosenOutcomes) -> Section:
     for place, outcome in enumerate(chosen.shown):
         folded = place > 0 and len(groups) > _MOST_OPEN_ROWS
         parts.append(_table(samples, outcome, columns, groups, folded=folded))
-    for what, outcomes in (("The same in all runs that have a value", chosen.constant), ("Never there in any run", chosen.never)):
+    for what, outcomes in (
+        ("The same in all runs that have a value", chosen.constant),
+        ("Never there in any run", chosen.never),
+    ):
         if outcomes:
             parts.append(f"{what}, and so left out: {listed([f'`{outcome.column}`' for outcome in outcomes])}.")
     if chosen.others:
