@@ -3,7 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.clock import NS_PER_S, WallClock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.clock import NS_PER_S, ScaledClock, WallClock, tick_start_ns, to_ns, to_s
+from tests.clocks import FakeClock
 
 TICKS = st.integers(0, 10**9)
 RATES = st.integers(1, 10_000)
@@ -42,3 +43,32 @@ def test_the_wall_clock_returns_once_the_time_has_come_and_at_once_when_it_is_pa
     clock.sleep_until(before_ns - NS_PER_S)
     clock.sleep_until(before_ns + 1_000_000)
     assert clock.now_ns() >= before_ns + 1_000_000
+
+
+class DatedClock(FakeClock):
+    """A clock that shows a date besides."""
+
+    date_ns = 1_800_000_000 * NS_PER_S
+
+    def utc_ns(self) -> int:
+        return self.date_ns + self.time_ns
+
+
+def test_a_scaled_clock_runs_as_many_times_as_fast_and_sleeps_as_much_shorter() -> None:
+    wall = DatedClock()
+    clock = ScaledClock(wall, 4.0)
+    began_ns, date_ns = wall.time_ns, clock.utc_ns()
+    clock.sleep_until(2 * NS_PER_S)
+    assert wall.time_ns - began_ns == NS_PER_S // 2
+    assert clock.now_ns() == 2 * NS_PER_S
+    assert abs(clock.utc_ns() - date_ns - 2 * NS_PER_S) < 1000  # what a float of a date rounds off
+
+
+@given(st.floats(0.01, 1000.0), st.integers(0, 50 * 365 * 86_400))
+def test_dates_of_scaled_clocks_are_such_as_messages_have_room_for(factor: float, since_2026_s: int) -> None:
+    wall = DatedClock()
+    wall.date_ns = (1_767_225_600 + since_2026_s) * NS_PER_S
+    one, other = ScaledClock(wall, factor), ScaledClock(wall, factor)
+    wall.time_ns += NS_PER_S
+    assert one.utc_ns() == other.utc_ns()
+    assert 0 <= one.utc_ns() // NS_PER_S < 2**31

@@ -5,6 +5,8 @@ from datetime import UTC, datetime
 from typing import Protocol
 
 NS_PER_S = 1_000_000_000  # all times are integers, in ns
+SCALED_FROM_NS = 1_767_225_600 * NS_PER_S  # the first of January 2026: when all scaled clocks show the same date
+SCALED_SPAN_NS = 10 * 365 * 86_400 * NS_PER_S  # after which they show it again: dates of ROS 2 end in 2038
 
 
 def tick_start_ns(tick: int, rate_hz: int) -> int:
@@ -38,6 +40,14 @@ class Clock(Protocol):
         ...
 
 
+class DatedClock(Clock, Protocol):
+    """A clock that knows the date, too: what stamps made on several machines are compared by."""
+
+    def utc_ns(self) -> int:
+        """Time in ns since 1970, UTC; it may be set, and jump."""
+        ...
+
+
 class WallClock:
     """The machine's monotonic clock."""
 
@@ -54,3 +64,30 @@ class WallClock:
     def utc_stamp(self) -> str:
         """The date and time now as 20261121T030405Z: for names of folders, never for a run."""
         return datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+
+    def utc_ns(self) -> int:
+        """Wall time in ns since 1970, UTC."""
+        return time.time_ns()
+
+
+class ScaledClock:
+    """A clock that runs `factor` times as fast as another: for agents of emulated robots in a world that does so."""
+
+    def __init__(self, clock: DatedClock, factor: float) -> None:
+        self._clock, self._factor = clock, factor
+        self._began_ns = clock.now_ns()
+
+    def now_ns(self) -> int:
+        """Monotonic time in ns, which began with this object."""
+        return round((self._clock.now_ns() - self._began_ns) * self._factor)
+
+    def utc_ns(self) -> int:
+        """A date in ns since 1970 that runs as fast, and is the same for all clocks of the same factor.
+
+        It lies within ten years from 2026 on, and then begins anew: at 10 times the pace once in a year.
+        """
+        return SCALED_FROM_NS + round((self._clock.utc_ns() - SCALED_FROM_NS) * self._factor) % SCALED_SPAN_NS
+
+    def sleep_until(self, at_ns: int) -> None:
+        """Return once `now_ns()` has reached `at_ns`."""
+        self._clock.sleep_until(self._began_ns + round(at_ns / self._factor))

@@ -12,8 +12,12 @@ SwarmwireError
 ├── NotWanted           nobody waits for this task any more: it is not begun
 ├── StorageFailed       a campaign's folder cannot be written: what is done stays
 ├── NothingFound        a tuning in which every trial failed
+├── HostFailed          a robot's host is out of reach, or cannot do what was asked (exit code 1); in deploy
 ├── NoGraphics          this machine has nothing to draw with (exit code 1); in metrics
 ├── RecordFailed        a table of the run folder cannot be written: the run goes on without it
+├── NotStopped          a robot that an agent drives did not confirm that it stands still; in agent
+├── DriverLost          a real robot does not answer its driver; in agent
+├── HostFailed          a computer of the fleet cannot be reached, or cannot do what it was asked to; in deploy
 ├── Interrupted         somebody asked for the end of the run (exit code 130)
 └── BadFrame            a message on the wire breaks the protocol: counted and dropped, never fatal
 """

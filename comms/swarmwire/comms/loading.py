@@ -51,7 +51,8 @@ def _hint(error: BaseException, place: str) -> str:
     """In which line of the file it was, and what is amiss if that imports a file beside it."""
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == place]
     hint = f" (line {lines[-1]})" if lines else ""
-    if isinstance(error, ModuleNotFoundError) and error.name and Path(place).with_name(f"{error.name}.py").is_file():
+    missing = error.name or "" if isinstance(error, ModuleNotFoundError) else ""
+    if missing.isidentifier() and Path(place).with_name(f"{missing}.py").is_file():
         hint += "; a file is loaded alone: it imports what is installed, not what lies beside it"
     return hint
 

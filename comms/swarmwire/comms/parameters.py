@@ -55,3 +55,8 @@ def fault_of(value: float, limits: Limits) -> str | None:
     if limits.below is not None and not value < limits.below:
         return f"expected less than {limits.below:g}{unit}, got {value!r}"
     return None
+
+
+@dataclass(frozen=True)
+class NoParameters:
+    """Parameters of what has none."""

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.bodies.body import Body, body_from, body_from_mapping, body_names, load_body
+from swarmwire.comms.bodies.body import Body, body_from, body_from_mapping, body_names, load_body, merged
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sheets import Positioning, Proximity
 
@@ -270,3 +270,11 @@ def test_a_told_sheet_whose_actuator_is_too_wide_is_refused() -> None:
         BadInput, match=r"told: actuators\.arm\.width: expected a whole number from 0 to 10000, got 10001"
     ):
         body_from_mapping(told, "told")
+
+
+def test_merged_tables_keep_what_only_one_says_and_take_the_rest_from_the_second():
+    base = {"name": "a", "senses": {"compass": {"noise_rad": 0.1}, "light": {"noise": 0.2}}, "radius_m": 1.0}
+    over = {"senses": {"compass": {"delay_s": 1.0}}, "radius_m": {"new": 2}}
+    senses = {"compass": {"noise_rad": 0.1, "delay_s": 1.0}, "light": {"noise": 0.2}}
+    assert merged(base, over) == {"name": "a", "senses": senses, "radius_m": {"new": 2}}
+    assert base["senses"] == {"compass": {"noise_rad": 0.1}, "light": {"noise": 0.2}}

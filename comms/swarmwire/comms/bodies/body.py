@@ -168,6 +168,12 @@ def body_from_mapping(mapping: Mapping[str, Any], where: str) -> Body:
     return _body(dict(mapping), where, None)
 
 
+def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """`base` with what `over` says in its place; tables that both have are merged."""
+    both = {key for key in over if isinstance(over[key], Mapping) and isinstance(base.get(key), Mapping)}
+    return {**base, **over, **{key: merged(base[key], over[key]) for key in both}}
+
+
 def _body(rest: dict[str, Any], where: str, beside: Path | None) -> Body:
     """The body of a whole sheet, or, with nothing `beside`, of one that `as_mapping` wrote down."""
     senses = mapping_of(where, "senses", rest.pop("senses", {}))
@@ -187,7 +193,7 @@ def _body(rest: dict[str, Any], where: str, beside: Path | None) -> Body:
 
 def _like(base: dict[str, Any], rest: Mapping[str, Any]) -> dict[str, Any]:
     """`base` with what `rest` says; senses that do not go with it any more are not taken over."""
-    both = _merged(base, rest)
+    both = merged(base, rest)
     own = rest.get("senses", {})
     if isinstance(both.get("senses"), dict):
         for name in unfit_senses(_kind_of(both), both.get("altitude_m", 0.0)):
@@ -234,9 +240,3 @@ def _shipped(name: object, where: str, key: str) -> dict[str, Any]:
     if name not in body_names():
         raise BadInput(where, key, f"expected {one_of(body_names(), name)}; got {name!r}")
     return tomllib.loads(files("swarmwire.comms.bodies").joinpath(f"{name}.toml").read_text(encoding="utf-8"))
-
-
-def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """`base` with what `over` says in its place; tables that both have are merged."""
-    both = {key for key in over if isinstance(over[key], Mapping) and isinstance(base.get(key), Mapping)}
-    return {**base, **over, **{key: _merged(base[key], over[key]) for key in both}}

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from swarmwire.comms.air.parameters.bursts import Bursts, bursts_from_steps
+from swarmwire.comms.air.parameters.bursts import Bursts, bursts_from_steps, bursts_of_mean
 from swarmwire.comms.air.reception.burst_states import LEAST_CAPACITY, BurstStates
 from swarmwire.comms.air.reception.bursts import bad_after
 from swarmwire.comms.clock import NS_PER_S
@@ -99,6 +99,12 @@ def test_losses_are_as_frequent_and_as_correlated_as_stated(steps, lags: dict[in
         # The stated correlations have four or five digits.
         assert is_mean(covariance / (bursts.loss * (1.0 - bursts.loss)), correlation)
     assert is_mean((lost[:, :-1] * (lost[:, 1:] - after_loss)).mean(axis=1), 0.0)
+
+
+@pytest.mark.parametrize("mean_loss", [0.0, 0.3, 0.9])
+def test_as_much_is_lost_as_the_mean_says(mean_loss: float):
+    lost = losses(bursts_of_mean(mean_loss, 1.0, 0.0, 0.5), 0.1, 800).astype(float)
+    assert is_mean(lost.mean(axis=1), mean_loss) if mean_loss else not lost.any()
 
 
 @pytest.mark.parametrize("interval_s", [0.02, 0.1, 0.4])

@@ -7,19 +7,25 @@ from typing import ClassVar
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import parameter
 
+LONGEST_S = 1e6  # of a spell, on average
+STEPS = ("p", "r", "interval_s")
+
 
 @dataclass(frozen=True)
 class BurstsTable:
-    """How a scenario writes bursts: by how long spells last, or by the steps p and r from packet to packet.
+    """How a scenario writes bursts: by how long spells last, by the mean loss, or by steps p and r between packets.
 
     The steps are those of netem's `gemodel p r 1-h 1-k`, whose 1-h and 1-k are the losses.
     """
 
     bad_s: float | None = parameter(
-        None, help="mean duration of a burst: 1 / b; 0.5 s without", unit="s", above=0, at_most=1e6
+        None, help="mean duration of a burst: 1 / b; 0.5 s without", unit="s", above=0, at_most=LONGEST_S
     )
     good_s: float | None = parameter(
-        None, help="mean time between bursts: 1 / a; 10 s without", unit="s", above=0, at_most=1e6
+        None, help="mean time between bursts: 1 / a; 10 s without", unit="s", above=0, at_most=LONGEST_S
+    )
+    mean_loss: float | None = parameter(
+        None, help="instead of good_s: share of packets lost in the long run", at_least=0, below=1
     )
     p: float | None = parameter(
         None, help="instead of bad_s and good_s: probability that good turns bad by the next packet", above=0, below=1
@@ -33,20 +39,27 @@ class BurstsTable:
 
     def made(self) -> "Bursts":
         """The bursts; BadInput, which names the key in this table, if it says too much or too little."""
-        spells = {name: value for name in ("bad_s", "good_s") if (value := getattr(self, name)) is not None}
-        steps = {name: value for name in ("p", "r", "interval_s") if (value := getattr(self, name)) is not None}
+        spells, mean, steps = self._given("bad_s", "good_s"), self._given("mean_loss"), self._given(*STEPS)
         losses = {"loss_bad": self.loss_bad, "loss_good": self.loss_good}
+        if steps and (spells or mean):
+            either = "expected either bad_s and good_s, or p, r and interval_s"
+            raise BadInput("", next(iter(steps)), f"{either}; got {' and '.join((*spells, *mean, *steps))}")
+        if mean and "good_s" in spells:
+            raise BadInput("", "mean_loss", "expected either good_s or mean_loss, got both")
+        if mean:
+            return bursts_of_mean(**mean, **spells, **losses)
         if not steps:
             return Bursts(**spells, **losses)
-        if spells:
-            either = "expected either bad_s and good_s, or p, r and interval_s"
-            raise BadInput("", next(iter(steps)), f"{either}; got {' and '.join((*spells, *steps))}")
-        for name in ("p", "r", "interval_s"):
+        for name in STEPS:
             if name not in steps:
                 raise BadInput("", name, "is missing; expected p, r and interval_s together")
         if steps["p"] + steps["r"] >= 1.0:
             raise BadInput("", "r", f"expected less than 1 - p, as losses are bursty only then; got {steps['r']:g}")
         return bursts_from_steps(**steps, **losses)
+
+    def _given(self, *names: str) -> dict[str, float]:
+        """What is said of these."""
+        return {name: value for name in names if (value := getattr(self, name)) is not None}
 
 
 @dataclass(frozen=True)
@@ -55,8 +68,8 @@ class Bursts:
 
     written_as: ClassVar[type[BurstsTable]] = BurstsTable
 
-    bad_s: float = parameter(0.5, help="mean duration of a burst: 1 / b", unit="s", above=0, at_most=1e6)
-    good_s: float = parameter(10.0, help="mean time between bursts: 1 / a", unit="s", above=0, at_most=1e6)
+    bad_s: float = parameter(0.5, help="mean duration of a burst: 1 / b", unit="s", above=0, at_most=LONGEST_S)
+    good_s: float = parameter(10.0, help="mean time between bursts: 1 / a", unit="s", above=0, at_most=LONGEST_S)
     loss_bad: float = parameter(1.0, help="probability that a packet is lost in a burst", at_least=0, at_most=1)
     loss_good: float = parameter(0.0, help="probability that a packet is lost otherwise", at_least=0, at_most=1)
 
@@ -69,6 +82,25 @@ class Bursts:
     def loss(self) -> float:
         """The share of packets that are lost in the long run."""
         return self.bad_share * self.loss_bad + (1.0 - self.bad_share) * self.loss_good
+
+
+def bursts_of_mean(mean_loss: float, loss_bad: float, loss_good: float, bad_s: float = 0.5) -> Bursts:
+    """Bursts of `bad_s` that are so far apart that this share of packets is lost in the long run.
+
+    The share of time that is bad is (mean_loss - loss_good) / (loss_bad - loss_good). BadInput for a mean below
+    `loss_good`, or not below `loss_bad`, and for one so near to `loss_good` that bursts would be too seldom.
+    """
+    if not loss_good <= mean_loss < loss_bad:
+        between = f"expected at least loss_good, {loss_good:g}, and less than loss_bad, {loss_bad:g}"
+        raise BadInput("", "mean_loss", f"{between}; got {mean_loss:g}")
+    if mean_loss == loss_good:
+        # Never bad is no finite spell; a burst that loses no more than the time between is none.
+        return Bursts(bad_s, LONGEST_S, loss_good, loss_good)
+    good_s = bad_s * (loss_bad - mean_loss) / (mean_loss - loss_good)
+    if good_s > LONGEST_S:
+        seldom = f"bursts of {bad_s:g} s would be more than {LONGEST_S:g} s apart"
+        raise BadInput("", "mean_loss", f"expected loss_good, {loss_good:g}, or more above it: {seldom}")
+    return Bursts(bad_s, good_s, loss_bad, loss_good)
 
 
 def bursts_from_steps(p: float, r: float, loss_bad: float, loss_good: float, interval_s: float) -> Bursts:

@@ -1,0 +1,30 @@
+"""What arrives on a topic is handed on; of rmw_zenoh's frames only those with their attachment."""
+
+# zenoh's stubs leave out return types.
+# pyright: reportUnknownMemberType=false
+
+import queue
+
+from swarmwire.comms.robots.ros2 import sessions
+from swarmwire.comms.robots.ros2.attachment import attachment
+from swarmwire.comms.robots.ros2.inlet import Inlet
+
+WAIT_S = 10.0
+
+
+def test_frames_without_their_attachment_are_refused_by_name():
+    router, endpoint = sessions.open_router("tcp/127.0.0.1:0")
+    client = sessions.open_client(endpoint, 5.0)
+    taken: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    refused: queue.SimpleQueue[str] = queue.SimpleQueue()
+    inlet = Inlet(router, "0/scan", attached=True, take=taken.put, refuse=refused.put)
+    try:
+        client.put("0/scan", b"bare")
+        assert refused.get(timeout=WAIT_S) == "no_attachment"
+        client.put("0/scan", b"whole", attachment=attachment(0, 1, bytes(16)))
+        assert taken.get(timeout=WAIT_S) == b"whole"
+        assert taken.empty()
+        inlet.close()
+    finally:
+        sessions.close(client)
+        sessions.close(router)
