@@ -58,7 +58,7 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     assert refused(f"{tmp_path}/mine.py:Mine") == f"there is no file {tmp_path}/mine.py"
 
 
-@pytest.mark.parametrize("text", ["no.such.module:Mine", "..up:Mine", "swarmwire.agent.nothing:Mine"])
+@pytest.mark.parametrize("text", ["no.such.module:Mine", "..up:Mine", "swarmwire.agent.nothing:Mine", "/a/folder:Mine"])
 def test_a_module_that_is_not_there(text: str) -> None:
     assert "does not import" in refused(text)
 

@@ -34,6 +34,19 @@ def test_assigning_a_column_copies_into_it() -> None:
         state.x = np.zeros(3)
 
 
+def test_a_wide_column_has_several_numbers_for_each_robot_and_moves_with_it() -> None:
+    class Wide(State):
+        slots: IntColumn = column(-1, width=3)
+
+    state = Wide.fresh(2)
+    assert state.slots.tolist() == [[-1] * 3] * 2
+    state.slots[1] = [4, 5, 6]
+    moved = state.moved(np.array([2, 7]), np.array([5, 7]))
+    assert moved.slots.tolist() == [[-1] * 3, [4, 5, 6]]
+    state.slots = 8
+    assert state.slots.tolist() == [[8] * 3] * 2
+
+
 def test_tables_share_nothing() -> None:
     first, second = Table.fresh(1), Table.fresh(1)
     first.x += 1.0

@@ -62,7 +62,10 @@ def checked(kind: type, params: dict[str, Any], robots: int = 1) -> dict[str, An
     for name, parameter in declared.items():
         if name not in params and parameter.default is REQUIRED:
             raise BadParameter(name, f"is missing: expected {TYPES[parameter.type]}")
-    return {name: _value(declared[name], value, robots) for name, value in params.items()}
+    values = {name: _value(declared[name], value, robots) for name, value in params.items()}
+    if issubclass(kind, VectorAgent):
+        kind.check_parameters(values, robots)
+    return values
 
 
 def make(kind: type[T], params: dict[str, Any], robots: int = 1) -> T:

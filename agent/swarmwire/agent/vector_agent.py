@@ -1,6 +1,7 @@
 """VectorAgent: the code that decides for n robots at a time, and the State that the framework keeps for it."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_args, get_type_hints
 
 import numpy as np
@@ -10,9 +11,9 @@ from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.robots import Robots
 from swarmwire.comms.arrays import FloatArray, IntArray
 
-FloatColumn = NDArray[np.float64]  # float64, (n,)
-IntColumn = NDArray[np.int64]  # int64, (n,)
-BoolColumn = NDArray[np.bool_]  # bool, (n,)
+FloatColumn = NDArray[np.float64]  # float64, (n,), or (n, width)
+IntColumn = NDArray[np.int64]  # int64, (n,), or (n, width)
+BoolColumn = NDArray[np.bool_]  # bool, (n,), or (n, width)
 
 
 FROZEN = "_frozen"  # attribute of a VectorAgent once it is made
@@ -21,22 +22,25 @@ FROZEN = "_frozen"  # attribute of a VectorAgent once it is made
 class _Default:
     """What a state's column starts with."""
 
-    def __init__(self, value: float | int | bool) -> None:
-        self.value = value
+    def __init__(self, value: float | int | bool, width: int) -> None:
+        self.value, self.shape = value, (width,) if width else ()
 
 
-def column(default: float | int | bool) -> Any:
-    """A column of a State: `count: IntColumn = column(0)`; a new robot's row starts with `default`."""
-    return _Default(default)
+def column(default: float | int | bool, width: int = 0) -> Any:
+    """A column of a State: `count: IntColumn = column(0)`; a new robot's row starts with `default`.
+
+    With a `width` each robot has so many numbers, (n, width), all of which start with `default`.
+    """
+    return _Default(default, width)
 
 
 class State:
-    """What a VectorAgent remembers: a table with a row per robot, (n,) arrays that `step` reads and writes in place.
+    """What a VectorAgent remembers: a table with a row per robot, arrays that `step` reads and writes in place.
 
     The framework owns it: rows are added, removed and moved to another runner with their robots.
     """
 
-    columns: ClassVar[dict[str, tuple[np.dtype[Any], float | int | bool]]] = {}
+    columns: ClassVar[dict[str, tuple[np.dtype[Any], float | int | bool, tuple[int, ...]]]] = {}
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -47,7 +51,7 @@ class State:
                 raise TypeError(f"{cls.__name__}.{name}: the name is taken by State")
             if isinstance(default, _Default) and hint in (FloatColumn, IntColumn, BoolColumn):
                 dtype = np.dtype(get_args(get_args(hint)[1])[0])
-                cls.columns[name] = (dtype, default.value)
+                cls.columns[name] = (dtype, default.value, default.shape)
             elif name != "columns":
                 raise TypeError(
                     f"{cls.__name__}.{name}: expected FloatColumn, IntColumn or BoolColumn = column(default)"
@@ -57,8 +61,8 @@ class State:
     def fresh(cls, n: int) -> Self:
         """A state of n new robots."""
         state = cls()
-        for name, (dtype, default) in cls.columns.items():
-            object.__setattr__(state, name, np.full(n, default, dtype))
+        for name, (dtype, default, shape) in cls.columns.items():
+            object.__setattr__(state, name, np.full((n, *shape), default, dtype))
         return state
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -109,6 +113,13 @@ class VectorAgent(ABC, Generic[S]):
                 f"{type(self).__name__}.{name}: one instance serves many robots; memory goes into a State"
             )
         super().__setattr__(name, value)
+
+    @classmethod
+    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
+        """Called before anything runs with the parameters that were given for so many robots, each of its type.
+
+        Raises BadParameter of swarmwire.agent.declared for values that do not go together; here none are refused.
+        """
 
     @abstractmethod
     def step(self, robots: Robots, state: S) -> None:

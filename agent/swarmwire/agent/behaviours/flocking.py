@@ -1,9 +1,18 @@
 """Flocking over the radio: robots tell one another their headings, and keep together, apart and aligned."""
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
-import numpy as np
-
+from swarmwire.agent.behaviours.limits import check_above_zero
+from swarmwire.agent.fields import (
+    ahead,
+    alignment,
+    attraction,
+    mean_heard,
+    repulsion,
+    repulsion_of_rays,
+    steered,
+)
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import State, VectorAgent
 from swarmwire.comms.messages import Message, f4
@@ -33,21 +42,19 @@ class Flocking(VectorAgent):
     forward: float = 0.3  # weight of the way ahead, against dithering
     turn_gain_per_s: float = 2.0  # turn rate per angle to the wanted direction
 
+    @classmethod
+    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
+        """Distances are in units of one."""
+        check_above_zero(params, "separation_m")
+
     def step(self, robots: Robots, state: State) -> None:
         """Steer to the sum of all pulls, and broadcast the heading."""
         heading = robots.compass.heading_rad
         heard = robots.radio.heard(Heading)
-        pull = np.minimum((heard.range_m - self.separation_m) / self.separation_m, 1.0)
-        turn = heard.message.heading_rad - heading[heard.row]
-        along = self.cohesion * pull * np.cos(heard.bearing_rad) + self.alignment * np.cos(turn)
-        across = self.cohesion * pull * np.sin(heard.bearing_rad) + self.alignment * np.sin(turn)
-        neighbours = np.maximum(heard.count(), 1)
-
-        near_x, near_y = robots.proximity.vector_sum()
-        x = self.forward + heard.sum(along) / neighbours - self.avoidance * near_x
-        y = heard.sum(across) / neighbours - self.avoidance * near_y
-
-        angle = np.arctan2(y, x)
-        linear = self.speed_mps * np.maximum(np.cos(angle), 0.0)
-        robots.drive(linear_mps=linear, angular_radps=self.turn_gain_per_s * angle)
+        place = heard.range_m, heard.bearing_rad, self.separation_m
+        pull = self.cohesion * (attraction(*place) + repulsion(*place))
+        turn = self.alignment * alignment(heard.message.heading_rad, heading[heard.row])
+        near = self.avoidance * repulsion_of_rays(robots.proximity)
+        wanted = self.forward * ahead(robots.n) + mean_heard(heard, pull + turn) + near
+        robots.drive(*steered(wanted, self.speed_mps, self.turn_gain_per_s))
         robots.radio.send(Heading, heading_rad=heading)

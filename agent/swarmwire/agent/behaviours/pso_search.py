@@ -4,10 +4,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours.pso import Particle, ParticleSwarm, Vectors
+from swarmwire.agent.behaviours.pso.on_wheels import ParticlesOnWheels
+from swarmwire.agent.behaviours.pso.particle import Bests, Particle
+from swarmwire.agent.behaviours.pso.particle_swarm import Vectors
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, column
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.messages import Message, f4
 
 
@@ -26,7 +28,7 @@ class WheeledParticle(Particle):
     right_m: FloatColumn = column(np.nan)
 
 
-class PsoSearch(ParticleSwarm[WheeledParticle]):
+class PsoSearch(ParticlesOnWheels[WheeledParticle]):
     """Particle swarm search by what a robot itself senses: wheels, compass, and a radio that tells range and bearing.
 
     Neighbours are those whose broadcast is heard; a best comes as a vector from its sender, and the receiver adds where
@@ -48,10 +50,10 @@ class PsoSearch(ParticleSwarm[WheeledParticle]):
         """The own best, as a vector from here."""
         robots.radio.send(BestVector, rows=rows, brightness=state.own_brightness, x_m=state.own_x, y_m=state.own_y)
 
-    def told(self, robots: Robots) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+    def told(self, robots: Robots) -> Bests:
         """Bests of those that were heard, seen from here."""
         heard = robots.radio.heard(BestVector)
         direction = heard.bearing_rad + robots.compass.heading_rad[heard.row]
         x = heard.range_m * np.cos(direction) + heard.message.x_m
         y = heard.range_m * np.sin(direction) + heard.message.y_m
-        return heard.row, heard.message.brightness, x, y
+        return Bests(heard.row, heard.sender, heard.message.brightness, x, y)

@@ -1,0 +1,96 @@
+"""Aggregation: approach whom one hears, wait beside them, and leave again by chance."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from swarmwire.agent.behaviours.limits import check_above_zero, check_not_negative
+from swarmwire.agent.behaviours.random_walk import spell_lengths, turns_at_random
+from swarmwire.agent.behaviours.walking import Walk, begin_spells, ended, turns_away, walk_on
+from swarmwire.agent.robots import Robots
+from swarmwire.agent.vector_agent import IntColumn, VectorAgent, column
+from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.messages import Message
+
+START, APPROACH, WAIT, REPEL = range(4)
+NAMES = {APPROACH: "approaches", WAIT: "waits", REPEL: "leaves"}
+
+
+class Beacon(Message):
+    """What an aggregating robot broadcasts in every step: that it is there. Range and bearing tell where."""
+
+
+class Gathering(Walk):
+    """A walker, and what it is at."""
+
+    at: IntColumn = column(START)
+
+
+class Aggregation(VectorAgent[Gathering]):
+    """Robots gather: they approach whom they hear, wait when near, and leave by chance, the less the more are near.
+
+    The three states and two probabilities of Soysal and Sahin (2005), beside avoidance by rays:
+
+        approach   a neighbour is heard within near_m                               -> wait
+        wait       with probability leave_per_s / (1 + neighbours near)^crowding    -> repel    (per second)
+        repel      with probability return_per_s                                    -> approach (per second)
+
+    Approaching, a robot goes in spells of `approach_m` along the sum of r / |r| over the neighbours heard in the last
+    step, repelled against it; who hears nobody walks at random. The source's robots hear an aggregate's sound where
+    ours hear beacons by radio, and they leave whatever the number near: that is `crowding = 0`. We had only its
+    abstract at hand: weights, lengths and rates are our choice, and so is the number, of which the leaving of
+    cockroaches depends (Jeanson et al. 2005).
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("proximity", "radio.range", "radio.bearing")
+    speed_mps: float = 0.1  # straight ahead
+    near_m: float = 0.15  # a neighbour heard from so near, centre to centre, is company to wait with
+    leave_per_s: float = 0.1  # rate at which a waiting robot that hears nobody near leaves
+    crowding: float = 2.0  # how much those near hold it: 0 not at all
+    return_per_s: float = 1.0  # rate at which a robot that leaves turns back
+    approach_m: float = 0.1  # length of a spell towards or away from neighbours
+    spell_m: float = 1.0  # mean length of a spell where nobody is heard, exponential
+    turn_radps: float = 2.0  # turn rate, on the spot
+    faint: float = 0.1  # least answer of a ray, 0 to 1, to a thing; above the noise of the bodies' rays
+
+    @classmethod
+    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
+        """Spells end, turns too, and no rate is negative."""
+        check_above_zero(params, "spell_m", "approach_m", "turn_radps", "faint")
+        check_not_negative(params, "leave_per_s", "return_per_s")
+
+    def step(self, robots: Robots, state: Gathering) -> None:
+        """Change what it is at, walk unless waiting, and be heard."""
+        heard = robots.radio.heard(Beacon)
+        near = heard.sum((heard.range_m <= self.near_m).astype(np.float64))
+        self._change(robots, state, near)
+
+        x, y = heard.sum(np.cos(heard.bearing_rad)), heard.sum(np.sin(heard.bearing_rad))
+        towards = np.arctan2(y, x) + np.where(state.at == REPEL, np.pi, 0.0)
+        self._walk(robots, state, heard.count() > 0, towards)
+        robots.radio.send(Beacon)
+
+    def _change(self, robots: Robots, state: Gathering, near: FloatArray) -> None:
+        """By the state at the start of the step; who begins to wait or to leave drops its spell."""
+        period_s, before = robots.period_s, state.at.copy()
+        leave = self.leave_per_s / (1.0 + near) ** self.crowding
+        leaves = robots.draw.uniform("leave") < -np.expm1(-leave * period_s)
+        returns = robots.draw.uniform("return") < -np.expm1(-self.return_per_s * period_s)
+        state.at[before == START] = APPROACH
+        state.at[(before <= APPROACH) & (near > 0.0)] = WAIT
+        state.at[(before == WAIT) & leaves] = REPEL
+        state.at[(before == REPEL) & returns] = APPROACH
+        begin_spells(state, state.at != before, np.zeros(robots.n), 0.0)
+        for at, name in NAMES.items():
+            robots.note(name, (state.at == at) & (state.at != before))
+
+    def _walk(self, robots: Robots, state: Gathering, hears: BoolArray, towards: FloatArray) -> None:
+        """A spell along `towards` where somebody is heard, at random elsewhere; not for who waits."""
+        turn = np.where(hears, towards, turns_at_random(robots, 0.0))
+        length = np.where(hears, self.approach_m, spell_lengths(robots, self.spell_m))
+        walks = state.at != WAIT
+        begin_spells(state, walks & ended(state), turn, length)
+        blocked, away = turns_away(robots, self.faint)
+        begin_spells(state, walks & blocked & (state.turn_rad == 0.0), away, length)
+        walk_on(robots, state, self.speed_mps, self.turn_radps, walks)

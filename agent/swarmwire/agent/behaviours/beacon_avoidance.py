@@ -1,0 +1,129 @@
+"""Beacon avoidance: robots without rays keep clear of one another by what they hear over the radio."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from swarmwire.agent.behaviours.limits import check_above_zero, check_not_negative, check_order
+from swarmwire.agent.behaviours.remembered import Remembered, forget, known, pass_time, remember
+from swarmwire.agent.fields import Vectors, along, hysteresis, low_pass, steered
+from swarmwire.agent.robots import Robots
+from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, VectorAgent, column
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.messages import Message, f4
+
+HEAD_ON_M = 1e-3  # so far to the left is who would be met head on: both then turn to the right
+NONE = 1e-9  # least length of what is divided by
+
+
+class Beacon(Message):
+    """How a robot moves, broadcast in every step."""
+
+    heading_rad: f4  # of its compass
+    speed_mps: f4
+
+
+class Traffic(Remembered):
+    """What a robot knows of the traffic around it, and where it was going."""
+
+    course_rad: FloatColumn = column(np.nan)  # of its compass, as in its first step
+    speed_mps: FloatColumn = column(0.0)  # as commanded in the last step
+    push_x: FloatColumn = column(0.0)  # low-passed, along the axes of the compass
+    push_y: FloatColumn = column(0.0)
+    avoiding: BoolColumn = column(False)
+
+
+class BeaconAvoidance(VectorAgent[Traffic]):
+    """Straight on, and around whoever would be met, by the radio alone.
+
+    Each robot broadcasts its heading and speed in every step, and remembers for `memory_s` the 8 nearest neighbours
+    that it heard. Where one was when its packet went on air follows from range and bearing; where it is now from
+    the time since, its beacon's velocity and the own motion.
+
+    The robot wants to go on in the direction in which it stood first, at `speed_mps`. If it did, a neighbour at p,
+    moving at w against it, would be nearest after t = -p.w / w.w (0 if that is past), at m = p + w t. It pushes away
+    from m by
+
+        strength max(1 - |m| / clear_m, 0) max(1 - t / horizon_s, 0)
+
+    and, wherever it is going, away from p by close max(1 - |p| / close_m, 0). Pushes are added up and low-passed
+    (`smooth_s`); they count from a sum of `alarm` on until it has fallen to `relaxed` (hysteresis). Who would be met
+    head on is passed on the right. The robot turns towards its course plus the push, and drives the slower the more it
+    has to turn.
+
+    Our own rule, of the kind of Reynolds's unaligned collision avoidance (Steering Behaviors, 1999). No packet tells
+    how long the air had it: what `latency_s` does not name makes neighbours seem where they were.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("compass", "radio.range", "radio.bearing")
+    speed_mps: float = 0.1  # straight ahead
+    clear_m: float = 0.4  # who would pass at this distance between centres, or farther, does not push
+    horizon_s: float = 6.0  # who would be nearest only after so long does not push
+    strength: float = 2.0  # weight of pushes from a meeting against the course
+    close_m: float = 0.2  # who is at this distance between centres now, or farther, does not push for that
+    close: float = 2.0  # weight of pushes from who is close now
+    alarm: float = 0.2  # sum of pushes from which on the robot avoids
+    relaxed: float = 0.05  # sum of pushes at which it takes up its course again
+    smooth_s: float = 0.2  # time constant of the pushes' low-pass
+    memory_s: float = 2.0  # a neighbour whose newest packet went on air longer ago is forgotten
+    latency_s: float = 0.0  # known delay of packets between going on air and being heard
+    turn_gain_per_s: float = 2.5  # turn rate per angle to the wanted direction
+
+    @classmethod
+    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
+        """What is divided by is above 0, and hysteresis has a gap."""
+        check_above_zero(params, "speed_mps", "clear_m", "horizon_s", "close_m")
+        check_not_negative(params, "smooth_s")
+        check_order(cls, params, "relaxed", "alarm")
+
+    def step(self, robots: Robots, state: Traffic) -> None:
+        """Remember who is where, steer clear, and broadcast heading and speed."""
+        heading = robots.compass.heading_rad
+        state.course_rad = np.where(np.isnan(state.course_rad), heading, state.course_rad)
+        own_mps = state.speed_mps * along(heading)
+        pass_time(state, own_mps, robots.period_s)
+        forget(state, self.memory_s)
+        self._listen(robots, state, heading, own_mps)
+
+        course = along(state.course_rad)
+        self._feel(self._push(state, self.speed_mps * course), state, robots.period_s)
+        wanted = course + Vectors(state.push_x, state.push_y)
+        state.speed_mps, turn_radps = steered(wanted.turned(-heading), self.speed_mps, self.turn_gain_per_s)
+        robots.drive(state.speed_mps, turn_radps)
+        robots.note("on course", ~state.avoiding)
+        robots.note("avoiding", state.avoiding)
+        robots.radio.send(Beacon, heading_rad=heading, speed_mps=state.speed_mps)
+
+    def _listen(self, robots: Robots, state: Traffic, heading: FloatArray, own_mps: Vectors) -> None:
+        """Take in the beacons, each moved on by its age."""
+        heard = robots.radio.heard(Beacon)
+        row = heard.row
+        age_s = robots.time_s - 1e-9 * heard.heard_at_ns.astype(np.float64) + self.latency_s
+        mps = heard.message.speed_mps * along(heard.message.heading_rad)
+        place = heard.range_m * along(heading[row] + heard.bearing_rad)
+        place += age_s * (mps - Vectors(own_mps.x[row], own_mps.y[row]))
+        remember(state, row, heard.sender, heard.sequence, place, mps, age_s)
+
+    def _push(self, state: Traffic, course_mps: Vectors) -> Vectors:
+        """The sum of pushes, along the axes of the compass."""
+        x_mps, y_mps = state.x_mps - course_mps.x[:, None], state.y_mps - course_mps.y[:, None]
+        closing = np.maximum(-(state.x_m * x_mps + state.y_m * y_mps), 0.0)
+        after_s = closing / np.maximum(x_mps**2 + y_mps**2, NONE)
+        aside_m = HEAD_ON_M / self.speed_mps * course_mps
+        x_m = state.x_m + x_mps * after_s - aside_m.y[:, None]
+        y_m = state.y_m + y_mps * after_s + aside_m.x[:, None]
+        miss_m = np.hypot(x_m, y_m)
+        near = np.maximum(1.0 - miss_m / self.clear_m, 0.0) * np.maximum(1.0 - after_s / self.horizon_s, 0.0)
+        later = self.strength * near / np.maximum(miss_m, NONE)
+        far_m = np.hypot(state.x_m, state.y_m)
+        now = self.close * np.maximum(1.0 - far_m / self.close_m, 0.0) / np.maximum(far_m, NONE)
+        there = known(state)
+        x, y = there * (later * x_m + now * state.x_m), there * (later * y_m + now * state.y_m)
+        return Vectors(-np.add.reduce(x, 1), -np.add.reduce(y, 1))
+
+    def _feel(self, push: Vectors, state: Traffic, period_s: float) -> None:
+        """The push as it counts, by hysteresis and low-pass."""
+        state.avoiding = hysteresis(state.avoiding, push.length, self.alarm, self.relaxed)
+        state.push_x = low_pass(state.push_x, push.x * state.avoiding, period_s, self.smooth_s)
+        state.push_y = low_pass(state.push_y, push.y * state.avoiding, period_s, self.smooth_s)

@@ -1,0 +1,98 @@
+"""Minimalist flocking: four sectors, four thresholds, no radio, and no memory but the side of a turn under way."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from swarmwire.agent.behaviours.limits import check_not_negative, check_share
+from swarmwire.agent.behaviours.sectors import EITHER, LEFT, RIGHT, STRAIGHT, Sectors
+from swarmwire.agent.robots import Robots
+from swarmwire.agent.vector_agent import IntColumn, State, VectorAgent, column
+from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.sheets.rim import Rim
+
+
+class Turning(State):
+    """What is kept of the step before."""
+
+    side: IntColumn = column(STRAIGHT)  # to which the robot turned
+
+
+class MinimalistFlocking(VectorAgent[Turning]):
+    """Flocking by sector rules, without radio, of Moeslinger, Schmickl and Crailsheim (ECAL 2009).
+
+    Four sectors of 90 degrees: front, left, rear, right. In each step the first rule that applies turns the robot on
+    the spot; if none does it drives straight ahead:
+
+        1. avoid: anything in front nearer than `avoid_diameters`: away from the half in which it is nearest;
+        2. separation: a robot to the left, in front or to the right, asked in this order, nearer than
+           `separation_diameters`: away from it;
+        3. lateral cohesion: a robot to the left or right farther than `lateral_diameters`: to the side where more rays
+           see such; to neither if as many do;
+        4. rear cohesion: a robot behind farther than `rear_diameters`: to the half of the rear in which it is nearest.
+
+    `proximity` sees robots and walls (active infrared), `infrared` robots alone (passive). Distances are from rim to
+    surface, in diameters of the body. A turn away from what is in front, and one to the rear, keep the side to which
+    the robot turned in the step before; without such, where both halves are equal, and of a robot in front, a draw
+    decides. A robot behind turns later than one beside, hence the alignment, of which no rule speaks.
+
+    The paper's own thresholds, speeds and noise are not known to us. Rules and sides are those of ROS2swarm
+    (minimalist_flocking_pattern.py), which states that it implements the paper; the thresholds are its values for the
+    jackal (1, 1, 2 and 4 m of 5 m), scaled to the 5 diameters of the paper's robot. They keep robots a diameter apart,
+    and so out of flocks by a criterion of one diameter. There a robot is told from a wall by the number of rays that
+    see it. Speeds are ours; so is `random_turn`, as rule 0, off unless asked for.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("proximity", "infrared")
+    speed_mps: float = 0.1  # straight ahead
+    turn_radps: float = 2.0  # turn rate on the spot
+    avoid_diameters: float = 1.0  # anything in front is avoided if it is nearer
+    separation_diameters: float = 1.0  # robots in front or beside are turned away from if they are nearer
+    lateral_diameters: float = 2.0  # robots beside are turned to if they are farther
+    rear_diameters: float = 4.0  # robots behind are turned to if they are farther
+    random_turn: float = 0.0  # share of the steps, drawn, in which the robot turns to a random side instead
+
+    @classmethod
+    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
+        """No distance is negative, and a share is one."""
+        check_not_negative(params, "avoid_diameters", "separation_diameters", "lateral_diameters", "rear_diameters")
+        check_share(params, "random_turn")
+
+    def step(self, robots: Robots, state: Turning) -> None:
+        """Straight ahead, or a turn on the spot."""
+        things, mates = Sectors.of(robots.proximity), Sectors.of(robots.infrared)
+        diameter_m = 2.0 * robots.body.radius_m
+        avoid = answer_at(robots.proximity.sheet, self.avoid_diameters * diameter_m)
+        close = answer_at(robots.infrared.sheet, self.separation_diameters * diameter_m)
+        astray = mates.weaker_than(answer_at(robots.infrared.sheet, self.lateral_diameters * diameter_m))
+        behind = mates.weaker_than(answer_at(robots.infrared.sheet, self.rear_diameters * diameter_m))
+        to_left, to_right = astray.count(mates.left), astray.count(mates.right)
+
+        def kept(side: IntArray | int) -> IntArray:
+            return np.where(state.side == STRAIGHT, side, state.side)
+
+        rules: list[tuple[BoolArray, IntArray | int]] = [
+            (things.strongest(things.front) > avoid, kept(things.farther_half(things.front))),
+            (mates.strongest(mates.left) > close, RIGHT),
+            (mates.strongest(mates.front) > close, kept(EITHER)),
+            (mates.strongest(mates.right) > close, LEFT),
+            (to_left + to_right > 0, np.sign(to_left - to_right)),
+            (behind.strongest(mates.rear) > 0.0, kept(behind.nearer_half(mates.rear))),
+        ]
+        if self.random_turn > 0.0:
+            rules.insert(0, (robots.draw.uniform("whether") < self.random_turn, EITHER))
+        side = np.zeros(robots.n, np.int64)
+        for applies, turn in reversed(rules):  # so that the first has the last word
+            side = np.where(applies, turn, side)
+        if np.any(side == EITHER):  # in most steps of a few robots nobody has to draw
+            drawn = np.where(robots.draw.uniform("side") < 0.5, LEFT, RIGHT)
+            side = np.where(side == EITHER, drawn, side)
+        state.side = side
+        linear = np.where(side == STRAIGHT, self.speed_mps, 0.0)
+        robots.drive(linear_mps=linear, angular_radps=self.turn_radps * side)
+
+
+def answer_at(sheet: Rim, distance_m: float) -> float:
+    """What an ideal ray answers to a thing so far from the rim."""
+    return float(sheet.response.value(np.array(distance_m)))

@@ -1,0 +1,1 @@
+"""What the particle swarms share: a particle's memory, the rule, wheels, and places."""

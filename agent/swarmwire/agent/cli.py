@@ -1,0 +1,201 @@
+"""`swarmwire-agent`: runs an agent on a robot, says whether it could, lists drivers, stops motors."""
+
+import argparse
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib.metadata import version
+from pathlib import Path
+from typing import NoReturn
+
+from swarmwire.agent.on_robot.end import SIGNALS, End, by_signals
+from swarmwire.agent.on_robot.exit_codes import BAD_INPUT, ENDED, FAILED, INTERRUPTED
+from swarmwire.agent.on_robot.flags import AGENT, add_flags, by_flag, given_flags
+from swarmwire.agent.on_robot.settings import RobotSettings
+from swarmwire.agent.on_robot.settings_file import NO_FILE, read_settings
+from swarmwire.comms.clock import DatedClock, ScaledClock, WallClock
+from swarmwire.comms.errors import BadInput, SwarmwireError
+
+ABOUT = """Runs a swarmwire agent on a robot: the same code that was tested in emulation.
+
+Keep a hand near the robot's switch, and lift it off the floor the first time. Motors stop when
+the agent is late, fails, freezes or is killed, on Ctrl-C and on an emergency stop. A robot that
+is out of reach does what it was told last, unless it has a watchdog of its own, and is stopped
+first of all when it answers again."""
+EXAMPLE = """examples:
+  swarmwire-agent drivers
+  swarmwire-agent check avoid.py:Avoid --driver epuck2 --address 192.168.1.23
+  swarmwire-agent run avoid.py:Avoid --driver epuck2 --address 192.168.1.23 --duration-s 60
+  swarmwire-agent run --config robot.toml --log log
+
+robot.toml:
+  format = 1
+  name = "flock-3"
+  robots = ["flock-0", "flock-3"]
+  agent = "flocking.py:Flock"
+  driver = { name = "epuck2", address = "192.168.1.23" }
+  radio = { kind = "zenoh" }
+  tracker = true
+  network = { listen = ["tcp/0.0.0.0:7547"], connect = ["tcp/10.0.0.5:7547"], insecure = true }
+
+exit codes: 0 it ended, 1 it failed, 2 bad input, 130 Ctrl-C"""
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong, and end."""
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; {self.prog} --help tells more\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The exit code of a command."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    parsed = _parser().parse_args(given, argparse.Namespace(given=given))
+    try:
+        return _COMMANDS[parsed.command](parsed)
+    except BadInput as error:
+        sys.stderr.write(f"{_told(error, parsed)}\n")
+        return BAD_INPUT
+    except SwarmwireError as error:
+        sys.stderr.write(f"{error}\n")
+        return FAILED
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+def _told(error: BadInput, parsed: argparse.Namespace) -> BadInput:
+    """The fault, told of the flag that it came by, if it did."""
+    if parsed.command == "drivers" or error.where != _where(parsed):
+        return error
+    return by_flag(error, error.where, given_flags(parsed))
+
+
+def _parser() -> argparse.ArgumentParser:
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = _Parser("swarmwire-agent", description=ABOUT, epilog=EXAMPLE, formatter_class=raw)
+    parser.add_argument("--version", action="version", version=f"swarmwire-agent {version('swarmwire-agent')}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    helps = {
+        "run": "run an agent on a robot until it is ended",
+        "check": "say what would run, or what is wrong with it; nothing is connected",
+        "stop-motors": "stop the motors of a robot, and nothing else; it may be given all that `run` was",
+    }
+    for name, text in helps.items():
+        command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        command.add_argument("--config", metavar="FILE", type=Path, help="the robot's settings; flags override them")
+        add_flags(command, only_driver=name == "stop-motors")
+        shown = None if name == "run" else argparse.SUPPRESS
+        command.add_argument(
+            "--duration-s",
+            metavar="S",
+            type=_duration,
+            help=shown or "end after so long; else it runs until it is ended",
+        )
+        command.add_argument(
+            "--no-guard",
+            action="store_true",
+            help=shown or "do without the process that stops the motors if this one dies: for debuggers",
+        )
+        command.add_argument("--heartbeats", type=int, help=argparse.SUPPRESS)
+        command.add_argument("--standby", action="store_true", help=argparse.SUPPRESS)
+    commands.add_parser("drivers", help="list the drivers that are installed, with their options")
+    return parser
+
+
+def _duration(text: str) -> float:
+    seconds = float(text)
+    if not 0.0 < seconds < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected more than 0 s, got {text}")
+    return seconds
+
+
+def _run(parsed: argparse.Namespace) -> int:
+    settings = _settings(parsed)
+    if parsed.heartbeats is None and not parsed.no_guard:
+        from swarmwire.agent.on_robot.guarded import become_guard
+
+        become_guard(settings, parsed.given, ["stop-motors", *parsed.given[1:]])
+    from swarmwire.agent.on_robot.guard import CLOSED
+    from swarmwire.agent.on_robot.plan import plan_of
+    from swarmwire.agent.on_robot.run import run_robot
+
+    end, wall, pipe = End(), WallClock(), parsed.heartbeats
+    clock = _clock(settings, wall)
+    try:
+        with by_signals(end, patient=pipe is not None):
+            plan = plan_of(settings, _where(parsed), clock)
+            return run_robot(plan, clock, end, wall.utc_stamp(), parsed.duration_s, pipe)
+    finally:  # all is closed, whatever was raised
+        if pipe is not None:
+            with suppress(BrokenPipeError):
+                os.write(pipe, CLOSED)
+
+
+def _check(parsed: argparse.Namespace) -> int:
+    from swarmwire.agent.on_robot.plan import plan_of
+
+    settings = _settings(parsed)
+    sys.stdout.write(f"{settings.name}: {plan_of(settings, _where(parsed), _clock(settings, WallClock()))}\n")
+    return ENDED
+
+
+def _stop_motors(parsed: argparse.Namespace) -> int:
+    from swarmwire.agent.on_robot.plan import driver_of
+    from swarmwire.agent.on_robot.robot_lock import RobotLock
+
+    settings = _settings(parsed, needs_agent=False)
+    driver, _ = driver_of(settings, _where(parsed), WallClock())
+    if parsed.standby:  # the guard's: the agent is dead, whatever holds its lock
+        if not _wanted():
+            return ENDED
+    elif (holder := RobotLock(settings.driver.name, driver, WallClock()).stopped_by_holder()) is not None:
+        sys.stdout.write(f"{settings.name}: stopped, for good, by process {holder}, which drives it\n")
+        return ENDED
+    try:
+        driver.open()
+        driver.stop()
+    finally:
+        driver.close()
+    if not parsed.standby:  # whose guard says so
+        sys.stdout.write(f"{settings.name}: stopped\n")
+    return ENDED
+
+
+def _wanted() -> bool:
+    """Wait until the guard asks for it, or needs it no more; whoever ends all processes at once does not end this."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+    return sys.stdin.buffer.read(1) != b""
+
+
+def _drivers(_: argparse.Namespace) -> int:
+    from swarmwire.agent.on_robot.driver_registry import told_drivers
+
+    sys.stdout.write("\n".join(told_drivers()) + "\n")
+    return ENDED
+
+
+_COMMANDS = {"run": _run, "check": _check, "stop-motors": _stop_motors, "drivers": _drivers}
+
+
+def _settings(parsed: argparse.Namespace, needs_agent: bool = True) -> RobotSettings:
+    flags = dict(given_flags(parsed))
+    if not needs_agent:
+        flags["agent"] = AGENT, "none:None"
+    return read_settings(parsed.config, flags)
+
+
+def _where(parsed: argparse.Namespace) -> str:
+    return str(parsed.config) if parsed.config else NO_FILE
+
+
+def _clock(settings: RobotSettings, wall: WallClock) -> DatedClock:
+    return wall if settings.pace == 1.0 else ScaledClock(wall, settings.pace)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

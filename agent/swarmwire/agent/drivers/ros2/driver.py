@@ -1,0 +1,185 @@
+"""The driver of a base that takes Twist and tells LaserScan, Odometry, Imu, BatteryState and Illuminance."""
+
+from collections import Counter
+from math import copysign, isfinite
+from typing import ClassVar
+
+import zenoh
+
+from swarmwire.agent.drivers.driver import STOP, Command, Driver, DriverLost
+from swarmwire.agent.drivers.ros2.commander import Commander
+from swarmwire.agent.drivers.ros2.feed import Feed
+from swarmwire.agent.drivers.ros2.options import Ros2Options
+from swarmwire.agent.drivers.ros2.topics import readers_of
+from swarmwire.agent.drivers.ros2.wiring import Wiring
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.drives import Holonomic
+from swarmwire.comms.clock import NS_PER_S, DatedClock, to_ns
+from swarmwire.comms.robots.ros2.kinds import TWIST, TWIST_STAMPED
+from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.robots.ros2.names import absolute, ros_name
+from swarmwire.comms.robots.ros2.outlet import Outlet
+from swarmwire.comms.robots.ros2.sessions import check_endpoint, close, is_linked, open_client
+from swarmwire.comms.robots.ros2.twist import Velocities, encode_twist, encode_twist_stamped
+
+FRAME = "base_link"
+LOOK_NS = NS_PER_S // 100  # how often it is looked whether a base is there
+
+
+class Ros2Driver(Driver):
+    """A ROS 2 base behind zenoh-bridge-ros2dds or rmw_zenoh's router; `address` is that one's endpoint.
+
+    Until scanner, odometry and IMU, as far as the agent asks for them, were heard once, the base stays at rest,
+    whatever it is told.
+    """
+
+    options: ClassVar[type] = Ros2Options
+    body_name: ClassVar[str] = "turtlebot3-burger"
+
+    def __init__(self, address: str, body: Body, options: Ros2Options, clock: DatedClock) -> None:
+        """As `Driver`; BadInput also if rosbags is not installed."""
+        super().__init__(address, body, options, clock)
+        check_endpoint(address, "driver", "address")
+        options.check()
+        self._options = options
+        self._messages = Messages(options.distro)
+        readers = readers_of(body, options)
+        self._readers = tuple(readers.values())
+        self._feeds = {topic: Feed(reader, self._messages, clock) for topic, reader in readers.items()}
+        self._asked: tuple[Feed, ...] = ()
+        self._counts: Counter[str] = Counter()
+        self._since_ns: int | None = None  # when the connection was made
+        self._session: zenoh.Session | None = None
+        self._wiring: Wiring | None = None
+        self._commander: Commander | None = None
+        self._outlet: Outlet | None = None
+
+    @property
+    def target(self) -> str:
+        """As `Driver.target`: several bases may be behind one router."""
+        options = self._options
+        return f"{self.address} {options.domain} {options.namespace or self.robot} {options.command_topic}"
+
+    @property
+    def gives(self) -> frozenset[str]:
+        """As `Driver.gives`: those of the body that a topic tells of."""
+        senses = (feed.senses for feed in self._feeds.values())
+        return frozenset[str]().union(*senses) & self.body.senses.keys()
+
+    def open(self) -> None:
+        """As `Driver.open`."""
+        self.close()
+        try:
+            session = open_client(self.address, self._options.connect_s)
+        except zenoh.ZError as error:
+            raise DriverLost(f"no ROS 2 router answers at {self.address}: {error}") from error
+        namespace = self._options.namespace or ros_name(self.robot)
+        self._wiring = wiring = Wiring(session, namespace, self._options, self._messages)
+        for (topic, feed), reader in zip(self._feeds.items(), self._readers, strict=True):
+            feed.begin()
+            wiring.feed(topic, reader.kind, feed)
+        outlet = wiring.outlet(self._options.command_topic, TWIST_STAMPED if self._options.stamped else TWIST)
+        self._session, self._outlet, self._asked = session, outlet, ()
+        self._find(outlet)
+        self._counts["reconnections"] += self._since_ns is not None
+        self._since_ns = self.clock.now_ns()
+        self._commander = Commander(lambda command: self._send(outlet, command), self.clock)
+
+    def sense(self, senses: frozenset[str]) -> dict[str, FloatArray]:
+        """As `Driver.sense`: what came until now; nothing is waited for."""
+        self._check_link()
+        if self._outlet is None or not self._outlet.wanted:
+            self.stop()
+            raise DriverLost(self._nobody())
+        self._asked = tuple(feed for feed in self._feeds.values() if feed.senses & senses)
+        fields: dict[str, FloatArray] = {}
+        for feed in self._asked:
+            fields.update(feed.look())
+        self._check_silence()
+        return {field: value.copy() for field, value in fields.items() if field.split(".")[0] in senses}
+
+    def act(self, command: Command) -> None:
+        """As `Driver.act`; it is sent again until the next one, or `stop`."""
+        commander = self._check_link()
+        blind = any(feed.is_blind for feed in self._asked)
+        self._counts["held_back"] += blind
+        commander.tell(STOP if blind else command)
+
+    def stop(self) -> None:
+        """As `Driver.stop`."""
+        commander = self._commander
+        if commander is not None:
+            commander.tell(STOP)
+
+    def counts(self) -> dict[str, int]:
+        """As `Driver.counts`."""
+        counts = Counter(self._counts)
+        counts["garbage"] = sum(feed.garbage for feed in self._feeds.values())
+        for reader in self._readers:
+            counts.update(reader.counts())
+        counts["without_attachment"] += 0 if self._wiring is None else self._wiring.refused
+        return dict(counts)
+
+    def close(self) -> None:
+        """As `Driver.close`."""
+        if self._session is None:
+            return
+        if self._commander is not None:
+            self._commander.end()
+        self._counts["without_attachment"] += 0 if self._wiring is None else self._wiring.refused
+        close(self._session)
+        self._session = self._wiring = self._commander = self._outlet = None
+
+    def _find(self, outlet: Outlet) -> None:
+        """Return once a base takes commands; else hang up, and DriverLost."""
+        end_ns = self.clock.now_ns() + to_ns(self._options.connect_s)
+        while not outlet.wanted:
+            if self.clock.now_ns() >= end_ns:
+                self.close()
+                raise DriverLost(self._nobody())
+            self.clock.sleep_until(self.clock.now_ns() + LOOK_NS)
+
+    def _check_silence(self) -> None:
+        """DriverLost if a topic that was asked for is silent for too long; the first message may take its time."""
+        now_ns, since_ns = self.clock.now_ns(), self._since_ns or 0
+        for topic, feed in self._feeds.items():
+            limit_s = max(self._options.stale_s, self._options.connect_s if feed.is_blind else 0.0)
+            if feed in self._asked and feed.silent_ns(now_ns, since_ns) > to_ns(limit_s):
+                self.stop()
+                raise DriverLost(f"nothing on the topic {topic} for {limit_s:g} s")
+
+    def _nobody(self) -> str:
+        options = self._options
+        topic = absolute(options.namespace or ros_name(self.robot), options.command_topic)
+        return f"nobody takes {'TwistStamped' if options.stamped else 'Twist'} on {topic} behind {self.address}"
+
+    def _check_link(self) -> Commander:
+        """The commander, of a connection that holds; else DriverLost."""
+        if self._session is None or self._commander is None:
+            raise DriverLost(f"not connected to {self.address}")
+        if not is_linked(self._session):
+            raise DriverLost(f"the connection to {self.address} is cut")
+        return self._commander
+
+    def _send(self, outlet: Outlet, command: Command) -> None:
+        told = self._within_limits(command)
+        if not all(map(isfinite, told)):
+            self._counts["not_finite"] += 1
+            told = Velocities(0.0, 0.0)
+        utc_ns = self.clock.utc_ns()
+        stamped = self._options.stamped
+        outlet.put(encode_twist_stamped(told, utc_ns, FRAME) if stamped else encode_twist(told), utc_ns)
+
+    def _within_limits(self, command: Command) -> Velocities:
+        """The command, each speed of which is cut to the greatest of the body; nan stays nan."""
+        linear_mps, angular_radps = self.body.max_linear_mps, self.body.max_angular_radps
+        return Velocities(
+            _cut(command.linear_mps, linear_mps),
+            _cut(command.angular_radps, angular_radps),
+            _cut(command.lateral_mps, linear_mps) if isinstance(self.body.drive, Holonomic) else 0.0,
+        )
+
+
+def _cut(value: float, most: float) -> float:
+    return value if abs(value) <= most or not isfinite(value) else copysign(most, value)

@@ -1,0 +1,1 @@
+"""An agent on a robot: driver, radio, host, watchdog and log in one process, paced by the wall clock."""

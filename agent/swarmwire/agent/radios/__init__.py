@@ -1,0 +1,1 @@
+"""Radios of an agent on a robot: the robots' own network, or the air of a world nearby."""

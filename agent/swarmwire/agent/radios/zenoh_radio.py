@@ -1,0 +1,209 @@
+"""The robots' own network as a radio: each packet is one message from peer to peer, and may be lost like any other."""
+
+# zenoh's stubs leave out the return types of put and undeclare.
+# pyright: reportUnknownMemberType=false
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import zenoh
+from zenoh.handlers import Callback
+
+from swarmwire.agent.radios.arrived import Arrival, Arrived, arrived, sender_in
+from swarmwire.agent.radios.links import Link
+from swarmwire.agent.radios.packet_header import HEADER_BYTES, SEQUENCES, PacketHeader
+from swarmwire.agent.radios.radio_log import SENT, TOO_LARGE, HeardPacket, NoRadioLog, RadioLog, SentPacket
+from swarmwire.agent.radios.range_bearing import range_bearing
+from swarmwire.agent.radios.tracker import Tracker
+from swarmwire.comms.clock import DatedClock
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
+from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.wire.bounded_inbox import BoundedInbox
+from swarmwire.comms.wire.swarm_keys import SwarmKeys
+
+MOST_WAITING = 1024  # packets that may wait for the agent's next step
+GIVES = ("range_m", "bearing_rad")  # with a tracker
+NEEDS = ("radio.range", "radio.bearing")  # what these meet
+NOWHERE = float("nan")
+
+
+class ZenohRadio:
+    """The radio of the robot `own` of the swarm `robots`.
+
+    Attributes:
+        links: from each sender that was heard, by its index; for whoever asks how the network is.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: SwarmKeys,
+        robots: Sequence[str],
+        own: str,
+        max_payload_bytes: int,
+        clock: DatedClock,
+        tracker: Tracker | None = None,
+        asks_pose: bool = False,
+        log: RadioLog | None = None,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        """`asks_pose`: the agent needs range or bearing, so packets from nowhere are not for it.
+
+        The tracker is opened by its owner; `say` is told, once, what the user should know.
+        """
+        self._session, self._keys, self._clock, self._tracker = session, keys, clock, tracker
+        self._own, self._asks_pose, self._say = own, asks_pose, say
+        self._robots, self._row = tuple(robots), tuple(robots).index(own)
+        self._sender_of = {robot: index for index, robot in enumerate(robots)}
+        self._max_payload_bytes = max_payload_bytes
+        self._log: RadioLog = log or NoRadioLog()
+        self._inbox = BoundedInbox[Arrival](MOST_WAITING)
+        self._subscriber: zenoh.Subscriber[None] | None = None
+        self._publishers: dict[int, zenoh.Publisher] = {}  # by tag
+        self._sequence = 0
+        self._far_too_large = 0  # refused by the network's thread
+        self._counted = Counter[str]()
+        self.links: dict[int, Link] = {}
+        self.gives: tuple[str, ...] = GIVES if tracker else ()
+        self.needs: frozenset[str] = frozenset(NEEDS if tracker else ())
+
+    def open(self) -> None:
+        """Listen to everybody in the swarm."""
+        self._subscriber = self._session.declare_subscriber(
+            self._keys.any_radio, Callback(self._arrive, indirect=False), allowed_origin=zenoh.Locality.REMOTE
+        )
+
+    def heard(self, now_ns: int) -> tuple[Heard, Outcomes]:
+        """What arrived for the robot since the last call, each with its time and, with a tracker, range and bearing."""
+        packets = [packet for arrival in self._inbox.take() if (packet := self._checked(arrival)) is not None]
+        if not packets:
+            return Heard.none(self.gives), NO_OUTCOMES
+        packets.sort(key=_promised_order)
+        given = [(packet, where) for packet in packets if (where := self._given(packet)) is not None]
+        started_ns = self._clock.now_ns() - now_ns
+        index = np.arange(len(given))
+        columns = np.array([where for _, where in given], np.float64).reshape(len(given), 2).T
+        heard = Heard(
+            receiver=np.full(len(given), self._row),
+            sender=np.array([packet.sender for packet, _ in given], np.int64),
+            sequence=np.array([packet.header.sequence for packet, _ in given], np.int64),
+            heard_at_ns=np.array([packet.at_ns - started_ns for packet, _ in given], np.int64),
+            given={name: np.ascontiguousarray(column) for name, column in zip(self.gives, columns, strict=False)},
+            payload=index,
+            payloads=Payloads.of([packet.message for packet, _ in given]),
+        )
+        return heard, NO_OUTCOMES
+
+    def send(self, sent: Sent) -> None:
+        """Put each packet into the network; too large ones and those for nobody are numbered, as in emulation."""
+        for at, (to, tag, size_bytes) in enumerate(
+            zip(sent.to.tolist(), sent.payloads.tags().tolist(), sent.payloads.sizes.tolist(), strict=True)
+        ):
+            sequence, self._sequence = self._sequence, (self._sequence + 1) % SEQUENCES
+            utc_ns = self._clock.utc_ns()
+            if size_bytes > self._max_payload_bytes:
+                self._refuse_large(size_bytes)
+                self._log.sent(SentPacket(utc_ns, sequence, to, size_bytes, tag, TOO_LARGE))
+            elif to >= len(self._robots) or to == self._row or to < BROADCAST:
+                self._counted["packets_to_nobody"] += 1
+            else:
+                self._put(tag, PacketHeader(to, sequence, utc_ns).encode() + sent.payloads.row(at))
+                self._log.sent(SentPacket(utc_ns, sequence, to, size_bytes, tag, SENT))
+
+    def counts(self) -> dict[str, int]:
+        """What was sent, heard and lost on the way, by name, where there is any."""
+        counted = Counter(self._counted)
+        counted["packets_oversized"] += self._far_too_large
+        counted["packets_dropped"] += self._inbox.dropped
+        return {name: count for name, count in sorted(counted.items()) if count}
+
+    def close(self) -> None:
+        """Hear and send no more; the session is its owner's."""
+        declared = (self._subscriber, *self._publishers.values())
+        self._subscriber, self._publishers = None, {}
+        for one in declared:
+            if one is not None and not self._session.is_closed():
+                one.undeclare()
+
+    def _arrive(self, sample: zenoh.Sample) -> None:
+        """Called by the network's thread: it must take no time, and keep nothing that is large."""
+        if len(sample.payload) > self._max_payload_bytes + HEADER_BYTES:
+            self._far_too_large += 1
+            return
+        key, packet = str(sample.key_expr), sample.payload.to_bytes()
+        self._inbox.put(Arrival(key, packet, self._clock.now_ns(), self._clock.utc_ns()))
+
+    def _checked(self, arrival: Arrival) -> Arrived | None:
+        """The packet that arrived, counted and noted for its link, or None if it is of no use."""
+        sender = self._sender_of.get(sender_in(arrival.key))
+        if sender is None or sender == self._row:
+            self._counted["packets_of_unknown" if sender is None else "packets_in_own_name"] += 1
+            return None
+        try:
+            packet = arrived(arrival, self._keys, sender, len(self._robots), self._max_payload_bytes)
+        except BadFrame as error:
+            self._counted[f"packets_{error.fault}"] += 1
+            return None
+        self.links.setdefault(sender, Link()).add(packet.header.sequence, packet.header.sent_utc_ns, packet.at_ns)
+        return packet
+
+    def _given(self, packet: Arrived) -> tuple[float, float] | None:
+        """Range and bearing of a packet that the agent gets, else None; the log learns of either."""
+        where = self._where(packet.sender)
+        mine = packet.header.to in (BROADCAST, self._row)
+        given = mine and not (self._asks_pose and where is None)
+        if not given:
+            self._counted["packets_without_pose" if mine else "packets_overheard"] += 1
+        else:
+            self._counted["packets_heard"] += 1
+        heard = HeardPacket(
+            utc_ns=packet.utc_ns,
+            sender=packet.sender,
+            sequence=packet.header.sequence,
+            to=packet.header.to,
+            size_bytes=len(packet.message),
+            tag=packet.tag,
+            latency_ns=packet.utc_ns - packet.header.sent_utc_ns,
+            distance_m=where[0] if where else None,
+            given=given,
+        )
+        self._log.heard(heard)
+        return (where or (NOWHERE, NOWHERE)) if given else None
+
+    def _where(self, sender: int) -> tuple[float, float] | None:
+        """Range and bearing of a sender, where a tracker saw both robots of late."""
+        if self._tracker is None:
+            return None
+        now_utc_ns = self._clock.utc_ns()
+        own = self._tracker.pose(self._own, now_utc_ns)
+        its = self._tracker.pose(self._robots[sender], now_utc_ns)
+        return range_bearing(own, its) if own and its else None
+
+    def _refuse_large(self, size_bytes: int) -> None:
+        self._counted["packets_too_large"] += 1
+        if self._counted["packets_too_large"] == 1:
+            self._say(
+                f"radio: a message of {size_bytes} bytes is not sent: "
+                f"expected at most {self._max_payload_bytes} (radio.max_payload_bytes)"
+            )
+
+    def _put(self, tag: int, packet: bytes) -> None:
+        try:
+            publisher = self._publishers.get(tag)
+            if publisher is None:
+                publisher = self._publishers[tag] = self._session.declare_publisher(
+                    self._keys.radio(self._own, tag),
+                    congestion_control=zenoh.CongestionControl.DROP,
+                    allowed_destination=zenoh.Locality.REMOTE,
+                )
+            publisher.put(packet)
+        except zenoh.ZError:  # the session was closed, or the network is not there any more
+            self._counted["packets_refused"] += 1
+        else:
+            self._counted["packets_sent"] += 1
+
+
+def _promised_order(packet: Arrived) -> tuple[int, int, int]:
+    return packet.at_ns, packet.sender, packet.header.sequence
