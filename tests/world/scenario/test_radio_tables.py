@@ -48,6 +48,31 @@ def test_bursts_may_be_given_by_steps_from_packet_to_packet() -> None:
     assert scenario_from(mapping_of(in_python), "g").radio == scenario.radio
 
 
+@pytest.mark.parametrize("mean", [0.1, 0.3, 0.79])
+@pytest.mark.parametrize(("loss_bad", "loss_good"), [(1.0, 0.0), (0.8, 0.05)])
+def test_bursts_may_be_given_by_their_mean_loss(mean: float, loss_bad: float, loss_good: float) -> None:
+    table = {"bad_s": 2.0, "mean_loss": mean, "loss_bad": loss_bad, "loss_good": loss_good}
+    scenario = scenario_from({**SAMPLE, "radio": {"range_m": 2.0, "bursts": table}}, "f")
+    assert scenario.radio is not None
+    bursts = scenario.radio.bursts
+    assert bursts is not None
+    assert (bursts.bad_s, bursts.loss_bad, bursts.loss_good) == (2.0, loss_bad, loss_good)
+    assert bursts.loss == pytest.approx(mean, rel=1e-12)
+    assert mapping_of(scenario)["radio"]["bursts"] == table
+
+
+@pytest.mark.parametrize("loss_good", [0.0, 0.25])
+def test_a_mean_loss_no_greater_than_that_of_good_links_is_never_more(loss_good: float) -> None:
+    table = {"mean_loss": loss_good, "loss_good": loss_good}
+    scenario = scenario_from({**SAMPLE, "radio": {"range_m": 2.0, "bursts": table}}, "f")
+    assert scenario.radio is not None
+    bursts = scenario.radio.bursts
+    assert bursts is not None
+    assert (bursts.loss_bad, bursts.loss) == (loss_good, loss_good)
+    in_python = scenario.model_copy(update={"name": "another"})
+    assert scenario_from(mapping_of(in_python), "g").radio == scenario.radio
+
+
 def test_spells_left_out_have_their_usual_length() -> None:
     assert radio_of({"range_m": 2.0, "bursts": {"good_s": 3.0}}).bursts == Bursts(good_s=3.0)
 
@@ -78,6 +103,18 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({**SIGNAL, "bursts": {"interval_s": 0.1}}, "radio.bursts.p: is missing; expected p, r and"),
     ({**SIGNAL, "bursts": {"p": 0.5, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.r: expected less than 1 - p"),
     ({**SIGNAL, "bursts": {"p": 1.0, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.p: expected a number above 0 and"),
+    (
+        {**SIGNAL, "bursts": {"mean_loss": 0.1, "good_s": 1.0}},
+        "radio.bursts.mean_loss: expected either good_s or mean_loss, got both",
+    ),
+    ({**SIGNAL, "bursts": {"mean_loss": 0.1, "p": 0.1}}, "radio.bursts.p: expected either bad_s and good_s, or p"),
+    ({**SIGNAL, "bursts": {"mean_loss": 1.0}}, "radio.bursts.mean_loss: expected a number"),
+    (
+        {**SIGNAL, "bursts": {"mean_loss": 0.5, "loss_bad": 0.5}},
+        "radio.bursts.mean_loss: expected at least loss_good, 0, and less than loss_bad, 0.5; got 0.5",
+    ),
+    ({**SIGNAL, "bursts": {"mean_loss": 0.1, "loss_good": 0.2}}, "radio.bursts.mean_loss: expected at least loss_good"),
+    ({**SIGNAL, "bursts": {"mean_loss": 1e-9}}, "radio.bursts.mean_loss: expected loss_good, 0, or more above it"),
     ({"range_m": 2.0, "cut_off_db": 3.0}, "radio.cut_off_db: expected a model with signals"),
     (
         {**SIGNAL, "bursts": {"loss_bad": 0.1, "loss_good": 0.2}},

@@ -125,7 +125,8 @@ FAULTS: list[tuple[str, Any, str]] = [
     (
         "robots.flock.colour",
         "red",
-        "robots.flock.colour: unknown key; expected one of body, count, agent, act_every_ticks, params, radio, place",
+        "robots.flock.colour: unknown key; expected one of body, sheet, count, agent, act_every_ticks, params, radio, "
+        "place",
     ),
     (
         "robots.flock.place",

@@ -10,6 +10,8 @@ from numba import njit
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray
 from swarmwire.comms.packets import Heard
 
+WAITING_BYTES = 2**20  # hashed together at most, over all arenas
+
 
 class TrajectoryHash:
     """SHA-256 per arena over, tick by tick, unrounded: poses, velocities, applied commands, and all that was heard."""
@@ -19,30 +21,45 @@ class TrajectoryHash:
         self._hashes = [hashlib.sha256() for _ in range(arenas)]
         self._open = list(range(arenas))
         self._first_row = [arena * robots for arena in range(arenas + 1)]
+        self._waiting: list[AnyArray] = []  # of the ticks since anything was heard, a row per robot of the open arenas
 
     def add(self, pose: FloatArray, velocity: FloatArray, command: FloatArray, heard: Heard) -> None:
         """One tick; tables are (rows, 3), a row per robot of all arenas, `heard` is sorted by receiver."""
-        tables, hashes = [pose, velocity, command], [self._hashes[arena] for arena in self._open]
-        if len(hashes) < len(self._hashes):
-            tables = [table.reshape(len(self._hashes), -1, 3)[self._open].reshape(-1, 3) for table in tables]
-        self._add(np.concatenate(tables, axis=1), self._first_row[: len(hashes) + 1], hashes)
+        if not self._open:
+            return
+        moved = np.concatenate((pose, velocity, command), axis=1)
+        if len(self._open) < len(self._hashes):
+            moved = moved.reshape(len(self._hashes), -1)[self._open]
+        self._waiting.append(moved)
+        if len(heard) or len(self._waiting) * moved.nbytes >= WAITING_BYTES:
+            self._hash_waiting()
         if len(heard):
             first = np.searchsorted(heard.receiver, self._first_row)
             packets = _packets(heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, first, self._robots)
-            self._add(packets, [*first[self._open].tolist(), len(packets)], hashes)
+            self._add(packets, [*first[self._open].tolist(), len(packets)])
 
     def close(self, arenas: BoolArray) -> None:
         """Nothing more goes into the hashes of these arenas (arenas,): nothing is heard there from now on."""
+        self._hash_waiting()
         self._open = [arena for arena in self._open if not arenas[arena]]
 
-    def _add(self, table: AnyArray, first: list[int], hashes: "list[hashlib._Hash]") -> None:
-        """The rows first[k] to first[k + 1] - 1 of a table go into hash k."""
+    def _hash_waiting(self) -> None:
+        """Hash the ticks that wait, all of an arena at once: a call for each would cost more than the hashing."""
+        if self._waiting:
+            arenas = len(self._open)
+            ticks = np.stack([moved.reshape(arenas, -1) for moved in self._waiting], axis=1)
+            self._waiting.clear()
+            self._add(ticks.reshape(arenas, -1), list(range(arenas + 1)))
+
+    def _add(self, table: AnyArray, first: list[int]) -> None:
+        """The rows first[k] to first[k + 1] - 1 of a table go into the hash of the k-th open arena."""
         row_bytes, view = table.shape[1] * table.itemsize, table.data.cast("B")
-        for digest, start, stop in zip(hashes, first[:-1], first[1:], strict=True):
-            digest.update(view[start * row_bytes : stop * row_bytes])
+        for arena, start, stop in zip(self._open, first[:-1], first[1:], strict=True):
+            self._hashes[arena].update(view[start * row_bytes : stop * row_bytes])
 
     def hexdigests(self) -> list[str]:
         """The hash of each arena so far."""
+        self._hash_waiting()
         return [digest.hexdigest() for digest in self._hashes]
 
 

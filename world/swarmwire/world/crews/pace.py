@@ -14,6 +14,7 @@ class Pace:
         factor: simulated seconds per second of wall time, at present.
         missed_ticks: ticks that were over before the loop came to wait for it, so the next one started late.
         worst_lag_ns: by how much at most, wall time.
+        lag_ns: how far behind the last tick was when it was over, wall time; 0: it was waited for.
     """
 
     def __init__(self, clock: Clock, rate_hz: int, factor: float, say: Callable[[str], None]) -> None:
@@ -22,7 +23,7 @@ class Pace:
         self._first_tick = self._paused_ns = 0
         self._first_ns: int | None = None  # when the first tick of this schedule began, wall time
         self._quiet_until_ns: int | None = None
-        self.missed_ticks = self.worst_lag_ns = 0
+        self.missed_ticks = self.worst_lag_ns = self.lag_ns = 0
 
     def begin(self) -> int:
         """A tick begins; the first sets the schedule. Returns the wall time in ns, pauses left out."""
@@ -41,6 +42,7 @@ class Pace:
         first_ns = self.begin() if self._first_ns is None else self._first_ns
         over_ns = first_ns + round(self._span_ns(tick) / self.factor)
         lag_ns = self._clock.now_ns() - over_ns
+        self.lag_ns = max(0, lag_ns)
         if lag_ns <= 0:
             self._clock.sleep_until(over_ns)
             return

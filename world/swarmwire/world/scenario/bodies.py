@@ -1,16 +1,17 @@
 """The body of each group: one that comes with swarmwire, or a sheet of the user's own beside the scenario."""
 
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
-from swarmwire.comms.bodies.body import Body, body_from, load_body
+from swarmwire.comms.bodies.body import Body, body_from, load_body, merged
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sheets import OwnSheet
+from swarmwire.comms.toml_file import read_toml
 from swarmwire.comms.truth import Static
 from swarmwire.world.own.fitting import fitted
-from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario.scenario import RobotsTable, Scenario
 
 
 def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
@@ -20,7 +21,7 @@ def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
     for group, table in scenario.robots.items():
         if table.body not in known:
             known[table.body] = _body(table.body, where, f"robots.{group}.body")
-        bodies[group] = known[table.body]
+        bodies[group] = _changed(known[table.body], table, where, f"robots.{group}.sheet")
     return bodies
 
 
@@ -52,17 +53,32 @@ def _body(name: str, where: str, key: str) -> Body:
     return read_body(path, where, key)
 
 
+def _changed(body: Body, table: RobotsTable, where: str, key: str) -> Body:
+    """The body with what the scenario itself says of its sheet; a star at its name tells the two apart."""
+    if not table.sheet:
+        return body
+    path = sheet_path(table.body, where)
+    base = {"like": table.body} if path is None else read_toml(path)
+    sheet = merged({**base, "name": f"{body.name}*"}, table.sheet)
+    try:
+        changed = body_from(sheet, where) if path is None else _fitted(sheet, path)
+    except BadInput as error:
+        raise BadInput(where, ".".join(filter(None, (key, error.key))), error.expected) from None
+    if own_code_of([changed]) != own_code_of([body]):
+        raise BadInput(where, key, "expected no classes of your own: they belong into a file that `body` names")
+    return changed
+
+
 def read_body(path: Path, where: str, key: str) -> Body:
     """The body of a sheet of the user's own, its own senses and actuators fitted.
 
     BadInput names the sheet, or `where` and `key`, which name it, if it cannot be read.
     """
-    try:
-        sheet = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise BadInput(where, key, f"expected a readable file: {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadInput(str(path), "", f"expected TOML: {error}") from None
+    sheet = read_toml(path, (where, key))
     if "robots" in sheet:
         raise BadInput(str(path), "", "expected a body's sheet, got a scenario; swarmwire check and draw take one")
+    return _fitted(sheet, path)
+
+
+def _fitted(sheet: dict[str, Any], path: Path) -> Body:
     return fitted(body_from(sheet, str(path), path.parent), str(path))

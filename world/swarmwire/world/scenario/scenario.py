@@ -46,6 +46,8 @@ class RobotsTable(Table):
 
     body: str = Field(min_length=1)
     """Name of the body."""
+    sheet: dict[str, Any] = Field(default_factory=dict)
+    """What of the body's data sheet is otherwise for this group, such as senses.proximity.drop_out."""
     count: int = Field(ge=1, le=1_000_000)
     """How many robots."""
     agent: str = Field(min_length=1)

@@ -1,0 +1,138 @@
+"""The gateway that lets ROS 2 nodes drive the robots of a group."""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+import zenoh
+
+from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.drives import Holonomic
+from swarmwire.comms.clock import DatedClock, to_ns
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.led_changes import NO_LED_CHANGES
+from swarmwire.comms.robots.ros2.bridge_keys import bridge_itself, bridge_key
+from swarmwire.comms.robots.ros2.kinds import CLOCK
+from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.robots.ros2.names import ros_name
+from swarmwire.comms.robots.ros2.outlet import Outlet
+from swarmwire.comms.robots.ros2.rmw_keys import RmwNode, rmw_key
+from swarmwire.comms.robots.ros2.sessions import check_endpoint, close, open_router
+from swarmwire.world.gateways.gateway import Commands, Gateway
+from swarmwire.world.gateways.ros2.base import NODE, Base
+from swarmwire.world.gateways.ros2.command_inbox import CommandInbox
+from swarmwire.world.gateways.ros2.options import Ros2GatewayOptions
+from swarmwire.world.gateways.ros2.rate import Rate
+from swarmwire.world.gateways.ros2.tellers import tellers_of
+
+CHOICE = "tcp/127.0.0.1:0"  # a port that the system chooses
+CLOCK_TOPIC = "/clock"
+
+
+class Ros2Gateway(Gateway):
+    """The robots of a group as ROS 2 bases, each in a namespace of its name, behind one zenoh router.
+
+    Messages are stamped with the date on which the run began, and its own time from there on; so is `/clock`.
+    """
+
+    options: ClassVar[type] = Ros2GatewayOptions
+    senses: ClassVar[frozenset[str]] = frozenset({"scan", "odometry", "imu", "compass", "battery", "light"})
+
+    def __init__(
+        self, names: Sequence[str], body: Body, address: str, options: Ros2GatewayOptions, clock: DatedClock
+    ) -> None:
+        """As `Gateway`; BadInput also if rosbags is not installed, or two robots have the same name in ROS."""
+        super().__init__(names, body, address or CHOICE, options, clock)
+        check_endpoint(self.address, "ros2", "address")
+        self._options = options
+        self._spaces = _spaces(names)
+        self._messages = Messages(options.distro)
+        self._tellers = tellers_of(body, len(names), options)
+        self._rates = [Rate(teller.rate_hz) for teller in self._tellers]
+        self._began_ns: int | None = None
+        self._session: zenoh.Session | None = None
+        self._bases: list[Base] = []
+        self._clocks: tuple[Outlet, ...] = ()
+        self._graph: tuple[object, ...] = ()  # tokens of the gateway itself
+
+    def differences(self) -> tuple[str, ...]:
+        """As `Gateway.differences`."""
+        return (*super().differences(), *(["nobody switches its LEDs"] if self.body.led_count else []))
+
+    def open(self) -> tuple[str, ...]:
+        """As `Gateway.open`: one endpoint for all robots, which their namespaces tell apart."""
+        try:
+            self._session, endpoint = open_router(self.address)
+        except zenoh.ZError as error:
+            raise BadInput(
+                "ros2", "address", f"cannot listen on {self.address}: {str(error).split(' at ')[0]}"
+            ) from error
+        self._graph = (self._session.liveliness().declare_token(bridge_itself(str(self._session.zid()))),)
+        self._bases = [self._base(self._session, place) for place in range(len(self.names))]
+        rmw = rmw_key(self._options.domain, CLOCK_TOPIC, CLOCK, self._messages.hash_of(CLOCK))
+        self._clocks = Outlet(self._session, bridge_key(CLOCK_TOPIC), None), Outlet(self._session, rmw, rmw)
+        return (endpoint,) * len(self.names)
+
+    def publish(self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray) -> None:
+        """As `Gateway.publish`: what is due, and somebody subscribes to."""
+        if self._began_ns is None:
+            self._began_ns = self.clock.utc_ns() - time_ns
+        stamp_ns = self._began_ns + time_ns
+        for base, lives in zip(self._bases, alive, strict=True):
+            base.show() if lives else base.hide()
+        for place, (teller, rate) in enumerate(zip(self._tellers, self._rates, strict=True)):
+            if rate.is_due(time_ns) and teller.is_told(fields):
+                teller.follow(time_ns, fields)
+                for row in np.flatnonzero(alive):
+                    self._tell(place, int(row), fields, stamp_ns)
+        if any(outlet.wanted for outlet in self._clocks):
+            now = self._messages.make(CLOCK, self._messages.time(stamp_ns))
+            _put(self._clocks, self._messages.encode(CLOCK, now), stamp_ns)
+
+    def take(self) -> Commands:
+        """As `Gateway.take`; a base that was told nothing for `cmd_timeout_s` is told to stand still."""
+        newest = [base.inbox.newest() for base in self._bases]
+        told = np.array([command or (0.0, 0.0, 0.0) for command in newest], np.float64).reshape(-1, 3)
+        drive = np.array([command is not None for command in newest], np.bool_)
+        lateral_mps = told[:, 2] if isinstance(self.body.drive, Holonomic) else np.zeros(len(told))
+        return Commands(drive, told[:, 0].copy(), told[:, 1].copy(), lateral_mps.copy(), NO_LED_CHANGES)
+
+    def counts(self) -> dict[str, int]:
+        """As `Gateway.counts`."""
+        return dict(sum((base.inbox.counts() for base in self._bases), Counter[str]()))
+
+    def close(self) -> None:
+        """As `Gateway.close`."""
+        if self._session is not None:
+            close(self._session)
+        self._session, self._graph, self._clocks = None, (), ()
+
+    def _base(self, session: zenoh.Session, place: int) -> Base:
+        options = self._options
+        node = RmwNode(options.domain, str(session.zid()), place, f"/{self._spaces[place]}", NODE)
+        inbox = CommandInbox(to_ns(options.cmd_timeout_s), self.clock)
+        return Base(session, node, self._tellers, self._messages, inbox, stamped=options.stamped)
+
+    def _tell(self, place: int, row: int, fields: dict[str, FloatArray], stamp_ns: int) -> None:
+        outlets, teller = self._bases[row].outlets[place], self._tellers[place]
+        if any(outlet.wanted for outlet in outlets):
+            message = teller.message(self._messages, fields, row, stamp_ns)
+            if message is not None:
+                _put(outlets, self._messages.encode(teller.kind, message), stamp_ns)
+
+
+def _put(outlets: tuple[Outlet, ...], payload: bytes, stamp_ns: int) -> None:
+    for outlet in outlets:
+        if outlet.wanted:
+            outlet.put(payload, stamp_ns)
+
+
+def _spaces(names: Sequence[str]) -> tuple[str, ...]:
+    """The namespaces of robots of these names; BadInput if two have the same."""
+    spaces = tuple(map(ros_name, names))
+    for name, space in zip(names, spaces, strict=True):
+        if spaces.count(space) > 1:
+            raise BadInput("ros2", name, f"expected names that differ in ROS, where this robot is called {space}")
+    return spaces
