@@ -2,14 +2,18 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static, Truth
+
+T = TypeVar("T")
 
 ROUNDING = 1e-9  # 0.28 x 25 is a little more than 7 in floats
 
@@ -51,6 +55,7 @@ class Moment:
         self._few: IntArray | None = None if everyone or truth.running.all() else np.flatnonzero(truth.running)
         counted = self.alive if self._few is None else self.alive[self._few]
         self._counted = True if everyone or counted.all() else counted
+        self._shared: dict[Hashable, Any] = {}
 
     @property
     def position_m(self) -> FloatArray:
@@ -66,6 +71,12 @@ class Moment:
     def direction(self) -> tuple[FloatArray, FloatArray]:
         """Cosines and sines of the headings, (arenas, robots) each, of the dead too."""
         return _direction(self.pose)
+
+    def once(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What `make` returned when it was first asked for by this key in this tick."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        return self._shared[key]
 
     def robots_for(self, share: float) -> FloatArray:
         """How many robots such a share of those alive is, rounded up, at least one, (arenas,)."""

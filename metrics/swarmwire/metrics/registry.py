@@ -33,6 +33,7 @@ from swarmwire.metrics.swarm.order_velocity import OrderVelocity
 from swarmwire.metrics.swarm.oscillation import Oscillation
 from swarmwire.metrics.swarm.path_efficiency import PathEfficiency
 from swarmwire.metrics.swarm.rotation import Rotation
+from swarmwire.metrics.swarm.speed import Speed
 from swarmwire.metrics.task.consensus_bias import ConsensusBias
 from swarmwire.metrics.task.consensus_error import ConsensusError
 from swarmwire.metrics.task.coverage import Coverage
@@ -64,6 +65,7 @@ METRICS: dict[str, type[Metric]] = {
         TargetMean,
         OrderLocal,
         Rotation,
+        Speed,
         Cohesion,
         Dispersion,
         NearestNeighbour,

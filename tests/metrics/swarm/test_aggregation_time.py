@@ -52,6 +52,16 @@ def test_it_stays_once_it_is_known():
     assert time_s([1, 5, 1, 1, 5]) == [pytest.approx(0.1)]
 
 
+def test_by_one_hop_a_chain_is_not_together_and_a_star_is():
+    apart_m = 3.9 * stand((0, 0)).of.groups[0].body.radius_m
+    chain = stand(*((apart_m * k, 0) for k in range(5)))
+    star = stand((0, 0), (apart_m, 0), (-apart_m, 0), (0, apart_m), (0, -apart_m))
+    ticks = chain.seen(0), star.seen(1)
+    assert told(AggregationTime(), *ticks, of=chain.of) == [0.0]
+    assert told(AggregationTime(reading="hop"), *ticks, of=chain.of) == [pytest.approx(TICK_S)]
+    assert told(AggregationTime(reading="hop", share=0.6), *ticks, of=chain.of) == [0.0]
+
+
 def test_the_dead_are_not_asked_for():
     of, [seen] = at_ticks([1])
     assert np.isnan(told(AggregationTime(), seen, of=of)).all()

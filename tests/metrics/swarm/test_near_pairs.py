@@ -56,3 +56,12 @@ def test_robots_far_outside_an_open_arena_are_found():
 
 def test_robots_of_different_arenas_are_no_pair():
     assert found(stand((0.0, 0.0), (0.0, 0.0), arenas=2), np.ones(1)) == []
+
+
+def test_they_are_found_once_a_tick_for_all_who_ask_by_the_same_reaches_alone():
+    swarm = stand((0.0, 0.0), (1.0, 0.0))
+    wide, as_wide, narrow = (NearPairs(swarm.of, np.full(2, reach_m)) for reach_m in (0.6, 0.6, 0.4))
+    moment = Moment(swarm.of, swarm.seen())
+    assert as_wide.of(moment) is wide.of(moment)
+    assert (len(wide.of(moment)), len(narrow.of(moment))) == (1, 0)
+    assert wide.of(Moment(swarm.of, swarm.seen(1))) is not wide.of(moment)

@@ -35,12 +35,15 @@ _LEGEND_WIDTH_IN = LONG_SIDE_IN - 0.3
 class FilmFigure:
     """Draws any tick of a film; what does not move is drawn once and kept as pixels."""
 
-    def __init__(self, film: Film, size_px: int, metrics: Sequence[str] | None = None) -> None:
+    def __init__(
+        self, film: Film, size_px: int, metrics: Sequence[str] | None = None, trail_s: float = TRAIL_S
+    ) -> None:
         """A figure whose longer side has this many pixels, with these metrics beside the arena (None: the usual ones).
 
+        Behind each robot is its way of the last `trail_s`.
         BadInput for a metric that was not recorded, or a size that nobody could look at.
         """
-        self._film, static = film, film.static
+        self._film, static, self._trail_s = film, film.static, trail_s
         names = choose(film.metrics, metrics)
         entries = _entries(film)
         columns = columns_in(entries, _LEGEND_WIDTH_IN)
@@ -97,16 +100,17 @@ class FilmFigure:
             torus_m = static.arena_size_m if static.boundary == "torus" else None
             edges = in_range(pose[:, :2], alive, static.range_m, (*static.fixed(film.arena), *movable), torus_m)
         state = None if self._state is None else self._state[index]
-        self._swarm.show(pose, alive, edges, _trail(film, index), state)
+        self._swarm.show(pose, alive, edges, _trail(film, index, self._trail_s), state)
         self._time.set_text(f"t = {film.time_s[index]:.1f} s")
         if self._strip:
             self._strip.show(index)
 
 
-def _trail(film: Film, index: int) -> AnyArray:
-    """Where the robots were in the last seconds, (points, n, 2), thinned if the run has many ticks a second."""
-    since = film.index_at(float(film.time_s[index]) - TRAIL_S)
-    every = max(1, (index - since) // MOST_TRAIL_POINTS)
+def _trail(film: Film, index: int, trail_s: float) -> AnyArray:
+    """Where the robots were in the last seconds, (points, n, 2), thinned if these are many ticks."""
+    since = film.index_at(float(film.time_s[index]) - trail_s)
+    most = round(MOST_TRAIL_POINTS * max(1.0, trail_s / TRAIL_S))
+    every = max(1, (index - since) // most)
     return whole_path(film.pose[np.arange(index, since - 1, -every)[::-1], :, :2], film.static)
 
 

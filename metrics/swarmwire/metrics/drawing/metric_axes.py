@@ -36,7 +36,7 @@ def limits(name: str, value: FloatArray, facts: Facts = UNKNOWN) -> tuple[float,
     known = value[np.isfinite(value)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
     low = min(low, 0.0)
-    span = max(high - low, 1.0 if is_count(name, facts) else 1e-6)
+    span = max(high - low, 1.0 if is_count(name, facts) or low == high else 1e-6)
     return low - 0.03 * span, high + 0.08 * span
 
 

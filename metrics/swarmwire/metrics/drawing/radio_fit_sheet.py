@@ -22,11 +22,14 @@ from swarmwire.metrics.drawing.looks import (
 from swarmwire.metrics.drawing.plain_axes import plain_axes
 from swarmwire.metrics.radio_fit.correlogram import correlogram
 from swarmwire.metrics.radio_fit.expected_runs import expected_runs
+from swarmwire.metrics.radio_fit.loss_fit import LossFit
+from swarmwire.metrics.radio_fit.loss_sequences import LossSequences
 from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit
 from swarmwire.metrics.radio_fit.places import places_of
 from swarmwire.metrics.radio_fit.radio_fit import RadioFit
 from swarmwire.metrics.radio_fit.shadowing_fit import ShadowingFit
 
+RUNS_TITLE = "runs of lost packets by length"
 _HEIGHT_IN = 4.6
 _DECADE = 10.0  # of the farthest distance over the nearest, from which on the axis is logarithmic
 _MOST_POINTS = 4000
@@ -42,14 +45,14 @@ def draw_radio_fit(fit: RadioFit, title: str, to: Path, size_px: int) -> None:
     _draw_correlogram(
         plain_axes(figure, (0.08, 0.08, 0.4, 0.34), "residuals' correlogram in dB² over distance in m"), fit
     )
-    _draw_bursts(plain_axes(figure, (0.575, 0.08, 0.4, 0.34), "runs of lost packets by length"), fit)
+    draw_bursts(plain_axes(figure, (0.575, 0.08, 0.4, 0.34), RUNS_TITLE), fit.sequences, fit.losses)
     save(figure, to)
 
 
 def _draw_rssi(axes: Any, fit: RadioFit) -> None:
     distance_m, rssi_dbm = fit.distance_m, fit.rssi_dbm
     if not len(distance_m):
-        _say(axes, "no packet was received")
+        say(axes, "no packet was received")
         return
     every = max(1, len(distance_m) // _MOST_POINTS)
     if distance_m.max() >= _DECADE * distance_m.min():
@@ -82,7 +85,7 @@ def _deviation_db(fit: RadioFit, distance_m: FloatArray) -> FloatArray:
 
 def _draw_correlogram(axes: Any, fit: RadioFit) -> None:
     if isinstance(fit.shadowing, str) or isinstance(fit.path_loss, str):
-        _say(axes, "shadowing was left out")
+        say(axes, "shadowing was left out")
         return
     found = correlogram(places_of(fit.log), fit.path_loss, fit.shadowing)
     axes.axhline(0.0, color=FAINT, lw=0.7)
@@ -92,20 +95,21 @@ def _draw_correlogram(axes: Any, fit: RadioFit) -> None:
     axes.legend(fontsize=SMALL_PT, frameon=False, labelcolor=SOFT, loc="upper right")
 
 
-def _draw_bursts(axes: Any, fit: RadioFit) -> None:
-    lengths = fit.sequences.burst_lengths
-    if not len(lengths) or isinstance(fit.losses, str):
-        _say(axes, "too few packets were lost")
+def draw_bursts(axes: Any, sequences: LossSequences, losses: LossFit | str) -> None:
+    """How long runs of lost packets are, and how long the fit expects them to be."""
+    lengths = sequences.burst_lengths
+    if not len(lengths) or isinstance(losses, str):
+        say(axes, "too few packets were lost")
         return
     longest = max(int(np.quantile(lengths, _LONGEST_SHARE)), 5)
     counts = np.bincount(np.minimum(lengths, longest + 1), minlength=longest + 2)[1 : longest + 1]
     at = np.arange(1, longest + 1)
     axes.plot(at, np.where(counts > 0, counts, np.nan), "o", ms=3, color=SOFT, label="found")
-    single, bursts = fit.losses.loss.value, fit.losses.chosen.bursts
+    single, bursts = losses.loss.value, losses.chosen.bursts
     # Runs of single losses are geometric: what lies above their line is bursts.
     axes.plot(at, len(lengths) * (1.0 - single) * single ** (at - 1.0), color=FAINT, lw=1.2, label="single losses")
     if bursts is not None:
-        expected = len(lengths) * expected_runs(bursts, fit.sequences.interval_s, longest)
+        expected = len(lengths) * expected_runs(bursts, sequences.interval_s, longest)
         axes.plot(at, expected, color=CURVE, lw=1.4, label="the fitted bursts")
     axes.set_yscale("log")
     axes.set_ylim(0.5, None)
@@ -113,6 +117,7 @@ def _draw_bursts(axes: Any, fit: RadioFit) -> None:
     axes.legend(fontsize=SMALL_PT, frameon=False, labelcolor=SOFT, loc="upper right")
 
 
-def _say(axes: Any, text: str) -> None:
+def say(axes: Any, text: str) -> None:
+    """A text in place of a drawing."""
     axes.set_axis_off()
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=TEXT_PT, color=SOFT)

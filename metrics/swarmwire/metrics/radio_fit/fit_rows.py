@@ -44,14 +44,15 @@ def parameter_rows(fit: RadioFit) -> Iterator[Row]:
         yield Row("noise from packet to packet", field.noise_db, "dB")
     else:
         yield Row("shadowing", None, "", field)
+    yield from loss_rows(losses, fit.sequences.interval_s)
+
+
+def loss_rows(losses: LossFit | str, interval_s: float) -> Iterator[Row]:
+    """Losses, single and in bursts, of packets that are usually so long apart."""
     if isinstance(losses, str):
         yield Row("losses", None, "", losses)
         return
     yield Row("loss", losses.loss, "")
-    yield from _burst_rows(fit, losses)
-
-
-def _burst_rows(fit: RadioFit, losses: LossFit) -> Iterator[Row]:
     bursts = losses.chosen.bursts
     if bursts is None:
         yield Row("bursts", None, "", "losses are no burstier than single ones")
@@ -59,7 +60,6 @@ def _burst_rows(fit: RadioFit, losses: LossFit) -> Iterator[Row]:
     for name in NAMES:
         error = losses.chosen.errors.get(name, math.nan)
         yield Row(WORDS[name], Estimate(getattr(bursts, name), error), "s" if name.endswith("_s") else "")
-    interval_s = fit.sequences.interval_s
     turned = 1.0 - math.exp(-interval_s * (1.0 / bursts.bad_s + 1.0 / bursts.good_s))
     for name, share in (("p, good to bad", bursts.bad_share), ("r, bad to good", 1.0 - bursts.bad_share)):
         yield Row(f"{name} in {interval_s:.3g} s", Estimate(share * turned, math.nan), "")

@@ -28,18 +28,21 @@ def radio_table(fit: RadioFit, antenna: Antenna) -> dict[str, Any]:
     if isinstance(fit.shadowing, ShadowingFit):
         field = Shadowing(fit.shadowing.deviation_db.value, fit.shadowing.correlation_m.value)
         tables["shadowing"] = _table(field, ("deviation_db", "correlation_m"))
-    if isinstance(fit.losses, LossFit):
-        if fit.losses.chosen.bursts is None:
-            radio["loss"] = _rounded(fit.losses.loss.value)
-        else:
-            tables["bursts"] = _table(fit.losses.chosen.bursts, NAMES)
-    return {"radio": {**radio, **tables}}
+    return {"radio": {**radio, **tables, **loss_table(fit.losses)}}
+
+
+def loss_table(losses: LossFit | str) -> dict[str, Any]:
+    """`loss`, or the table `bursts`, by what the data speak for; nothing where losses could not be fitted."""
+    if isinstance(losses, str):
+        return {}
+    bursts = losses.chosen.bursts
+    return {"loss": rounded(losses.loss.value)} if bursts is None else {"bursts": _table(bursts, NAMES)}
 
 
 def _table(parameters: object, keys: tuple[str, ...]) -> dict[str, float]:
-    return {key: _rounded(getattr(parameters, key)) for key in keys}
+    return {key: rounded(getattr(parameters, key)) for key in keys}
 
 
-def _rounded(value: float) -> float:
+def rounded(value: float) -> float:
     """As many digits as any fit can mean."""
     return float(f"{value:.{DIGITS}g}")

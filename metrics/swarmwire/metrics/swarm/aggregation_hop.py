@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment
@@ -38,14 +38,17 @@ class AggregationHop(OfClosePairs):
         pairs = self.close_pairs(static)
 
         def measure(moment: Moment) -> FloatArray:
-            return _largest_flock(pairs.of(moment), moment.alive) / moment.per_robot_alive
+            return largest_flock(pairs.of(moment), moment.alive) / moment.per_robot_alive
 
         return measure
 
 
 @njit(cache=True)
-def _largest_flock(pairs, alive):
-    """The robots in the largest flock of each arena, (arenas,)."""
+def largest_flock(pairs: IntArray, alive: BoolArray) -> FloatArray:
+    """The robots in the largest flock of each arena, (arenas,).
+
+    `pairs` (k, 2) are rows of robots that are close, each pair once; `alive` is (arenas, robots).
+    """
     arenas, robots = alive.shape
     start, close = neighbours_of(pairs, arenas * robots)
     largest, in_flock = np.zeros(arenas), np.zeros(arenas * robots, np.bool_)

@@ -23,10 +23,14 @@ class NearPairs:
     def __init__(self, static: Static, reach_m: FloatArray) -> None:
         """`reach_m` (robots,) is each robot's share of the distance below which it is near another."""
         self._reach_m, self._wrap_m = reach_m, sides_m(static)
+        self._key = "near pairs", reach_m.tobytes()
         self._order, self._strips = first_order(static), room_for(static)
 
     def of(self, moment: Moment) -> IntArray:
-        """The pairs, (k, 2) robot rows, each once."""
+        """The pairs, (k, 2) robot rows, each once; found once a tick for all metrics of the same reach."""
+        return moment.once(self._key, lambda: self._found(moment))
+
+    def _found(self, moment: Moment) -> IntArray:
         return _near_pairs(moment.pose, moment.alive, self._reach_m, self._order, self._strips, self._wrap_m)
 
 

@@ -1,0 +1,1 @@
+"""How near a run comes to what real robots did: the same metrics of both, side by side."""

@@ -1,0 +1,191 @@
+"""The metrics of emulated runs and of real robots side by side, and how far apart they are.
+
+Whether a log lies within the spread over seeds is asked of distances: each run's to all other runs, and the log's to
+all runs. A log that is one more of these runs lies farther out than all n of them once in n + 1 times.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.network.pdr import PacketDeliveryRatio
+from swarmwire.metrics.parity.emulated_runs import EmulatedRuns
+from swarmwire.metrics.parity.radio_values import RadioValue, radio_values, why_no_radio
+from swarmwire.metrics.real_log.measured_log import MeasuredLog
+from swarmwire.metrics.statistics.block_bootstrap import mean_difference_interval
+from swarmwire.metrics.statistics.distances import kolmogorov_smirnov, wasserstein_1
+from swarmwire.metrics.statistics.interval import UNKNOWN, Interval
+
+FEWEST_RUNS = 3  # that have a spread
+SPREAD = (0.05, 0.5, 0.95)
+ONLY_IN_RANGE = (
+    "who was within range is not in the log, and not all were; the radio's delivery counts all on both sides"
+)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A value over runs: of a single one all three are the same; NaN of none."""
+
+    low: float  # 5 %
+    median: float
+    high: float  # 95 %
+
+
+@dataclass(frozen=True)
+class MetricRow:
+    """One metric: its mean over ticks (of a count per second), and its distribution."""
+
+    metric: Metric
+    emulated: Spread  # over runs
+    log: float
+    ks: float  # between the log's values and those of all runs; NaN for what has no distribution, a time
+    distance: float  # Wasserstein-1 between them, in the metric's unit
+    reach: float  # the farthest that one run is from the others; NaN of fewer than three
+    difference: Interval  # of the means, log less run, by blocks of ticks: of a single run
+    runs: tuple[FloatArray, ...]  # the values of each run
+    values: FloatArray  # those of the log
+
+    @property
+    def within(self) -> bool | None:
+        """Whether the log lies within the spread, or the means differ by no more than chance; None: nothing tells."""
+        if not math.isnan(self.reach):
+            return self.distance <= self.reach
+        return None if math.isnan(self.difference.low) else self.difference.low <= 0.0 <= self.difference.high
+
+    @property
+    def badness(self) -> float:
+        """By which the worst come first."""
+        if math.isnan(self.ks):
+            return -1.0
+        return self.distance / self.reach if self.reach > 0.0 else 1.0 + self.ks
+
+
+@dataclass(frozen=True)
+class RadioRow:
+    """A number of the radio over the time that is compared."""
+
+    of: RadioValue
+    emulated: Spread
+    runs: int  # with a value
+
+    @property
+    def within(self) -> bool | None:
+        """Whether it is between the 5 % and the 95 % of the runs, as far as can be counted; None: too few."""
+        if self.runs < FEWEST_RUNS or math.isnan(self.of.log):
+            return None
+        return self.emulated.low - self.of.grain <= self.of.log <= self.emulated.high + self.of.grain
+
+
+@dataclass(frozen=True)
+class Parity:
+    """The whole comparison."""
+
+    runs: int
+    duration_s: float  # that is compared, from the start
+    rows: tuple[MetricRow, ...]  # the worst first
+    radio: tuple[RadioRow, ...]
+    not_in_log: Mapping[str, str]  # by metric: what it lacks
+    not_compared: Mapping[str, str]  # by number of the radio: why
+    not_in_run: tuple[str, ...]  # metrics that the runs did not keep
+    undefined: tuple[str, ...]  # that had a value on one side alone
+    never: tuple[str, ...]  # times of what happened on neither side
+
+    @property
+    def judged(self) -> tuple[MetricRow, ...]:
+        """The metrics of which something can be said."""
+        return tuple(row for row in self.rows if row.within is not None)
+
+    @property
+    def judged_radio(self) -> tuple[RadioRow, ...]:
+        """The radio's numbers of which something can be said."""
+        return tuple(row for row in self.radio if row.within is not None)
+
+    @property
+    def outside_by_chance(self) -> float:
+        """How many of the judged numbers of one more run would lie outside, on average.
+
+        A metric is outside once in runs + 1. A number is below the 5 % quantile, which lies 0.05 (runs - 1) ranks above
+        the least of the runs, once in (runs + 1) / (1 + 0.05 (runs - 1)), and above the 95 % quantile as often.
+        """
+        ranks = 2.0 * (1.0 + SPREAD[0] * (self.runs - 1))
+        return (len(self.judged) + ranks * len(self.judged_radio)) / (self.runs + 1)
+
+
+def parity(emulated: EmulatedRuns, log: MeasuredLog, metrics: Sequence[Metric]) -> Parity:
+    """Compare metrics over the time that log and runs have in common, counted from the start of each."""
+    duration_s = min(log.duration_s, *(run.duration_s for run in emulated.runs), math.inf)
+    rows: list[MetricRow] = []
+    undefined: list[str] = []
+    never: list[str] = []
+    absent: list[str] = []
+    lacks = {**log.left_out, **_of_range(emulated, metrics)}
+    for metric in metrics:
+        if metric.name in lacks:
+            continue
+        kept = [run.series[metric.name] for run in emulated.runs if metric.name in run.series]
+        if not kept:
+            absent.append(metric.name)
+            continue
+        runs = [_values(metric, of, emulated.rate_hz, duration_s) for of in kept]
+        real = _values(metric, log.series[metric.name], log.static.rate_hz, duration_s)
+        runs = [values for values in runs if len(values)]
+        if runs and len(real):
+            rows.append(_row(metric, runs, real))
+        elif runs or len(real):
+            undefined.append(metric.name)
+        elif metric.kind == "time":
+            never.append(metric.name)
+    rows.sort(key=lambda row: -row.badness)
+    numbers = list(radio_values(emulated, log, duration_s))
+    radio = tuple(RadioRow(of, spread(of.runs), len(of.runs)) for of in numbers if of.runs)
+    why = why_no_radio(emulated, log, duration_s)
+    has_radio = any(run.radio for run in emulated.runs)
+    not_compared = {of.name: why for of in numbers if not of.runs} if why is not None and has_radio else {}
+    lists = (tuple(names) for names in (absent, undefined, never))
+    return Parity(len(emulated.runs), duration_s, tuple(rows), radio, lacks, not_compared, *lists)
+
+
+def _of_range(emulated: EmulatedRuns, metrics: Sequence[Metric]) -> dict[str, str]:
+    """Metrics that count receivers in range alone, which in a log are all: not the same where some were out of it."""
+    out_of_range = any(run.radio and run.radio["fates"].get("out_of_range") for run in emulated.runs)
+    counting = [metric.name for metric in metrics if isinstance(metric, PacketDeliveryRatio)]
+    return dict.fromkeys(counting, ONLY_IN_RANGE) if out_of_range else {}
+
+
+def spread(values: Iterable[float]) -> Spread:
+    """Over runs, by linear interpolation."""
+    known = np.array(list(values), np.float64)
+    return Spread(*np.quantile(known, SPREAD).tolist()) if len(known) else Spread(math.nan, math.nan, math.nan)
+
+
+def _values(metric: Metric, series: FloatArray, rate_hz: int, duration_s: float) -> FloatArray:
+    """The finite values of a metric within a time: of a count what was added per second, of a time the last."""
+    series = series[: math.floor(duration_s * rate_hz + 1e-6) + 1]
+    if metric.kind == "time":
+        series = series[-1:]
+    known = series[np.isfinite(series)]
+    return np.diff(known, prepend=0.0) * rate_hz if metric.kind == "count" else known
+
+
+def _row(metric: Metric, runs: list[FloatArray], real: FloatArray) -> MetricRow:
+    emulated, mean = spread(float(of.mean()) for of in runs), float(real.mean())
+    nan, values = math.nan, (tuple(runs), real)
+    if metric.kind == "time":
+        return MetricRow(metric, emulated, mean, nan, nan, nan, UNKNOWN, *values)
+    pooled = np.concatenate(runs)
+    reach, difference = nan, UNKNOWN
+    if len(runs) >= FEWEST_RUNS:
+        reach = max(_to_others(runs, place) for place in range(len(runs)))
+    elif len(runs) == 1:
+        difference = mean_difference_interval(runs[0], real)
+    ks, distance = kolmogorov_smirnov(pooled, real), wasserstein_1(pooled, real)
+    return MetricRow(metric, emulated, mean, ks, distance, reach, difference, *values)
+
+
+def _to_others(runs: list[FloatArray], place: int) -> float:
+    return wasserstein_1(np.concatenate([*runs[:place], *runs[place + 1 :]]), runs[place])

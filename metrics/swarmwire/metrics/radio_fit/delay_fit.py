@@ -1,0 +1,135 @@
+"""Delays that are not uniform: a constant and one of the distributions of `[radio.delays]`, by quantiles.
+
+Three quantiles give the three numbers of each distribution, so that a few packets that are very late have no say.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import brentq  # pyright: ignore[reportUnknownVariableType] - scipy has no types
+from scipy.special import ndtri
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.metrics.radio_fit.estimate import Estimate
+from swarmwire.metrics.statistics.distances import kolmogorov_smirnov
+
+TAIL = 0.05  # the quantiles: this, the median, and 1 - this
+EVEN = 1000  # quantiles of a fitted delay that packets are held against
+FOLDS = 10  # parts of the packets by which errors are told
+LEAST_SHAPE, MOST_SHAPE = 2.01, 100.0  # of a Pareto law: below, it has no deviation; above, it is exponential
+SYMMETRIC = 3.0  # deviations that a normal delay's mean is above 0 at least: nothing is cut off
+
+
+@dataclass(frozen=True)
+class DelayFit:
+    """A constant delay, and one that varies on top."""
+
+    distribution: str  # as [radio.delays] calls it
+    latency_s: Estimate
+    mean_s: Estimate  # of what varies
+    deviation_s: Estimate
+    quantiles_s: FloatArray  # (EVEN,) of the whole delay
+    apart: float  # Kolmogorov and Smirnov's distance between the packets and the fit, 0 to 1
+
+
+@dataclass(frozen=True)
+class _Law:
+    latency_s: float
+    mean_s: float
+    deviation_s: float
+    quantiles_s: FloatArray
+
+
+def fit_delays(latency_s: FloatArray) -> DelayFit | None:
+    """The nearest of the distributions to the latencies of packets (n,), all known; None where none can be theirs.
+
+    Standard errors are by tenths of the packets; NaN where these are too few for a fit.
+    """
+    found: list[DelayFit] = []
+    for distribution, fit in _LAWS.items():
+        law = _fitted(fit, latency_s)
+        if law is not None:
+            apart = kolmogorov_smirnov(latency_s, law.quantiles_s)
+            latency, mean, deviation = (
+                Estimate(value, math.nan) for value in (law.latency_s, law.mean_s, law.deviation_s)
+            )
+            found.append(DelayFit(distribution, latency, mean, deviation, law.quantiles_s, apart))
+    if not found:
+        return None
+    best = min(found, key=lambda of: of.apart)
+    parts = [_fitted(_LAWS[best.distribution], latency_s[fold::FOLDS]) for fold in range(FOLDS)]
+    laws = [law for law in parts if law is not None]
+    if len(laws) < FOLDS:
+        return best
+
+    def with_error(of: Estimate, values: list[float]) -> Estimate:
+        return Estimate(of.value, float(np.std(values, ddof=1)) / math.sqrt(FOLDS))
+
+    return replace(
+        best,
+        latency_s=with_error(best.latency_s, [law.latency_s for law in laws]),
+        mean_s=with_error(best.mean_s, [law.mean_s for law in laws]),
+        deviation_s=with_error(best.deviation_s, [law.deviation_s for law in laws]),
+    )
+
+
+def _fitted(fit: Callable[[float, float, float], _Law | None], latency_s: FloatArray) -> _Law | None:
+    low, middle, high = np.quantile(latency_s, (TAIL, 0.5, 1.0 - TAIL)).tolist()
+    law = fit(low, middle, high) if 0.0 < low < middle < high else None
+    # No packets deviate by more than the latest of them: a law that says so is of others.
+    return law if law is not None and law.deviation_s <= latency_s.max() else None
+
+
+def _normal(low: float, middle: float, high: float) -> _Law | None:
+    deviation_s = (high - low) / (2.0 * _Z)
+    if middle < SYMMETRIC * deviation_s:
+        return None
+    return _Law(0.0, middle, deviation_s, middle + deviation_s * ndtri(_SHARES))
+
+
+def _lognormal(low: float, middle: float, high: float) -> _Law | None:
+    """Above the constant, the median is the geometric mean of the two other quantiles; with none below 0 it is 0."""
+    skew = low + high - 2.0 * middle
+    if skew <= 0.0:
+        return None
+    constant = max((low * high - middle**2) / skew, 0.0)
+    ratio = (high - constant) / (low - constant) if low > constant else math.inf
+    if math.isinf(ratio):
+        return None
+    spread = math.log(ratio) / (2.0 * _Z)
+    mean_s = (middle - constant) * math.exp(0.5 * spread**2)
+    deviation_s = mean_s * math.sqrt(math.expm1(spread**2))
+    return _Law(constant, mean_s, deviation_s, constant + (middle - constant) * np.exp(spread * ndtri(_SHARES)))
+
+
+def _pareto(low: float, middle: float, high: float) -> _Law | None:
+    """The ratio of the quantiles' distances tells the shape; with a constant below 0, the ratio of two quantiles."""
+
+    def widths(shape: float) -> tuple[float, float]:
+        of_low, of_middle, of_high = ((1.0 - share) ** (-1.0 / shape) for share in (TAIL, 0.5, 1.0 - TAIL))
+        return of_middle - of_low, of_high - of_middle
+
+    def excess(shape: float) -> float:
+        lower, upper = widths(shape)
+        return upper / lower - (high - middle) / (middle - low)
+
+    if excess(LEAST_SHAPE) * excess(MOST_SHAPE) > 0.0:
+        return None
+    shape = float(brentq(excess, LEAST_SHAPE, MOST_SHAPE))  # pyright: ignore[reportArgumentType] - asked otherwise, a tuple
+    least_s = (middle - low) / widths(shape)[0]
+    constant = low - least_s * (1.0 - TAIL) ** (-1.0 / shape)
+    if constant < 0.0:
+        shape = math.log((1.0 - TAIL) / TAIL) / math.log(high / low)
+        constant, least_s = 0.0, low * (1.0 - TAIL) ** (1.0 / shape)
+        if shape < LEAST_SHAPE:
+            return None
+    mean_s = least_s * shape / (shape - 1.0)
+    deviation_s = mean_s / math.sqrt(shape * (shape - 2.0))
+    return _Law(constant, mean_s, deviation_s, constant + least_s * (1.0 - _SHARES) ** (-1.0 / shape))
+
+
+_Z = float(ndtri(1.0 - TAIL))
+_SHARES: FloatArray = (np.arange(EVEN) + 0.5) / EVEN
+_LAWS = {"normal": _normal, "lognormal": _lognormal, "pareto": _pareto}

@@ -1,0 +1,1 @@
+"""Logs of real robots, read, and made into what metrics measure."""
