@@ -16,7 +16,7 @@ from swarmwire.metrics.verify.verify import verify
 from tests.deploy.commands import LOSSY, family, runners_of, started, swarmwire
 
 LONG = ["--set", "duration_s=3600", "--runners", "4", "--set", "robots.flock.count=8"]
-GONE_S = 5.0
+GONE_S = 20.0  # of a machine that is busy: they are gone in a fraction of a second
 
 
 @pytest.fixture

@@ -1,5 +1,8 @@
 """Law 2: the same scenario and seed give the same run bit for bit, in every layout, over real processes."""
 
+from functools import cache
+from pathlib import Path
+
 import pytest
 
 from swarmwire.comms.clock import WallClock
@@ -16,6 +19,12 @@ from tests.deploy.commands import LOSSY, ROOT
 
 SHORT = ["duration_s=3"]
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
+FURTHER = sorted(
+    path
+    for folder in ("behaviours", "papers/scenarios", "robots")
+    for path in (ROOT / "scenarios" / folder).glob("*.toml")
+)
+BODIES = {ROOT / "scenarios" / "robots" / "turtlebot.toml"}  # lie among them
 
 
 @pytest.fixture(scope="module")
@@ -23,13 +32,20 @@ def local() -> Result:
     return run(LOSSY, overrides=SHORT)
 
 
+@cache
+def in_one_process(scenario: Path) -> list[str]:
+    return run(scenario, overrides=SHORT).trajectory_sha256
+
+
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda path: path.stem)
 @pytest.mark.parametrize("runners", [1, 3, "per-robot"])
 def test_every_shipped_scenario_runs_alike_in_one_process_and_in_many(scenario, runners):
-    assert (
-        run(scenario, overrides=SHORT, runners=runners).trajectory_sha256
-        == run(scenario, overrides=SHORT).trajectory_sha256
-    )
+    assert run(scenario, overrides=SHORT, runners=runners).trajectory_sha256 == in_one_process(scenario)
+
+
+@pytest.mark.parametrize("scenario", [path for path in FURTHER if path not in BODIES], ids=lambda path: path.stem)
+def test_scenarios_of_behaviours_papers_and_robots_run_alike_in_one_process_and_in_three(scenario):
+    assert run(scenario, overrides=SHORT, runners=3).trajectory_sha256 == in_one_process(scenario)
 
 
 def test_two_executions_in_one_process_are_alike(local):

@@ -1,5 +1,6 @@
 """The shipped particle swarm finds the light by what its robots tell one another, and not without."""
 
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -34,10 +35,10 @@ class Gathering:
         return {}
 
 
-def successes(seeds: range, *overrides: str) -> int:
+def successes(seeds: range, *overrides: str, scenario: Path = PSO) -> int:
     """How many of the seeds' arenas succeed before the run's end."""
     gathering = Gathering()
-    run(PSO, seeds=seeds, overrides=overrides, observers=[gathering])
+    run(scenario, seeds=seeds, overrides=overrides, observers=[gathering])
     times = np.sort(gathering.first_s)
     count = int(np.isfinite(times).sum())
     quartiles = times[[len(times) * q // 4 for q in (1, 2, 3)]]
@@ -50,6 +51,16 @@ def successes(seeds: range, *overrides: str) -> int:
 )
 def test_a_few_swarms_find_the_light_with_the_radio_alone(overrides: list[str], least: int, most: int):
     assert least <= successes(range(1, 4), "duration_s=120", *overrides) <= most
+
+
+@pytest.mark.parametrize(
+    "name", ["pso_search", "pso_search_positioned", "pso_model", "pso_ring", "pso_noise_resistant"]
+)
+def test_each_kind_of_particle_swarm_finds_the_light_by_what_is_told(name: str):
+    scenario = ROOT / "scenarios" / "behaviours" / f"{name}.toml"
+    heard, deaf = (successes(range(1, 4), *loss, scenario=scenario) for loss in ([], [DEAF]))
+    assert heard >= 2
+    assert deaf == 0
 
 
 @pytest.mark.slow

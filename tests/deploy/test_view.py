@@ -25,8 +25,9 @@ from swarmwire.deploy.live.whole_recording import whole
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.viewer.program import end, free_port, is_open, program
 from tests.deploy.commands import LOSSY
-from tests.deploy.watching import At, until
+from tests.deploy.watching import At
 from tests.metrics.truths import tally
+from tests.waiting import until
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
 

@@ -1,4 +1,4 @@
-"""A process that looks on at a run, and waiting for what other processes do."""
+"""A process that looks on at a run."""
 
 import subprocess
 import sys
@@ -7,9 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.clock import NS_PER_S, WallClock
-
-PATIENCE_NS = 60 * NS_PER_S
 WATCHER = """
 import sys
 from pathlib import Path
@@ -27,16 +24,6 @@ with following(read_live(Path(sys.argv[1]))) as run:
             seen += 1
 print(seen, run.lost, run.bad)
 """
-
-
-def until(ready: Callable[[], Any]) -> Any:
-    """What `ready` returns once that is true."""
-    clock = WallClock()
-    end_ns = clock.now_ns() + PATIENCE_NS
-    while not (found := ready()):
-        assert clock.now_ns() < end_ns, "it did not happen"
-        clock.sleep_until(clock.now_ns() + NS_PER_S // 100)
-    return found
 
 
 @contextmanager

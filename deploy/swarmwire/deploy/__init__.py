@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from swarmwire.deploy.campaign.sweeping import Sweep, resume, sweep
+    from swarmwire.deploy.gateways.gateways import Gateways
     from swarmwire.deploy.record.recording import Recording
     from swarmwire.deploy.repetition import Repetition, repeat
     from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArenaResult",
+    "Gateways",
     "Percentiles",
     "RadioResult",
     "Recording",
@@ -33,6 +35,7 @@ __all__ = [
 ]
 
 _PLACES = {
+    "Gateways": "swarmwire.deploy.gateways.gateways",
     "Recording": "swarmwire.deploy.record.recording",
     "Repetition": "swarmwire.deploy.repetition",
     "RunFolder": "swarmwire.metrics.run_folder",

@@ -1,9 +1,12 @@
 """What people ask of an execution, checked at the door: seeds, runners, the pace of real time."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
+from swarmwire.comms.clock import to_ns
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario.scenario_file import load_scenario
 
 FASTEST = 1e6  # factor in real time
 Runners = int | str | None  # how many, "per-robot", or None for a local crew
@@ -43,3 +46,17 @@ def real_time_factor(realtime: float | str | None) -> float | None:
     if not 0 < factor <= FASTEST:
         raise BadInput("--realtime", "", f"expected a factor above 0 and at most {FASTEST:g}, got {realtime!r}")
     return factor
+
+
+def scenario_of(given: Scenario | Path | str, overrides: Sequence[str]) -> Scenario:
+    """The scenario as checked; BadInput for overrides of one that is complete as it is."""
+    if not isinstance(given, Scenario):
+        return load_scenario(given, overrides)
+    if overrides:
+        raise BadInput("overrides", "", "expected a path of a scenario; a Scenario is complete as it is")
+    return given
+
+
+def tick_count(scenario: Scenario) -> int:
+    """Ticks that start before the scenario's duration is over; the first always does."""
+    return max(1, -(-to_ns(scenario.duration_s) * scenario.time.rate_hz // 10**9))

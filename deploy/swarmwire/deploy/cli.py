@@ -2,21 +2,27 @@
 
 import io
 import sys
+from importlib.metadata import version
+from typing import Annotated
 
 import typer
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
+from swarmwire.deploy.commands.certs.group import certs_app
 from swarmwire.deploy.commands.check import check_command
 from swarmwire.deploy.commands.compare import compare_command
 from swarmwire.deploy.commands.describe import describe_command
 from swarmwire.deploy.commands.draw import draw_command
 from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.commands.export import ExportCommand, export_command
+from swarmwire.deploy.commands.help_text import let_help_flow
 from swarmwire.deploy.commands.list_kinds import list_command
 from swarmwire.deploy.commands.new import new_command
+from swarmwire.deploy.commands.parity import parity_command
 from swarmwire.deploy.commands.radio.group import radio_app
 from swarmwire.deploy.commands.repeat import repeat_command
 from swarmwire.deploy.commands.report import report_command
+from swarmwire.deploy.commands.robots.group import robots_app
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
@@ -25,13 +31,31 @@ from swarmwire.deploy.commands.tune import tune_command
 from swarmwire.deploy.commands.verify import verify_command
 from swarmwire.deploy.commands.view import view_command
 
+ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
+
 app = typer.Typer(
-    help="A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
+
+
+def _tell_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"swarmwire {version('swarmwire-deploy')}")
+        raise typer.Exit
+
+
+@app.callback(help=ABOUT)
+def options(
+    told: Annotated[
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Say which version this is.")
+    ] = False,
+) -> None:
+    """What the program itself takes, before any command."""
+
+
 app.command("run")(run_command)
 app.command("sweep")(sweep_command)
 app.command("tune")(tune_command)
@@ -48,7 +72,11 @@ app.command("new")(new_command)
 app.command("verify")(verify_command)
 app.command("compare")(compare_command)
 app.command("report")(report_command)
+app.command("parity")(parity_command)
 app.add_typer(radio_app, name="radio")
+app.add_typer(robots_app, name="robots")
+app.add_typer(certs_app, name="certs")
+let_help_flow(app)
 
 
 def main() -> None:

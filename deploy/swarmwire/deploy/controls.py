@@ -22,8 +22,9 @@ class Controls:
         on_wait: called while the loop is held, many times a second.
     """
 
-    def __init__(self, clock: Clock, rate_hz: int, pace: Pace | None = None) -> None:
-        """With a `pace` the run is in real time."""
+    def __init__(self, clock: Clock, rate_hz: int, pace: Pace | None = None, *, speed_fixed: bool = False) -> None:
+        """With a `pace` the run is in real time; a fixed speed stays, as programs elsewhere keep to it."""
+        self._speed_fixed = speed_fixed
         self._clock, self._rate_hz, self._pace = clock, rate_hz, pace
         self._lock = threading.Lock()
         self.paused = self.quit_asked = self.help_asked = False
@@ -137,6 +138,8 @@ class Controls:
         return (self._tick - tick) / self._rate_hz / wall_s if wall_s > 0 else self._free_speed
 
     def _set_speed(self, speed: float | None) -> None:
+        if self._speed_fixed:
+            return
         self.speed, self._asked = speed, True
         self._next_ns = self._clock.now_ns()
         self._since = None  # measured anew from the next tick on

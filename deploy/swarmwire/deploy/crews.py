@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Generator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from swarmwire.agent.local_crew import LocalCrew
@@ -11,6 +11,7 @@ from swarmwire.comms.clock import Clock
 from swarmwire.comms.protocols import Crew
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.endpoint import local_endpoint
+from swarmwire.deploy.gateways.served import Served
 from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.world.crews import split_robots as assignments
 from swarmwire.world.crews.pace import Pace
@@ -18,6 +19,7 @@ from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.crews.remote_crew import RemoteCrew
 from swarmwire.world.crews.roster import Loss
 from swarmwire.world.crews.runner_crew import Surroundings
+from swarmwire.world.gateways.gateway_crew import GatewayCrew
 from swarmwire.world.scenario.scenario import Scenario
 
 
@@ -38,9 +40,23 @@ class Crews:
     say: Callable[[str], None]  # what people should know at once
 
     @contextmanager
-    def crew(self) -> Generator[Crew]:
-        """The crew, ended with the context."""
+    def crew(self, served: Served | None = None) -> Generator[Crew]:
+        """The crew, ended with the context; it plays no robot that is served, but hands on what programs tell it."""
         whole = assignments.whole(self.scenario, self.static, dict(self.agents))
+        if served and self.pace:
+            names = {group.name for group in served.groups}
+            others = replace(whole, groups=tuple(group for group in whole.groups if group.name not in names))
+            with closing(LocalCrew(others)) as local:
+                yield GatewayCrew(
+                    local,
+                    served.groups,
+                    served.air,
+                    self.pace,
+                    self.static.rate_hz,
+                    served.show,
+                    served.show_counts,
+                )
+            return
         if not self.runners:
             with closing(LocalCrew(whole)) as local:
                 yield PacedCrew(local, self.pace) if self.pace else local

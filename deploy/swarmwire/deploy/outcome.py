@@ -74,6 +74,7 @@ def outcome(
         inputs=inputs,
         lost_runners=tuple(str(loss) for loss in losses),
         realtime=realtime,
+        gateways=dict(origin.gateways),
         record=record,
         out=folder,
     )

@@ -149,7 +149,8 @@ def _read_summary(folder: Path) -> _Summary | None:
 
 def _inputs(folder: Path, origin: Origin, summary: _Summary | None) -> RecordedInputs | None:
     inputs = recorded_inputs(folder)
-    from_outside = (origin.realtime is not None and origin.runners > 0) or bool(summary and summary.inputs_sha256)
+    driven = bool(origin.gateways) or (origin.realtime is not None and origin.runners > 0)
+    from_outside = driven or bool(summary and summary.inputs_sha256)
     if inputs is None and from_outside:
         expected = "expected the record of what came from outside, on which this run depends"
         raise BadInput(str(folder / INPUTS), "", expected)

@@ -104,6 +104,7 @@ class Result:
     inputs: InputsRecord | None = None  # what came from outside, if anything did
     lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
     realtime: RealTimeReport | None = None
+    gateways: dict[str, str] = field(default_factory=dict[str, str])  # by group: the kind, where it has one
     error: str | None = None  # why it failed
     record: dict[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]], compare=False)  # tables
     out: Path | None = field(default=None, compare=False)  # the run folder
@@ -160,6 +161,7 @@ class Result:
             "counts": self.counts,
             "lost_runners": list(self.lost_runners),
             "realtime": asdict(self.realtime) if self.realtime else None,
+            "gateways": self.gateways,
             "record": self.record,
             "cpu": self.cpu,
             "versions": self.versions,

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from swarmwire.comms.protocols import Observer
 from swarmwire.deploy.arguments import Runners
+from swarmwire.deploy.gateways.gateways import GatewaysGiven
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation
@@ -23,6 +24,7 @@ def run(
     socket: Path | None = None,
     realtime: float | None = None,
     record: Recording | None = None,
+    gateways: GatewaysGiven = None,
 ) -> Result:
     """Run a scenario and return its result; with `seeds`, one arena per seed, side by side in one world.
 
@@ -30,7 +32,8 @@ def run(
     "path=value" as for `--set`. With `out`, a new or empty folder, the run folder is written there; `record` says what
     goes into it. `realtime` keeps
     the run to the wall clock, so many simulated seconds per second, and waits for no runner; None runs as fast as the
-    machine allows.
+    machine allows. `gateways` has robots answer as real ones, in real time, for programs elsewhere to drive: "epuck2"
+    all of them, {"flock": "ros2"} those of a group; `Gateways` says also options, and the network of their agents.
 
     Raises BadInput for anything wrong with the scenario or these arguments, AgentFailed with the agent's traceback, and
     RunnerLost if a runner's process or link is gone.
@@ -46,6 +49,7 @@ def run(
         socket=socket,
         realtime=realtime,
         record=record,
+        gateways=gateways,
     )
     return finished(simulation)
 

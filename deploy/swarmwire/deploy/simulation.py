@@ -6,15 +6,26 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from swarmwire.comms.clock import WallClock, to_ns, to_s
-from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.comms.clock import WallClock, to_s
+from swarmwire.comms.errors import Interrupted
 from swarmwire.comms.protocols import Crew, Judge, Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.agents import agent_specs, check_agents
-from swarmwire.deploy.arguments import Runners, choose_seeds, real_time_factor, runner_count
+from swarmwire.deploy.arguments import (
+    Runners,
+    choose_seeds,
+    real_time_factor,
+    runner_count,
+    scenario_of,
+    tick_count,
+)
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.crews import Crews
 from swarmwire.deploy.endpoint import check_socket, new_run_id
+from swarmwire.deploy.gateways.behind import Behind
+from swarmwire.deploy.gateways.gateways import GatewaysGiven, as_gateways
+from swarmwire.deploy.gateways.served import Served
+from swarmwire.deploy.gateways.undriven import Undriven
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.kept_memory import keep_memory
@@ -25,6 +36,7 @@ from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.deploy.record.inputs import ReplayedCrew
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.record.run_record import RunRecord
+from swarmwire.deploy.rehearsal import rehearse
 from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.too_large import TooLarge
@@ -37,10 +49,10 @@ from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.crews.remote_crew import RemoteCrew
 from swarmwire.world.crews.roster import Loss
 from swarmwire.world.crews.runner_health import RunnerHealth
+from swarmwire.world.gateways.gateway_crew import GatewayCrew
 from swarmwire.world.loop import Loop
-from swarmwire.world.scenario.bodies import own_code
+from swarmwire.world.scenario.bodies import bodies_of, own_code
 from swarmwire.world.scenario.scenario import Scenario
-from swarmwire.world.scenario.scenario_file import load_scenario
 from swarmwire.world.world import World
 
 
@@ -69,6 +81,7 @@ class Simulation:
         interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
         judge: says which arenas are over, by the scenario's stop conditions; another may take its place before the run.
         controls: pause, step, speed and end of `run`, for other threads.
+        served: entered, the robots that answer as real ones, if any.
     """
 
     def __init__(
@@ -84,12 +97,14 @@ class Simulation:
         socket: Path | None = None,
         realtime: float | str | None = None,
         record: Recording | None = None,
+        gateways: GatewaysGiven = None,
         replay: Replay | None = None,
     ) -> None:
         self._clock = WallClock()
         self._called_ns = self._clock.now_ns()
-        self.scenario = _scenario_of(scenario, overrides)
-        factor = real_time_factor(realtime)
+        self.scenario = scenario_of(scenario, overrides)
+        self._behind = Behind(as_gateways(gateways), self.scenario)
+        factor = self._behind.factor(real_time_factor(realtime))
         self.agents = agent_specs(self.scenario)
         self.world = self._new_world(seed, seeds)
         measures = measuring(self.scenario)
@@ -99,9 +114,10 @@ class Simulation:
         self.judge: Judge | None = self._stop
         self.code = tuple(dict.fromkeys([*self.agents.values(), *own_code(self.world.static), *measures.code]))
         self._traces = scenario_traces(self.scenario)
-        self.ticks = replay.ticks if replay else _ticks(self.scenario)
+        self.ticks = replay.ticks if replay else tick_count(self.scenario)
         self.inputs = replay.inputs if replay else None
         self.runners = runner_count(runners, self.static.arenas * self.static.robots)
+        self._behind.check(self.static.arenas, self.runners)
         what = record or Recording()
         what.check(self.static)
         if self.runners and socket is not None:
@@ -110,12 +126,13 @@ class Simulation:
         self._record = RunRecord(None if out is None else Path(out), self._clock)
         rate_hz = self.scenario.time.rate_hz
         self._pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
-        self.controls = Controls(self._clock, rate_hz, self._pace)
+        self.controls = Controls(self._clock, rate_hz, self._pace, speed_fixed=bool(self._behind.kinds))
         self.run_id, self.interrupt = new_run_id(), Interrupt()
         self._observers: list[Guarded] = []
         for observer in (TooLarge(self._record.say), *self._recorders(what), *observers):
             self.watch(observer)
         self._losses: list[Loss] = []
+        self.served: Served | None = None
         self._crews = self._new_crews(socket)
         self._crew: Crew | None = None
         self._loop: Loop | None = None
@@ -164,13 +181,22 @@ class Simulation:
             ticks=self.ticks,
             runners=self.runners,
             realtime=realtime,
+            gateways=self._behind.kinds,
             metrics=self.metrics,
         )
         with ExitStack() as stack:
             stack.push(self._record.failed_to_start)
-            crew = self._crew = stack.enter_context(self._crews.crew())
+            if self._pace:  # before anything answers, and the pace begins
+                world = self._new_world(None, self.static.seeds)
+                rehearse(world, new_air(self.scenario, world, self._traces), self.metrics.metrics)
+            pace = self._pace.factor if self._pace else 1.0
+            served = self._behind.served(self.world, self.agents, self._clock, pace, self.folder, self._record.say)
+            self.served = stack.enter_context(served)
+            crew = self._crew = stack.enter_context(self._crews.crew(self.served))
             judging = [self._stop] if self._stop else []
             self._watching: list[Observer] = [self.metrics, *judging, RadioTally(), EventLog(), *self._observers]
+            if self.served:
+                self._watching.append(Undriven(self.served, pace, self._record.say))
             acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows)
             acting = self._record.recorded(acting, self._from_outside)
             self._loop = Loop(
@@ -227,7 +253,7 @@ class Simulation:
                 inputs=self._record.inputs(),
                 losses=self._losses,
                 engines=self.world.engines,
-                realtime=crew.report() if isinstance(crew, PacedCrew | RealTimeCrew) else None,
+                realtime=crew.report() if isinstance(crew, PacedCrew | RealTimeCrew | GatewayCrew) else None,
                 folder=self.folder,
             )
         self._record.close(self._result)
@@ -239,6 +265,7 @@ class Simulation:
     def _new_world(self, seed: int | None, seeds: Sequence[int] | None) -> World:
         """Every arena at its start, with the senses that its agents need."""
         needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
+        needs = self._behind.senses(needs, bodies_of(self.scenario, self.scenario.source))
         return World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
 
     def _recorders(self, what: Recording) -> Sequence[Observer]:
@@ -266,7 +293,7 @@ class Simulation:
         """Whether the actions of this tick need not follow from scenario and seed."""
         if self.inputs is not None:
             return tick >= self.inputs.first_tick
-        return bool(self._losses) or (self._pace is not None and self.runners > 0)
+        return bool(self._losses or self._behind.kinds) or (self._pace is not None and self.runners > 0)
 
     def _stopped(self) -> bool:
         return self.interrupt.asked or self.controls.quit_asked
@@ -286,17 +313,3 @@ class Simulation:
         if self.tick >= self.ticks:
             return "duration"
         return "interrupted" if self._stopped() else "left"
-
-
-def _scenario_of(given: Scenario | Path | str, overrides: Sequence[str]) -> Scenario:
-    """The scenario as checked; BadInput for overrides of one that is complete as it is."""
-    if not isinstance(given, Scenario):
-        return load_scenario(given, overrides)
-    if overrides:
-        raise BadInput("overrides", "", "expected a path of a scenario; a Scenario is complete as it is")
-    return given
-
-
-def _ticks(scenario: Scenario) -> int:
-    """Ticks that start before the scenario's duration is over; the first always does."""
-    return max(1, -(-to_ns(scenario.duration_s) * scenario.time.rate_hz // 10**9))

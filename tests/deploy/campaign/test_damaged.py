@@ -1,32 +1,44 @@
 """A campaign's folder that a power cut or a person has damaged: one line that says which file, and how to go on."""
 
 import json
+from shutil import copytree
 
 import polars as pl
 import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
+from swarmwire.deploy.campaign import sweeping
 from swarmwire.deploy.campaign.run_again import CampaignRun
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from tests.deploy.campaign.small import rows_in, series_in
+from tests.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
 from tests.deploy.campaign.test_resume import ASKED, Killed, dying_at
 
 
-@pytest.fixture
-def whole(tmp_path, scenario, here):
-    sweep(scenario, out=tmp_path / "whole", **ASKED)
-    return tmp_path / "whole"
-
-
-@pytest.fixture
-def half(tmp_path, scenario, here, monkeypatch):
-    """Of four pieces two are done."""
-    with monkeypatch.context() as patched:
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    """A folder with a campaign that is `whole`, and with one of which two of four pieces are done, `half`."""
+    folder = tmp_path_factory.mktemp("sound")
+    scenario = scenario_in(folder)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
+        sweep(scenario, out=folder / "whole", **ASKED)
         dying_at(patched, 4, Killed())
         with pytest.raises(Killed):
-            sweep(scenario, out=tmp_path / "half", **ASKED)
-    return tmp_path / "half"
+            sweep(scenario, out=folder / "half", **ASKED)
+    return folder
+
+
+@pytest.fixture
+def whole(sound, tmp_path, here):
+    """A copy, for one test to damage."""
+    return copytree(sound / "whole", tmp_path / "whole")
+
+
+@pytest.fixture
+def half(sound, tmp_path, here):
+    """A copy, for one test to damage."""
+    return copytree(sound / "half", tmp_path / "half")
 
 
 def refused(call, *arguments):

@@ -141,7 +141,7 @@ def test_the_picture_has_distances_to_read_off(here, monkeypatch, capsys, farthe
         (["log.csv", "--power-dbm", "nan"], "--power-dbm: expected at least -100 dBm, got nan"),
         (["log.csv", "--gain-dbi", "nan"], "--gain-dbi: expected at least -100 dBi, got nan"),
         (["log.csv", "--power-dbm", "inf"], "--power-dbm: expected at most 100 dBm, got inf"),
-        (["absent.csv"], "absent.csv: expected a readable file: No such file or directory"),
+        (["absent.csv"], "absent.csv: expected a log: there is no such file or folder"),
         (["log.csv", "--write", "radio.json"], "radio.json: expected a file name that ends in .toml"),
         (["log.csv", "--write", "absent/radio.toml"], "absent/radio.toml: expected a path in a folder that exists"),
         (["log.csv", "--to", "fit.bmp"], "fit.bmp: expected a file name that ends in .png or .svg or .pdf"),
@@ -152,3 +152,12 @@ def test_what_cannot_be_is_refused_in_one_line(here, monkeypatch, capsys, argume
     (here / "log.csv").write_text(SMALL)
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", *arguments)
     assert (code, out, errors) == (2, "", f"error: {told}\n")
+
+
+def test_brackets_in_notes_are_printed_as_they_are(here, monkeypatch, capsys):
+    rows = [f"{0.1 * i},a,b,{i},{0.9 if i % 4 == 0 else 0.01 + 1e-5 * i}\n" for i in range(200)]
+    (here / "heard[1].csv").write_text("t_s,tx,rx,seq,latency_s\n" + "".join(rows))
+    code, out, _ = called(monkeypatch, capsys, "radio", "fit", "heard[1].csv")
+    assert code == 0
+    assert out.startswith("heard[1].csv: 200 packets")
+    assert "no distribution of [radio.delays] fits" in " ".join(out.split())

@@ -11,6 +11,7 @@ from swarmwire.deploy import Result, run
 from swarmwire.deploy.result import Statistics
 from swarmwire.deploy.terminal.report import print_result
 from swarmwire.metrics.registry import METRICS
+from swarmwire.world.crews.realtime_crew import RealTimeReport
 from tests.deploy.commands import LOSSY
 
 
@@ -80,3 +81,21 @@ def test_arenas_that_stopped_are_told_with_when_and_by_what_and_those_that_did_n
         f"not stopped │ seed 1, seed 2, seed 4, seed 6, seed 7, seed 8 and 2 more in 1 s: {early} or {late}",
     ]
     assert "stopped" not in shown(result)
+
+
+def test_what_real_time_was_asked_for_and_what_came_of_it_agree(result):
+    def rows(gateways: dict[str, str]) -> tuple[str, str]:
+        out = StringIO()
+        late = RealTimeReport(1.0, 2, 9.9924)
+        run = replace(
+            result, ticks=600, sim_time_s=60.0, wall_time_s=80.64, mode="realtime", realtime=late, gateways=gateways
+        )
+        print_result(run, METRICS.values(), Console(file=out, width=160, color_system=None))
+        return row(out.getvalue(), "simulated").partition(" (")[0], row(out.getvalue(), "real time")
+
+    speed = "60 s in 80.64 s: 0.74 x real time"
+    assert rows({"flock": "epuck2"}) == (
+        speed,
+        "asked for x 1, took 20.64 s longer; 2 of 600 ticks missed, worst lag 9.99 s",
+    )
+    assert rows({}) == (speed, "asked for x 1; 2 of 600 ticks missed, worst lag 9.99 s")

@@ -1,12 +1,12 @@
 """A campaign as a TOML file: which scenario, what varies, which seeds."""
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.one_of import one_of
+from swarmwire.comms.toml_file import read_toml
 from swarmwire.deploy.campaign.design import GRID
 from swarmwire.deploy.campaign.plan import Asked
 from swarmwire.deploy.campaign.seed_list import chosen_seeds, seed_list
@@ -37,12 +37,7 @@ def campaign_table(path: Path) -> dict[str, Any] | None:
     BadInput if it cannot be read, or has a key that is unknown, missing or of another type.
     """
     where = str(path)
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise BadInput(where, "", f"expected a readable file: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadInput(where, "", f"expected TOML: {error}") from None
+    table = read_toml(path)
     if "scenario" not in table and any(key in table for key in OF_SCENARIOS):
         return None
     for key, value in table.items():

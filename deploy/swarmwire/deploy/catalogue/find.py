@@ -38,9 +38,11 @@ def find(name: str) -> Entry:
         return behaviour(name)
     entries = [entry for kind in chosen or KINDS for entry in kind.entries()]
     asked = rest if chosen else name
-    found = [entry for entry in entries if _is(entry.name, asked)] or [
-        entry for entry in entries if _is(entry.name, asked, ends=True)
-    ]
+    found = (
+        [entry for entry in entries if entry.name == asked]  # Aggregation is a behaviour, aggregation a metric
+        or [entry for entry in entries if _is(entry.name, asked)]
+        or [entry for entry in entries if _is(entry.name, asked, ends=True)]
+    )
     if not found:
         raise BadInput(name, "", _nearest(asked, entries))
     if len(found) > 1:

@@ -13,6 +13,7 @@ from swarmwire.deploy.catalogue.fates import fates
 from swarmwire.deploy.catalogue.metrics import metrics
 from swarmwire.deploy.catalogue.presets import presets
 from swarmwire.deploy.catalogue.radio_stages import radio_stages
+from swarmwire.deploy.catalogue.robot_protocols import drivers, gateways
 from swarmwire.deploy.catalogue.scenario_keys import keys, radio_keys
 from swarmwire.deploy.catalogue.senses import senses
 from swarmwire.deploy.catalogue.sheet_keys import sheet_keys
@@ -41,5 +42,7 @@ KINDS = (
     Kind("stages", "stage", "what a packet passes on its way to a receiver, in order", radio_stages),
     Kind("fates", "fate", "what may become of a packet for one receiver", fates),
     Kind("engines", "engine", "what moves the bodies of a run", engines),
+    Kind("drivers", "driver", "real robots that swarmwire-agent can drive", drivers),
+    Kind("gateways", "gateway", "real robots that robots of a run can answer as", gateways),
     Kind("keys", "key", "all other keys of a scenario", keys),
 )

@@ -9,6 +9,7 @@ from rich.text import Text
 
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.kinds import KINDS, Kind
+from swarmwire.deploy.terminal.rows import aligned
 
 WIDEST_VALUE = 28  # columns of a terminal
 SAID_BY_VALUE = ("a number", "a table")
@@ -68,9 +69,8 @@ def _print_rows(console: Console, headings: Sequence[str], rows: Sequence[Sequen
         console.print(_table(headings, rows))
         return
     cells = [[cell.replace("\n", "; ") for cell in row] for row in ([headings, *rows] if any(headings) else rows)]
-    widths = [max(len(cell) for cell in column) for column in zip(*cells, strict=True)]
-    for row in cells:
-        _line(console, "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+    for line in aligned(cells):
+        _line(console, line)
 
 
 def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:

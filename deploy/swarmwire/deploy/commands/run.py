@@ -8,6 +8,17 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
+from swarmwire.deploy.commands.gateway_options import (
+    Ca,
+    Certificate,
+    Gateway,
+    GatewaySet,
+    Insecure,
+    Key,
+    NetworkEndpoint,
+    Revoked,
+    Swarm,
+)
 from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
 from swarmwire.deploy.commands.options import Links, Overrides, Packets, Quiet, Runners, ScenarioFile, Seed
 from swarmwire.deploy.commands.program import program
@@ -53,21 +64,40 @@ def run_command(
     rrd: Rrd = True,
     select: Select = None,
     view: View = False,
+    gateway: Gateway = None,
+    gateway_set: GatewaySet = None,
+    network: NetworkEndpoint = None,
+    swarm: Swarm = None,
+    ca: Ca = None,
+    certificate: Certificate = None,
+    key: Key = None,
+    revoked: Revoked = None,
+    insecure: Insecure = False,
     quiet: Quiet = False,
 ) -> None:
     """Run a scenario, show how it goes, and leave a run folder: summary, tables, recording, log.
 
     Without --realtime the same scenario and seed give the same run bit for bit, whatever --runners says.
+
+    With --gateway robots answer as real ones would, in real time, to programs that drive them: swarmwire-agent, whose
+    settings for each robot are written into the run folder, or any other that speaks the robot's protocol. For example:
+    --gateway epuck2, or --gateway flock=ros2@tcp/127.0.0.1:7447.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.arguments import choose_seeds
     from swarmwire.deploy.compiling import compiling_told
+    from swarmwire.deploy.gateways.gateways import gateways_of_options, network_of
     from swarmwire.deploy.record.new_folder import default_folder
     from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.simulation import Simulation
     from swarmwire.world.scenario.scenario_file import load_scenario
 
     checked = load_scenario(scenario, overrides or [])
+    for name in revoked or []:
+        if name not in checked.robot_names():
+            raise BadInput("--revoked", name, "expected a robot of the scenario")
+    member = network_of(network, ca, certificate, key, revoked or [], insecure=insecure)
+    gateways = gateways_of_options(gateway or [], gateway_set or [], swarm, member)
     chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
     folder = out or default_folder(scenario.stem, chosen)
     console = Console(quiet=quiet, highlight=False)
@@ -79,6 +109,7 @@ def run_command(
             out=folder,
             socket=socket,
             realtime=realtime,
+            gateways=gateways,
             record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
         )
         result = _shown(simulation, folder, view, console)
@@ -91,8 +122,10 @@ def _shown(simulation: "Simulation", folder: Path, view: bool, console: Console)
     from swarmwire.deploy.live.live_view import LiveView
     from swarmwire.deploy.running import finished
     from swarmwire.deploy.terminal.report import print_result
+    from swarmwire.deploy.terminal.robots_told import RobotsTold
     from swarmwire.deploy.terminal.shown import progress
 
+    simulation.watch(RobotsTold(simulation, console))
     simulation.watch(progress(simulation, console))
     with LiveView(folder) as live:
         if view:

@@ -1,6 +1,7 @@
 """A radio's fit as people read it in a terminal."""
 
 import math
+from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
@@ -17,26 +18,26 @@ def print_fit(fit: RadioFit, title: str, console: Console) -> None:
     packets = len(fit.sequences.lost)
     counts = f"{packets} packet{'s' if packets != 1 else ''} on {links} link{'s' if links != 1 else ''}"
     console.print(f"{title}: {counts}, {received} received", soft_wrap=True)
-    _print_parameters(fit, console)
+    print_parameters(list(parameter_rows(fit)), console)
     residuals = list(residual_rows(fit))
     if residuals:
-        table = _table("residuals of RSSI")
+        table = titled_table("residuals of RSSI")
         table.add_column(style="cyan")
         table.add_column(justify="right")
         for name, value in residuals:
             table.add_row(name, value)
         console.print(table)
     if isinstance(fit.losses, LossFit):
-        _print_models(fit.losses, console)
+        print_models(fit.losses, console)
     for note in fit.notes:
         console.print(f"note: {note}", soft_wrap=True)
 
 
-def _print_parameters(fit: RadioFit, console: Console) -> None:
-    table = _table("parameters", header=True)
+def print_parameters(rows: Sequence[Row], console: Console) -> None:
+    """Each with its value, standard error and unit, then those that were left out, and why."""
+    table = titled_table("parameters", header=True)
     for name in ("parameter", "value", "standard error", "unit"):
         table.add_column(name, justify="right" if name in {"value", "standard error"} else "left")
-    rows = list(parameter_rows(fit))
     for row in rows:
         if row.estimate is not None:
             table.add_row(row.parameter, *_figures(row), row.unit)
@@ -47,8 +48,9 @@ def _print_parameters(fit: RadioFit, console: Console) -> None:
             console.print(f"left out: {row.parameter}: {row.left_out}", soft_wrap=True)
 
 
-def _print_models(losses: LossFit, console: Console) -> None:
-    table = _table("models of loss (the least AIC fits best)", header=True)
+def print_models(losses: LossFit, console: Console) -> None:
+    """The models of loss, and how well they tell the losses."""
+    table = titled_table("models of loss (the least AIC fits best)", header=True)
     for name in ("model", "parameters", "AIC", ""):
         table.add_column(name, justify="right" if name in {"parameters", "AIC"} else "left")
     for model in losses.models:
@@ -69,5 +71,6 @@ def _figures(row: Row) -> tuple[str, str]:
     return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
 
 
-def _table(title: str, header: bool = False) -> Table:
+def titled_table(title: str, header: bool = False) -> Table:
+    """An empty table with a title."""
     return Table(title=Text(title), show_header=header, title_justify="left", title_style="bold")

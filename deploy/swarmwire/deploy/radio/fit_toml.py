@@ -7,6 +7,7 @@ from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
     from swarmwire.comms.air.parameters.propagation import Antenna
+    from swarmwire.metrics.radio_fit.network_fit import NetworkFit
     from swarmwire.metrics.radio_fit.radio_fit import RadioFit
 
 DISK = {"range_m": 1.0}  # what a table without path loss is put into
@@ -31,6 +32,22 @@ def radio_fit_toml(fit: "RadioFit", antenna: "Antenna", file: Path) -> str:
         comments.append("Without path loss this is no radio yet: put it into one that has a model or a range_m.")
     _refuse_unfit(table, file)
     return "".join(f"# {comment}\n" for comment in comments) + tomli_w.dumps(table)
+
+
+def network_fit_toml(fit: "NetworkFit", file: Path) -> str:
+    """The table `[radio]` of a network's fit, with what was left out as comments; BadInput as `radio_fit_toml`."""
+    import tomli_w
+
+    from swarmwire.metrics.radio_fit.network_rows import network_rows
+    from swarmwire.metrics.radio_fit.network_table import network_comments, network_table
+
+    table = network_table(fit)
+    left_out = [f"{row.parameter}: {row.left_out}" for row in network_rows(fit) if row.estimate is None]
+    if not table["radio"]:
+        raise BadInput(str(file), "", f"nothing could be fitted: {'; '.join(left_out)}")
+    _refuse_unfit(table, file)
+    comments = [f"Fitted to {file.name} by swarmwire radio fit.", *(f"Left out: {one}." for one in left_out)]
+    return "".join(f"# {comment}\n" for comment in [*comments, *network_comments(fit)]) + tomli_w.dumps(table)
 
 
 def _refuse_unfit(table: dict[str, Any], file: Path) -> None:

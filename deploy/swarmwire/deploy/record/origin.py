@@ -5,7 +5,7 @@ A run that is killed leaves no summary; what stands here is enough to run it aga
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ class Origin:
     modules: Mapping[str, str]  # sha256 of the installed code, by module
     cpu: str
     versions: Mapping[str, str]
+    gateways: Mapping[str, str] = field(default_factory=dict[str, str])  # by group: of which kind it has one
     metrics: tuple[MetricFacts, ...] = ()  # that were measured; none: by a swarmwire that did not keep them
 
     def changes(self, folder: Path, code: Sequence[str]) -> list[str]:
@@ -56,6 +57,7 @@ def origin_of(
     runners: int,
     realtime: float | None,
     metrics: Sequence[Metric],
+    gateways: Mapping[str, str],
     folder: Path | None,
 ) -> Origin:
     """The origin of a run that is about to begin; put into its run folder, if it has one, with the copied files.
@@ -71,6 +73,7 @@ def origin_of(
         modules=module_digests(code),
         cpu=machine.cpu(),
         versions=machine.versions(),
+        gateways=gateways,
         metrics=tuple(facts_of(metric) for metric in metrics),
     )
     if folder:
@@ -107,4 +110,5 @@ def _origin(found: dict[str, Any]) -> Origin:
         modules=dict(found["modules"]),
         cpu=str(found["cpu"]),
         versions=dict(found["versions"]),
+        gateways=dict(found.get("gateways", {})),
     )

@@ -1,12 +1,14 @@
 """What a run leaves behind: its folder, from the scenario and the first line of the log to the summary."""
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from shutil import rmtree
 from types import TracebackType
 
 from swarmwire.comms.clock import WallClock
+from swarmwire.comms.errors import BadInput
 from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.deploy.live.published import Published
@@ -70,6 +72,7 @@ class RunRecord:
         ticks: int,
         runners: int,
         realtime: float | None,
+        gateways: Mapping[str, str],
         metrics: Metrics,
     ) -> Origin:
         """Put into the folder all that the run is made from; what that is."""
@@ -81,6 +84,7 @@ class RunRecord:
             runners=runners,
             realtime=realtime,
             metrics=metrics.metrics,
+            gateways=gateways,
             folder=self.folder,
         )
         what = f"{scenario.name}, seeds {list(seeds)}, {ticks} ticks, {runners} runners"
@@ -90,9 +94,13 @@ class RunRecord:
     def failed_to_start(
         self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
     ) -> None:
-        """Say in the log why there was no first tick; there is nothing to sum up."""
+        """Say in the log why there was no first tick; there is nothing to sum up. What is refused leaves no folder."""
         if error is not None:
             self.note(f"failed to start: {error}")
+        if isinstance(error, BadInput) and self.folder and self._log:
+            self._log.close()
+            rmtree(self.folder, ignore_errors=True)  # it was new or empty, so all that is in it is of this run
+            self.folder = self._log = None
 
     def recorded(self, crew: Crew, outside: Callable[[int], bool]) -> Crew:
         """The crew, with its actions kept in the folder from the first tick on at which `outside(tick)` holds."""

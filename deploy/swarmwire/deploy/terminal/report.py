@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 BLOCKED = Fate.BLOCKED.name.lower()
 SHOWN = 6  # arenas that are named, at most
+SHOWN_S = 0.01  # that a run in real time took longer than asked for, at least: as the times above are rounded
 WHOLE = 1000  # from here on numbers are shown without decimals, nor as powers of ten
 
 
@@ -24,11 +25,12 @@ def print_result(result: Result, metrics: "Iterable[Metric]", console: Console) 
     table = Table(title=Text(result.scenario), show_header=False, title_justify="left", title_style="bold")
     table.add_column(style="cyan")
     table.add_column()
-    who = f"{result.runners} processes, {result.mode}" if result.runners else "all agents in this process"
+    who = f"{result.runners} processes, {result.mode}" if result.runners else _who(result)
     table.add_row(
         "robots", f"{result.robots}, {who}" + (f", {len(result.arenas)} arenas" if len(result.arenas) > 1 else "")
     )
-    speed = f"{result.sim_time_s:g} s in {result.wall_time_s:.2f} s: {result.realtime_factor:.1f} x real time"
+    decimals = 2 if result.realtime else 1  # beside what was asked for, a percent counts
+    speed = f"{result.sim_time_s:g} s in {result.wall_time_s:.2f} s: {result.realtime_factor:.{decimals}f} x real time"
     table.add_row("simulated", f"{speed} (start took {result.start_time_s:.2f} s), engine {result.engine}")
     if result.ended not in ("duration", "stopped"):
         table.add_row("ended", result.ended)
@@ -54,6 +56,12 @@ def print_result(result: Result, metrics: "Iterable[Metric]", console: Console) 
     console.print(table)
 
 
+def _who(result: Result) -> str:
+    if not result.gateways:
+        return "all agents in this process"
+    return "behind gateways: " + ", ".join(f"{group} ({kind})" for group, kind in result.gateways.items())
+
+
 def _add_stops(table: Table, result: Result) -> None:
     """Which arenas stopped, by what and since when it held, and which did not."""
     for condition in dict.fromkeys(result.stop):
@@ -77,12 +85,22 @@ def _add_real_time(table: Table, result: Result) -> None:
     if real is None:
         return
     missed = f"{real.missed_ticks} of {result.ticks} ticks missed"
-    lag = f", worst lag {real.worst_lag_s * 1000:.1f} ms" if real.missed_ticks else ""
-    table.add_row("real time", f"x {real.factor:g}; {missed}{lag}")
+    lag = f", worst lag {_lag(real.worst_lag_s)}" if real.missed_ticks else ""
+    table.add_row("real time", f"asked for x {real.factor:g}{_longer(result, real.factor)}; {missed}{lag}")
     if result.runners:
         late, stops = sum(real.late_answers.values()), sum(real.watchdog_stops.values())
         drops = f"{real.frames_dropped} frames with {real.packets_dropped} packets dropped"
         table.add_row("runners", f"{late} late answers (per robot), {stops} watchdog stops, {drops}")
+
+
+def _lag(lag_s: float) -> str:
+    return f"{lag_s:.2f} s" if lag_s >= 1.0 else f"{lag_s * 1000:.1f} ms"
+
+
+def _longer(result: Result, factor: float) -> str:
+    """By how much it took longer than was asked for: behind gateways, where nobody changed the speed meanwhile."""
+    longer_s = result.wall_time_s - result.sim_time_s / factor
+    return f", took {_lag(longer_s)} longer" if result.gateways and longer_s >= SHOWN_S else ""
 
 
 def _add_radio(table: Table, arena: ArenaResult) -> None:

@@ -1,0 +1,141 @@
+"""A certificate authority: an EC key on P-256 and a certificate of its own, with which it signs those of others."""
+
+import ipaddress
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from cryptography import x509
+from cryptography.exceptions import UnsupportedAlgorithm
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.certificates.dates import DAY, text_of
+from swarmwire.deploy.certificates.files import AUTHORITY, certificate_path, key_path, read_key
+
+AUTHORITY_DAYS = 3652  # ten years
+EARLIER = DAY  # a certificate holds from then: robots without a battery for their clock lag behind
+
+
+@dataclass(frozen=True)
+class Authority:
+    """A CA with its key."""
+
+    certificate: x509.Certificate
+    key: ec.EllipticCurvePrivateKey
+
+    @classmethod
+    def new(cls, now: datetime) -> "Authority":
+        """A new one, good for ten years, which signs certificates of the network's members and nothing else."""
+        key = ec.generate_private_key(ec.SECP256R1())
+        name = _name(f"swarmwire CA {text_of(now)}")
+        signs = _usage(signs_certificates=True)
+        builder = _begun(name, name, key.public_key(), now, now + AUTHORITY_DAYS * DAY)
+        builder = builder.add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        builder = builder.add_extension(signs, critical=True)
+        return cls(builder.sign(key, hashes.SHA256()), key)
+
+    @classmethod
+    def read(cls, folder: Path, now: datetime) -> "Authority":
+        """The CA in a folder; BadInput unless its files are there, private, belong together, and hold at that date."""
+        path = certificate_path(folder, AUTHORITY)
+        if not path.is_file():
+            raise BadInput(str(folder), "", f"expected a CA's folder: swarmwire certs init {folder}")
+        pem = read_key(key_path(folder, AUTHORITY))
+        try:
+            certificate = x509.load_pem_x509_certificate(path.read_bytes())
+            key = serialization.load_pem_private_key(pem, None)
+        except (ValueError, TypeError, UnsupportedAlgorithm):
+            raise BadInput(str(folder), "", f"expected PEM in {AUTHORITY}.pem and {AUTHORITY}.key") from None
+        if not isinstance(key, ec.EllipticCurvePrivateKey) or key.public_key() != certificate.public_key():
+            raise BadInput(str(key_path(folder, AUTHORITY)), "", f"expected the key of {path.name}")
+        _check_date(folder, certificate, now)
+        return cls(certificate, key)
+
+    def issue(
+        self, name: str, hosts: Sequence[str], days: int, now: datetime
+    ) -> tuple[x509.Certificate, ec.EllipticCurvePrivateKey]:
+        """A new key, and a certificate for it: as server and as client, for that name and these hosts.
+
+        It holds for so many days, though not longer than the CA.
+        """
+        key = ec.generate_private_key(ec.SECP256R1())
+        until = min(now + days * DAY, self.certificate.not_valid_after_utc)
+        both = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
+        issuer = x509.AuthorityKeyIdentifier.from_issuer_public_key(self.key.public_key())
+        builder = _begun(_name(name), self.certificate.subject, key.public_key(), now, until)
+        builder = builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        builder = builder.add_extension(_usage(signs_certificates=False), critical=True)
+        builder = builder.add_extension(x509.ExtendedKeyUsage(both), critical=False)
+        builder = builder.add_extension(x509.SubjectAlternativeName([_host(of) for of in (name, *hosts)]), False)
+        builder = builder.add_extension(issuer, critical=False)
+        return builder.sign(self.key, hashes.SHA256()), key
+
+    def revocation_list(self, revoked: Sequence[tuple[int, datetime]], now: datetime) -> bytes:
+        """The list (CRL, PEM) of revoked certificates: serial numbers, and since when."""
+        builder = x509.CertificateRevocationListBuilder().issuer_name(self.certificate.subject)
+        builder = builder.last_update(now).next_update(self.certificate.not_valid_after_utc)
+        for serial, since in revoked:
+            entry = x509.RevokedCertificateBuilder().serial_number(serial).revocation_date(since).build()
+            builder = builder.add_revoked_certificate(entry)
+        return builder.sign(self.key, hashes.SHA256()).public_bytes(serialization.Encoding.PEM)
+
+
+def certificate_pem(certificate: x509.Certificate) -> str:
+    """A certificate as it is written to a file."""
+    return certificate.public_bytes(serialization.Encoding.PEM).decode()
+
+
+def key_pem(key: ec.EllipticCurvePrivateKey) -> bytes:
+    """A key as it is written to a file: PKCS#8, as zenoh wants it, without a password."""
+    return key.private_bytes(
+        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+    )
+
+
+def _begun(
+    subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePublicKey, now: datetime, until: datetime
+) -> x509.CertificateBuilder:
+    builder = x509.CertificateBuilder().subject_name(subject).issuer_name(issuer).public_key(key)
+    builder = builder.serial_number(x509.random_serial_number())
+    builder = builder.not_valid_before(now - EARLIER).not_valid_after(until)
+    return builder.add_extension(x509.SubjectKeyIdentifier.from_public_key(key), critical=False)
+
+
+def _usage(*, signs_certificates: bool) -> x509.KeyUsage:
+    return x509.KeyUsage(
+        digital_signature=not signs_certificates,
+        key_cert_sign=signs_certificates,
+        crl_sign=signs_certificates,
+        content_commitment=False,
+        key_encipherment=False,
+        data_encipherment=False,
+        key_agreement=False,
+        encipher_only=False,
+        decipher_only=False,
+    )
+
+
+def _name(common_name: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)])
+
+
+def _host(host: str) -> x509.GeneralName:
+    try:
+        return x509.IPAddress(ipaddress.ip_address(host))
+    except ValueError:
+        return x509.DNSName(host)
+
+
+def _check_date(folder: Path, certificate: x509.Certificate, now: datetime) -> None:
+    until, since = certificate.not_valid_after_utc, certificate.not_valid_before_utc
+    where = str(certificate_path(folder, AUTHORITY))
+    if now >= until:
+        raise BadInput(where, "", f"the CA ended on {text_of(until)}: swarmwire certs init --renew {folder}")
+    if now < since:
+        raise BadInput(
+            where, "", f"the clock shows {text_of(now)}, before the CA began, {text_of(since)}: set the clock"
+        )

@@ -1,0 +1,1 @@
+"""`swarmwire certs`: its commands, one a file."""

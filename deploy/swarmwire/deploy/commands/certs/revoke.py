@@ -1,0 +1,28 @@
+"""`swarmwire certs revoke`."""
+
+from typing import Annotated
+
+import typer
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.deploy.commands.certs.needed import AuthorityFolder, need_cryptography
+
+
+def revoke_command(
+    folder: AuthorityFolder, name: Annotated[str, typer.Argument(help="Whose certificates.", metavar="NAME")]
+) -> None:
+    """Revoke a name for good: under this CA it never gets a certificate again.
+
+    Robots learn of it with their settings (`revoked = ["NAME"]` under network), when they are pushed and started anew;
+    a run with gateways reads it beside its --ca. For example, a robot that was stolen:
+
+      swarmwire certs revoke lab-ca flock-3
+    """
+    need_cryptography()
+    from swarmwire.deploy.certificates.certificate_folder import revoke
+    from swarmwire.deploy.certificates.files import REVOKED
+    from swarmwire.deploy.certificates.register import Register
+
+    revoke(folder, name, WallClock())
+    names = ", ".join(f'"{of}"' for of in Register.read(folder).revoked())
+    typer.echo(f"written: {folder / REVOKED}; in the robots' settings: revoked = [{names}]")

@@ -1,0 +1,1 @@
+"""`swarmwire robots`: its commands, one a file."""

@@ -1,0 +1,83 @@
+"""A fleet: robots, where each is reached, and what runs on it."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.one_of import one_of
+from swarmwire.deploy.certificates.revoked import revoked_in
+
+
+@dataclass(frozen=True)
+class Host:
+    """An account on a machine that is reached by SSH; several robots may share one."""
+
+    user: str
+    address: str
+    port: int
+    key: str = field(compare=False)  # file of the private key; "": those of the user's agent and of ~/.ssh
+    python: str = field(compare=False)  # as it is called there
+
+    def __str__(self) -> str:
+        """As people write it."""
+        return f"{self.user}@{self.address}" + (f":{self.port}" if self.port != 22 else "")
+
+
+@dataclass(frozen=True)
+class Robot:
+    """One robot of a fleet: its settings are those of `robot.toml`, but for what concerns the whole swarm."""
+
+    name: str
+    host: Host
+    endpoint: str  # of the robots' network, as others call it: tls/192.168.1.31:7447
+    groups: tuple[str, ...]
+    packages: tuple[str, ...]  # beyond what agent and driver need, as they are installed here
+    settings: dict[str, Any]
+    places: dict[str, str]  # where each setting is said: rate_hz -> defaults.rate_hz
+
+    @property
+    def network_host(self) -> str:
+        """Where others call it: the address in `endpoint`, which its certificate must have."""
+        return self.endpoint.partition("/")[2].rpartition(":")[0].strip("[]")
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """All robots of a swarm, in the order of their index."""
+
+    file: Path
+    swarm: str
+    robots: tuple[Robot, ...]
+    known_hosts: Path
+    certificates: Path | None  # None: an insecure network
+    operator: str  # name of the certificate with which robots are stopped
+
+    def revoked(self) -> list[str]:
+        """Names whose certificates count no more; BadInput if the register of certificates cannot be read."""
+        return revoked_in(self.certificates) if self.certificates is not None else []
+
+    def chosen(self, robots: Iterable[str] = (), groups: Iterable[str] = ()) -> tuple[Robot, ...]:
+        """The robots of these names and groups, all if none is given; BadInput for a name that there is not."""
+        names, chosen_groups = list(robots), list(groups)
+        _known("--robots", names, [robot.name for robot in self.robots])
+        _known("--group", chosen_groups, {group: 0 for robot in self.robots for group in robot.groups})
+        if not names and not chosen_groups:
+            return self.robots
+        return tuple(of for of in self.robots if of.name in names or set(of.groups) & set(chosen_groups))
+
+
+def hosts_of(robots: Iterable[Robot]) -> dict[Host, list[Robot]]:
+    """The robots by their hosts."""
+    hosts: dict[Host, list[Robot]] = {}
+    for robot in robots:
+        hosts.setdefault(robot.host, []).append(robot)
+    return hosts
+
+
+def _known(option: str, given: Iterable[str], known: Iterable[str]) -> None:
+    names = list(known)
+    for name in given:
+        if name not in names:
+            raise BadInput(option, "", f"expected {one_of(names, name)}; got {name!r}")

@@ -1,0 +1,1 @@
+"""Emulated runs and robots' logs, found in folders and brought together."""

@@ -1,0 +1,85 @@
+"""What differs between a scenario and robots' settings, as far as it may well make metrics differ."""
+
+import hashlib
+import inspect
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from swarmwire.agent.declared import parameters_of
+from swarmwire.agent.loading import NoAgent, load_agent
+from swarmwire.comms.truth import Static
+from swarmwire.deploy.agents import agent_specs
+from swarmwire.deploy.parity.emulation import Emulation
+from swarmwire.metrics.real_log.real_logs import RealLogs
+from swarmwire.metrics.real_log.robot_log import RobotLog
+
+NAMED = 3  # differing keys that are told in one line, at most
+
+
+def differing_settings(emulation: Emulation, logs: RealLogs) -> list[str]:
+    """A line for each: robots, rate, agent, its file, its parameters, body."""
+    static = emulation.static
+    lines: list[str] = []
+    if static.robots != len(logs.robots):
+        lines.append(f"robots: {static.robots} emulated, {len(logs.robots)} in the log")
+    rates = sorted({static.rate_hz / group.act_every_ticks for group in static.groups})
+    if rates != [logs.rate_hz]:
+        told = " and ".join(f"{rate_hz:g} Hz" for rate_hz in rates)
+        lines.append(f"steps of the agents: {told} emulated, {logs.rate_hz:g} Hz in the log")
+    return [*lines, *_agents(emulation, logs), *_bodies(static, logs)]
+
+
+def _agents(emulation: Emulation, logs: RealLogs) -> Iterator[str]:
+    groups = list(emulation.scenario.robots.values())
+    specs = {_class_of(group.agent) for group in groups}
+    real = {_class_of(robot.about.agent) for robot in logs.robots}
+    if specs != real:
+        yield f"agent: {', '.join(sorted(specs))} emulated, {', '.join(sorted(real))} in the log"
+        return
+    try:
+        kinds = [load_agent(spec) for spec in agent_specs(emulation.scenario).values()]
+    except NoAgent as error:
+        yield f"agent: the emulated one cannot be compared any more: {error}"
+        return
+    digests, logged = {_digest(kind) for kind in kinds}, {robot.about.agent_sha256 for robot in logs.robots}
+    if digests != logged:
+        shown = [", ".join(sorted(digest[:12] for digest in some)) for some in (digests, logged)]
+        yield f"agent's file: sha256 {shown[0]}… emulated, {shown[1]}… in the log"
+    if len(groups) == 1:
+        yield from _params(kinds[0], groups[0].params, logs.robots)
+
+
+def _class_of(spec: str) -> str:
+    """The last part of a spec's place and its class: the file lies elsewhere on the robot."""
+    place, _, name = spec.rpartition(":")
+    return f"{Path(place).name}:{name}" if place.endswith(".py") else f"{place}:{name}"
+
+
+def _params(kind: type, emulated: Mapping[str, Any], robots: Sequence[RobotLog]) -> Iterator[str]:
+    told: list[str] = []
+    for name, parameter in parameters_of(kind).items():
+        mine = emulated.get(name, parameter.default)
+        real = [robot.about.params.get(name, parameter.default) for robot in robots]
+        each = cast("list[Any]", mine) if isinstance(mine, list) else [mine] * len(real)  # a value for each robot
+        if real != each:
+            told.append(f"{name} {mine} emulated, {', '.join(sorted({str(value) for value in real}))} in the log")
+    if told:
+        more = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
+        yield f"params: {'; '.join(told[:NAMED])}{more}"
+
+
+def _bodies(static: Static, logs: RealLogs) -> Iterator[str]:
+    emulated = {group.body.name: group.body for group in static.groups}
+    real = {robot.about.body.name: robot.about.body for robot in logs.robots}
+    if emulated.keys() != real.keys():
+        yield f"body: {', '.join(sorted(emulated))} emulated, {', '.join(sorted(real))} in the log"
+    for name in emulated.keys() & real.keys():
+        if emulated[name].told.as_mapping() != real[name].told.as_mapping():
+            yield f"body {name}: its sheet in the log differs from the emulated one"
+
+
+def _digest(kind: type) -> str:
+    """Of the file that the class stands in, as robots have it."""
+    file = inspect.getsourcefile(kind)
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else ""

@@ -1,0 +1,55 @@
+"""A rehearsal: some ticks apart from the run, so that what a machine has not compiled yet is not compiled within it.
+
+Whoever drives a robot in real time would otherwise find it dead for half a minute, and the run behind from then on.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from swarmwire.comms.air.air import Air
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
+from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.world.loop import Loop
+from swarmwire.world.world import World
+
+TICKS = 5  # by which packets of the first have come, and are over
+PACKET = b"\0"
+
+
+def rehearse(world: World, air: Air | None, metrics: Iterable[Metric]) -> None:
+    """Run a world and an air that nobody needs any more: every robot drives and sends, and metrics are measured."""
+    observers = [Metrics(tuple(metrics)), RadioTally()]
+    for observer in observers:
+        observer.begin(world.static)
+    Loop(world, air, _Extras(world.static, sends=air is not None), observers).run(TICKS)
+
+
+class _Extras:
+    """A crew that drives and sends, whatever it is told."""
+
+    def __init__(self, static: Static, *, sends: bool) -> None:
+        rows = np.arange(static.arenas * static.robots)
+        still = np.zeros(len(rows))
+        packets = Sent(rows, np.full(len(rows), BROADCAST), Payloads.of([PACKET] * len(rows)))
+        sent = packets if sends else Sent.none()
+        self._actions = Actions(rows, np.ones(len(rows), np.bool_), still + 0.01, still, still, sent)
+
+    def start(self) -> None:
+        """They are ready."""
+
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+        """The same in every tick."""
+        return self._actions
+
+    def counts(self) -> dict[str, int]:
+        """No faults."""
+        return {}
+
+    def close(self) -> None:
+        """Nothing to end."""

@@ -1,0 +1,102 @@
+"""Peers of a robots' network on this machine, with certificates, and the waiting for what happens among them."""
+
+import json
+import queue
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.swarm_keys import SwarmKeys
+from swarmwire.comms.wire.swarm_session import endpoints_of
+
+KEYS = SwarmKeys("lab")
+ROBOTS = ("flock-0", "flock-1", "flock_2")
+LISTEN = ("tls/127.0.0.1:0",)
+WITHIN_S = 20.0
+REFUSED_MS, PATIENT_MS = 300, 20_000  # a stranger tries so long
+
+
+def network_of(folder: Path, name: str, *others: zenoh.Session, revoked: tuple[str, ...] = ()) -> Network:
+    """The settings of a peer that listens at a port of the system's choice and calls all others."""
+    certificate, key = folder / f"{name}.pem", folder / f"{name}.key"
+    calls = tuple(map(endpoint_of, others))
+    return Network(LISTEN, calls, ca=folder / "ca.pem", certificate=certificate, key=key, revoked=revoked)
+
+
+def stranger(endpoint: str, authority: Path, certificate: tuple[Path, str] | None, patience_ms: int) -> zenoh.Session:
+    """A session that calls one endpoint; zenoh.ZError if it is not let in."""
+    connects = {"connect": {"endpoints": [endpoint], "timeout_ms": patience_ms, "exit_on_failure": True}}
+    tls: dict[str, object] = {"root_ca_certificate": str(authority / "ca.pem")}
+    if certificate:
+        folder, name = certificate
+        own = {"connect_certificate": str(folder / f"{name}.pem"), "connect_private_key": str(folder / f"{name}.key")}
+        tls |= own | {"enable_mtls": True}
+    config = {"mode": "client", "scouting": {"multicast": {"enabled": False}}, "transport": {"link": {"tls": tls}}}
+    return zenoh.open(zenoh.Config.from_json5(json.dumps(config | connects)))
+
+
+def endpoint_of(session: zenoh.Session) -> str:
+    """Where a peer listens."""
+    return endpoints_of(session, Network(LISTEN))[0]
+
+
+def wait_for_listeners(session: zenoh.Session, key: str) -> None:
+    """Return once somebody is known who hears what the session puts on that key."""
+    publisher = session.declare_publisher(key)
+    _wait_for_match(publisher)
+    publisher.undeclare()
+
+
+def replies_of(session: zenoh.Session, key: str, *, wait: bool) -> list[str]:
+    """All replies to a query, which waits until somebody is known who answers, or does not."""
+    querier = session.declare_querier(key, timeout=WITHIN_S)
+    if wait:
+        _wait_for_match(querier)
+    return [reply.ok.payload.to_string() for reply in querier.get() if reply.ok]
+
+
+def _wait_for_match(declared: zenoh.Publisher | zenoh.Querier) -> None:
+    known: queue.SimpleQueue[bool] = queue.SimpleQueue()
+    declared.declare_matching_listener(lambda status: known.put(status.matching))
+    if not declared.matching_status.matching:
+        assert known.get(timeout=WITHIN_S)
+
+
+def at_once(callback: Callable[[Any], None]) -> "zenoh.handlers.Callback[Any]":
+    """A callback that zenoh's own thread calls, so all that comes by one link is told in the order in which it came.
+
+    Otherwise each declaration has a thread of its own, and what two of them tell may change places.
+    """
+    return zenoh.handlers.Callback(callback, indirect=False)
+
+
+class Inbox:
+    """Keys of what a session hears, in the order of each link."""
+
+    def __init__(self, session: zenoh.Session, *keys: str) -> None:
+        self._heard: queue.SimpleQueue[str] = queue.SimpleQueue()
+        for key in keys:
+            session.declare_subscriber(key, at_once(lambda sample: self._heard.put(str(sample.key_expr))))
+
+    def next(self) -> str:
+        return self._heard.get(timeout=WITHIN_S)
+
+    def empty(self) -> bool:
+        return self._heard.empty()
+
+
+class Links:
+    """Waits for links of a session to come and go."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._events: queue.SimpleQueue[bool] = queue.SimpleQueue()
+        session.info.declare_transport_events_listener(
+            lambda event: self._events.put(event.kind == zenoh.SampleKind.PUT), history=True
+        )
+
+    def wait(self, *, up: bool) -> None:
+        while self._events.get(timeout=WITHIN_S) != up:
+            pass

@@ -1,0 +1,173 @@
+"""What `fleet.toml` may say, and what each robot's settings become of it."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.fleet.fleet import Fleet, Host, hosts_of
+from swarmwire.deploy.fleet.fleet_file import read_fleet
+from swarmwire.deploy.fleet.fleet_keys import OF_FLEET, OF_ROBOT
+from swarmwire.deploy.fleet.release import release_entries
+from swarmwire.deploy.fleet.robot_settings import operator_network, robot_settings
+from tests.docs.pages import ROOT
+
+EXAMPLE = ROOT / "examples" / "fleet" / "fleet.toml"
+LEAST: dict[str, Any] = {
+    "format": 1, "swarm": "lab", "insecure": True,
+    "defaults": {"user": "pi", "agent": "still.py:Still", "driver": {"name": "epuck2", "address": "e"}},
+    "groups": {"red": {}, "blue": {}},
+    "robots": {"a": {"address": "10.0.0.1"}, "b": {"address": "10.0.0.2"}},
+}  # fmt: skip
+
+
+def read(tmp_path: Path, **changed: Any) -> Fleet:
+    """The fleet of the least file with some tables changed; None takes a key away."""
+    table = {key: value for key, value in {**LEAST, **changed}.items() if value is not None}
+    (tmp_path / "fleet.toml").write_text(tomli_w.dumps(table))
+    return read_fleet(tmp_path / "fleet.toml")
+
+
+def test_the_example_is_a_fleet():
+    fleet = read_fleet(EXAMPLE)
+    assert [robot.name for robot in fleet.robots] == ["flock-0", "flock-1", "flock-2", "flock-3"]
+    assert [len(robots) for robots in hosts_of(fleet.robots).values()] == [1, 1, 2]
+    assert fleet.robots[3].host == Host("lab", "192.168.1.20", 22, "", "")
+    assert fleet.robots[2].settings["params"] == {"near": 0.2, "speed_mps": 0.03}
+    assert fleet.robots[2].settings["driver"] == {"name": "epuck2", "address": "192.168.1.43"}
+
+
+def test_the_examples_agent_fits_its_robots(tmp_path):
+    from swarmwire.deploy.commands.robots.contents import contents_of
+
+    text = EXAMPLE.read_text().replace('certificates = "certs"', "insecure = true")
+    (tmp_path / "fleet.toml").write_text(text)
+    (tmp_path / "shy.py").write_bytes((EXAMPLE.parent / "shy.py").read_bytes())
+    fleet = read_fleet(tmp_path / "fleet.toml")
+    contents = contents_of(fleet, fleet.robots)
+    assert contents.faults == {}
+    assert {entry.name for entry in contents.entries["flock-0"]} == {"robot.toml", "shy.py"}
+
+
+def test_a_robots_own_goes_before_its_groups_and_these_before_defaults(tmp_path):
+    defaults = {**LEAST["defaults"], "rate_hz": 1, "watchdog_s": 3.0, "seed": 1, "params": {"x": 1, "y": 1, "z": 1}}
+    groups = {"red": {"rate_hz": 2, "params": {"y": 2, "z": 2}}, "blue": {"seed": 3, "params": {"z": 3}}}
+    robots = {"a": {"address": "h", "groups": ["red", "blue"], "seed": 4}}
+    (robot,) = read(tmp_path, defaults=defaults, groups=groups, robots=robots).robots
+    assert {key: robot.settings[key] for key in ("rate_hz", "watchdog_s", "seed", "params")} == {
+        "rate_hz": 2, "watchdog_s": 3.0, "seed": 4, "params": {"x": 1, "y": 2, "z": 3},
+    }  # fmt: skip
+    assert (robot.places["rate_hz"], robot.places["seed"]) == ("groups.red.rate_hz", "robots.a.seed")
+
+
+def test_robots_at_one_address_get_ports_one_after_the_other(tmp_path):
+    robots = {
+        "a": {"address": "h"}, "b": {"address": "h"}, "c": {"address": "i"},
+        "d": {"address": "h", "network_port": 9000},
+    }  # fmt: skip
+    endpoints = [robot.endpoint for robot in read(tmp_path, robots=robots).robots]
+    assert endpoints == ["tcp/h:7557", "tcp/h:7558", "tcp/i:7557", "tcp/h:9000"]
+    robots["d"]["network_port"] = 7557
+    with pytest.raises(
+        BadInput, match=r"robots\.d\.network_port: expected a port that a, at the same address, has not"
+    ):
+        read(tmp_path, robots=robots)
+
+
+def test_every_two_robots_are_linked_by_one_of_them(tmp_path):
+    fleet = read(tmp_path, robots={name: {"address": name} for name in "abc"})
+    networks = [robot_settings(fleet, robot, [])["network"] for robot in fleet.robots]
+    assert [network.get("connect", []) for network in networks] == [[], ["tcp/a:7557"], ["tcp/a:7557", "tcp/b:7557"]]
+    assert all(network["listen"] == ["tcp/0.0.0.0:7557"] for network in networks)
+    assert operator_network(fleet, [], fleet.robots[1:]) == {"connect": ["tcp/b:7557", "tcp/c:7557"], "insecure": True}
+
+
+def test_with_certificates_links_are_proven_and_the_revoked_are_named(tmp_path):
+    fleet = read(tmp_path, insecure=None, certificates="certs", operator="boss")
+    assert fleet.certificates == tmp_path / "certs"
+    network = robot_settings(fleet, fleet.robots[0], ["b"])["network"]
+    assert network == {
+        "listen": ["tls/0.0.0.0:7557"], "ca": "ca.pem", "certificate": "a.pem", "key": "a.key",
+        "operator": "boss", "revoked": ["b"],
+    }  # fmt: skip
+    assert operator_network(fleet, [], [])["certificate"] == "boss.pem"
+
+
+def test_a_missing_certificate_is_told_with_what_issues_it_after_a_missing_ca_with_what_begins_it(tmp_path):
+    robots = {"a": {"address": "h", "agent": "swarmwire.agent.behaviours:Flocking"}}
+    fleet = read(tmp_path, insecure=None, certificates="certs", robots=robots)
+    certs = tmp_path / "certs"
+    issue = f"swarmwire certs issue {certs} --fleet {fleet.file}"
+    with pytest.raises(BadInput, match=rf"; swarmwire certs init {certs}, then {issue}$"):
+        release_entries(fleet, fleet.robots[0], [])
+    certs.mkdir()
+    (certs / "ca.pem").touch()
+    with pytest.raises(BadInput, match=rf"; {issue}$"):
+        release_entries(fleet, fleet.robots[0], [])
+
+
+def test_files_are_beside_the_robots_settings(tmp_path):
+    defaults = {**LEAST["defaults"], "agent": "agents/still.py:Still", "body": "sheets/mine.toml"}
+    fleet = read(tmp_path, defaults=defaults)
+    settings = robot_settings(fleet, fleet.robots[0], [])
+    assert (settings["agent"], settings["body"]) == ("still.py:Still", "mine.toml")
+    assert settings["robots"] == ["a", "b"]
+    assert tomllib.loads(tomli_w.dumps(settings)) == settings
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({"format": 2}, "format: expected 1, which this version reads; got 2"),
+        ({"swarm": None}, "swarm: is missing"),
+        ({"swarm": "a/*"}, "swarm: expected 1 to 63 letters"),
+        ({"robot": {}}, r"robot: unknown key; expected .*\(did you mean robots\?\)"),
+        ({"robots": {}}, r"robots: expected at least one robot, such as \[robots.flock-0\]"),
+        ({"robots": {"a b": {"address": "h"}}}, "robots.a b: expected 1 to 63 letters"),
+        ({"robots": {"env": {"address": "h"}}}, "robots.env: expected another name: on hosts ~/swarmwire/env is not"),
+        ({"robots": {"a": {}}}, "robots.a.address: is missing, here and in defaults"),
+        ({"robots": {"a": {"adress": "h"}}}, r"robots.a.adress: unknown key; .*\(did you mean address\?\)"),
+        ({"robots": {"a": 3}}, "robots.a: expected a table, got 3"),
+        ({"robots": {"a": {"address": 3}}}, "robots.a.address: expected a text, got 3"),
+        ({"robots": {"a": {"address": ""}}}, "robots.a.address: expected a text that is not empty"),
+        ({"robots": {"a": {"address": "h", "port": 0}}}, "robots.a.port: expected a port, 1 to 65535, got 0"),
+        ({"robots": {"a": {"address": "h", "port": True}}}, "robots.a.port: expected a whole number, got True"),
+        (
+            {"robots": {"a": {"address": "h", "groups": ["rad"]}}},
+            r"robots.a.groups: .*\(did you mean red\?\); got 'rad'",
+        ),
+        ({"robots": {"a": {"address": "h", "groups": [1]}}}, r"robots.a.groups: expected a list of texts, got \[1\]"),
+        (
+            {"robots": {"a": {"address": "h"}, "b": {"address": "h", "python": "p"}}},
+            "robots.b: expected the python and",
+        ),
+        ({"defaults": {"user": "pi", "address": "h"}}, "defaults.address: unknown key"),
+        ({"groups": {"red": {"groups": ["blue"]}}}, "groups.red.groups: unknown key"),
+        ({"groups": {"red": {"rate_hz": 1.5}}}, "groups.red.rate_hz: expected a whole number, got 1.5"),
+        ({"insecure": None}, "certificates: expected the folder of `swarmwire certs`, or insecure = true"),
+        ({"certificates": "certs"}, "insecure: expected either certificates or insecure = true"),
+    ],
+)
+def test_what_is_wrong_is_refused_in_one_line(tmp_path, changed, expected):
+    with pytest.raises(BadInput, match=rf"^{tmp_path}/fleet\.toml: {expected}"):
+        read(tmp_path, **changed)
+
+
+@pytest.mark.parametrize(("text", "expected"), [("a = ", "expected TOML"), (None, "expected a readable file")])
+def test_what_is_no_file_of_a_fleet_is_refused(tmp_path, text, expected):
+    if text is not None:
+        (tmp_path / "fleet.toml").write_text(text)
+    with pytest.raises(BadInput, match=expected):
+        read_fleet(tmp_path / "fleet.toml")
+
+
+def test_every_key_stands_on_the_page_and_in_the_example():
+    page, example = (ROOT / "docs" / "fleet.md").read_text(), EXAMPLE.read_text()
+    rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
+    told = {name for row in rows for name in row.split("`")[1::2]}
+    assert {*OF_FLEET, *OF_ROBOT} <= told
+    in_example = {line.lstrip("# ").split(" ")[0] for line in example.splitlines() if " = " in line}
+    assert {*OF_ROBOT, *OF_FLEET} - in_example == {"defaults", "robots", "groups", "insecure", "seed"} - in_example
