@@ -1,0 +1,39 @@
+"""A metric of one's own: what is left of the disagreement with which a consensus began."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.moment import Moment
+
+
+@dataclass(frozen=True)
+class FirstPattern(Metric):
+    """<x - mean x, d> / <d, d>, with d the robots' first values x less their mean: 1 at first, 0 once it is gone.
+
+    x_i is what robot i told last (`note(value=...)`). It is linear in x, so its mean over runs that begin alike follows
+    the mean of x; where d is an eigenvector of the mean step, that mean decays by the eigenvalue in each step, exactly.
+    Values of all robots are needed; NaN before they are told, and if all begin with the same.
+    """
+
+    name = "first_pattern"
+    help = "share of the first values' pattern that is left in the values that robots told last"
+    bounds = (-np.inf, None)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure, which keeps the first values."""
+        first: FloatArray = np.full((static.arenas, static.robots), np.nan)
+
+        def measure(moment: Moment) -> FloatArray | float:
+            if moment.truth.value is None:
+                return np.nan
+            value = moment.truth.value.reshape(first.shape)
+            np.copyto(first, value, where=np.isnan(first))
+            pattern = first - first.mean(axis=1, keepdims=True)
+            square = (pattern * pattern).sum(axis=1)
+            return (value * pattern).sum(axis=1) / np.where(square > 0.0, square, np.nan)
+
+        return measure

@@ -1,0 +1,32 @@
+"""A metric: whether a swarm is one flock, by the worse of how far it is aligned and how far it is together."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.metric import Measure
+from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.swarm.aggregation import Aggregation
+from swarmwire.metrics.swarm.order import Order
+
+
+@dataclass(frozen=True)
+class Flock(Aggregation):
+    """The smaller of `order` and `aggregation`, 0 to 1: both are at least as high; NaN if none is alive.
+
+    A swarm whose robots go their ways is no flock though they are parallel, nor is a heap whose robots point anywhere.
+    """
+
+    name = "flock"
+    help = "the smaller of the order of headings and the share of robots alive in the largest cluster"
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure."""
+        aligned, together = Order().begin(static), super().begin(static)
+
+        def measure(moment: Moment) -> FloatArray:
+            return np.minimum(aligned(moment), together(moment))
+
+        return measure

@@ -1,0 +1,39 @@
+"""A metric of one's own: how many robots pass a gate, and which way round."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.moment import Moment
+
+
+@dataclass(frozen=True)
+class Gate(Metric):
+    """Robots whose centre passed the y axis above the origin since the tick before: to the left less to the right.
+
+    With an obstacle in the middle of an arena the half axis is a gate that whoever goes round must pass; counted
+    anticlockwise, so that who goes to and fro counts for nothing. 0 in the first tick.
+    """
+
+    name = "gate"
+    help = "robots that passed the gate above the origin anticlockwise less those that passed it clockwise"
+    kind = "count"
+    bounds = (-np.inf, None)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure, which keeps the places of the tick before."""
+        before: FloatArray | None = None
+
+        def measure(moment: Moment) -> FloatArray:
+            nonlocal before
+            x, y = moment.pose[:, :, 0], moment.pose[:, :, 1]
+            was = x if before is None else before
+            before = x.copy()
+            left = (was > 0.0) & (x <= 0.0) & (y > 0.0)
+            right = (was <= 0.0) & (x > 0.0) & (y > 0.0)
+            return moment.sum_alive(left.astype(np.float64) - right)
+
+        return measure
