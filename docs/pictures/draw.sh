@@ -26,4 +26,5 @@ swarmwire export "$runs/warehouse" --pdr --to docs/delivery.png
 .ci/uv run --no-sync python -m docs.pictures.stages
 .ci/uv run --no-sync python -m docs.pictures.runner_states
 .ci/uv run --no-sync python -m docs.pictures.parts
+.ci/uv run --no-sync python -m docs.pictures.robots
 .ci/uv run --no-sync python -m docs.pictures.tick_figure

@@ -1,8 +1,8 @@
 """A Sphinx extension: the reference's tables, made from the registries each time the site is built.
 
-A page asks for one by name, ```` ```{reference} fates ````, and for keys of a scenario with the path of their table,
-```` ```{reference} keys radio ````. `TABLES` lists them. Each is a function that returns Markdown, so that a page reads
-as if the table stood in it.
+A page asks for one by name, ```` ```{reference} fates ````, for keys of a scenario with the path of their table,
+```` ```{reference} keys radio ````, and for a behaviour with its name. `TABLES` lists them. Each is a function that
+returns Markdown, so that a page reads as if the table stood in it.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from sphinx.util.typing import ExtensionMetadata
 
 from reference import array_names, docstrings, field_comments
 from reference.actuators import drive_tables, led_table
-from reference.behaviours import behaviour_table
+from reference.behaviours import behaviour_details, behaviour_table
 from reference.bodies import body_keys, body_sources, body_table
 from reference.commands import command_tables
 from reference.events import event_tables
@@ -27,6 +27,7 @@ from reference.seams import seam_table
 from reference.senses import sense_tables
 
 TABLES: dict[str, Callable[..., str]] = {
+    "behaviour": behaviour_details,
     "behaviours": behaviour_table,
     "bodies": body_table,
     "body-keys": body_keys,

@@ -1,0 +1,80 @@
+"""`python -m docs.behaviours`: makes the pictures, figures and numbers of the pages beside it."""
+
+import sys
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from docs.behaviours.degradation import degradation_of
+from docs.behaviours.picture import draw_picture
+from docs.behaviours.places import HERE, names
+from docs.behaviours.shown import find_shown
+from docs.experiments.command import exit_code_of
+from swarmwire.comms.errors import SwarmwireError
+from swarmwire.deploy.commands.help_text import flowing, let_help_flow
+
+ABOUT = """The pages in docs/behaviours: a picture of each behaviour at work, and how it bears loss and latency.
+
+A behaviour NAME is run by scenarios/behaviours/NAME.toml and swept by scenarios/behaviours/campaigns/NAME.toml;
+docs/behaviours/shown.py says what of them is drawn. Swept campaigns lie in campaigns/behaviours, their digests in
+docs/behaviours/data.
+"""
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=flowing(ABOUT))
+Names = Annotated[
+    list[str] | None, typer.Argument(help="Behaviours, as `list` has them; all without.", metavar="NAME…")
+]
+Workers = Annotated[int | None, typer.Option(help="Worker processes of a sweep. Default: one for each core.")]
+
+
+@app.command("list")
+def list_command() -> None:
+    """Name the behaviours, with what is measured of each."""
+    for name in names(HERE):
+        typer.echo(f"{name}: {find_shown(name, HERE).title}")
+
+
+@app.command("picture")
+def picture_command(asked: Names = None) -> None:
+    """Run the scenario and draw it, with the ways of the robots."""
+    for name in asked or names(HERE):
+        typer.echo(f"drawn: {draw_picture(name, HERE)}")
+
+
+@app.command("degrade")
+def degrade_command(asked: Names = None, workers: Workers = None) -> None:
+    """Sweep what is missing of the campaign, digest it, and draw the figure and the numbers from the digest."""
+    from docs.experiments.running import run
+    from swarmwire.deploy.campaign.sweeping import Means
+
+    for name in asked or names(HERE):
+        typer.echo(run(degradation_of(name, HERE), HERE, None, Means(workers=workers), Console(highlight=False)))
+
+
+@app.command("draw")
+def draw_command(asked: Names = None) -> None:
+    """Draw the figure, and put the numbers into the page, from the digest that is there."""
+    from docs.experiments.drawing import draw
+
+    for name in asked or names(HERE):
+        typer.echo(draw(degradation_of(name, HERE), HERE))
+
+
+@app.command("all")
+def all_command(asked: Names = None, workers: Workers = None) -> None:
+    """Make all that stands on the pages: pictures, figures and numbers."""
+    picture_command(asked)
+    degrade_command(asked, workers)
+
+
+def main() -> None:
+    """Every error of ours is one line."""
+    try:
+        app()
+    except SwarmwireError as error:
+        sys.exit(exit_code_of(error))
+
+
+let_help_flow(app)
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,67 @@
+"""What is shown of each behaviour: the picture's trails and metrics, and the outcome that loss and latency spoil."""
+
+from dataclasses import dataclass
+
+from docs.experiments.places import Places
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.one_of import one_of
+
+PACKETS, RAYS, INFRARED, SCANS = "packets", "rays' readings", "infrared rays' readings", "scanner's readings"
+BEFORE_WALLS = "oscillation", "deadlocked"  # how robots fare that something holds up
+CONTACTS = "contacts between robots per robot-hour"
+FOUND = "time until half of them are at the light, s"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Of one behaviour."""
+
+    title: str  # the outcome, in words, with its unit
+    outcome: str  # its column in the campaign's summary
+    metrics: tuple[str, ...]  # beside the picture
+    trail_s: float = 60.0  # how much of the robots' ways is drawn
+    at_s: float | None = None  # when the picture is taken; None: at the end
+    lost: str = PACKETS  # what is lost and late
+
+
+SHOWN = {
+    "aggregation": Shown(
+        "share of the robots in the largest cluster, at the end", "aggregation.final", ("aggregation",)
+    ),
+    "avoidance": Shown(CONTACTS, "collision_rate.final", ("collisions", "min_gap"), 20.0, lost=RAYS),
+    "beacon_avoidance": Shown(CONTACTS, "collision_rate.final", ("collisions", "min_gap"), 8.0),
+    "consensus": Shown(
+        "time until the values are within 0.01 of their mean, s", "stop_time_s", ("consensus_error", "consensus_bias")
+    ),
+    "coverage": Shown("share of the floor that was covered, at the end", "coverage.final", ("coverage",)),
+    "diffusion": Shown(CONTACTS, "collision_rate.final", ("nearest_neighbour", "collisions"), lost=RAYS),
+    "flocking": Shown("order of headings, mean over the time of a run", "order.mean", ("order",)),
+    "lennard_jones_flocking": Shown(
+        "distance to the nearest other robot, m, at the end", "nearest_neighbour.final", ("target_mean",)
+    ),
+    "minimalist_flocking": Shown(
+        "share of the robots in the largest cluster, at the end",
+        "aggregation.final",
+        ("aggregation", "aggregation_hop"),
+        lost=INFRARED,
+    ),
+    "pso_model": Shown(FOUND, "find_time_s", ("target_best", "target_mean")),
+    "pso_search": Shown(FOUND, "find_time_s", ("target_best", "target_mean")),
+    "pso_search_positioned": Shown(FOUND, "find_time_s", ("target_best", "target_mean")),
+    "random_walk": Shown("share of the floor that was covered, at the end", "coverage.final", ("coverage",), lost=RAYS),
+    "smoothed_avoidance": Shown(CONTACTS, "collision_rate.final", BEFORE_WALLS, 30.0, lost=SCANS),
+    "smoothed_avoidance_proximity": Shown(CONTACTS, "collision_rate.final", BEFORE_WALLS, 30.0, lost=RAYS),
+    "threshold_rule": Shown(CONTACTS, "collision_rate.final", BEFORE_WALLS, 30.0, lost=SCANS),
+    "threshold_rule_proximity": Shown(CONTACTS, "collision_rate.final", BEFORE_WALLS, 30.0, lost=RAYS),
+    "vicsek": Shown("order of headings, mean over the time of a run", "order.mean", ("order",), 10.0),
+}
+
+
+def find_shown(name: str, places: Places) -> Shown:
+    """What is shown of a behaviour; BadInput names those that there are, or says that it has no campaign."""
+    if name not in SHOWN:
+        raise BadInput("NAME", name, f"unknown behaviour; expected {one_of(SHOWN, name)}")
+    campaign = places.campaigns / f"{name}.toml"
+    if not campaign.exists():
+        raise BadInput(str(campaign), "", "is missing: expected the campaign of a behaviour")
+    return SHOWN[name]

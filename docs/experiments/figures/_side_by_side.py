@@ -1,0 +1,59 @@
+"""Panels side by side, and means with their intervals."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.metrics.drawing.looks import SMALL_PT, SOFT, TEXT_PT, Look
+from swarmwire.metrics.drawing.plain_axes import plain_axes
+from swarmwire.metrics.report.svg import blank_figure
+from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means
+from swarmwire.metrics.statistics.interval import Interval
+
+PANEL_IN, HEIGHT_IN = 2.9, 2.35
+_LEFT_IN, _RIGHT_IN, _FOOT_IN, _HEAD_IN = 0.42, 0.12, 0.42, 0.26
+
+
+def panels(*said: tuple[str, str]) -> tuple[Any, list[Any]]:
+    """A figure with axes side by side, for each a title and what its x axis shows."""
+    figure = blank_figure(PANEL_IN * len(said), HEIGHT_IN)
+    wide, high = PANEL_IN - _LEFT_IN - _RIGHT_IN, HEIGHT_IN - _FOOT_IN - _HEAD_IN
+    found: list[Any] = []
+    for place, (title, x_label) in enumerate(said):
+        left = (place * PANEL_IN + _LEFT_IN) / (PANEL_IN * len(said))
+        axes = plain_axes(figure, (left, _FOOT_IN / HEIGHT_IN, wide / PANEL_IN / len(said), high / HEIGHT_IN), title)
+        axes.set_xlabel(x_label, fontsize=TEXT_PT, color=SOFT, labelpad=3)
+        found.append(axes)
+    return figure, found
+
+
+def mean_and_interval(value: FloatArray) -> tuple[float, Interval]:
+    """The mean of runs (n,) and its bootstrap interval."""
+    return float(value.mean()), percentile_interval(resampled_means(value), len(value))
+
+
+def means(axes: Any, x: Sequence[float], values: Sequence[FloatArray], **look: Any) -> None:
+    """Means over runs as points, their intervals as lines."""
+    of = [mean_and_interval(value) for value in values]
+    low, high = (np.array([interval[end] for _, interval in of]) for end in (0, 1))
+    axes.vlines(x, low, high, color=look["color"], lw=1.0, zorder=3)
+    given: Look = {"ms": 3, "lw": 1.2, "zorder": 4, **look}
+    axes.plot(x, [mean for mean, _ in of], "o-" if "ls" not in given else "o", **given)
+
+
+def legend(axes: Any, **where: Any) -> None:
+    """A legend without a frame."""
+    axes.legend(fontsize=SMALL_PT, frameon=False, handlelength=1.8, borderaxespad=0.2, **where)
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def within(mean: float, interval: Interval, digits: int) -> str:
+    """A mean with its interval, as text."""
+    return f"{mean:.{digits}f} ({interval.low:.{digits}f} to {interval.high:.{digits}f})"
