@@ -17,8 +17,10 @@ from benchmarks.first_compile import CASES as COMPILES
 from benchmarks.first_compile import first_compile
 from benchmarks.metrics_share import metrics_share
 from benchmarks.processes import processes
+from benchmarks.push_fleet import push_fleet
 from benchmarks.record_cost import record_cost
 from benchmarks.report_cost import report_cost
+from benchmarks.robot_step import robot_step
 from benchmarks.robot_steps import CASES, D1, robot_steps, start
 from benchmarks.view_cost import view_cost
 
@@ -40,6 +42,9 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     "processes-100": partial(processes, robots=100, ticks=300),
     **dict.fromkeys(COMPILES, first_compile),
     "report-10000": partial(report_cost, seeds=200),
+    "robot-step": partial(robot_step, kind="epuck2"),
+    "robot-step-ros2": partial(robot_step, kind="ros2"),
+    "push-20": partial(push_fleet, hosts=20),
 }
 
 

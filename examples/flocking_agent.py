@@ -40,8 +40,8 @@ class MyFlocking(Agent):
         for packet in packets:
             pull = min((packet.range_m - self.separation_m) / self.separation_m, 1.0)
             turn = packet.message.heading_rad - heading
-            x += self.cohesion * pull * np.cos(packet.bearing_rad) + self.alignment * np.cos(turn)
-            y += self.cohesion * pull * np.sin(packet.bearing_rad) + self.alignment * np.sin(turn)
+            x += self.cohesion * (pull * np.cos(packet.bearing_rad)) + self.alignment * np.cos(turn)
+            y += self.cohesion * (pull * np.sin(packet.bearing_rad)) + self.alignment * np.sin(turn)
         neighbours = max(len(packets), 1)
 
         near_x, near_y = robot.proximity.vector_sum()

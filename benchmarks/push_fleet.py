@@ -1,0 +1,128 @@
+"""How long a push to twenty hosts takes: the first one, with all packages, and one of another release."""
+
+import asyncio
+import getpass
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import asyncssh
+
+from benchmarks.lines import print_line, spread
+from swarmwire.comms.clock import WallClock, to_s
+from swarmwire.deploy.commands.robots.contents import contents_of
+from swarmwire.deploy.fleet.environment.environments import LockedEnvironments
+from swarmwire.deploy.fleet.environment.target import Target
+from swarmwire.deploy.fleet.fleet import Fleet
+from swarmwire.deploy.fleet.fleet_file import read_fleet
+from swarmwire.deploy.fleet.host_side.facts import facts
+from swarmwire.deploy.fleet.push import push
+from tests.deploy.fleet.fake_host import new_key, write_key
+from tests.deploy.fleet.small_fleet import AGENT
+from tests.deploy.fleet.sshd import SSHD
+
+KINDS = ("asyncssh", "openssh") if SSHD else ("asyncssh",)  # the last is the one that robots are more like
+FLEET = """format = 1
+swarm = "lab"
+insecure = true
+[defaults]
+user = "{user}"
+key = "id"
+agent = "still.py:Still"
+driver = {{ name = "epuck2", address = "192.168.1.41" }}
+"""
+
+
+@dataclass
+class Pushes:
+    """Seconds of each push, by what it was."""
+
+    first: list[float]
+    release: list[float]
+    again: list[float]
+
+
+def push_fleet(name: str, repeats: int, *, hosts: int) -> None:
+    """A line for each kind of server and push, with the packages of a robot for this machine's platform."""
+    with tempfile.TemporaryDirectory() as cache:
+        environments = LockedEnvironments(Path(cache))
+        began_ns = WallClock().now_ns()
+        archives = environments.archives(Target.of(facts_here()), ["epuck2"], [])
+        made_s = to_s(WallClock().now_ns() - began_ns)
+        config = {
+            "hosts": hosts, "robots": hosts, "driver": "epuck2", "on": "loopback, all hosts on this machine",
+            "cores": os.cpu_count(), "packages_mb": round(sum(archive.size for archive in archives) / 1e6, 1),
+            "unpacked_mb": round(sum(archive.unpacked for archive in archives) / 1e6, 1),
+            "python": sys.version.split()[0], "asyncssh": asyncssh.__version__,
+        }  # fmt: skip
+        print_line(f"{name}-packages", made_s, "s", {**config, "index": "pip's cache as it was"})
+        for kind in KINDS:
+            found = Pushes([], [], [])
+            for _ in range(repeats):
+                _measure(kind, hosts, environments, found)
+            suffix = "" if kind == KINDS[-1] else f"-{kind}"
+            for what, values in (("-first", found.first), ("", found.release), ("-again", found.again)):
+                told = {**config, "server": kind, **spread(values)}
+                print_line(f"{name}{suffix}{what}", statistics.median(values), "s", told)
+
+
+def facts_here() -> dict[str, object]:
+    """What this machine would say as a host."""
+    with tempfile.TemporaryDirectory() as home:
+        before = os.environ["HOME"]
+        os.environ["HOME"] = home
+        try:
+            return facts()
+        finally:
+            os.environ["HOME"] = before
+
+
+def _measure(kind: str, hosts: int, environments: LockedEnvironments, found: Pushes) -> None:
+    with tempfile.TemporaryDirectory() as text:
+        folder = Path(text)
+        write_key(new_key(), folder / "id")
+        with _served(kind, hosts, folder) as known:
+            (folder / "known_hosts").write_text("".join(f"[127.0.0.1]:{port} {line}" for port, line in known))
+            robots = "".join(
+                f'[robots.flock-{place}]\naddress = "127.0.0.1"\nport = {port}\n'
+                for place, (port, _) in enumerate(known)
+            )
+            (folder / "fleet.toml").write_text(FLEET.format(user=getpass.getuser()) + robots)
+            for source, times in ((AGENT, found.first), (f"{AGENT}\n", found.release), (f"{AGENT}\n", found.again)):
+                (folder / "still.py").write_text(source)
+                times.append(_pushed(read_fleet(folder / "fleet.toml"), environments))
+
+
+def _pushed(fleet: Fleet, environments: LockedEnvironments) -> float:
+    began_ns = WallClock().now_ns()
+    contents = contents_of(fleet, fleet.robots)
+    results = asyncio.run(push(fleet, fleet.robots, contents.entries, environments))
+    took_s = to_s(WallClock().now_ns() - began_ns)
+    bad = [
+        *map(str, contents.faults.values()),
+        *(f"{result.robot}: {result.said}" for result in results if not result.good),
+    ]
+    if bad:
+        sys.exit("\n".join(bad))
+    return took_s
+
+
+@contextmanager
+def _served(kind: str, hosts: int, folder: Path) -> Generator[list[tuple[int, str]]]:
+    command = [sys.executable, "-m", "benchmarks.fleet_hosts", kind, str(hosts), str(folder)]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert process.stdin
+    assert process.stdout
+    try:
+        yield json.loads(process.stdout.readline())
+    finally:
+        process.stdin.close()
+        process.wait()
+        process.stdout.close()
