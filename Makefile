@@ -15,8 +15,8 @@ demo: sync ## fly a flock over a lossy radio, a process per robot, and record it
 	$(RUN) swarmwire run scenarios/flocking-lossy.toml --runners per-robot
 
 .PHONY: test
-test: check ## check, then the quick tests
-	$(RUN) pytest -m "not slow"
+test: check ## check, then the quick tests, in two processes
+	$(RUN) pytest -m "not slow" -n 2 --dist worksteal # whoever is done first takes over half of what the other has left
 
 .PHONY: check
 check: sync ## lint, format, types, and who may import whom

@@ -123,10 +123,13 @@ def test_the_summary_page_names_every_metric_fate_and_key(site):
     assert all(of.name in page(site, "summary") for of in fields(RealTimeReport))
 
 
-def test_the_behaviours_page_names_every_behaviour_and_parameter(site):
-    named = code(site, "behaviours")
+def test_every_behaviour_has_a_page_that_names_its_parameters(site):
     for name in behaviours.__all__:
-        assert {f"swarmwire.agent.behaviours:{name}", *parameters_of(getattr(behaviours, name))} <= named
+        kind = getattr(behaviours, name)
+        own = kind.__module__.rpartition(".")[2]
+        assert f'href="behaviours/{own}.html"' in page(site, "behaviours")
+        named = code(site, f"behaviours/{own}")
+        assert {f'agent = "swarmwire.agent.behaviours:{name}"', *parameters_of(kind)} <= named
 
 
 def test_the_radio_page_names_every_preset_with_its_source(site):

@@ -1,0 +1,166 @@
+"""The page about real robots: what it does without one happens, and all that needs one can be typed as it stands."""
+
+import argparse
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from collections.abc import Generator, Sequence
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+
+import click
+import pytest
+from typer.main import get_command
+
+from docs.pictures import robots as picture
+from swarmwire.agent.cli import _parser as agent_parser
+from swarmwire.agent.radios.tracker import Tracker
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, SENSORS
+from swarmwire.comms.wire.access import access_of
+from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.swarm_keys import SwarmKeys
+from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm
+from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
+from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.cli import app
+from tests.docs.pages import ROOT, blocks_of, files_of
+from tests.waiting import until
+
+PAGE = "docs/robots.md"
+TRIED = re.compile(r"^<!-- try: (\w+) -->\n```text\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
+OURS = re.compile(r"^(?:.*\| xargs .*)?uv run (swarmwire(?:-agent)?) (.*)$")
+ROBOTS = ("flock-0", "flock-1")
+
+
+@contextmanager
+def terminal(line: str) -> Generator[subprocess.Popen[str]]:
+    """A shell that is given a line of the page, and Ctrl-C at the end."""
+    here = line.replace("uv run ", f"{Path(sys.executable).parent}/")
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    with subprocess.Popen(["bash", "-c", here], start_new_session=True, **pipes) as process:
+        try:
+            yield process
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGINT)
+            process.communicate()
+
+
+def read_until(process: subprocess.Popen[str], said: str) -> list[str]:
+    """What the process prints, up to the first line with this."""
+    assert process.stdout is not None
+    lines = list[str]()
+    for line in process.stdout:
+        lines.append(line)
+        if said in line:
+            return lines
+    raise AssertionError("".join(lines))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_the_rehearsal_on_the_page_moves_robots_that_hear_one_another(tmp_path, monkeypatch):
+    lines = dict(TRIED.findall((ROOT / PAGE).read_text(encoding="utf-8")))
+    (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
+    monkeypatch.chdir(tmp_path)
+    with terminal(f"{lines['world']} --set duration_s=40") as world:
+        table = read_until(world, "ticks at 10 Hz")
+        assert sum("swarmwire-agent run --config" in line for line in table) == 3
+        with terminal(lines["agents"]) as agents:
+            read_until(agents, "Flocking on epuck2 by epuck2")
+            read_until(world, "delivery so far 0")
+
+
+@pytest.fixture
+def feed(tmp_path) -> Path:
+    """The page's program, beside a folder with the certificates of a robot and of the tracker."""
+    begin_authority(tmp_path / "lab-ca", WallClock())
+    issue(tmp_path / "lab-ca", [wanted(name, ("127.0.0.1",)) for name in ("flock-0", "tracker")], 1, WallClock())
+    file = tmp_path / "pose_feed.py"
+    file.write_text(files_of(PAGE)[file.name])
+    return file
+
+
+@contextmanager
+def listening(folder: Path) -> Generator[tuple[Tracker, Sequence[str]]]:
+    """What an agent does with poses, and its endpoints."""
+    keys = SwarmKeys("lab")
+    own = {"ca": folder / "ca.pem", "certificate": folder / "flock-0.pem", "key": folder / "flock-0.key"}
+    network = Network(("tls/127.0.0.1:0",), **own)
+    with closing(open_swarm(network, access_of(network, keys, ROBOTS, "flock-0"), small=False)) as session:
+        tracker = Tracker(session, keys, ROBOTS)
+        tracker.open()
+        yield tracker, endpoints_of(session, network)
+        tracker.close()
+
+
+def fed(feed: Path, endpoints: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """A single line for the page's program."""
+    command = [sys.executable, str(feed), "lab", str(folder), *endpoints]
+    line = "flock-1 1.20 0.35 1.57\n"
+    return subprocess.run(command, input=line, capture_output=True, text=True, check=False, timeout=60)
+
+
+def test_a_single_line_of_a_camera_becomes_a_pose_by_the_tracker_s_certificate(feed, tmp_path):
+    with listening(tmp_path / "lab-ca") as (tracker, endpoints):
+        done = fed(feed, endpoints, tmp_path / "lab-ca")
+        assert (done.returncode, done.stderr) == (0, "linked with 1 of 1\n")
+        assert until(lambda: tracker.pose("flock-1", WallClock().utc_ns())) == (1.20, 0.35, 1.57)
+
+
+def test_a_camera_with_the_certificate_of_another_ca_is_told_that_nobody_listens(feed, tmp_path):
+    begin_authority(tmp_path / "other", WallClock())
+    issue(tmp_path / "other", [wanted("tracker", ())], 1, WallClock())
+    with listening(tmp_path / "lab-ca") as (tracker, endpoints):
+        done = fed(feed, endpoints, tmp_path / "other")
+        assert done.returncode == 1
+        assert "nobody listens for poses of 'lab'" in done.stderr
+        assert tracker.pose("flock-1", WallClock().utc_ns()) is None
+
+
+def typed() -> list[tuple[str, list[str]]]:
+    """All commands of ours in blocks that nothing runs: which program, and its arguments."""
+    lines = [line for block in blocks_of(PAGE, "text") for line in block.text.replace("\\\n", " ").splitlines()]
+    found = [OURS.match(line) for line in lines]
+    assert all(found), lines
+    return [(match[1], shlex.split(match[2], comments=True)) for match in found if match]
+
+
+@pytest.mark.parametrize(("program", "words"), typed(), ids=lambda of: of if isinstance(of, str) else " ".join(of))
+def test_commands_for_robots_are_ones_that_there_are(program: str, words: list[str]):
+    if program == "swarmwire-agent":
+        parser = agent_parser()
+        parsed = parser.parse_args([*words, "robot.toml"] if words[-1] == "--config" else words, argparse.Namespace())
+        assert parsed.command == words[0]
+        return
+    command = get_command(app)
+    context = command.make_context("swarmwire", list(words))
+    while isinstance(command, click.Group):
+        name, command, words = command.resolve_command(context, words)
+        assert command
+        context = command.make_context(name, list(words), parent=context)
+
+
+def test_the_bytes_of_the_e_puck2_are_told_as_they_are():
+    page = (ROOT / "docs" / "epuck2.md").read_text(encoding="utf-8")
+    command, answer = page.split("## An answer")
+    rows = re.compile(r"^\| (\d+)(?:-(\d+))? \| (?:(\d+) )?([iuf]\d) \|", re.MULTILINE)
+    for text, size in ((command, COMMAND_BYTES), (answer, SENSORS.itemsize)):
+        place, told = 0, list[tuple[str, int]]()
+        for first, last, count, kind in rows.findall(text):
+            assert int(first) == place
+            place = int(last or first) + 1
+            assert place - int(first) == int(count or 1) * int(kind[1])
+            told.append((kind, int(count or 1)))
+        assert place == size
+    fields = [SENSORS[name] for name in SENSORS.names or ()]
+    assert told == [(of.base.str[1:], of.shape[0] if of.shape else 1) for of in fields]
+
+
+def test_the_picture_is_as_it_is_drawn(tmp_path):
+    picture.draw(tmp_path / "robots.svg")
+    assert (tmp_path / "robots.svg").read_bytes() == picture.TO.read_bytes(), "python -m docs.pictures.robots"
