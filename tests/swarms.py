@@ -11,6 +11,7 @@ from swarmwire.agent.radios.zenoh_radio import ZenohRadio
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.messages import Message, f4
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.swarm_keys import SwarmKeys
 from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm
@@ -63,7 +64,7 @@ def peers(count: int) -> Generator[list[zenoh.Session]]:
         yield sessions
     finally:
         for session in sessions:
-            session.close()
+            close_session(session)
 
 
 def radio(session: zenoh.Session, own: str, clock=None, robots: Sequence[str] = ROBOTS, **given) -> ZenohRadio:

@@ -24,6 +24,7 @@ from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Senses
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.closing import closed_after
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
@@ -34,7 +35,7 @@ JOIN_S = 30.0
 def run(endpoint: str, run_id: str, runner: str) -> None:
     """Play robots of the run at `endpoint` until it ends; RunnerLost if there is no world or it gives no robots."""
     keys = Keys(run_id)
-    with open_runner(endpoint) as session:
+    with closed_after(open_runner(endpoint)) as session:
         inbox = _Inbox()
         declared = (  # zenoh takes back what nobody holds on to
             session.liveliness().declare_subscriber(

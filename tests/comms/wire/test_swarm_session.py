@@ -10,8 +10,9 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.swarm_session import close_swarm, endpoints_of, open_swarm, swarm_config
+from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm, swarm_config
 from tests.swarms import ANY_PORT, peers
 from tests.waiting import until
 
@@ -26,7 +27,7 @@ def test_peers_that_list_one_another_are_linked_and_others_are_not():
         try:
             assert not list(alone.info.peers_zid())
         finally:
-            alone.close()
+            close_session(alone)
 
 
 def test_opening_does_not_wait_for_those_who_are_not_there():
@@ -34,18 +35,18 @@ def test_opening_does_not_wait_for_those_who_are_not_there():
     began_ns = clock.now_ns()
     session = open_swarm(Network(connect=(NOBODY,)))
     assert clock.now_ns() - began_ns < NS_PER_S
-    session.close()
+    close_session(session)
 
 
 def test_closing_does_not_wait_long_for_peers_that_are_frozen():
     answers = threading.Event()
     frozen: Any = SimpleNamespace(close=answers.wait)
     try:
-        close_swarm(frozen, patience_s=0.01)
+        close_session(frozen, patience_s=0.01)
     finally:
         answers.set()
     with peers(1) as (session,):
-        close_swarm(session)
+        close_session(session)
         assert session.is_closed()
 
 
@@ -68,7 +69,7 @@ def test_who_lists_none_listens_nowhere():
         assert swarm_config(Network(connect=(NOBODY,)))["listen"]["endpoints"] == []
         assert not list(session.info.peers_zid())
     finally:
-        session.close()
+        close_session(session)
 
 
 def test_who_is_to_be_found_by_multicast_listens_at_a_port_that_can_be_read_back():

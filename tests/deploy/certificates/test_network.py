@@ -9,6 +9,7 @@ import zenoh
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.wire.access import access_of
+from swarmwire.comms.wire.closing import close_session, closed_after
 from swarmwire.comms.wire.swarm_session import open_swarm
 from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
 from swarmwire.deploy.certificates.wanted import wanted
@@ -61,10 +62,10 @@ def lawless(folder: Path, name: str, *others: zenoh.Session) -> zenoh.Session:
 
 def test_robots_hear_one_another_and_nobody_in_anothers_name(folder: Path, opened: ExitStack):
     """The forged ones are sent first on the same link, so they would have been heard first."""
-    listener = opened.enter_context(ours(folder, "flock-0"))
+    listener = opened.enter_context(closed_after(ours(folder, "flock-0")))
     inbox = Inbox(listener, *EVERYTHING)
-    speaker = opened.enter_context(ours(folder, "flock-1", listener))
-    forger = opened.enter_context(lawless(folder, "flock_2", listener, speaker))
+    speaker = opened.enter_context(closed_after(ours(folder, "flock-1", listener)))
+    forger = opened.enter_context(closed_after(lawless(folder, "flock_2", listener, speaker)))
     own = KEYS.radio("flock-1", 1), KEYS.radio("flock_2", 1)
     wait_for_listeners(speaker, own[0])
     speaker.put(own[0], b"")
@@ -77,9 +78,9 @@ def test_robots_hear_one_another_and_nobody_in_anothers_name(folder: Path, opene
 
 
 def test_what_a_peer_of_ours_may_not_say_never_leaves_it(folder: Path, opened: ExitStack):
-    listener = opened.enter_context(lawless(folder, "flock-1"))
+    listener = opened.enter_context(closed_after(lawless(folder, "flock-1")))
     inbox = Inbox(listener, *EVERYTHING)
-    speaker = opened.enter_context(ours(folder, "flock-0", listener))
+    speaker = opened.enter_context(closed_after(ours(folder, "flock-0", listener)))
     wait_for_listeners(speaker, KEYS.radio("flock-0", 1))
     for key in (KEYS.radio("flock-1", 1), KEYS.pose("flock-0"), KEYS.radio("flock-0", 1)):
         speaker.put(key, b"")
@@ -89,12 +90,12 @@ def test_what_a_peer_of_ours_may_not_say_never_leaves_it(folder: Path, opened: E
 
 def test_a_peer_of_ours_passes_nothing_on(folder: Path, opened: ExitStack):
     """Peers do so for clients, as whose link the peer's own would then be taken."""
-    listener = opened.enter_context(lawless(folder, "flock-1"))
+    listener = opened.enter_context(closed_after(lawless(folder, "flock-1")))
     inbox = Inbox(listener, *EVERYTHING)
-    between = opened.enter_context(ours(folder, "flock-0", listener))
+    between = opened.enter_context(closed_after(ours(folder, "flock-0", listener)))
     arrived = Inbox(between, KEYS.any_radio)
     wait_for_listeners(between, KEYS.radio("flock-0", 1))
-    client = opened.enter_context(stranger(endpoint_of(between), folder, (folder, "flock_2"), PATIENT_MS))
+    client = opened.enter_context(closed_after(stranger(endpoint_of(between), folder, (folder, "flock_2"), PATIENT_MS)))
     wait_for_listeners(client, KEYS.radio("flock_2", 1))
     client.put(KEYS.radio("flock_2", 1), b"")
     assert arrived.next() == KEYS.radio("flock_2", 1)
@@ -103,9 +104,9 @@ def test_a_peer_of_ours_passes_nothing_on(folder: Path, opened: ExitStack):
 
 
 def test_poses_come_from_the_tracker_who_is_no_robot(folder: Path, opened: ExitStack):
-    robot = opened.enter_context(ours(folder, "flock-0"))
+    robot = opened.enter_context(closed_after(ours(folder, "flock-0")))
     inbox = Inbox(robot, *EVERYTHING)
-    tracker = opened.enter_context(lawless(folder, "tracker", robot))
+    tracker = opened.enter_context(closed_after(lawless(folder, "tracker", robot)))
     for key in (KEYS.radio("flock-1", 1), KEYS.pose("flock-0"), KEYS.air_heard("flock-0")):
         wait_for_listeners(tracker, key)
         tracker.put(key, b"")
@@ -115,26 +116,26 @@ def test_poses_come_from_the_tracker_who_is_no_robot(folder: Path, opened: ExitS
 
 @pytest.mark.parametrize(("name", "replies"), [("operator", ["yes"]), ("tracker", []), ("flock-1", [])])
 def test_only_the_operator_is_answered(folder: Path, opened: ExitStack, name: str, replies: list[str]):
-    robot = opened.enter_context(ours(folder, "flock-0"))
+    robot = opened.enter_context(closed_after(ours(folder, "flock-0")))
     control = KEYS.control("flock-0")
     robot.declare_queryable(control, lambda query: query.reply(control, b"yes"))
     robot.declare_subscriber(KEYS.any_radio, lambda _: None)
-    asking = opened.enter_context(lawless(folder, name, robot))
+    asking = opened.enter_context(closed_after(lawless(folder, name, robot)))
     wait_for_listeners(asking, KEYS.any_radio)
     assert replies_of(asking, control, wait=bool(replies)) == replies
 
 
 def test_a_robot_asks_the_world_for_its_own_terms_in_the_air(folder: Path, opened: ExitStack):
-    world = opened.enter_context(ours(folder, "tracker"))
+    world = opened.enter_context(closed_after(ours(folder, "tracker")))
     world.declare_queryable(KEYS.any_air_join, lambda query: query.reply(query.key_expr, b"yes"))
-    robot = opened.enter_context(ours(folder, "flock-0", world))
+    robot = opened.enter_context(closed_after(ours(folder, "flock-0", world)))
     assert replies_of(robot, KEYS.air_join("flock-0"), wait=True) == ["yes"]
     assert replies_of(robot, KEYS.air_join("flock-1"), wait=False) == []
 
 
 def test_a_revoked_name_is_heard_by_those_only_who_do_not_know(folder: Path, opened: ExitStack):
-    robot = opened.enter_context(ours(folder, "flock-0", revoked=("flock-1",)))
-    unaware = opened.enter_context(ours(folder, "flock_2"))
+    robot = opened.enter_context(closed_after(ours(folder, "flock-0", revoked=("flock-1",))))
+    unaware = opened.enter_context(closed_after(ours(folder, "flock_2")))
     inboxes, links = [Inbox(session, *EVERYTHING) for session in (robot, unaware)], Links(robot)
     tokens = list[str]()
     robot.liveliness().declare_subscriber(KEYS.alive("*"), at_once(lambda sample: tokens.append(str(sample.key_expr))))
@@ -144,7 +145,7 @@ def test_a_revoked_name_is_heard_by_those_only_who_do_not_know(folder: Path, ope
     wait_for_listeners(revoked, KEYS.radio("flock-1", 1))
     revoked.put(KEYS.radio("flock-1", 1), b"")
     assert inboxes[1].next() == KEYS.radio("flock-1", 1)
-    revoked.close()
+    close_session(revoked)
     links.wait(up=False)  # all that it sent has come before
     assert inboxes[0].empty()
     assert not tokens
@@ -154,8 +155,8 @@ def test_strangers_are_not_let_in(folder: Path, opened: ExitStack, tmp_path: Pat
     foreign = tmp_path / "foreign"
     begin_authority(foreign, WallClock())
     issue(foreign, [wanted("flock-1", HERE)], 1, WallClock())
-    endpoint = endpoint_of(opened.enter_context(ours(folder, "flock-0")))
-    stranger(endpoint, folder, (folder, "flock-1"), PATIENT_MS).close()
+    endpoint = endpoint_of(opened.enter_context(closed_after(ours(folder, "flock-0"))))
+    close_session(stranger(endpoint, folder, (folder, "flock-1"), PATIENT_MS))
     refused: list[tuple[str, tuple[Path, str] | None]] = [
         (endpoint, (foreign, "flock-1")),  # signed by another CA
         (endpoint, None),  # no certificate
@@ -171,6 +172,6 @@ def test_a_certificate_that_has_ended_is_refused(opened: ExitStack, tmp_path: Pa
     begin_authority(folder, past)
     issue(folder, [wanted("flock-0", HERE)], 3000, past)
     issue(folder, [wanted("flock-1", HERE)], 1, past)
-    endpoint = endpoint_of(opened.enter_context(ours(folder, "flock-0")))
+    endpoint = endpoint_of(opened.enter_context(closed_after(ours(folder, "flock-0"))))
     with pytest.raises(zenoh.ZError):
         stranger(endpoint, folder, (folder, "flock-1"), REFUSED_MS)

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 import pytest
 
 from swarmwire.comms.wire.access import access_control
+from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.swarm_control import ESTOP, STOPPED
 from swarmwire.comms.wire.swarm_keys import SwarmKeys
@@ -32,7 +33,7 @@ def on_network(robots: list[str], answer: str = STOPPED, network: Network = PLAI
         assert declared
         yield int(endpoints_of(session, network)[0].rpartition(":")[2]), asked
     finally:
-        session.close()
+        close_session(session)
 
 
 @pytest.fixture

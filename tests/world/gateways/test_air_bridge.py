@@ -13,6 +13,7 @@ from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.air_frames import encode_air
+from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.swarm_session import open_swarm
 from swarmwire.world.gateways.air_bridge import AirBridge, LentAir
@@ -209,7 +210,7 @@ def test_without_a_world_the_robot_says_so_once_its_patience_is_over():
         with pytest.raises(BadInput, match="expected a world that lends its air to flock-1; none in the network"):
             AirRadio(session, KEYS, ROBOTS, "flock-1", clock, wall=clock).open()
     finally:
-        session.close()
+        close_session(session)
     assert clock.slept_until[-1] - clock.slept_until[0] > 5 * NS_PER_S
 
 
@@ -291,7 +292,7 @@ def test_after_the_run_neither_side_is_hurt():
         radio = joined(peer := session())
         bridge.close()
         radio.send(words(1.0))
-        peer.close()
+        close_session(peer)
         radio.send(words(1.0))
         radio.close()
         assert radio.counts()["packets_refused"] == 1

@@ -53,14 +53,15 @@ def network_parts(plan: Plan, clock: DatedClock, log: RadioLog | None, say: Say,
     # zenoh costs memory and time, and is of no use to a robot by itself.
     from swarmwire.agent.radios.control import ControlPoint
     from swarmwire.comms.wire.access import access_of
+    from swarmwire.comms.wire.closing import close_session
     from swarmwire.comms.wire.swarm_keys import SwarmKeys
-    from swarmwire.comms.wire.swarm_session import close_swarm, open_swarm
+    from swarmwire.comms.wire.swarm_session import open_swarm
 
     if network.warning:
         say(network.warning)
     keys, own = SwarmKeys(settings.swarm), settings.name
     session = open_swarm(network, access_of(network, keys, settings.robots, own))
-    closing.callback(close_swarm, session)
+    closing.callback(close_session, session)
     tracker = _opened_tracker(settings, session, keys, closing)
     radio = _made_radio(plan, session, keys, tracker, clock, log, say)
     closing.callback(radio.close)

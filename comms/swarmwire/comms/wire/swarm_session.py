@@ -13,7 +13,6 @@ ten times as much, and some tens at once overflow the queue (measured on loopbac
 
 import json
 import os
-import threading
 from collections.abc import Mapping
 from typing import Any
 
@@ -26,7 +25,6 @@ from swarmwire.comms.wire.sessions import SMALL_RUNTIME
 LEASE_MS = 3000  # a robot that is frozen or out of reach is noticed after this
 RETRY = {"period_init_ms": 200, "period_max_ms": 2000, "period_increase_factor": 1.5}
 LOCATORS_S = 2.0
-PATIENCE_S = 1.0  # with peers that are frozen or out of reach: zenoh itself would wait for ten
 
 
 def open_swarm(network: Network, access: Mapping[str, Any] | None = None, small: bool = True) -> zenoh.Session:
@@ -43,13 +41,6 @@ def open_swarm(network: Network, access: Mapping[str, Any] | None = None, small:
         reason = str(error).split(" at ")[0]
         listens = ", ".join(network.listen) or "multicast"
         raise BadInput("network", listens, f"expected endpoints that are free, and files that fit: {reason}") from error
-
-
-def close_swarm(session: zenoh.Session, patience_s: float = PATIENCE_S) -> None:
-    """Close a session, which waits for peers that do not answer any more: no longer than so; safe to call again."""
-    closing = threading.Thread(target=session.close, name="closing", daemon=True)
-    closing.start()
-    closing.join(patience_s)
 
 
 def swarm_config(network: Network, access: Mapping[str, Any] | None = None) -> dict[str, Any]:

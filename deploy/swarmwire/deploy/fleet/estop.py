@@ -7,10 +7,11 @@ import asyncssh
 
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.wire.access import access_control
+from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.swarm_control import ESTOP, STOPPED, ask_all
 from swarmwire.comms.wire.swarm_keys import SwarmKeys
-from swarmwire.comms.wire.swarm_session import close_swarm, open_swarm
+from swarmwire.comms.wire.swarm_session import open_swarm
 from swarmwire.deploy.fleet.connecting import connected, lost
 from swarmwire.deploy.fleet.fleet import Fleet, Host, Robot, hosts_of
 from swarmwire.deploy.fleet.host_failed import HostFailed
@@ -60,7 +61,7 @@ def _over_network(fleet: Fleet, robots: Sequence[Robot]) -> Said:
     try:
         replies = ask_all(session, keys, ESTOP, names, NETWORK_S)
     finally:
-        close_swarm(session)
+        close_session(session)
     return {name: "" if said == STOPPED else said or "no answer" for name, said in replies.items()}
 
 

@@ -12,6 +12,7 @@ import zenoh
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadFrame, SwarmwireError
 from swarmwire.comms.glimpse import Glimpse, Scene, Series
+from swarmwire.comms.wire.closing import closed_after
 from swarmwire.comms.wire.frames import decode
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.scene_frames import decode_scene
@@ -75,7 +76,7 @@ def following(live: Live) -> Generator[Following]:
         session = open_observer(live.endpoint)
     except zenoh.ZError as error:
         raise RunGone(f"the run of process {live.pid} cannot be reached: {str(error).split(' at ')[0]}") from error
-    with session:
+    with closed_after(session):
         token = session.liveliness().declare_subscriber(keys.published, zenoh.handlers.RingChannel(KEPT), history=True)
         # Asked before there is a subscriber: until then the run publishes nothing.
         scene = _scene(session, keys)

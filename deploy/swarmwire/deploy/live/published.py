@@ -19,6 +19,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.glimpse import Glimpse, Scene, Series
 from swarmwire.comms.one_arena import static_of
 from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.wire.closing import closed_after
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.scene_frames import encode_scene
 from swarmwire.comms.wire.sessions import open_observed
@@ -70,7 +71,7 @@ class Published:
         self._frames: queue.Queue[Glimpse | None] = queue.Queue(maxsize=1)
         with ExitStack() as opening:
             endpoint = opening.enter_context(local_endpoint(None))
-            session = opening.enter_context(open_observed(endpoint))
+            session = opening.enter_context(closed_after(open_observed(endpoint)))
             self._declare(session, encode_scene(self._scene(static)))
             opening.callback(forget_live, self._folder)
             Live(endpoint, self._run_id, os.getpid()).write(self._folder)

@@ -17,6 +17,7 @@ from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.keys import Keys, runner_of
 from swarmwire.comms.wire.sessions import open_world
 from swarmwire.world.crews.roster import Loss, Refused, Roster
@@ -117,7 +118,7 @@ class RunnerCrew(ABC, Generic[R]):
             item = self._next()
             if isinstance(item, zenoh.Sample) and item.kind == zenoh.SampleKind.DELETE:
                 self._present.discard(runner_of(str(item.key_expr)))
-        session.close()
+        close_session(session)
 
     def _send(self, out: list[tuple[str, bytes]]) -> None:
         for runner, data in out:

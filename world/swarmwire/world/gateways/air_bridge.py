@@ -19,9 +19,10 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.air_frames import MOST_BYTES, encode_air
 from swarmwire.comms.wire.air_terms import AirTerms
 from swarmwire.comms.wire.bounded_inbox import BoundedInbox
+from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.swarm_keys import SwarmKeys
-from swarmwire.comms.wire.swarm_session import close_swarm, endpoints_of, open_swarm
+from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm
 from swarmwire.comms.wire.tick_frames import decode_actions
 
 MOST_WAITING = 4096  # frames that may wait for the loop
@@ -119,7 +120,7 @@ class AirBridge:
         """Leave the network; safe to call more than once."""
         session, self._session = self._session, None
         if session is not None:
-            close_swarm(session)
+            close_session(session)
 
     def _arrive(self, sample: zenoh.Sample) -> None:
         """Called by the network's threads: it must take no time, and keep nothing that is large."""

@@ -6,7 +6,7 @@ import re
 import zenoh
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.swarm_session import close_swarm
+from swarmwire.comms.wire.closing import close_session
 
 ENDPOINT = re.compile(r"(tcp|udp|ws)/.+:\d+|unixsock-stream/.+")
 EXAMPLE = "tcp/192.168.1.7:7447"
@@ -48,7 +48,7 @@ def open_client(endpoint: str, connect_s: float) -> zenoh.Session:
 
 def close(session: zenoh.Session) -> None:
     """Close a session; what was put before still goes out."""
-    close_swarm(session, CLOSE_S)
+    close_session(session, CLOSE_S)
 
 
 def is_linked(session: zenoh.Session) -> bool:
