@@ -56,7 +56,7 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
         """Updates are some steps apart, and a ring needs the place of each robot."""
         check_above_zero(params, "update_every_ticks")
-        check_ring(params, robots)
+        check_ring(cls, params, robots)
 
     @abstractmethod
     def moved(self, robots: Robots, state: P) -> Vectors:
