@@ -1,6 +1,5 @@
 """`python -m docs.behaviours`: makes the pictures, figures and numbers of the pages beside it."""
 
-import sys
 from typing import Annotated
 
 import typer
@@ -10,9 +9,8 @@ from docs.behaviours.degradation import degradation_of
 from docs.behaviours.picture import draw_picture
 from docs.behaviours.places import HERE, names
 from docs.behaviours.shown import find_shown
-from docs.experiments.command import exit_code_of
-from swarmwire.comms.errors import SwarmwireError
-from swarmwire.deploy.commands.help_text import flowing, let_help_flow
+from docs.experiments.command import run_app
+from swarmwire.deploy.commands.help_text import flowing
 
 ABOUT = """The pages in docs/behaviours: a picture of each behaviour at work, and how it bears loss and latency.
 
@@ -67,14 +65,5 @@ def all_command(asked: Names = None, workers: Workers = None) -> None:
     degrade_command(asked, workers)
 
 
-def main() -> None:
-    """Every error of ours is one line."""
-    try:
-        app()
-    except SwarmwireError as error:
-        sys.exit(exit_code_of(error))
-
-
-let_help_flow(app)
 if __name__ == "__main__":
-    main()
+    run_app(app)

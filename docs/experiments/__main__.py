@@ -1,17 +1,15 @@
 """`python -m docs.experiments`: lists, runs, digests and draws the experiments on the pages beside it."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
-from docs.experiments.command import exit_code_of
+from docs.experiments.command import run_app
 from docs.experiments.experiment import find_experiment, names
 from docs.experiments.places import HERE
-from swarmwire.comms.errors import SwarmwireError
-from swarmwire.deploy.commands.help_text import flowing, let_help_flow
+from swarmwire.deploy.commands.help_text import flowing
 
 ABOUT = """The experiments in docs/experiments: campaigns, and what is drawn and told of them.
 
@@ -87,14 +85,5 @@ def run_command(
     typer.echo(run(find_experiment(name, HERE), HERE, seeds, Means(workers=workers), console))
 
 
-def main() -> None:
-    """Every error of ours is one line."""
-    try:
-        app()
-    except SwarmwireError as error:
-        sys.exit(exit_code_of(error))
-
-
-let_help_flow(app)
 if __name__ == "__main__":
-    main()
+    run_app(app)

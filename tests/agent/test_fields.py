@@ -80,7 +80,7 @@ def test_a_scan_pushes_as_much_by_few_rays_as_by_many(rays: int) -> None:
 def test_vectors_add_up_and_are_weighed() -> None:
     one, other = Vectors(np.array([1.0, 2.0]), np.array([3.0, 4.0])), ahead(2)
     assert parts(2.0 * one - other) == [(1.0, 6.0), (3.0, 8.0)]
-    assert parts(np.array([1.0, 0.5]) * one + -other) == [(0.0, 3.0), (0.0, 2.0)]
+    assert parts(np.array([1.0, 0.5]) * one - other) == [(0.0, 3.0), (0.0, 2.0)]
     assert parts(one * np.array([0.0, 1.0])) == [(0.0, 0.0), (2.0, 4.0)]
     assert along(np.array([np.pi / 2.0])).angle_rad.tolist() == [np.pi / 2.0]
 

@@ -7,7 +7,8 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from docs.experiments.__main__ import app, main
+from docs.experiments.__main__ import app
+from docs.experiments.command import run_app
 from docs.experiments.digest import digest, digests
 from docs.experiments.drawing import draw
 from docs.experiments.experiment import find_experiment, names
@@ -119,7 +120,7 @@ def test_unknown_experiments_and_folders_are_refused_by_name(places, tmp_path):
 def test_errors_are_one_line(monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["experiments", "draw", "no-such"])
     with pytest.raises(SystemExit) as ended:
-        main()
+        run_app(app)
     assert ended.value.code == 2
     assert capsys.readouterr().err.startswith("error: NAME: no-such: unknown experiment")
 

@@ -45,6 +45,16 @@ def test_what_is_no_ring_is_refused_before_anything_runs(params: dict[str, Any],
     assert caught.value.key == key
 
 
+def test_the_ring_of_a_class_by_default_is_checked_as_one_that_is_given() -> None:
+    class Ringed(PsoSearch):
+        ring_count: int = 10
+
+    with pytest.raises(BadParameter, match="0 to 9, got 0"):
+        checked(Ringed, {}, robots=3)
+    assert checked(Ringed, {"ring_index": [0, 1, 9]}, robots=3) == {"ring_index": [0, 1, 9]}
+    assert checked(Ringed, {"ring_count": 0}, robots=3) == {"ring_count": 0}
+
+
 def test_one_robot_of_a_ring_is_told_its_index_alone() -> None:
     assert checked(PsoSearch, {"ring_count": 3, "ring_index": 2})["ring_index"] == 2
 

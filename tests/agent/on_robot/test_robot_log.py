@@ -133,7 +133,7 @@ def test_a_disk_that_is_full_from_the_start_gets_the_header_once_there_is_room(t
     assert file.lost_rows == 1
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has /dev/full, a disk that is always full")
 def test_what_is_lost_of_a_log_is_counted(tmp_path):
     log = _log(tmp_path)
     log._sent._file.close()

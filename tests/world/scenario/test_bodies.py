@@ -63,7 +63,7 @@ def test_a_scenario_changes_a_body_for_one_group(tmp_path, body):
     worn, new = found["worn"], found["new"]
     assert new.proximity is not None
     assert worn.proximity == replace(new.proximity, drop_out=0.5)
-    assert worn.name == f"{new.name}*"
+    assert worn.name == f"{new.name} of worn"
     assert (worn.mass_kg, worn.drive, worn.compass) == (new.mass_kg, new.drive, new.compass)
 
 

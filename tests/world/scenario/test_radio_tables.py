@@ -96,9 +96,12 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({"preset": "ieee802154", "model": "disk", "range_m": 1.0}, "radio.antenna: expected a model with signals"),
     (
         {**SIGNAL, "bursts": {"p": 0.1, "r": 0.5, "interval_s": 0.1, "bad_s": 1.0}},
-        "radio.bursts.p: expected either bad_s and good_s, or p, r and interval_s; got bad_s and p and r",
+        "radio.bursts.p: expected either bad_s with good_s or mean_loss, or p, r and interval_s; got bad_s and p and r",
     ),
-    ({"preset": "gilbert", "bursts": {"r": 0.5}}, "radio.bursts.r: expected either bad_s and good_s, or p"),
+    (
+        {"preset": "gilbert", "bursts": {"r": 0.5}},
+        "radio.bursts.r: expected either bad_s with good_s or mean_loss, or p",
+    ),
     ({**SIGNAL, "bursts": {"p": 0.1, "r": 0.5}}, "radio.bursts.interval_s: is missing; expected p, r and"),
     ({**SIGNAL, "bursts": {"interval_s": 0.1}}, "radio.bursts.p: is missing; expected p, r and"),
     ({**SIGNAL, "bursts": {"p": 0.5, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.r: expected less than 1 - p"),
@@ -107,7 +110,10 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
         {**SIGNAL, "bursts": {"mean_loss": 0.1, "good_s": 1.0}},
         "radio.bursts.mean_loss: expected either good_s or mean_loss, got both",
     ),
-    ({**SIGNAL, "bursts": {"mean_loss": 0.1, "p": 0.1}}, "radio.bursts.p: expected either bad_s and good_s, or p"),
+    (
+        {**SIGNAL, "bursts": {"mean_loss": 0.1, "p": 0.1}},
+        "radio.bursts.p: expected either bad_s with good_s or mean_loss, or p, r and interval_s; got mean_loss and p",
+    ),
     ({**SIGNAL, "bursts": {"mean_loss": 1.0}}, "radio.bursts.mean_loss: expected a number"),
     (
         {**SIGNAL, "bursts": {"mean_loss": 0.5, "loss_bad": 0.5}},

@@ -9,8 +9,6 @@ from swarmwire.comms.air.parameters.gives import BearingGiven, Gives, RangeGiven
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.bodies.body import body_names
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.scenario.as_mapping import mapping_of
-from swarmwire.world.scenario.metric_tables import MetricTable
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.scenario_file import load_scenario, scenario_from, scenario_schema
 from tests.world.samples import SAMPLE, changed, without
@@ -24,7 +22,6 @@ HEADING = "expected a number of at least -7 and at most 7 (rad)"
 RANDOM_ALONE = 'expected place = "random" with within or apart_m, not at = [x, y]'
 CONVEX = "expected the corners of a convex polygon in order"
 POLYGON = {"shape": "polygon", "at": [0.0, 0.0]}
-ONE_COMPARISON = "expected just one of at_least, at_most, above, below"
 FAULTS: list[tuple[str, Any, str]] = [
     ("format", 2, "format: expected 1, got 2"),
     ("name", "", "name: expected a text that is not empty, got ''"),
@@ -182,27 +179,6 @@ FAULTS: list[tuple[str, Any, str]] = [
         "format, name, seed, duration_s, time, physics, arena, robots, radio, events, "
         "standard_metrics, metrics, stop, run",
     ),
-    ("standard_metrics", 1, "standard_metrics: expected true or false, got 1"),
-    ("metrics", "order", "metrics: expected a list, got 'order'"),
-    ("metrics", ["order", 5], "metrics.1: expected a text that is not empty or a table, got 5"),
-    ("metrics", [""], "metrics.0: expected a text that is not empty, got ''"),
-    ("metrics", [{"gap_m": 1}], "metrics.0.metric: is missing; expected a text that is not empty"),
-    ("stop", 3, "stop: expected a table or a list, got 3"),
-    ("stop", [3], "stop.0: expected a table, got 3"),
-    ("stop", {"above": 1}, "stop.metric: is missing; expected a text that is not empty"),
-    ("stop", {"metric": "order"}, f"stop: {ONE_COMPARISON}; got none"),
-    ("stop", [{"metric": "order", "above": 1, "below": 2}], f"stop.0: {ONE_COMPARISON}; got above and below"),
-    ("stop", {"metric": "order", "above": "x"}, "stop.above: expected a number, got 'x'"),
-    (
-        "stop",
-        {"metric": "order", "abov": 1},
-        "stop.abov: unknown key; expected one of metric, at_least, at_most, above, below, hold_s (did you mean above?)",
-    ),
-    (
-        "stop",
-        [{"metric": "order", "above": 1, "hold_s": -1}],
-        "stop.0.hold_s: expected a number of at least 0 and at most 1000000000 (s), got -1",
-    ),
 ]
 
 
@@ -335,21 +311,3 @@ def test_a_scenario_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="frozen"):
         scenario.seed = 4  # pyright: ignore[reportAttributeAccessIssue] - frozen: that is what is tested
     assert isinstance(scenario, Scenario)
-
-
-def test_a_condition_that_ends_arenas_is_a_table_or_a_list_of_tables_and_may_be_none() -> None:
-    order = {"metric": "order", "at_least": 1, "hold_s": 2}
-    [(path, table)] = scenario_from(changed("stop", order), "file.toml").stops().items()
-    assert (path, table.metric, table.comparison, table.hold_s) == ("stop", "order", ("at_least", 1.0), 2.0)
-    assert list(scenario_from(changed("stop", [order, order]), "file.toml").stops()) == ["stop.0", "stop.1"]
-    assert scenario_from(changed("stop", []), "file.toml").stops() == {}
-    assert scenario_from(changed("stop", order), "file.toml", ["stop=[]"]).stops() == {}
-
-
-def test_a_metrics_parameters_stand_beside_its_name_and_can_be_set() -> None:
-    given = changed("metrics", ["order", {"metric": "fragmentations", "hold_s": 2.0}])
-    scenario = scenario_from(given, "file.toml", ["metrics.1.hold_s=3.0"])
-    assert scenario.metrics == ("order", MetricTable(metric="fragmentations", hold_s=3.0))
-    assert [item.params for item in scenario.metrics if isinstance(item, MetricTable)] == [{"hold_s": 3.0}]
-    again = mapping_of(scenario.model_copy(update={"duration_s": 2.0}))
-    assert again["metrics"] == ["order", {"metric": "fragmentations", "hold_s": 3.0}]

@@ -64,11 +64,12 @@ class LennardJonesFlocking(VectorAgent[Wheels]):
     def step(self, robots: Robots, state: Wheels) -> None:
         """Roll along the sum of all pulls, and say where one is."""
         heard = robots.radio.heard(Here)
-        force = np.where(heard.range_m < self.reach * self.target_m, self.force(heard.range_m), 0.0)
-        counted = np.maximum(heard.sum((heard.range_m < self.reach * self.target_m).astype(np.float64)), 1.0)
+        counts = heard.range_m < self.reach * self.target_m
+        force = np.where(counts, self.force(heard.range_m), 0.0)
+        counted = np.maximum(heard.sum(counts.astype(np.float64)), 1.0)
         x = heard.sum(force * np.cos(heard.bearing_rad)) / counted
         y = heard.sum(force * np.sin(heard.bearing_rad)) / counted
-        x, y = cut(x, y, self.speed_mps)
+        x, y = _cut(x, y, self.speed_mps)
         light_x, light_y = self._to_light(robots)
         self._roll(robots, state, x + light_x, y + light_y)
         robots.radio.send(Here)
@@ -98,7 +99,7 @@ class LennardJonesFlocking(VectorAgent[Wheels]):
         robots.wheels(np.where(left, slow, fast), np.where(left, fast, slow))
 
 
-def cut(x: FloatArray, y: FloatArray, longest: float) -> tuple[FloatArray, FloatArray]:
+def _cut(x: FloatArray, y: FloatArray, longest: float) -> tuple[FloatArray, FloatArray]:
     """Vectors (n,) no longer than `longest`, in the same directions."""
     scale = longest / np.maximum(np.hypot(x, y), longest)
     return scale * x, scale * y

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.agent.behaviours.pso.on_wheels import ParticlesOnWheels
 from swarmwire.agent.behaviours.pso.particle import Bests, Particle
-from swarmwire.agent.behaviours.pso.particle_swarm import Vectors
+from swarmwire.agent.fields import Vectors, along
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, column
 from swarmwire.comms.arrays import BoolArray
@@ -43,8 +43,7 @@ class PsoSearch(ParticlesOnWheels[WheeledParticle]):
         forward = np.nan_to_num(0.5 * ((wheels.left_m - state.left_m) + (wheels.right_m - state.right_m)))
         state.left_m[:] = wheels.left_m
         state.right_m[:] = wheels.right_m
-        heading = robots.compass.heading_rad
-        return forward * np.cos(heading), forward * np.sin(heading)
+        return forward * along(robots.compass.heading_rad)
 
     def tell(self, robots: Robots, state: WheeledParticle, rows: BoolArray) -> None:
         """The own best, as a vector from here."""
@@ -53,7 +52,6 @@ class PsoSearch(ParticlesOnWheels[WheeledParticle]):
     def told(self, robots: Robots) -> Bests:
         """Bests of those that were heard, seen from here."""
         heard = robots.radio.heard(BestVector)
-        direction = heard.bearing_rad + robots.compass.heading_rad[heard.row]
-        x = heard.range_m * np.cos(direction) + heard.message.x_m
-        y = heard.range_m * np.sin(direction) + heard.message.y_m
-        return Bests(heard.row, heard.sender, heard.message.brightness, x, y)
+        place = heard.range_m * along(heard.bearing_rad + robots.compass.heading_rad[heard.row])
+        place += Vectors(heard.message.x_m, heard.message.y_m)
+        return Bests(heard.row, heard.sender, heard.message.brightness, place.x, place.y)

@@ -43,9 +43,6 @@ class Vectors:
     def __sub__(self, other: "Vectors") -> "Vectors":
         return Vectors(self.x - other.x, self.y - other.y)
 
-    def __neg__(self) -> "Vectors":
-        return Vectors(-self.x, -self.y)
-
     def __mul__(self, weight: float | FloatArray) -> "Vectors":
         return Vectors(weight * self.x, weight * self.y)
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -104,7 +104,7 @@ def _radio_of(row: dict[str, Any]) -> Radio | None:
 
 
 def _arena(radio: Any, arena: int) -> Radio:
-    return radio[arena] if isinstance(radio, list) else radio  # pyright: ignore[reportUnknownVariableType] - JSON
+    return cast("list[Radio]", radio)[arena] if isinstance(radio, list) else radio
 
 
 def _floats(column: "pl.Series") -> FloatArray:

@@ -6,9 +6,10 @@ Three quantiles give the three numbers of each distribution, so that a few packe
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any, cast
 
 import numpy as np
-from scipy.optimize import brentq  # pyright: ignore[reportUnknownVariableType] - scipy has no types
+from scipy import optimize
 from scipy.special import ndtri
 
 from swarmwire.comms.arrays import FloatArray
@@ -117,7 +118,7 @@ def _pareto(low: float, middle: float, high: float) -> _Law | None:
 
     if excess(LEAST_SHAPE) * excess(MOST_SHAPE) > 0.0:
         return None
-    shape = float(brentq(excess, LEAST_SHAPE, MOST_SHAPE))  # pyright: ignore[reportArgumentType] - asked otherwise, a tuple
+    shape = float(cast("Any", optimize).brentq(excess, LEAST_SHAPE, MOST_SHAPE))
     least_s = (middle - low) / widths(shape)[0]
     constant = low - least_s * (1.0 - TAIL) ** (-1.0 / shape)
     if constant < 0.0:

@@ -21,7 +21,7 @@ def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
     for group, table in scenario.robots.items():
         if table.body not in known:
             known[table.body] = _body(table.body, where, f"robots.{group}.body")
-        bodies[group] = _changed(known[table.body], table, where, f"robots.{group}.sheet")
+        bodies[group] = _changed(known[table.body], group, table, where)
     return bodies
 
 
@@ -53,13 +53,14 @@ def _body(name: str, where: str, key: str) -> Body:
     return read_body(path, where, key)
 
 
-def _changed(body: Body, table: RobotsTable, where: str, key: str) -> Body:
-    """The body with what the scenario itself says of its sheet; a star at its name tells the two apart."""
+def _changed(body: Body, group: str, table: RobotsTable, where: str) -> Body:
+    """The body with what the scenario itself says of its sheet; the group in its name tells it from all others."""
     if not table.sheet:
         return body
+    key = f"robots.{group}.sheet"
     path = sheet_path(table.body, where)
     base = {"like": table.body} if path is None else read_toml(path)
-    sheet = merged({**base, "name": f"{body.name}*"}, table.sheet)
+    sheet = merged({**base, "name": f"{body.name} of {group}"}, table.sheet)
     try:
         changed = body_from(sheet, where) if path is None else _fitted(sheet, path)
     except BadInput as error:

@@ -3,7 +3,8 @@
 import numpy as np
 
 from swarmwire.agent.behaviours.pso.particle import Bests, Particle
-from swarmwire.agent.behaviours.pso.particle_swarm import ParticleSwarm, Vectors
+from swarmwire.agent.behaviours.pso.particle_swarm import ParticleSwarm
+from swarmwire.agent.fields import Vectors
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, column
 from swarmwire.comms.arrays import BoolArray
@@ -34,7 +35,7 @@ class ParticlesByPlaces(ParticleSwarm[PositionedParticle]):
         x, y = np.nan_to_num(here.x_m - state.x_m), np.nan_to_num(here.y_m - state.y_m)
         state.x_m[:] = here.x_m
         state.y_m[:] = here.y_m
-        return x, y
+        return Vectors(x, y)
 
     def tell(self, robots: Robots, state: PositionedParticle, rows: BoolArray) -> None:
         """The own best, as a place."""

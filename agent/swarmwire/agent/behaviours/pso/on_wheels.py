@@ -6,6 +6,7 @@ import numpy as np
 
 from swarmwire.agent.behaviours.pso.particle import Particle
 from swarmwire.agent.behaviours.pso.particle_swarm import ParticleSwarm
+from swarmwire.agent.fields import along, repulsion_of_rays
 from swarmwire.agent.robots import Robots
 
 P = TypeVar("P", bound=Particle)
@@ -22,10 +23,7 @@ class ParticlesOnWheels(ParticleSwarm[P], Generic[P]):
         """To the target, and away from what is near."""
         bearing = np.arctan2(state.target_y, state.target_x) - robots.compass.heading_rad
         pull = np.where(np.hypot(state.target_x, state.target_y) < self.arrived_m, 0.0, 1.0)
-        near_x, near_y = robots.proximity.vector_sum()
-        x = pull * np.cos(bearing) - self.avoidance * near_x
-        y = pull * np.sin(bearing) - self.avoidance * near_y
-        angle = np.arctan2(y, x)
-        push = np.minimum(np.hypot(x, y), 1.0)
+        wanted = pull * along(bearing) + self.avoidance * repulsion_of_rays(robots.proximity)
+        angle, push = wanted.angle_rad, np.minimum(wanted.length, 1.0)
         linear = self.speed_mps * push * np.maximum(np.cos(angle), 0.0)
         robots.drive(linear_mps=linear, angular_radps=self.turn_gain_per_s * push * angle)

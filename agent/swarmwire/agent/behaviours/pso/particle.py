@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmwire.agent.fields import Vectors
 from swarmwire.agent.vector_agent import FloatColumn, IntColumn, State, column
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
@@ -41,14 +42,14 @@ class Bests(NamedTuple):
         return Bests(self.row[which], self.sender[which], self.brightness[which], self.x[which], self.y[which])
 
 
-def shift(state: Particle, x: FloatArray, y: FloatArray) -> None:
-    """The robots moved by so much (n,), so the places that they remember are elsewhere from them."""
-    state.own_x -= x
-    state.own_y -= y
-    state.best_x -= x
-    state.best_y -= y
-    state.target_x -= x
-    state.target_y -= y
+def shift(state: Particle, by_m: Vectors) -> None:
+    """The robots moved by so much (n,), along the axes of the compass: places they remember are elsewhere from them."""
+    state.own_x -= by_m.x
+    state.own_y -= by_m.y
+    state.best_x -= by_m.x
+    state.best_y -= by_m.y
+    state.target_x -= by_m.x
+    state.target_y -= by_m.y
 
 
 def look(state: Particle, brightness: FloatArray, again_m: float) -> None:

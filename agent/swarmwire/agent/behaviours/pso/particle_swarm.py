@@ -9,12 +9,12 @@ import numpy as np
 from swarmwire.agent.behaviours.limits import check_above_zero
 from swarmwire.agent.behaviours.pso.particle import DARK, Bests, Particle, listen, look, shift
 from swarmwire.agent.behaviours.pso.ring import check_ring, ring_neighbours
+from swarmwire.agent.fields import Vectors
 from swarmwire.agent.per_robot import PerRobot, per_robot
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
-Vectors = tuple[FloatArray, FloatArray]
 P = TypeVar("P", bound=Particle)
 
 
@@ -56,7 +56,7 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
         """Updates are some steps apart, and a ring needs the place of each robot."""
         check_above_zero(params, "update_every_ticks")
-        check_ring(params, robots)
+        check_ring(cls, params, robots)
 
     @abstractmethod
     def moved(self, robots: Robots, state: P) -> Vectors:
@@ -76,7 +76,7 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
 
     def step(self, robots: Robots, state: P) -> None:
         """Look, listen, update or tell if it is time, and drive on."""
-        shift(state, *self.moved(robots, state))
+        shift(state, self.moved(robots, state))
         look(state, np.add.reduce(robots.light.value, 1), self.again_m)
         listen(state, self._of_neighbours(self.told(robots)))
         self._update(robots, state, state.steps % self.update_every_ticks == 0)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.agent.declared import BadParameter
+from swarmwire.agent.declared import BadParameter, parameters_of
 from swarmwire.comms.arrays import BoolArray, IntArray
 
 
@@ -15,14 +15,19 @@ def ring_neighbours(sender: IntArray, index: IntArray, count: int, width: int) -
     return np.minimum(apart, count - apart) <= width
 
 
-def check_ring(params: Mapping[str, Any], robots: int) -> None:
-    """BadParameter unless count, width and indices of so many robots can be a ring, or there is none."""
-    count, width = params.get("ring_count", 0), params.get("ring_width", 1)
+def check_ring(kind: type, params: Mapping[str, Any], robots: int) -> None:
+    """BadParameter unless count, width and indices of so many robots can be a ring, or there is none.
+
+    One that is not given has the default of the class `kind`.
+    """
+    declared = parameters_of(kind)
+    count, width, index = (
+        params.get(name, declared[name].default) for name in ("ring_count", "ring_width", "ring_index")
+    )
     if count < 0:
         raise BadParameter("ring_count", f"expected 0 (no ring) or how many robots are on the ring, got {count}")
     if width < 1:
         raise BadParameter("ring_width", f"expected at least 1 neighbour on each side, got {width}")
-    index: int | list[int] = params.get("ring_index", 0)
     for_all = isinstance(index, int) and robots > 1
     if count > 0 and (for_all or not np.all((np.array(index) >= 0) & (np.array(index) < count))):
         expected = f"expected a list with the index in the arena of each robot, 0 to {count - 1}"

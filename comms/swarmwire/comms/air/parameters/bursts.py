@@ -42,7 +42,7 @@ class BurstsTable:
         spells, mean, steps = self._given("bad_s", "good_s"), self._given("mean_loss"), self._given(*STEPS)
         losses = {"loss_bad": self.loss_bad, "loss_good": self.loss_good}
         if steps and (spells or mean):
-            either = "expected either bad_s and good_s, or p, r and interval_s"
+            either = "expected either bad_s with good_s or mean_loss, or p, r and interval_s"
             raise BadInput("", next(iter(steps)), f"{either}; got {' and '.join((*spells, *mean, *steps))}")
         if mean and "good_s" in spells:
             raise BadInput("", "mean_loss", "expected either good_s or mean_loss, got both")

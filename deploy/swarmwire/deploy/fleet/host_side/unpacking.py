@@ -86,5 +86,5 @@ def unpack(stream: Incoming | BinaryIO, into: Path, *, links: bool = False) -> N
             elif (source := archive.extractfile(member)) is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, member.mode & 0o777)
-                with open(descriptor, "wb") as file:  # noqa: PTH123 - it is open already
+                with os.fdopen(descriptor, "wb") as file:
                     shutil.copyfileobj(source, file, BLOCK)
