@@ -81,8 +81,10 @@ def outcome(
 
 
 def _global_senses(static: Static) -> dict[str, list[str]]:
-    bodies = [group.body for group in static.groups]
-    found = {body.name: [name for name, sheet in body.senses.items() if sheet.is_global] for body in bodies}
+    found: dict[str, list[str]] = {}
+    for body in (group.body for group in static.groups):  # two of one name, by sheets of users' own, are told together
+        own = found.setdefault(body.name, [])
+        own += [name for name, sheet in body.senses.items() if sheet.is_global and name not in own]
     return {body: senses for body, senses in found.items() if senses}
 
 
