@@ -12,14 +12,15 @@ from typing import Any, Generic, TypeVar
 import zenoh
 
 from swarmwire.comms.clock import Clock, to_ns
-from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
+from swarmwire.comms.errors import Interrupted, RunnerLost
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.closing import close_session
+from swarmwire.comms.wire.door import Door
 from swarmwire.comms.wire.keys import Keys, runner_of
-from swarmwire.comms.wire.sessions import open_world
+from swarmwire.comms.wire.sessions import listens_at
 from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.roster import Loss, Refused, Roster
 from swarmwire.world.crews.runner_health import RunnerHealth
@@ -55,7 +56,7 @@ class RunnerCrew(ABC, Generic[R]):
 
     def __init__(
         self,
-        endpoint: str,
+        endpoint: str | Door,
         run_id: str,
         roster: R,
         timeout_s: float,
@@ -63,9 +64,10 @@ class RunnerCrew(ABC, Generic[R]):
         around: Surroundings,
         start_s: float = START_S,
     ) -> None:
-        self._endpoint, self._keys = endpoint, Keys(run_id)
+        self._door = endpoint if isinstance(endpoint, Door) else Door((endpoint,))
+        self._keys = Keys(run_id)
         self._roster, self._timeout_s, self._clock, self._around = roster, timeout_s, clock, around
-        self._inbox = RunnerInbox()
+        self._inbox = RunnerInbox(self._door.limits)
         self._session: zenoh.Session | None = None
         self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to
         self._frames: dict[str, zenoh.Publisher] = {}
@@ -77,13 +79,7 @@ class RunnerCrew(ABC, Generic[R]):
 
     def open(self) -> None:
         """Listen at the endpoint, so that runners may join; BadInput if it is taken."""
-        try:
-            session = self._session = open_world(self._endpoint, self._timeout_s)
-        except zenoh.ZError as error:
-            reason = str(error).split(" at ")[0]
-            raise BadInput(
-                "", self._endpoint, f"expected an endpoint that is free and can be listened on: {reason}"
-            ) from error
+        session = self._session = self._door.open_to_runners(self._keys, self._timeout_s)
         arrived = (self._inbox.put, self._inbox)
         self._declared = (
             session.declare_queryable(self._keys.any_offer, arrived),
@@ -92,6 +88,10 @@ class RunnerCrew(ABC, Generic[R]):
             session.liveliness().declare_subscriber(self._keys.any_alive, arrived, history=True),
             session.liveliness().declare_token(self._keys.world),  # last: it says that runners may join
         )
+
+    def listens_at(self) -> tuple[str, ...]:
+        """Where runners may join, with the ports that the system chose; nowhere before it is open."""
+        return () if self._session is None else listens_at(self._session)
 
     def start(self) -> None:
         """Wait until runners have taken all robots and built their agents."""
