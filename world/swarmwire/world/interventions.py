@@ -122,7 +122,7 @@ class Interventions:
             return taken
 
     def told(self) -> list[dict[str, Any]]:
-        """The newest events by number: the tick in which each began, if it has, what it does, and whether it is over."""
+        """The newest events by number: the tick in which each began, if it has, what it does, whether it is over."""
         with self._lock:
             newest = sorted(self._events)[-MOST_TOLD:]
             return [

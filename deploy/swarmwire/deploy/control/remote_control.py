@@ -19,7 +19,7 @@ ANSWER_S = 10.0  # a run answers in milliseconds, unless its machine is very bus
 
 
 class Refused(SwarmwireError):
-    """What the run does not do, in its own line: an unknown robot, an event that is over, a speed that it cannot have."""
+    """What the run does not do, in its own line: an unknown robot, an event that is over, a speed beyond bounds."""
 
 
 class RemoteControl:

@@ -18,19 +18,23 @@ def event_command(
         str, typer.Argument(help="A table as in a scenario's [[events]], without at_s.", metavar="'{ do = …, … }'")
     ],
 ) -> None:
-    """Have any event happen at the start of the next tick; `swarmwire list events` names them. For example:
+    """Have any event happen at the start of the next tick; `swarmwire list events` names them.
 
-    swarmwire ctl event '{ do = "fail", part = "motors", robots = { count = 3 }, for_s = 10 }'
+    For example:
 
-    swarmwire ctl event '{ do = "partition", halves = "y", bridge = ["flock-0"] }'
+      swarmwire ctl event '{ do = "fail", part = "motors", robots = { count = 3 }, for_s = 10 }'
+
+      swarmwire ctl event '{ do = "partition", halves = "y", bridge = ["flock-0"] }'
     """
     give(context.obj, _table(table))
 
 
 def events_command(context: typer.Context) -> None:
-    """List the run's events, the scenario's and those given: number, tick, what, and whether it is over. For example:
+    """List the run's events, the scenario's and those given: number, tick, what, and whether it is over.
 
-    swarmwire ctl events
+    For example:
+
+      swarmwire ctl events
     """
     from rich.console import Console
 
@@ -59,9 +63,11 @@ def end_command(
     context: typer.Context,
     number: Annotated[int, typer.Argument(help="Of the event, as `events` tells it.", min=0, metavar="NUMBER")],
 ) -> None:
-    """Undo an event that lasts, such as a kill, a partition, a jammer or a number that was set. For example:
+    """Undo an event that lasts, such as a kill, a partition, a jammer or a number that was set.
 
-    swarmwire ctl end 3
+    For example:
+
+      swarmwire ctl end 3
     """
     with control_of(context.obj) as control:
         tell(control.end(number))

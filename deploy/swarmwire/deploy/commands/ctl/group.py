@@ -20,11 +20,14 @@ from swarmwire.deploy.commands.ctl.pace import (
 from swarmwire.deploy.commands.ctl.radio import jam_command, partition_command, set_command
 from swarmwire.deploy.commands.ctl.robots import kill_command, push_command, revive_command
 from swarmwire.deploy.commands.ctl.status import status_command
+from swarmwire.deploy.commands.help_text import flowing
 
-HELP = """Runs that go on: how they do, pause, step, speed, and what happens to their robots and radios.
+HELP = flowing("""Runs that go on: how they do, pause, step, speed, and what happens to their robots and radios.
 
 RUN is the id of a run, which `swarmwire ctl status` tells, or its folder; with one run on this machine none need be
-named. What is done to a run is recorded in its folder: `swarmwire repeat` does it again, bit for bit. For example:
+named. What is done to a run is recorded in its folder: `swarmwire repeat` does it again, bit for bit.
+
+For example:
 
   swarmwire ctl status
 
@@ -39,7 +42,7 @@ named. What is done to a run is recorded in its folder: `swarmwire repeat` does 
   swarmwire ctl runs/flocking-s1-20261121T030405Z speed max
 
   swarmwire ctl --endpoint tls/10.0.0.5:7448 --ca ca.pem --certificate me.pem --key me.key status
-"""
+""")
 
 
 class CtlGroup(TyperGroup):

@@ -31,13 +31,15 @@ def partition_command(
     ] = False,
     for_s: ForS = None,
 ) -> None:
-    """Let sets of robots not hear one another, until `end` or after a time. For example:
+    """Let sets of robots not hear one another, until `end` or after a time.
 
-    swarmwire ctl partition x
+    For example:
 
-    swarmwire ctl partition --between flock-0,flock-1 --between scouts --for 30
+      swarmwire ctl partition x
 
-    swarmwire ctl partition --isolate flock-3
+      swarmwire ctl partition --between flock-0,flock-1 --between scouts --for 30
+
+      swarmwire ctl partition --isolate flock-3
     """
     table: dict[str, Any] = {
         "do": "partition",
@@ -62,11 +64,13 @@ def jam_command(
     duty: Annotated[float | None, typer.Option(help="The share of time for which it is on. Default: 1.")] = None,
     for_s: ForS = None,
 ) -> None:
-    """Put up a jammer, in runs whose radio has signals, until `end` or after a time. For example in the middle:
+    """Put up a jammer, in runs whose radio has signals, until `end` or after a time.
 
-    swarmwire ctl jam --at 0,0 --power 10
+    For example in the middle:
 
-    swarmwire ctl jam flock-3 --for 30
+      swarmwire ctl jam --at 0,0 --power 10
+
+      swarmwire ctl jam flock-3 --for 30
     """
     table: dict[str, Any] = {
         "do": "jammer",
@@ -81,16 +85,18 @@ def jam_command(
 
 def set_command(
     context: typer.Context,
-    settings: Annotated[list[str], typer.Argument(help="Numbers of [radio], such as loss=0.5.", metavar="KEY=VALUE")],
+    settings: Annotated[list[str], typer.Argument(help="Numbers of the radio, such as loss=0.5.", metavar="KEY=VALUE")],
     over_s: Annotated[
         float, typer.Option("--over", help="How long the way there takes, simulated seconds.", min=0, metavar="S")
     ] = 0.0,
 ) -> None:
-    """Set numbers of the radio, at once or evenly over a time; `swarmwire ctl status` tells what they are. For example:
+    """Set numbers of the radio, at once or evenly over a time; `swarmwire ctl status` tells what they are.
 
-    swarmwire ctl set loss=0.6 latency_s=0.2
+    For example:
 
-    swarmwire ctl set range_m=0.5 --over 20
+      swarmwire ctl set loss=0.6 latency_s=0.2
+
+      swarmwire ctl set range_m=0.5 --over 20
     """
     tables = [_ramp(setting, over_s) for setting in settings]
     with control_of(context.obj) as control:

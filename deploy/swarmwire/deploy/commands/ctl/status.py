@@ -1,7 +1,7 @@
 """`swarmwire ctl status`."""
 
 import json
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import Any
 
 import typer
@@ -15,7 +15,7 @@ COLUMNS = ("run", "scenario", "tick", "state", "speed", "alive", "folder")
 def status_command(context: typer.Context, as_json: AsJson = False) -> None:
     """Tell how a run is doing; of several runs on this machine, a line each.
 
-    With --json a JSON object per run and line. For example:
+    With --json there is a JSON object per run, each on a line. For example:
 
       swarmwire ctl status
 
@@ -42,11 +42,12 @@ def _told(chosen: Chosen) -> list[tuple[dict[str, Any], str | None]]:
     from swarmwire.deploy.control.remote_control import controlling
     from swarmwire.deploy.live.following import RunGone
 
-    runs = runs_of_this_machine(chosen)
     told: list[tuple[dict[str, Any], str | None]] = []
-    for run in runs:
-        with suppress(RunGone) if chosen.run is None else suppress(), controlling(run.endpoint, run.run) as control:
-            told.append((control.status(), run.folder))
+    for run in runs_of_this_machine(chosen):
+        with ExitStack() as stack:
+            if chosen.run is None:
+                stack.enter_context(suppress(RunGone))
+            told.append((stack.enter_context(controlling(run.endpoint, run.run)).status(), run.folder))
     return told
 
 
