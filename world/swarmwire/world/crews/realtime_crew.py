@@ -13,7 +13,6 @@ from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.protocols import Crew
 from swarmwire.comms.senses import Actions, Senses
-from swarmwire.comms.wire.door import Door
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime import RealTime
 from swarmwire.world.crews.roster import OnLoss
@@ -61,7 +60,7 @@ class RealTimeCrew(RunnerCrew[RealTime]):
 
     def __init__(
         self,
-        endpoint: str | Door,
+        endpoint: str,
         run_id: str,
         assignments: list[Assignment],
         timeout_s: float,

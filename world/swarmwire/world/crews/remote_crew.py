@@ -5,7 +5,6 @@ from swarmwire.comms.clock import Clock
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
-from swarmwire.comms.wire.door import Door
 from swarmwire.world.crews.lockstep import Lockstep
 from swarmwire.world.crews.roster import OnLoss
 from swarmwire.world.crews.runner_crew import START_S, RunnerCrew, Surroundings
@@ -19,7 +18,7 @@ class RemoteCrew(RunnerCrew[Lockstep]):
 
     def __init__(
         self,
-        endpoint: str | Door,
+        endpoint: str,
         run_id: str,
         assignments: list[Assignment],
         timeout_s: float,

@@ -12,24 +12,23 @@ from typing import Any, Generic, TypeVar
 import zenoh
 
 from swarmwire.comms.clock import Clock, to_ns
-from swarmwire.comms.errors import Interrupted, RunnerLost
+from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.closing import close_session
-from swarmwire.comms.wire.door import Door
 from swarmwire.comms.wire.keys import Keys, runner_of
-from swarmwire.comms.wire.sessions import listens_at
+from swarmwire.comms.wire.sessions import open_world
 from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.roster import Loss, Refused, Roster
 from swarmwire.world.crews.runner_health import RunnerHealth
-from swarmwire.world.crews.runner_inbox import Item, RunnerInbox
 
 POLL_S = 0.2  # how often a wait looks up whether to go on waiting
 START_S = 60.0  # how long runners may take to join and build their agents
 FAREWELL_S = 3.0  # how long runners may take to leave after the end
 
+Item = zenoh.Sample | zenoh.Query
 R = TypeVar("R", bound=Roster[Any])
 
 
@@ -56,7 +55,7 @@ class RunnerCrew(ABC, Generic[R]):
 
     def __init__(
         self,
-        endpoint: str | Door,
+        endpoint: str,
         run_id: str,
         roster: R,
         timeout_s: float,
@@ -64,10 +63,9 @@ class RunnerCrew(ABC, Generic[R]):
         around: Surroundings,
         start_s: float = START_S,
     ) -> None:
-        self._door = endpoint if isinstance(endpoint, Door) else Door((endpoint,))
-        self._keys = Keys(run_id)
+        self._endpoint, self._keys = endpoint, Keys(run_id)
         self._roster, self._timeout_s, self._clock, self._around = roster, timeout_s, clock, around
-        self._inbox = RunnerInbox(self._door.limits)
+        self._inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
         self._session: zenoh.Session | None = None
         self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to
         self._frames: dict[str, zenoh.Publisher] = {}
@@ -79,7 +77,13 @@ class RunnerCrew(ABC, Generic[R]):
 
     def open(self) -> None:
         """Listen at the endpoint, so that runners may join; BadInput if it is taken."""
-        session = self._session = self._door.open_to_runners(self._keys, self._timeout_s)
+        try:
+            session = self._session = open_world(self._endpoint, self._timeout_s)
+        except zenoh.ZError as error:
+            reason = str(error).split(" at ")[0]
+            raise BadInput(
+                "", self._endpoint, f"expected an endpoint that is free and can be listened on: {reason}"
+            ) from error
         arrived = (self._inbox.put, self._inbox)
         self._declared = (
             session.declare_queryable(self._keys.any_offer, arrived),
@@ -88,10 +92,6 @@ class RunnerCrew(ABC, Generic[R]):
             session.liveliness().declare_subscriber(self._keys.any_alive, arrived, history=True),
             session.liveliness().declare_token(self._keys.world),  # last: it says that runners may join
         )
-
-    def listens_at(self) -> tuple[str, ...]:
-        """Where runners may join, with the ports that the system chose; nowhere before it is open."""
-        return () if self._session is None else listens_at(self._session)
 
     def start(self) -> None:
         """Wait until runners have taken all robots and built their agents."""
@@ -106,7 +106,7 @@ class RunnerCrew(ABC, Generic[R]):
 
     def counts(self) -> dict[str, int]:
         """Frames that were dropped and runners that were lost, by name."""
-        return {**self._roster.counts(), **self._inbox.counts()}
+        return self._roster.counts()
 
     def health(self) -> RunnerHealth:
         """How the runners are doing."""
