@@ -10,6 +10,7 @@ from swarmwire.deploy.record.inputs import InputsRecord
 from swarmwire.deploy.record.origin import Origin
 from swarmwire.deploy.result import EventResult, Result, arena_result
 from swarmwire.metrics.record.recorders import record_summary
+from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.realtime_crew import RealTimeReport
 from swarmwire.world.crews.roster import Loss
 
@@ -34,6 +35,7 @@ def outcome(
     origin: Origin,
     inputs: InputsRecord | None,
     losses: Sequence[Loss],
+    changes: Sequence[Change],
     engines: Sequence[str],
     realtime: RealTimeReport | None,
     folder: Path | None,
@@ -73,6 +75,7 @@ def outcome(
         files=origin.files,
         inputs=inputs,
         lost_runners=tuple(str(loss) for loss in losses),
+        runner_changes=tuple(changes),
         realtime=realtime,
         gateways=dict(origin.gateways),
         record=record,
