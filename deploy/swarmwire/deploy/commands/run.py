@@ -119,12 +119,14 @@ def run_command(
 
 def _shown(simulation: "Simulation", folder: Path, view: bool, console: Console) -> "Result":
     """The result of the run, told and shown while it goes on and afterwards."""
+    from swarmwire.deploy.control.run_finder import Announced
     from swarmwire.deploy.live.live_view import LiveView
     from swarmwire.deploy.running import finished
     from swarmwire.deploy.terminal.report import print_result
     from swarmwire.deploy.terminal.robots_told import RobotsTold
     from swarmwire.deploy.terminal.shown import progress
 
+    simulation.watch(Announced(folder))
     simulation.watch(RobotsTold(simulation, console))
     simulation.watch(progress(simulation, console))
     with LiveView(folder) as live:
