@@ -138,20 +138,15 @@ def test_a_runner_that_plays_cannot_join_twice_nor_answer_for_others(certs, undi
     def disturb(tick: int) -> None:
         if tick != AT_TICK:
             return
-        with world.session_of("r1") as session:
-            wait_for_listeners(session, KEYS.answer("r1"))
-            asked = session.get(KEYS.join("r1"), payload=JoinRequest().encode(), timeout=20.0)
-            for payload in (
-                standing(0, 20, tick),
-                b"\xc1",
-                standing(0, 10, tick + 9),
-                frames.encode("dance", tick, {}),
-            ):
-                session.put(KEYS.answer("r1"), payload, congestion_control=BLOCK)
-            replies.append(asked)
+        session = opened.enter_context(world.session_of("r1"))
+        wait_for_listeners(session, KEYS.answer("r1"))
+        replies.append(session.get(KEYS.join("r1"), payload=JoinRequest().encode(), timeout=20.0))
+        odd = standing(0, 20, tick), b"\xc1", standing(0, 10, tick + 9), frames.encode("dance", tick, {})
+        for payload in odd:
+            session.put(KEYS.answer("r1"), payload, congestion_control=BLOCK)
 
     replies: list[Iterable[zenoh.Reply]] = []
-    with guarded_world(certs) as world:
+    with ExitStack() as opened, guarded_world(certs) as world:
         world.finish(disturb)
         refused = [reply.err.payload.to_string() for reply in replies[0] if reply.err]
         assert world.hashes == undisturbed
