@@ -5,6 +5,7 @@ import signal
 import sys
 from collections.abc import Generator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -45,7 +46,6 @@ def join_parsed(parsed: argparse.Namespace) -> int:
     from swarmwire.comms.wire.network import Network
 
     network = Network(
-        connect=(parsed.endpoint,),
         ca=parsed.ca,
         certificate=parsed.certificate,
         key=parsed.key,
@@ -75,9 +75,8 @@ def play_told(joining: "Joining") -> int:
     from swarmwire.agent.joining import join
     from swarmwire.agent.runner import Inbox
 
-    warning = joining.network.warning
-    if warning is not None:
-        _say(f"warning: {warning}")
+    if replace(joining.network, connect=(joining.endpoint,)).warning is not None:
+        _say("warning: insecure: whoever is in the network can take the robots over, and overhear them")
     inbox = Inbox()
     with _leaving_by_signals(inbox):
         ended = join(joining, inbox, _say)

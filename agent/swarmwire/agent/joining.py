@@ -14,7 +14,7 @@ from secrets import token_hex
 import zenoh
 
 from swarmwire.agent.loading import NoAgent, agent_sha256, load_agent
-from swarmwire.agent.runner import Asked, Ended, Inbox, play
+from swarmwire.agent.runner import NO_ROBOTS, Asked, Ended, Inbox, play
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame, BadInput, RunnerLost
 from swarmwire.comms.loading import resolve
@@ -28,7 +28,6 @@ from swarmwire.comms.wire.sessions import open_runner
 
 LOOK_S = 2.0  # for worlds at an endpoint
 OFFER_S = 10.0
-NOBODY = "none yet"
 BY_ALL = ""  # in place of a group's name
 
 
@@ -40,7 +39,8 @@ class Joining:
         endpoint: where the world, or a router before it, listens.
         robots: how many; None, and no names: all that are free, or the next part.
         names: of the robots.
-        agents: "mine.py:Mine" for all groups, or "flock=mine.py:Mine"; else as the scenario writes them, from here.
+        agents: "mine.py:Mine" for all groups, or "flock=mine.py:Mine"; else as the scenario writes them, beside it if
+            it was named, else here.
         scenario: a file that must be that of the run; None: any.
         name: of the runner; None: that of its certificate, or one made up.
         run: its id; None: the only one at the endpoint.
@@ -92,7 +92,7 @@ def join(joining: Joining, inbox: Inbox, say: Callable[[str], None]) -> Ended:
         session = open_runner(joining.endpoint, joining.connect_s, joining.network)
     except zenoh.ZError as error:
         reason = str(error).split(" at ")[0]
-        raise RunnerLost(runner, NOBODY, f"nobody answers at {joining.endpoint}: {reason}") from error
+        raise RunnerLost(runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}: {reason}") from error
     with closed_after(session):
         run_id = joining.run or _only_run(session, runner, joining.endpoint)
         keys = Keys(run_id)
@@ -116,7 +116,7 @@ def _only_run(session: zenoh.Session, runner: str, endpoint: str) -> str:
         return runs[0]
     if runs:
         raise BadInput("--run", "", f"expected one of the runs at {endpoint}: {', '.join(runs)}")
-    raise RunnerLost(runner, NOBODY, f"there is no run at {endpoint}, or it does not let {runner} in")
+    raise RunnerLost(runner, NO_ROBOTS, f"there is no run at {endpoint}, or it does not let {runner} in")
 
 
 def _offer(session: zenoh.Session, keys: Keys, runner: str) -> Offer:
@@ -125,8 +125,8 @@ def _offer(session: zenoh.Session, keys: Keys, runner: str) -> Offer:
             try:
                 return Offer.decode(reply.ok.payload.to_bytes())
             except BadFrame as fault:
-                raise RunnerLost(runner, NOBODY, f"another version of swarmwire: {fault}") from fault
-    raise RunnerLost(runner, NOBODY, f"the world told nothing of its run: it may not let {runner} in")
+                raise RunnerLost(runner, NO_ROBOTS, f"another version of swarmwire: {fault}") from fault
+    raise RunnerLost(runner, NO_ROBOTS, f"the world told nothing of its run: it may not let {runner} in")
 
 
 def _own_agents(
@@ -139,7 +139,9 @@ def _own_agents(
     for group in offer.groups:
         if joining.names is not None and not set(group.free) & set(joining.names):
             continue
-        spec = resolve(given.get(group.name, given.get(BY_ALL, group.agent)), Path.cwd())
+        own = given.get(group.name, given.get(BY_ALL))
+        beside = Path.cwd() if own or joining.scenario is None else joining.scenario.parent
+        spec = resolve(own or group.agent, beside)
         try:
             hashes[group.name] = agent_sha256(load_agent(spec))
             specs[group.name] = spec

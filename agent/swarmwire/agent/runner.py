@@ -39,6 +39,7 @@ from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 
 JOIN_S = 30.0
 FAREWELL_S = 3.0
+NO_ROBOTS = ""
 
 
 class Ended(NamedTuple):
@@ -83,7 +84,7 @@ def play(
         session.liveliness().declare_token(keys.alive(runner)),
     )
     if not inbox.wait_for_world():
-        raise RunnerLost(runner, "none yet", "there is no world")
+        raise RunnerLost(runner, NO_ROBOTS, "there is no world")
     assignment, memory = _join(session, keys, runner, asked())
     joined(assignment)
     answer = session.declare_publisher(
@@ -181,11 +182,11 @@ def _join(session: zenoh.Session, keys: Keys, runner: str, asked: Asked) -> tupl
     """The robots that the world gives, and what is remembered of them; None: nothing is to be kept."""
     for reply in session.get(keys.join(runner), payload=asked.request.encode(), timeout=JOIN_S):
         if reply.ok is None:
-            raise RunnerLost(runner, "none yet", reply.err.payload.to_string() if reply.err else "no answer to join")
+            raise RunnerLost(runner, NO_ROBOTS, reply.err.payload.to_string() if reply.err else "no answer to join")
         given = msgpack.unpackb(reply.ok.payload.to_bytes())
         assignment = Assignment.from_mapping(given).with_agents(asked.agents)
         return assignment, None if given["memory"] is None else _memory(assignment, given["memory"])
-    raise RunnerLost(runner, "none yet", "the world did not answer to join")
+    raise RunnerLost(runner, NO_ROBOTS, "the world did not answer to join")
 
 
 def _memory(assignment: Assignment, data: bytes) -> Memory:

@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.limits import LIMITS, Limits
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.run_access import RunAccess, agents_access
+from swarmwire.comms.wire.run_access import RunAccess, agents_access, observers_access
 from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.door import Door
 from swarmwire.world.crews.roster import GOES_ON
@@ -36,6 +36,7 @@ class Listening:
 
     Attributes:
         endpoints: such as "tls/0.0.0.0:7447".
+        observed: where observers and operators from elsewhere meet it.
         network: the world's certificates.
         access: who may do what; None: whoever reaches an endpoint may play.
         start_with: robots with an agent that are enough for the first tick; None: all.
@@ -44,6 +45,7 @@ class Listening:
     """
 
     endpoints: tuple[str, ...]
+    observed: tuple[str, ...] = ()
     network: Network = field(default_factory=Network)
     access: RunAccess | None = None
     start_with: int | None = None
@@ -54,6 +56,8 @@ class Listening:
         """BadInput for endpoints that will not do, or a start that the scenario does not allow; `robots` in all."""
         for endpoint in self.endpoints:
             self.network.check_endpoint(endpoint, "", "--listen")
+        for endpoint in self.observed:
+            self.network.check_endpoint(endpoint, "", "--observe")
         if self.start_with is None:
             return
         if not 0 <= self.start_with <= robots:
@@ -66,3 +70,8 @@ class Listening:
         """Where runners meet the world."""
         access = None if self.access is None else agents_access(Keys(run_id), self.access)
         return Door(self.endpoints, self.network, access)
+
+    def observers_door(self, run_id: str) -> Door:
+        """Where observers meet the world."""
+        access = None if self.access is None else observers_access(ObserverKeys(run_id), self.access)
+        return Door(self.observed, self.network, access)

@@ -147,7 +147,7 @@ class Simulation:
         )
         self._status = self._new_status()
         self._observers: list[Guarded] = []
-        for observer in (TooLarge(self._record.say), *self._recorders(what), *observers):
+        for observer in (TooLarge(self._record.say), *self._recorders(what, listening), *observers):
             self.watch(observer)
         self._losses: list[Loss] = []
         self._changes: list[Change] = []
@@ -300,12 +300,15 @@ class Simulation:
         needs = self._behind.senses(needs, bodies_of(self.scenario, self.scenario.source))
         return World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
 
-    def _recorders(self, what: Recording) -> Sequence[Observer]:
+    def _recorders(self, what: Recording, listening: Listening | None) -> Sequence[Observer]:
         """Those that fill the run folder, which may drop something only where the run keeps to the wall clock."""
         may_drop = self._pace is not None
         given = self.interventions
+        door = listening.observers_door(self.run_id) if listening else None
         control = ControlServer(self._status, self.controls, given.give, given.end, self._record.note)
-        return self._record.observers(what, self.run_id, self.metrics, self.hashes, control, may_drop=may_drop)
+        return self._record.observers(
+            what, self.run_id, self.metrics, self.hashes, control, may_drop=may_drop, door=door
+        )
 
     def _new_status(self) -> Status:
         """What tells how the run is doing."""

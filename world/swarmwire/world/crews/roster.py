@@ -322,7 +322,8 @@ class Roster(ABC, Generic[S]):
         if self._terms.open and len(rows) > most:
             self._refuse(f"expected at most {most} robots for one runner, got {len(rows)}")
         from_slots = [slot for slot in free if np.isin(slot.all_rows, rows).any()]
-        self._check_agents(asked, [group.name for slot in from_slots for group in slot.assignment.groups])
+        groups = [group for slot in from_slots for group in slot.assignment.groups]
+        self._check_agents(asked, [group.name for group in groups if np.isin(group.rows, rows).any()])
         return self._cut(from_slots, rows)
 
     def _named(self, names: Sequence[str]) -> IntArray:
