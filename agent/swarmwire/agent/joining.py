@@ -5,13 +5,16 @@
 
 import hashlib
 import os
+import queue
 import socket
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from secrets import token_hex
 
 import zenoh
+from zenoh.handlers import Callback
 
 from swarmwire.agent.loading import NoAgent, agent_sha256, load_agent
 from swarmwire.agent.runner import NO_ROBOTS, Asked, Ended, Inbox, play
@@ -26,7 +29,7 @@ from swarmwire.comms.wire.network_names import fault_of_name
 from swarmwire.comms.wire.offer import Offer
 from swarmwire.comms.wire.sessions import open_runner
 
-LOOK_S = 2.0  # for worlds at an endpoint
+LOOK_S = 5.0  # for worlds at an endpoint: a router may have to find its own first
 OFFER_S = 10.0
 BY_ALL = ""  # in place of a group's name
 
@@ -110,6 +113,11 @@ def join(joining: Joining, inbox: Inbox, say: Callable[[str], None]) -> Ended:
 
 def _only_run(session: zenoh.Session, runner: str, endpoint: str) -> str:
     """The id of the only run at the endpoint."""
+    arrived: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
+    looking = session.liveliness().declare_subscriber(EVERY_WORLD, Callback(arrived.put, indirect=False), history=True)
+    with suppress(queue.Empty):
+        arrived.get(timeout=LOOK_S)
+    looking.undeclare()
     replies = session.liveliness().get(EVERY_WORLD, timeout=LOOK_S)
     runs = sorted({run_of(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None})
     if len(runs) == 1:
