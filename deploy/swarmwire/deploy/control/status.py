@@ -84,7 +84,7 @@ class Status:
             "tick": tick,
             "ticks": self._ticks,
             "time_s": to_s(tick_start_ns(tick, static.rate_hz)),
-            "state": "over" if self._over else "paused" if self._controls.paused else "running",
+            "state": "over" if self._over else "paused" if self._controls.stands_still else "running",
             "speed": self._controls.speed,
             "real_time": self._controls.real_time,
             "alive": int(truth.alive[rows].sum()) if truth else static.robots,
