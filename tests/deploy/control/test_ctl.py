@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -30,7 +31,7 @@ def ctl(*arguments: object) -> str:
     return result.output
 
 
-def status(*run: object) -> dict:
+def status(*run: object) -> dict[str, Any]:
     return json.loads(ctl(*run, "status", "--json"))
 
 

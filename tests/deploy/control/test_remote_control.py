@@ -9,6 +9,7 @@ from swarmwire.deploy.control.remote_control import Refused, RemoteControl, cont
 from swarmwire.deploy.live.following import RunGone
 from swarmwire.deploy.live.live_file import Live, read_live
 from swarmwire.metrics.record.names import INTERVENTIONS
+from swarmwire.metrics.run_folder import RunFolder
 from tests.deploy.commands import LOSSY
 from tests.deploy.control.going import at_tick, going
 from tests.waiting import until
@@ -225,6 +226,8 @@ def test_what_people_did_from_python_and_an_altered_record_are_noticed(tmp_path)
         simulation.interventions.end(number)
         simulation.run()
     assert repeat(tmp_path / "run").same
+    rows = RunFolder(tmp_path / "run").events().select("tick", "do", "ended").rows()
+    assert rows == [(5, "kill", False), (9, "kill", True)]
     path = tmp_path / "run" / INTERVENTIONS
     path.write_text(path.read_text().replace("flock-2", "flock-3"))
     repetition = repeat(tmp_path / "run")

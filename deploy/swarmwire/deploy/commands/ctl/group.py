@@ -1,9 +1,8 @@
 """The group of commands `swarmwire ctl`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-import click
 import typer
 from typer.core import TyperGroup
 
@@ -48,7 +47,7 @@ For example:
 class CtlGroup(TyperGroup):
     """A group whose commands may follow the name of a run."""
 
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Take the run from the first argument that is neither an option nor a command."""
         place, chosen = _first_word(self, args), Chosen()
         if place is not None and args[place] not in self.commands:
@@ -82,7 +81,7 @@ def _ctl(
     chosen.insecure = insecure
 
 
-def _first_word(group: click.Group, args: list[str]) -> int | None:
+def _first_word(group: TyperGroup, args: list[str]) -> int | None:
     """The place of the first argument that is neither an option nor the value of one."""
     with_value = {name for of in group.params if not getattr(of, "is_flag", False) for name in of.opts}
     place = 0
