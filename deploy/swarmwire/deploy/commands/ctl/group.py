@@ -1,12 +1,12 @@
 """The group of commands `swarmwire ctl`."""
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from swarmwire.comms.one_of import one_of
+from swarmwire.deploy.commands.access_options import PANEL, Ca, Certificate, Certs, Insecure, Key, Name
 from swarmwire.deploy.commands.ctl.chosen_run import Chosen
 from swarmwire.deploy.commands.ctl.given import end_command, event_command, events_command
 from swarmwire.deploy.commands.ctl.pace import (
@@ -40,7 +40,7 @@ For example:
 
   swarmwire ctl runs/flocking-s1-20261121T030405Z speed max
 
-  swarmwire ctl --endpoint tls/10.0.0.5:7448 --ca ca.pem --certificate me.pem --key me.key status
+  swarmwire ctl --endpoint tls/10.0.0.5:7448 --certs lab-certs status
 """)
 
 
@@ -69,16 +69,20 @@ def _ctl(
     context: typer.Context,
     endpoint: Annotated[
         str | None,
-        typer.Option(help="Where a run on another machine takes observers.", metavar="ENDPOINT"),
+        typer.Option(
+            help="Of a run on another machine: where it takes observers.", metavar="ENDPOINT", rich_help_panel=PANEL
+        ),
     ] = None,
-    ca: Annotated[Path | None, typer.Option(help="Who signed the members' certificates.")] = None,
-    certificate: Annotated[Path | None, typer.Option(help="The operator's own certificate.")] = None,
-    key: Annotated[Path | None, typer.Option(help="Its key, which its owner alone may read.")] = None,
-    insecure: Annotated[bool, typer.Option("--insecure", help="Go to another machine without certificates.")] = False,
+    certs: Certs = None,
+    name: Name = None,
+    ca: Ca = None,
+    certificate: Certificate = None,
+    key: Key = None,
+    insecure: Insecure = False,
 ) -> None:
-    chosen = context.obj
-    chosen.endpoint, chosen.ca, chosen.certificate, chosen.key = endpoint, ca, certificate, key
-    chosen.insecure = insecure
+    chosen: Chosen = context.obj
+    chosen.endpoint, chosen.certs, chosen.name = endpoint, certs, name
+    chosen.files, chosen.insecure = (ca, certificate, key), insecure
 
 
 def _first_word(group: TyperGroup, args: list[str]) -> int | None:
