@@ -118,9 +118,12 @@ def test_what_contradicts_a_number_that_was_changed_is_refused():
     given = Interventions(scenario, bodies_of(scenario, "s.toml"))
     assert scenario.radio
     assert scenario.radio.bursts
-    given.give({"do": "ramp", "what": "radio.bursts.loss_good", "to": 0.8})
-    with pytest.raises(BadInput, match="loss_good"):
-        given.give({"do": "ramp", "what": "radio.bursts.loss_bad", "to": 0.05})
+    worse = given.give({"do": "ramp", "what": "radio.bursts.loss_good", "to": 0.8})
+    better = {"do": "ramp", "what": "radio.bursts.loss_bad", "to": 0.5}
+    with pytest.raises(BadInput, match="^to: radio.bursts.loss_bad: expected at least loss_good, 0.8; got 0.5"):
+        given.give(better)
+    given.end(worse)
+    given.give(better)
 
 
 def test_what_cannot_be_recorded_does_not_happen():

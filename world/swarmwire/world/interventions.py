@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.tuning import with_number
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.errors import BadInput
@@ -65,9 +67,10 @@ class Interventions:
         """
         self._check_open()
         event = event_of(table, self._scenario, self._bodies)
-        if event.needs_radio and self.course.radio is not None:
-            event.check_radio(self.course.radio)  # whose other numbers may have been changed
         with self._lock:
+            if event.needs_radio:
+                for radio in self._radios():
+                    event.check_radio(radio)
             if len(self._waiting) >= MOST_WAITING:
                 raise BadInput(
                     "", "", f"expected at most {MOST_WAITING} events that wait for a tick; let the run go on"
@@ -135,6 +138,17 @@ class Interventions:
                 }
                 for number in newest
             ]
+
+    def _radios(self) -> list[Radio]:
+        """The radio as events have made it by now, and as those that go on or wait will have made it."""
+        now = to_come = self.course.radio
+        if now is None or to_come is None:
+            return []
+        for number, event in self._events.items():
+            known = number in self.course.begun or number >= len(self._scenario.events)
+            if isinstance(event, Ramp) and known and not self._is_over(number):
+                to_come = with_number(to_come, event.what, event.to)
+        return [now, to_come]
 
     def _set_before(self, what: str) -> list[int]:
         """Numbers of events that were given and hold this number of the radio at a value."""

@@ -53,7 +53,7 @@ class Published:
         clock: Clock,
         arena: int = 0,
         selected: str | None = None,
-        declare: Callable[[zenoh.Session, ObserverKeys], object] = lambda *_: None,
+        declare: Callable[[zenoh.Session, ObserverKeys], object] | None = None,
         door: Door | None = None,
     ) -> None:
         """Publish the run whose folder this is; `selected` is the robot that is shown in detail.
@@ -161,7 +161,7 @@ class Published:
 
         self._declared = (
             session.declare_queryable(keys.scene, zenoh.handlers.Callback(answer, indirect=False)),
-            self._declare_more(session, keys),
+            self._declare_more(session, keys) if self._declare_more else None,
             session.liveliness().declare_token(keys.published),  # last: it says that all is there
         )
 
