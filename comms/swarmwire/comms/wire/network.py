@@ -98,8 +98,13 @@ class Network:
         if self.key.stat().st_mode & OF_OTHERS:
             raise BadInput(where, f"{key}.key", f"expected a file that its owner alone may read: chmod 600 {self.key}")
 
+    def check_safe(self, endpoint: str, where: str, key: str) -> None:
+        """BadInput if others could be at its other end who prove nothing; of one on this machine it asks nothing."""
+        if protocol_of(endpoint) in PROVEN or not is_local(endpoint):
+            self._check_proven(endpoint, where, key)
+
     def _check_proven(self, endpoint: str, where: str, key: str) -> None:
-        protocol = endpoint.partition("/")[0]
+        protocol = protocol_of(endpoint)
         if self.proves:
             if protocol not in PROVEN:
                 raise BadInput(where, key, f'expected {" or ".join(PROVEN)} with a certificate, got "{endpoint}"')
@@ -110,6 +115,15 @@ class Network:
 
 
 _SAFE = "{}; expected ca, certificate and key, or insecure = true"
+
+
+def protocol_of(endpoint: str) -> str:
+    """What an endpoint begins with.
+
+    >>> protocol_of("tls/10.0.0.5:7447")
+    'tls'
+    """
+    return endpoint.partition("/")[0]
 
 
 def is_local(endpoint: str) -> bool:
