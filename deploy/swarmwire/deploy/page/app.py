@@ -13,10 +13,10 @@ from starlette.requests import Request
 from starlette.types import ASGIApp
 
 from swarmwire.comms.errors import SwarmwireError
+from swarmwire.deploy.control.remote_control import RemoteControl
 from swarmwire.deploy.page.door import Door
 from swarmwire.deploy.page.news import NewsThread
 from swarmwire.deploy.page.orders import Order
-from swarmwire.deploy.page.run_control import RunControl
 
 FILES = Path(__file__).with_name("files")
 MOST_BYTES = 64 * 1024  # of an order
@@ -26,12 +26,12 @@ MOST_BYTES = 64 * 1024  # of an order
 class Shown:
     """What the page shows that does not change."""
 
-    viewer: str  # the origin of rerun's pages
+    viewer: str  # the address of rerun's pages, but for what they show
     stream: str  # what they show
     facts: Mapping[str, Any]  # of the scene
 
 
-def page_app(control: RunControl, news: NewsThread, shown: Shown, token: str, port: int) -> ASGIApp:
+def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str, port: int) -> ASGIApp:
     """The page, for whoever asks with the token at this port of the loopback."""
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, max_body_size=MOST_BYTES)
 

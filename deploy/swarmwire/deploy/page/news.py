@@ -9,7 +9,7 @@ from typing import Any
 
 from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.comms.errors import SwarmwireError
-from swarmwire.deploy.page.run_control import RunControl
+from swarmwire.deploy.control.remote_control import RemoteControl
 
 EVERY_S = 0.2  # between two looks
 KEPT = 240  # values of each number that a page that is opened later still gets
@@ -26,7 +26,7 @@ class NewsThread(threading.Thread):
         history: what the numbers were, by tick, as far as it is kept.
     """
 
-    def __init__(self, control: RunControl, seen: Callable[[], Mapping[str, Any]], clock: Clock) -> None:
+    def __init__(self, control: RemoteControl, seen: Callable[[], Mapping[str, Any]], clock: Clock) -> None:
         """`seen` tells what else there is to tell at each look."""
         super().__init__(name="news", daemon=True)
         self._control, self._seen, self._clock = control, seen, clock

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from swarmwire.deploy.page.run_control import RunControl
+from swarmwire.deploy.control.remote_control import RemoteControl
 
 MOST_STEPS = 100_000
 
@@ -14,7 +14,7 @@ class _Order(BaseModel, ABC):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     @abstractmethod
-    def give(self, control: RunControl) -> int | None:
+    def give(self, control: RemoteControl) -> int | None:
         """Ask the run for it; the number of the event that it began, if any."""
 
 
@@ -23,7 +23,7 @@ class Pause(_Order):
 
     do: Literal["pause"]
 
-    def give(self, control: RunControl) -> None:
+    def give(self, control: RemoteControl) -> None:
         """Pause."""
         control.pause()
 
@@ -33,7 +33,7 @@ class Resume(_Order):
 
     do: Literal["resume"]
 
-    def give(self, control: RunControl) -> None:
+    def give(self, control: RemoteControl) -> None:
         """Go on."""
         control.resume()
 
@@ -44,7 +44,7 @@ class Step(_Order):
     do: Literal["step"]
     n: int = Field(1, ge=1, le=MOST_STEPS)
 
-    def give(self, control: RunControl) -> None:
+    def give(self, control: RemoteControl) -> None:
         """Step."""
         control.step(self.n)
 
@@ -55,7 +55,7 @@ class Speed(_Order):
     do: Literal["speed"]
     factor: float | None = Field(gt=0, le=1e6)
 
-    def give(self, control: RunControl) -> None:
+    def give(self, control: RemoteControl) -> None:
         """Set it."""
         control.speed(self.factor)
 
@@ -65,7 +65,7 @@ class Stop(_Order):
 
     do: Literal["stop"]
 
-    def give(self, control: RunControl) -> None:
+    def give(self, control: RemoteControl) -> None:
         """End it."""
         control.stop()
 
@@ -76,7 +76,7 @@ class Happen(_Order):
     do: Literal["event"]
     event: dict[str, Any]
 
-    def give(self, control: RunControl) -> int:
+    def give(self, control: RemoteControl) -> int:
         """Let it happen."""
         return control.event(self.event)
 
@@ -87,7 +87,7 @@ class End(_Order):
     do: Literal["end"]
     number: int = Field(ge=0)
 
-    def give(self, control: RunControl) -> None:
+    def give(self, control: RemoteControl) -> None:
         """End it."""
         control.end(self.number)
 
