@@ -50,7 +50,8 @@ Select = Annotated[
 View = Annotated[bool, typer.Option("--view", help="Look at it while it goes on, as `swarmwire view` does.")]
 
 Ui = Annotated[
-    bool, typer.Option("--ui", help="Control it in a browser while it goes on, as `swarmwire ui` does; it begins paused.")
+    bool,
+    typer.Option("--ui", help="Control it in a browser while it goes on, as `swarmwire ui` does; it begins paused."),
 ]
 
 

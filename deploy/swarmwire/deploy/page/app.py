@@ -57,10 +57,8 @@ def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str,
         return {"event": number}
 
     @app.exception_handler(SwarmwireError)
-    async def refused(request: Request, error: SwarmwireError) -> JSONResponse:
+    async def refused(_: Request, error: SwarmwireError) -> JSONResponse:
         return JSONResponse({"detail": str(error)}, 409)
 
     app.mount("/", StaticFiles(directory=FILES))
     return Door(app, token, port, shown.viewer)
-
-

@@ -4,7 +4,7 @@ import hmac
 from collections.abc import Mapping
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import PlainTextResponse
+from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 HOSTS = ("127.0.0.1", "localhost")  # as browsers on this machine may call it
@@ -30,6 +30,9 @@ class Door:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse the request, or pass it on."""
+        if scope["type"] == "lifespan":  # no request, but the server's own start and end
+            await self._app(scope, receive, send)
+            return
         if scope["type"] != "http":
             raise TypeError(f"the page answers requests alone, not {scope['type']}")
         fault = self._fault(Headers(scope=scope))
@@ -44,6 +47,9 @@ class Door:
 
         if fault is not None:
             await PlainTextResponse(fault, 403)(scope, receive, closed)
+            return
+        if not rest:  # what the page loads is named from its folder on
+            await RedirectResponse(f"/{given}/")(scope, receive, closed)
             return
         path = "/" + "".join(rest)
         await self._app({**scope, "path": path, "raw_path": path.encode()}, receive, closed)

@@ -100,7 +100,8 @@ class NewsThread(threading.Thread):
 
 def _numbers(news: News) -> News:
     """What is drawn as a curve."""
-    return {"pdr": news.get("pdr"), "tick_ms": news.get("tick_ms"), **news.get("metrics", {})}
+    tick_ms = news.get("measures_ms")
+    return {"pdr": news.get("pdr"), "alive": news.get("alive"), "tick_ms": tick_ms, **news.get("metrics", {})}
 
 
 def _put(queue: asyncio.Queue[News | None], news: News | None) -> None:

@@ -30,7 +30,8 @@ class Seen:
         self.numbers = {
             "centre": living.mean(axis=0).round(3).tolist() if len(living) else None,
             "places": [
-                [*place, bool(lives)] for place, lives in zip(places[shown].round(2).tolist(), alive[shown], strict=True)
+                [*place, bool(lives)]
+                for place, lives in zip(places[shown].round(2).tolist(), alive[shown], strict=True)
             ],
             "pdr": self._pdr(glimpse),
         }

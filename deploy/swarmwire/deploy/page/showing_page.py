@@ -63,7 +63,9 @@ def facts(scene: Scene) -> Mapping[str, Any]:
         "arena_m": list(static.arena_size_m),
         "robots": list(static.robot_names),
         "groups": [group.name for group in static.groups],
-        "series": [{"name": series.name, "unit": series.unit, "bounds": list(series.bounds)} for series in scene.series],
+        "series": [
+            {"name": series.name, "unit": series.unit, "bounds": list(series.bounds)} for series in scene.series
+        ],
         "obstacles": [
             {"x": one.x_m, "y": one.y_m, "radius": one.radius_m, "corners": one.corners_m.tolist()}
             for one in static.fixed(0)
