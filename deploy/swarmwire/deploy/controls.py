@@ -101,7 +101,9 @@ class Controls:
         if self._speed_fixed:
             raise BadInput("", "factor", "expected no other speed: programs elsewhere keep to that of the run")
         if speed is None and self._pace:
-            raise BadInput("", "factor", "expected a number: the run keeps to the wall clock, and has no unlimited speed")
+            raise BadInput(
+                "", "factor", "expected a number: the run keeps to the wall clock, and has no unlimited speed"
+            )
         if speed is not None and not SLOWEST <= speed <= FASTEST:
             raise BadInput("", "factor", f"expected {SLOWEST:g} to {FASTEST:g} times real time, got {speed!r}")
         with self._lock:

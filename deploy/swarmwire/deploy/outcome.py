@@ -7,6 +7,7 @@ from typing import Any
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.record.inputs import InputsRecord
+from swarmwire.deploy.record.interventions import InterventionsRecord
 from swarmwire.deploy.record.origin import Origin
 from swarmwire.deploy.result import EventResult, Result, arena_result
 from swarmwire.metrics.record.recorders import record_summary
@@ -33,6 +34,7 @@ def outcome(
     arena_counts: Sequence[dict[str, int]],
     origin: Origin,
     inputs: InputsRecord | None,
+    interventions: InterventionsRecord | None,
     losses: Sequence[Loss],
     engines: Sequence[str],
     realtime: RealTimeReport | None,
@@ -72,6 +74,7 @@ def outcome(
         modules=dict(origin.modules),
         files=origin.files,
         inputs=inputs,
+        interventions=interventions,
         lost_runners=tuple(str(loss) for loss in losses),
         realtime=realtime,
         gateways=dict(origin.gateways),

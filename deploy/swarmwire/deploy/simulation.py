@@ -1,6 +1,6 @@
 """One execution of a scenario, tick by tick or to its end."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
@@ -19,6 +19,8 @@ from swarmwire.deploy.arguments import (
     scenario_of,
     tick_count,
 )
+from swarmwire.deploy.control.control_server import ControlServer
+from swarmwire.deploy.control.status import Status
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.crews import Crews
 from swarmwire.deploy.endpoint import check_socket, new_run_id
@@ -50,6 +52,7 @@ from swarmwire.world.crews.remote_crew import RemoteCrew
 from swarmwire.world.crews.roster import Loss
 from swarmwire.world.crews.runner_health import RunnerHealth
 from swarmwire.world.gateways.gateway_crew import GatewayCrew
+from swarmwire.world.interventions import Interventions
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of, own_code
 from swarmwire.world.scenario.scenario import Scenario
@@ -81,6 +84,7 @@ class Simulation:
         interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
         judge: says which arenas are over, by the scenario's stop conditions; another may take its place before the run.
         controls: pause, step, speed and end of `run`, for other threads.
+        interventions: events given while it goes on, and ended, from any thread.
         served: entered, the robots that answer as real ones, if any.
     """
 
@@ -128,6 +132,13 @@ class Simulation:
         self._pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
         self.controls = Controls(self._clock, rate_hz, self._pace, speed_fixed=bool(self._behind.kinds))
         self.run_id, self.interrupt = new_run_id(), Interrupt()
+        self.interventions = Interventions(
+            self.scenario,
+            {group.name: group.body for group in self.static.groups},
+            self._record.keep,
+            replay.interventions if replay else None,
+        )
+        self._status = self._new_status()
         self._observers: list[Guarded] = []
         for observer in (TooLarge(self._record.say), *self._recorders(what), *observers):
             self.watch(observer)
@@ -194,7 +205,8 @@ class Simulation:
             self.served = stack.enter_context(served)
             crew = self._crew = stack.enter_context(self._crews.crew(self.served))
             judging = [self._stop] if self._stop else []
-            self._watching: list[Observer] = [self.metrics, *judging, RadioTally(), EventLog(), *self._observers]
+            looking = [self.metrics, *judging, self._status, RadioTally(), EventLog()]
+            self._watching: list[Observer] = [*looking, *self._observers]
             if self.served:
                 self._watching.append(Undriven(self.served, pace, self._record.say))
             acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows)
@@ -206,6 +218,7 @@ class Simulation:
                 self._watching,
                 self.scenario.events,
                 self.judge,
+                self.interventions,
             )
             crew.start()
             for observer in self._watching:
@@ -218,12 +231,19 @@ class Simulation:
         """One tick; what the observers saw of it. It may go on beyond the scenario's duration."""
         return self._entered().step()
 
+    def intervene(self, event: Mapping[str, Any]) -> int:
+        """Have an event happen at the start of the next tick: a table as in a scenario, without at_s. Its number.
+
+        BadInput says what is wrong with it. `interventions.end` undoes one that lasts.
+        """
+        return self.interventions.give(event)
+
     def run(self, ticks: int | None = None) -> None:
         """Run up to tick `ticks`, or to the scenario's end, until all arenas have stopped, or until an interrupt."""
         loop = self._entered()
         with suppress(Interrupted):  # asked for while it waited for runners: the summary says how far it came
             until = self.ticks if ticks is None else ticks
-            loop.run(until, self._stopped, lambda tick: self.controls.hold(tick, self._stopped))
+            loop.run(until, self._stopped, self._hold)
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         """End the agents, and close the records with a summary: also of a run that failed, when it is worth most."""
@@ -251,6 +271,7 @@ class Simulation:
                 arena_counts=loop.arena_counts(),
                 origin=self._origin,
                 inputs=self._record.inputs(),
+                interventions=self._record.interventions(),
                 losses=self._losses,
                 engines=self.world.engines,
                 realtime=crew.report() if isinstance(crew, PacedCrew | RealTimeCrew | GatewayCrew) else None,
@@ -271,7 +292,29 @@ class Simulation:
     def _recorders(self, what: Recording) -> Sequence[Observer]:
         """Those that fill the run folder, which may drop something only where the run keeps to the wall clock."""
         may_drop = self._pace is not None
-        return self._record.observers(what, self.run_id, self.metrics, self.hashes, may_drop=may_drop)
+        given = self.interventions
+        control = ControlServer(self._status, self.controls, given.give, given.end, self._record.note)
+        return self._record.observers(what, self.run_id, self.metrics, self.hashes, control, may_drop=may_drop)
+
+    def _new_status(self) -> Status:
+        """What tells how the run is doing."""
+        return Status(
+            run_id=self.run_id,
+            scenario=self.scenario.name,
+            ticks=self.ticks,
+            metrics=self.metrics,
+            controls=self.controls,
+            clock=self._clock,
+            health=self.health,
+            counts=lambda: self._loop.counts() if self._loop else {},
+            radio=lambda: self.interventions.course.radio,
+            events=self.interventions.told,
+        )
+
+    def _hold(self, tick: int) -> None:
+        """Return when the tick may begin."""
+        self.controls.hold(tick, self._stopped)
+        self._status.began()
 
     def _new_crews(self, socket: Path | None) -> Crews:
         """How the agents will be started."""

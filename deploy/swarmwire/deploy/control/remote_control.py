@@ -88,7 +88,7 @@ def controlling(endpoint: str, run: str, network: Network | None = None) -> Gene
     `network` brings the certificates that an endpoint beyond this machine asks for.
     """
     try:
-        session = open_observer(endpoint)
+        session = open_observer(endpoint, network)
     except zenoh.ZError as error:
         raise RunGone(f"the run at {endpoint} cannot be reached: {str(error).split(' at ')[0]}") from error
     with closed_after(session):

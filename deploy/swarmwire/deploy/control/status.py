@@ -57,8 +57,8 @@ class Status:
 
     def see(self, truth: Truth) -> None:
         """Keep it."""
-        self._truth = truth
-        if self._began_ns is not None:
+        first, self._truth = self._truth is None, truth
+        if self._began_ns is not None and not first:  # which is long: kernels are compiled or loaded in it
             took_ns = self._clock.now_ns() - self._began_ns
             self._tick_ns = took_ns if self._tick_ns is None else (1 - SMOOTHING) * self._tick_ns + SMOOTHING * took_ns
 

@@ -6,6 +6,7 @@
 import os
 import queue
 import threading
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from math import isinf
 from pathlib import Path
@@ -51,8 +52,13 @@ class Published:
         clock: Clock,
         arena: int = 0,
         selected: str | None = None,
+        declare: Callable[[zenoh.Session, ObserverKeys], object] = lambda session, keys: None,
     ) -> None:
-        """Publish the run whose folder this is; `selected` is the robot that is shown in detail."""
+        """Publish the run whose folder this is; `selected` is the robot that is shown in detail.
+
+        `declare` declares what else is answered on the session, for as long as what it returns is kept.
+        """
+        self._declare_more = declare
         self._folder, self._run_id, self._metrics, self._clock = folder, run_id, metrics, clock
         self._arena, self._selected = arena, selected
         self._open = ExitStack()
@@ -142,6 +148,7 @@ class Published:
 
         self._declared = (
             session.declare_queryable(keys.scene, zenoh.handlers.Callback(answer, indirect=False)),
+            self._declare_more(session, keys),
             session.liveliness().declare_token(keys.published),  # last: it says that all is there
         )
 
