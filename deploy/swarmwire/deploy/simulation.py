@@ -31,6 +31,7 @@ from swarmwire.deploy.gateways.undriven import Undriven
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.kept_memory import keep_memory
+from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.deploy.new_air import new_air
 from swarmwire.deploy.outcome import outcome
@@ -294,7 +295,11 @@ class Simulation:
         may_drop = self._pace is not None
         given = self.interventions
         control = ControlServer(self._status, self.controls, given.give, given.end, self._record.note)
-        return self._record.observers(what, self.run_id, self.metrics, self.hashes, control, may_drop=may_drop)
+        found = self._record.observers(what, self.run_id, self.metrics, self.hashes, control, may_drop=may_drop)
+        for published in found:
+            if isinstance(published, Published):
+                self.controls.on_pause = published.catch_up
+        return found
 
     def _new_status(self) -> Status:
         """What tells how the run is doing."""

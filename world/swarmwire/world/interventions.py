@@ -122,7 +122,10 @@ class Interventions:
             return taken
 
     def told(self) -> list[dict[str, Any]]:
-        """The newest events by number: the tick in which they began (None: they have not), what they do, if they are over."""
+        """The newest events by number: the tick in which they began (None: they have not), what they do, if they are over.
+
+        `given` says that people gave it; others are the scenario's.
+        """
         with self._lock:
             newest = sorted(self._events)[-MOST_TOLD:]
             return [
@@ -132,6 +135,7 @@ class Interventions:
                     "do": self._events[number].do,
                     "text": self._events[number].words,
                     "over": self._is_over(number),
+                    "given": number >= len(self._scenario.events),
                 }
                 for number in newest
             ]

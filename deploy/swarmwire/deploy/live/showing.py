@@ -70,11 +70,11 @@ class Drawer(threading.Thread):
     In a thread that nobody waits for: drawing stands still while the viewer does, and ends with it.
     """
 
-    def __init__(self, run: Following, url: str, way: Way, also: Callable[[Glimpse], None] | None = None) -> None:
-        """Draw in the viewer that listens at `url`; `also` is handed each glimpse before it is drawn."""
+    def __init__(self, run: Following, url: str, way: Way, page: Callable[[Glimpse], None] | None = None) -> None:
+        """Draw in the viewer that listens at `url`; if it is that of a page, the page gets each glimpse before."""
         super().__init__(name="drawer", daemon=True)
-        self._run, self._way, self._also, self._evened = run, way, also, Evened()
-        self._drawing = RerunLive(url, run, way.clock, selected=run.scene.selected)
+        self._run, self._way, self._page, self._evened = run, way, page, Evened()
+        self._drawing = RerunLive(url, run, way.clock, selected=run.scene.selected, page=page is not None)
         self.fault: Exception | None = None
 
     def run(self) -> None:
@@ -92,8 +92,8 @@ class Drawer(threading.Thread):
         glimpse = self._run.next()
         if glimpse is None:
             return False
-        if self._also is not None:
-            self._also(glimpse)
+        if self._page is not None:
+            self._page(glimpse)
         truth = glimpse.truth
         tally = None if truth.tally is None else self._evened.per_tick(truth.tally, glimpse.ticks)
         self._drawing.see(replace(truth, tally=tally))

@@ -8,7 +8,7 @@ const OWN = [
   { name: "alive", unit: "", bounds: [0, null] },
   { name: "tick_ms", unit: "ms", bounds: [0, null] },
 ];
-const NAMES = { pdr: "delivery (PDR, last s)", tick_ms: "cost of a tick", alive: "robots alive" };
+const NAMES = { pdr: "PDR, last second", tick_ms: "cost of a tick", alive: "robots alive" };
 const by = (id) => document.getElementById(id);
 
 export function numbers() {
