@@ -11,6 +11,7 @@ from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.commands.certs.group import certs_app
 from swarmwire.deploy.commands.check import check_command
 from swarmwire.deploy.commands.compare import compare_command
+from swarmwire.deploy.commands.ctl.group import ctl_app
 from swarmwire.deploy.commands.describe import describe_command
 from swarmwire.deploy.commands.draw import draw_command
 from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
@@ -76,6 +77,7 @@ app.command("compare")(compare_command)
 app.command("report")(report_command)
 app.command("parity")(parity_command)
 app.add_typer(radio_app, name="radio")
+app.add_typer(ctl_app, name="ctl")
 app.add_typer(robots_app, name="robots")
 app.add_typer(certs_app, name="certs")
 let_help_flow(app)

@@ -122,9 +122,9 @@ class Interventions:
             return taken
 
     def told(self) -> list[dict[str, Any]]:
-        """The newest events by number: the tick in which they began (None: they have not), what they do, if they are over.
+        """The newest events by number: the tick in which each began, if it has, what it does, whether it is over.
 
-        `given` says that people gave it; others are the scenario's.
+        `given` says that people gave it; the others are the scenario's.
         """
         with self._lock:
             newest = sorted(self._events)[-MOST_TOLD:]

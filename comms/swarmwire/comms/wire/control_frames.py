@@ -87,9 +87,12 @@ def _value(do: str, value: object) -> Any:
         if type(value) is int:
             return value
         raise BadInput("", "event", f"expected the number of an event, got {_shown(value)}")
-    if type(value) is dict and all(type(name) is str for name in cast("dict[object, object]", value)):
-        return value
-    raise BadInput("", "event", f'expected a table as in a scenario, such as {{ do = "kill", … }}, got {_shown(value)}')
+    if isinstance(value, dict):
+        table = cast("dict[object, object]", value)
+        if all(type(name) is str for name in table):
+            return table
+    expected = 'expected a table as in a scenario, such as { do = "kill", robots = { count = 3 } }'
+    raise BadInput("", "event", f"{expected}; got {_shown(cast('object', value))}")
 
 
 def _map_of(data: bytes, most_bytes: int) -> dict[str, Any]:

@@ -128,6 +128,7 @@ def run_command(
 
 def _shown(simulation: "Simulation", folder: Path, console: Console, *, view: bool, ui: bool) -> "Result":
     """The result of the run, told and shown while it goes on and afterwards."""
+    from swarmwire.deploy.control.run_finder import Announced
     from swarmwire.deploy.live.live_view import LiveView
     from swarmwire.deploy.page.beside import PageBeside
     from swarmwire.deploy.running import finished
@@ -135,6 +136,7 @@ def _shown(simulation: "Simulation", folder: Path, console: Console, *, view: bo
     from swarmwire.deploy.terminal.robots_told import RobotsTold
     from swarmwire.deploy.terminal.shown import progress
 
+    simulation.watch(Announced(folder))
     simulation.watch(RobotsTold(simulation, console))
     simulation.watch(progress(simulation, console))
     with LiveView(folder) as live, PageBeside(simulation, folder, console) as page:

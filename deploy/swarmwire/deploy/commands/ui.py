@@ -1,18 +1,21 @@
 """`swarmwire ui`."""
 
 import os
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.with_parent import WithParent, standard_input_closed
 
 
 def ui_command(
-    run: Annotated[Path, typer.Argument(help="The folder of a run that goes on.", metavar="RUN")],
+    run: Annotated[
+        str | None,
+        typer.Argument(
+            help="The id of a run that goes on, or its folder. Default: the only one there is.", metavar="[RUN]"
+        ),
+    ] = None,
     port: Annotated[int | None, typer.Option(help="Port of the page. Default: a free one.", min=1, max=65535)] = None,
     with_parent: WithParent = False,
 ) -> None:
@@ -26,15 +29,14 @@ def ui_command(
 
     need_ui_extra("ui")
     need_view_extra("ui")
+    from swarmwire.deploy.control.run_finder import find_run
     from swarmwire.deploy.interrupt import Interrupt
-    from swarmwire.deploy.live.live_file import read_live
+    from swarmwire.deploy.live.live_file import Live
     from swarmwire.deploy.live.showing import Way
     from swarmwire.deploy.page.showing_page import show_page
 
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
-    live = read_live(run) if run.is_dir() else None
-    if live is None:
-        raise BadInput(str(run), "", "expected the folder of a run that goes on")
+    found = find_run(run)
     with Interrupt() as interrupt:
         way = Way(
             clock=WallClock(),
@@ -42,4 +44,4 @@ def ui_command(
             stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),
             port=port,
         )
-        show_page(live, way)
+        show_page(Live(found.endpoint, found.run, found.pid), way)

@@ -14,11 +14,12 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import open_observer
 from swarmwire.deploy.live.following import RunGone
 
+ANY_PUBLISHED = ObserverKeys("*").published
 ANSWER_S = 10.0  # a run answers in milliseconds, unless its machine is very busy
 
 
 class Refused(SwarmwireError):
-    """What the run does not do, in its own line: an unknown robot, an event that is over, a speed that it cannot have."""
+    """What the run does not do, in its own line: an unknown robot, an event that is over, a speed beyond bounds."""
 
 
 class RemoteControl:
@@ -87,9 +88,25 @@ def controlling(endpoint: str, run: str, network: Network | None = None) -> Gene
 
     `network` brings the certificates that an endpoint beyond this machine asks for.
     """
+    with _observing(endpoint, network) as session:
+        yield RemoteControl(session, run)
+
+
+def only_run_at(endpoint: str, network: Network | None = None) -> str:
+    """The id of the run that is published at an endpoint; RunGone if there is none, or several."""
+    with _observing(endpoint, network) as session:
+        found = session.liveliness().get(ANY_PUBLISHED, timeout=ANSWER_S)
+        runs = sorted({str(reply.ok.key_expr).split("/")[1] for reply in found if reply.ok is not None})
+    if len(runs) != 1:
+        raise RunGone(f"expected a run at {endpoint}, found {', '.join(runs) or 'none'}; RUN names one")
+    return runs[0]
+
+
+@contextmanager
+def _observing(endpoint: str, network: Network | None) -> Generator[zenoh.Session]:
     try:
         session = open_observer(endpoint, network)
     except zenoh.ZError as error:
         raise RunGone(f"the run at {endpoint} cannot be reached: {str(error).split(' at ')[0]}") from error
     with closed_after(session):
-        yield RemoteControl(session, run)
+        yield session

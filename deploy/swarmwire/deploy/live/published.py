@@ -52,7 +52,7 @@ class Published:
         clock: Clock,
         arena: int = 0,
         selected: str | None = None,
-        declare: Callable[[zenoh.Session, ObserverKeys], object] = lambda session, keys: None,
+        declare: Callable[[zenoh.Session, ObserverKeys], object] = lambda *_: None,
     ) -> None:
         """Publish the run whose folder this is; `selected` is the robot that is shown in detail.
 

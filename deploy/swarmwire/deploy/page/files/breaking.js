@@ -9,7 +9,7 @@ export function breaking() {
   let status = null, at = null;
   const small = map(by("map"), () => status && show());
   const names = () => ({ names: [by("robot").value] });
-  const lasting = (action) => (status?.events ?? []).filter((event) => event.do === action && !event.over);
+  const lasting = (action) => (status?.events ?? []).filter((event) => event.do === action && !event.over && (event.given || event.tick !== null));
   const endAll = (action) => lasting(action).forEach((event) => end(event.number));
 
   by("kill").onclick = () => happen({ do: "kill", robots: names() });
