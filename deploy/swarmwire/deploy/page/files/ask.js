@@ -1,7 +1,15 @@
 // Asks the run for something; what it refuses is said in its own words.
 import { say } from "./said.js";
 
-export async function ask(order) {
+let before = Promise.resolve();
+
+// One after the other, as they were asked for: a step comes after what is to happen in it.
+export function ask(order) {
+  before = before.then(() => give(order));
+  return before;
+}
+
+async function give(order) {
   try {
     const answer = await fetch("do", {
       method: "POST",
