@@ -95,7 +95,8 @@ class Turn:
     def send(self, row: IntArray | None, to: IntArray | int | None, payloads: Payloads) -> IntArray:
         """Queue a packet for each of the robots `row` (rising, each once; None: for all); returns their ids."""
         place = slice(None) if row is None else row
-        receiver = np.full(len(payloads), BROADCAST)
+        receiver = np.empty(len(payloads), np.int64)
+        receiver.fill(BROADCAST)
         if to is not None:
             receiver[:] = to
             if (receiver < 0).any() or (receiver != to).any():
