@@ -173,7 +173,7 @@ def _own(heard: Heard, rows: IntArray) -> Heard:
     first, last = (int(rows[0]), int(rows[-1])) if len(rows) else (0, -1)
     lowest, highest = int(heard.receiver[0]), int(heard.receiver[-1])  # receivers rise, as rows do
     if last - first + 1 == len(rows) and first <= lowest and highest <= last:  # one span, and nobody beside it heard
-        place = heard.receiver - first
+        place = heard.receiver - first if len(rows) > 1 else np.zeros(len(heard), np.int64)
     else:
         places = np.full(max(highest, last) + 1, NOT_OWN)
         places[rows] = np.arange(len(rows))
