@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from swarmwire.deploy.record.inputs import RecordedInputs
+from swarmwire.world.interventions import Intervention
 
 
 @dataclass(frozen=True)
@@ -11,3 +12,4 @@ class Replay:
 
     ticks: int  # instead of the scenario's
     inputs: RecordedInputs | None  # None: all follows from scenario and seed
+    interventions: tuple[Intervention, ...] = ()  # what people did to it

@@ -14,6 +14,7 @@ from swarmwire.comms.packets import NOWHERE, Heard, Sent
 from swarmwire.comms.protocols import Crew, Judge, Observer
 from swarmwire.comms.truth import Tally, Truth
 from swarmwire.world.events import Events
+from swarmwire.world.interventions import Interventions
 from swarmwire.world.mailbox import Mailbox
 from swarmwire.world.trajectory_hash import TrajectoryHash
 from swarmwire.world.world import World
@@ -38,13 +39,19 @@ class Loop:
         observers: Sequence[Observer],
         events: Sequence[Event] = (),
         judge: Judge | None = None,
+        interventions: Interventions | None = None,
     ) -> None:
-        """`judge` is asked after each tick, once observers saw it; without one no arena is over before the run is."""
+        """`judge` is asked after each tick, once observers saw it; without one no arena is over before the run is.
+
+        `interventions` are asked at the start of each tick for events that people want.
+        """
         self.world, self.air, self.crew, self.observers = world, air, crew, observers
         self.ticks_done = 0
         self._judge = judge
         self._running, self._left_after = world.running.copy(), np.zeros(world.static.arenas, np.int64)
-        self._events = Events(events, world.static, world.keys, air.radio if air else None)
+        self._interventions = interventions
+        course = interventions.course if interventions else None
+        self._events = Events(events, world.static, world.keys, air.radio if air else None, course)
         self._mailbox = Mailbox(world.static)
         self._to_nobody, self._without_radio = np.zeros_like(self._left_after), np.zeros_like(self._left_after)
         self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
@@ -68,6 +75,7 @@ class Loop:
         """One tick, in the order of the design: events, air, senses, crew, air, physics, observers, judge."""
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
+        self._intervene(tick, start_ns)
         events = self._events.apply(start_ns, world, self.air)
         news = self.air.advance(start_ns) if self.air else None
         heard = news.heard if news else Heard.none()
@@ -151,6 +159,16 @@ class Loop:
         """Faults by name, (arenas,) each."""
         packets = {"packets_to_nobody": self._to_nobody, "packets_without_radio": self._without_radio}
         return {**self.world.counts(), **packets}
+
+    def _intervene(self, tick: int, start_ns: int) -> None:
+        """Have begin and end what people want of this tick."""
+        if self._interventions is None:
+            return
+        for number, event in self._interventions.take(tick, self.world.static.rate_hz):
+            if event is None:
+                self._events.end(number, start_ns)
+            else:
+                self._events.begin(number, event, start_ns)
 
     def _leave(self, over: BoolArray) -> None:
         """These arenas (arenas,) take no part in the ticks to come."""

@@ -13,6 +13,7 @@ from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.protocols import Crew
 from swarmwire.comms.senses import Actions, Senses
+from swarmwire.world.crews.door import Door
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime import RealTime
 from swarmwire.world.crews.roster import OnLoss
@@ -60,7 +61,7 @@ class RealTimeCrew(RunnerCrew[RealTime]):
 
     def __init__(
         self,
-        endpoint: str,
+        door: Door | str,
         run_id: str,
         assignments: list[Assignment],
         timeout_s: float,
@@ -72,7 +73,7 @@ class RealTimeCrew(RunnerCrew[RealTime]):
         terms: Terms = USUAL,
     ) -> None:
         roster = RealTime(assignments, watchdog_s, timeout_s, on_loss, terms)
-        super().__init__(endpoint, run_id, roster, timeout_s, clock, around)
+        super().__init__(door, run_id, roster, timeout_s, clock, around)
         self._pace, self._assignments = pace, assignments
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
