@@ -16,7 +16,7 @@ from benchmarks.campaign import campaign
 from benchmarks.first_compile import CASES as COMPILES
 from benchmarks.first_compile import first_compile
 from benchmarks.metrics_share import metrics_share
-from benchmarks.processes import processes
+from benchmarks.processes import BOID, FLOCKING, processes
 from benchmarks.push_fleet import push_fleet
 from benchmarks.record_cost import record_cost
 from benchmarks.report_cost import report_cost
@@ -24,6 +24,7 @@ from benchmarks.robot_step import robot_step
 from benchmarks.robot_steps import CASES, D1, robot_steps, start
 from benchmarks.tls_cost import tls_cost
 from benchmarks.view_cost import view_cost
+from benchmarks.wire_over_floor import wire_over_floor
 
 REPEATS = 3
 WITH_ENGINE: dict[str, Callable[[str, str | None, int], None]] = {
@@ -40,8 +41,11 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     **dict.fromkeys(AIRS, air_cost),
     "air-scaling": air_scaling,
     "campaign-1000x10": campaign,
-    "processes-100": partial(processes, robots=100, ticks=300),
     "tls-cost": partial(tls_cost, robots=40, ticks=400),
+    "processes-100": partial(processes, robots=100, ticks=300, agent=FLOCKING),
+    "processes-200": partial(processes, robots=200, ticks=200, agent=BOID),
+    "processes-1000": partial(processes, robots=1000, ticks=50, agent=BOID),
+    "wire-over-floor": partial(wire_over_floor, robots=200, ticks=140),
     **dict.fromkeys(COMPILES, first_compile),
     "report-10000": partial(report_cost, seeds=200),
     "robot-step": partial(robot_step, kind="epuck2"),

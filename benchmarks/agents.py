@@ -1,10 +1,12 @@
 """Agents that only benchmarks need."""
 
+import math
+import time
 from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.agent import Agent, Message, Robot, Robots, State, VectorAgent, f8
+from swarmwire.agent import Agent, Message, Robot, Robots, State, VectorAgent, f4, f8
 from swarmwire.agent.behaviours import Diffusion
 
 
@@ -56,3 +58,42 @@ class Listener(Agent):
         for packet in robot.radio.heard(Ping):
             _ = packet.message.number, packet.range_m
         robot.drive(float(near[0]), 0.0)
+
+
+class Beacon(Message):
+    """What a boid broadcasts in every step."""
+
+    heading_rad: f4
+
+
+class Boid(Agent):
+    """One robot that flocks by Reynolds's rules, in plain Python: attraction, repulsion, alignment, rays."""
+
+    needs: ClassVar[tuple[str, ...]] = ("proximity", "compass", "radio.range", "radio.bearing")
+    speed_mps: float = 0.1
+    separation_m: float = 0.4
+
+    def step(self, robot: Robot) -> None:
+        """Steer to the sum of all pulls, and broadcast the heading."""
+        heading, heard = robot.compass.heading_rad, robot.radio.heard(Beacon)
+        x = y = 0.0
+        for packet in heard:
+            bearing, turn = packet.bearing_rad, packet.message.heading_rad - heading
+            pull = 0.6 * min((packet.range_m - self.separation_m) / self.separation_m, 1.0)
+            x += pull * math.cos(bearing) + math.cos(turn)
+            y += pull * math.sin(bearing) + math.sin(turn)
+        near_x, near_y = robot.proximity.vector_sum()
+        x, y = 0.3 + x / max(len(heard), 1) - 3.0 * near_x, y / max(len(heard), 1) - 3.0 * near_y
+        angle = math.atan2(y, x)
+        robot.drive(self.speed_mps * max(math.cos(angle), 0.0), 2.0 * angle)
+        robot.radio.send(Beacon(heading_rad=heading))
+
+
+class TimedBoid(Boid):
+    """A boid that tells how much processor time each of its steps took."""
+
+    def step(self, robot: Robot) -> None:
+        """Step, and tell."""
+        start_ns = time.thread_time_ns()
+        super().step(robot)
+        robot.note(value=(time.thread_time_ns() - start_ns) * 1e-9)

@@ -11,12 +11,14 @@ from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy import run
 from swarmwire.world.scenario.scenario_file import scenario_from
 
+FLOCKING, BOID = "swarmwire.agent.behaviours:Flocking", "benchmarks.agents:Boid"
+
 
 class OwnMemory:
-    """Observer that reads, once, the memory that belongs to each runner alone (USS)."""
+    """Observer that reads, once, the memory of the run: what belongs to each runner alone, and of all their share."""
 
     def __init__(self, at_tick: int) -> None:
-        self.at_tick, self.uss_mb = at_tick, list[float]()
+        self.at_tick, self.uss_mb, self.all_gb = at_tick, list[float](), 0.0
 
     def begin(self, static: Static) -> None:
         """Nothing to do."""
@@ -24,24 +26,37 @@ class OwnMemory:
     def see(self, truth: Truth) -> None:
         """Read at one tick."""
         if truth.tick == self.at_tick:
-            nursery = [child for child in psutil.Process().children() if "swarmwire.agent.nursery" in child.cmdline()]
+            world = psutil.Process()
+            nursery = [child for child in world.children() if "swarmwire.agent.nursery" in child.cmdline()]
             runners = [runner for process in nursery for runner in process.children()]
-            self.uss_mb = [runner.memory_full_info().uss / 1e6 for runner in runners]
+            memory = [runner.memory_full_info() for runner in runners]
+            self.uss_mb = [of.uss / 1e6 for of in memory]
+            # PSS: what some processes share counts for each by its part, so that the sum is what they take together.
+            self.all_gb = sum(of.pss for of in [*memory, *(one.memory_full_info() for one in [world, *nursery])]) / 1e9
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """No part of the summary."""
         return {}
 
 
-def processes(name: str, repeats: int, *, robots: int, ticks: int) -> None:
+def processes(name: str, repeats: int, *, robots: int, ticks: int, agent: str) -> None:
     """Real-time factor of a flock with a process per robot; its start, and what each process costs."""
-    scenario = scenario_from(scenes.flocking(robots, ticks / 10), name)
+    scenario = scenario_from(scenes.flocking(robots, ticks / 10, agent), name)
     run(scenario.model_copy(update={"duration_s": 1.0}))
     memory = OwnMemory(ticks // 2)
     results = [run(scenario, runners="per-robot", observers=[memory]) for _ in range(repeats)]
     factors = [result.realtime_factor for result in results]
-    config = {"body": "epuck", "physics_steps": 5, "density_per_m2": 20 / 64, "speed_mps": 0.1}
+    config = {
+        "agent": agent,
+        "body": "epuck",
+        "physics_steps": 5,
+        "density_per_m2": 20 / 64,
+        "speed_mps": 0.1,
+        "rays": 8,
+        "radio": "disk, 2 m, loss 0.3, latency 0.1 s",
+    }
     report(name, statistics.median(factors), "x real time", results[0], {**config, **spread(factors)})
     starts = [result.start_time_s for result in results]
     report(f"{name}-start", statistics.median(starts), "s", results[0], {**config, **spread(starts)})
     report(f"{name}-uss", statistics.median(memory.uss_mb), "MB", results[0], {**config, **spread(memory.uss_mb)})
+    report(f"{name}-memory", memory.all_gb, "GB", results[0], config)

@@ -48,8 +48,8 @@ def diffusion(
     return scenario
 
 
-def flocking(robots: int, duration_s: float) -> dict[str, Any]:
-    """The demo's flock, of another size."""
+def flocking(robots: int, duration_s: float, agent: str = "swarmwire.agent.behaviours:Flocking") -> dict[str, Any]:
+    """The demo's flock, of another size, and of another agent."""
     side_m = 8.0 * math.sqrt(robots / 20)
     return {
         "format": 1,
@@ -64,7 +64,7 @@ def flocking(robots: int, duration_s: float) -> dict[str, Any]:
                 "body": "epuck",
                 "count": robots,
                 "place": {"how": "disc", "radius_m": 0.3 * side_m},
-                "agent": "swarmwire.agent.behaviours:Flocking",
+                "agent": agent,
             }
         },
         "radio": {

@@ -64,6 +64,14 @@ TARGETS = {
     "tls-cost": most(
         1.15, "a lockstep tick of 40 e-pucks flocking, a process each, over mutual TLS with access control"
     ),
+    "processes-200": Target(2, "200 e-pucks that flock, each an `Agent` in plain Python, about 10 packets heard"),
+    "processes-1000": Target(0.4, "1,000 of them"),
+    "processes-1000-start": most(60, "from the call to the first tick, imports left out"),
+    "processes-1000-memory": most(16, "of world, nursery and runners together, as sum of their PSS"),
+    "wire-over-floor": most(
+        1.6,
+        "a tick of `processes-200` over that of as many processes that echo as many bytes, plus the agents' own time",
+    ),
     "compile-world": most(30, "a machine's first run without a radio: what it takes longer than the next"),
     "compile-disk": most(30, "with a disk radio"),
     "compile-signals": most(30, "with a radio of signals"),

@@ -237,12 +237,14 @@ def _own(heard: Heard, rows: IntArray) -> Heard:
     """What the robots `rows` heard, with the receiver as a place in `rows`."""
     if not len(heard):
         return heard
-    most = max(int(heard.receiver[-1]), int(rows[-1]) if len(rows) else 0)  # both rise
-    places = np.full(most + 1, NOT_OWN)
-    places[rows] = np.arange(len(rows))
-    place = places.take(heard.receiver)
-    mine = place != NOT_OWN
-    if not mine.all():  # some is for robots of other groups
-        index = np.flatnonzero(mine)
-        heard, place = heard.select(index), place.take(index)
+    first, last = (int(rows[0]), int(rows[-1])) if len(rows) else (0, -1)
+    lowest, highest = int(heard.receiver[0]), int(heard.receiver[-1])  # receivers rise, as rows do
+    if last - first + 1 == len(rows) and first <= lowest and highest <= last:  # one span, and nobody beside it heard
+        place = heard.receiver - first if len(rows) > 1 else np.zeros(len(heard), np.int64)
+    else:
+        places = np.full(max(highest, last) + 1, NOT_OWN)
+        places[rows] = np.arange(len(rows))
+        place = places.take(heard.receiver)
+        mine = np.flatnonzero(place != NOT_OWN)
+        heard, place = heard.select(mine), place.take(mine)
     return Heard(place, heard.sender, heard.sequence, heard.heard_at_ns, heard.given, heard.payload, heard.payloads)

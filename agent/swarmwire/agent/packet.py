@@ -1,11 +1,13 @@
 """Packets as agents see them: one object each for an Agent, columns for a VectorAgent."""
 
-from typing import Generic, TypeVar, cast
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
+from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import TAG_BYTES, Heard
 
 M = TypeVar("M", covariant=True)
 
@@ -82,11 +84,50 @@ class Packets(Generic[M]):
         return cast(FloatArray, np.bincount(self.row, weights=values, minlength=self._robots))
 
     def _given(self, need: str, column: str) -> FloatArray:
-        if need not in self._needs:
-            raise NotDeclared(
-                f"reads {need!r} of a packet, which its needs do not name: {', '.join(self._needs) or 'none'}"
-            )
-        return self._table.given[column]
+        return given_column(self._table, self._needs, need, column)
+
+
+class HeardLists:
+    """What the robots of a tick heard, as Python's own lists: for agents that read it number by number."""
+
+    __slots__ = ("_columns", "_data", "_needs", "_offset", "_payload", "_receiver", "_table")
+
+    def __init__(self, table: Heard, needs: tuple[str, ...]) -> None:
+        self._table, self._needs = table, needs
+        self._receiver: list[int] = table.receiver.tolist()
+        self._payload: list[int] = table.payload.tolist()
+        self._offset: list[int] = table.payloads.offset.tolist()
+        self._data = table.payloads.data.tobytes()
+        self._columns: dict[str, list[Any]] = {}
+
+    def payloads(self, row: int, tag: int, size_bytes: int | None = None) -> Iterator[tuple[int, bytes, int, int]]:
+        """What the robot of a row (rising) heard with a tag and, if given, of this size.
+
+        Each as its place, and the bytes with the span in which it stands.
+        """
+        data, offset = self._data, self._offset
+        low, high = tag & 0xFF, tag >> 8
+        for at in range(bisect_left(self._receiver, row), bisect_right(self._receiver, row)):
+            payload = self._payload[at]
+            start, end = offset[payload], offset[payload + 1]
+            size = end - start
+            fits = size >= TAG_BYTES if size_bytes is None else size == size_bytes
+            if fits and data[start] == low and data[start + 1] == high:
+                yield at, data, start, end
+
+    def column(self, name: str) -> list[Any]:
+        """A column of the table."""
+        known = self._columns.get(name)
+        if known is None:
+            known = self._columns[name] = getattr(self._table, name).tolist()
+        return known
+
+    def given(self, need: str, name: str) -> list[float]:
+        """What the medium tells; NotDeclared if the agent's needs do not name it."""
+        known = self._columns.get(name)
+        if known is None:
+            known = self._columns[name] = given_column(self._table, self._needs, need, name).tolist()
+        return known
 
 
 class Packet(Generic[M]):
@@ -96,35 +137,42 @@ class Packet(Generic[M]):
 
     message: M  # what was sent, frozen; of a dict a copy
 
-    def __init__(self, packets: Packets[M], at: int, message: M) -> None:
-        self._all, self._at, self.message = packets, at, message
+    def __init__(self, heard: HeardLists, at: int, message: M) -> None:
+        self._all, self._at, self.message = heard, at, message
 
     @property
     def sender(self) -> int:
         """Index of the sender in the arena."""
-        return int(self._all.sender[self._at])
+        return self._all.column("sender")[self._at]
 
     @property
     def sequence(self) -> int:
         """How many packets the sender had sent before this one."""
-        return int(self._all.sequence[self._at])
+        return self._all.column("sequence")[self._at]
 
     @property
     def heard_at_ns(self) -> int:
         """When it was heard, ns since the start of the run."""
-        return int(self._all.heard_at_ns[self._at])
+        return self._all.column("heard_at_ns")[self._at]
 
     @property
     def range_m(self) -> float:
         """Distance to the sender when the packet went on air."""
-        return float(self._all.range_m[self._at])
+        return self._all.given("radio.range", "range_m")[self._at]
 
     @property
     def bearing_rad(self) -> float:
         """Direction to the sender in this robot's frame when the packet went on air, in (-pi, pi]."""
-        return float(self._all.bearing_rad[self._at])
+        return self._all.given("radio.bearing", "bearing_rad")[self._at]
 
     @property
     def rssi_dbm(self) -> float:
         """Strength of the received signal."""
-        return float(self._all.rssi_dbm[self._at])
+        return self._all.given("radio.rssi", "rssi_dbm")[self._at]
+
+
+def given_column(table: Heard, needs: tuple[str, ...], need: str, column: str) -> FloatArray:
+    """What the medium tells of packets, (k,); NotDeclared if an agent's needs do not name it."""
+    if need not in needs:
+        raise NotDeclared(f"reads {need!r} of a packet, which its needs do not name: {', '.join(needs) or 'none'}")
+    return table.given[column]

@@ -7,16 +7,15 @@ from numpy.typing import ArrayLike
 
 from swarmwire.agent.draw import Draw
 from swarmwire.agent.outcome import Outcome
-from swarmwire.agent.packet import Packet, Packets
+from swarmwire.agent.packet import Packet
 from swarmwire.agent.readings import BumperReading, CameraReading, OwnReading
 from swarmwire.agent.robots import forward_and_turn
 from swarmwire.agent.sensing import Sensing
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.leds import rgb_of
-from swarmwire.comms.messages import DICT_TAG, Message, decode_dict, encode_dict
+from swarmwire.comms.messages import DICT_TAG, Message, decode_dict, encode_dict, message_class
 from swarmwire.comms.outcomes import SendResult
-from swarmwire.comms.packets import Payloads
 
 M = TypeVar("M", bound=Message)
 
@@ -92,7 +91,7 @@ class Robot(Sensing[float]):
         self._turn.note(slice(self._row, self._row + 1), state, None if value is None else float(value))
 
     def _number(self, sense: str, field: str) -> float:
-        return float(self._turn.field(sense, field)[self._row])
+        return self._turn.field(sense, field).item(self._row)
 
     def _numbers(self, sense: str, field: str) -> FloatArray:
         return self._turn.field(sense, field)[self._row]
@@ -110,23 +109,16 @@ class RadioPort:
     def heard(self, kind: type[dict[str, Any]]) -> "list[Packet[dict[str, Any]]]": ...
     def heard(self, kind: type[Any]) -> "list[Packet[Any]]":
         """The packets of a message class (or `dict`) heard since the robot's last step, by time."""
+        lists = self._turn.heard_lists
         if kind is not dict:
-            packets = self._turn.packets(kind)
-            span = self._span(packets.row)
-            columns = {name: getattr(packets.message, name)[span.start : span.stop].tolist() for name in kind.ranges}
-            return [
-                Packet(packets, at, kind(**{name: column[place] for name, column in columns.items()}))
-                for place, at in enumerate(span)
-            ]
-        table = self._turn.tagged(DICT_TAG)
-        dicts = Packets[dict[str, Any]](self._turn.n, table, {}, self._turn.needs)
-        return [
-            Packet(dicts, at, decode_dict(table.payloads.row(int(table.payload[at])))) for at in self._span(dicts.row)
-        ]
+            mine = lists.payloads(self._row, message_class(kind).tag, kind.size_bytes)
+            return [Packet(lists, at, kind.decode_at(data, start)) for at, data, start, _ in mine]
+        mine = lists.payloads(self._row, DICT_TAG)
+        return [Packet(lists, at, decode_dict(data[start:end])) for at, data, start, end in mine]
 
     def send(self, message: Message | dict[str, Any], to: int | None = None) -> int:
         """Send to all who hear it, or to the robot with index `to` in the arena; returns the packet's id."""
-        return int(self._turn.send(np.array([self._row]), to, Payloads.of([_encoded(message)]))[0])
+        return self._turn.send_one(self._row, to, _encoded(message))
 
     @property
     def outcomes(self) -> list[Outcome]:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarmwire.agent.packet import NotDeclared, Packets
+from swarmwire.agent.packet import HeardLists, NotDeclared, Packets
 from swarmwire.comms.actuations import NO_ACTUATIONS, Actuations
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
@@ -53,6 +53,7 @@ class Turn:
         self._leds: IntArray | None = None  # (n, leds) colours; NOT_SWITCHED: none given in this tick
         self._own: FloatArray | None = None  # (n, numbers of all own actuators); NaN: not set in this tick
         self._packets: dict[type[Message], Packets[Any]] = {}
+        self._lists: HeardLists | None = None
 
     def field(self, sense: str, name: str) -> FloatArray:
         """A field of a sense, (n, …); NotDeclared if the agent's needs do not name the sense."""
@@ -83,6 +84,13 @@ class Turn:
             known = self._packets[kind] = Packets[M](self.n, table, fields, self.needs)
         return known
 
+    @property
+    def heard_lists(self) -> HeardLists:
+        """All that these robots heard, for agents of one robot each."""
+        if self._lists is None:
+            self._lists = HeardLists(self.heard, self.needs)
+        return self._lists
+
     def tagged(self, tag: int, size_bytes: int | None = None) -> Heard:
         """What was heard with a tag and, if given, of this size."""
         wanted = self.heard.payloads.tags() == tag
@@ -95,7 +103,8 @@ class Turn:
     def send(self, row: IntArray | None, to: IntArray | int | None, payloads: Payloads) -> IntArray:
         """Queue a packet for each of the robots `row` (rising, each once; None: for all); returns their ids."""
         place = slice(None) if row is None else row
-        receiver = np.full(len(payloads), BROADCAST)
+        receiver = np.empty(len(payloads), np.int64)
+        receiver.fill(BROADCAST)
         if to is not None:
             receiver[:] = to
             if (receiver < 0).any() or (receiver != to).any():
@@ -106,6 +115,21 @@ class Turn:
         outcome_id = np.where(receiver == BROADCAST, UNTOLD, ids) if self._asks else None
         self._outbox.append(Sent(self.senses.rows[place], receiver, payloads, outcome_id))
         return ids
+
+    def send_one(self, place: int, to: int | None, payload: bytes) -> int:
+        """Queue a packet of one robot; returns its id."""
+        if to is None:
+            receiver = BROADCAST
+        elif to < 0 or int(to) != to:
+            raise ValueError(f"send(to=…): expected the index of a robot in the arena, 0 or more, got {to}")
+        else:
+            receiver = int(to)
+        id_ = self._sent_before.item(place)
+        self._sent_before[place] = id_ + 1
+        outcome_id = np.array((UNTOLD if to is None else id_,)) if self._asks else None
+        sender = self.senses.rows[place : place + 1]
+        self._outbox.append(Sent(sender, np.array((receiver,)), Payloads.one(payload), outcome_id))
+        return id_
 
     def mask(self, rows: BoolArray) -> BoolArray:
         """The mask that a VectorAgent gives; TypeError unless it is one."""

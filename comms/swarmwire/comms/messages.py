@@ -11,6 +11,7 @@ checker a field is a `float`, in the constructor and when read: a decoded field 
 on air, so that both kinds of agent compute with the same numbers.
 """
 
+import struct
 from collections.abc import Iterable, Iterator
 from hashlib import blake2b
 from typing import Annotated, Any, ClassVar, Self, cast, dataclass_transform, get_args, get_origin, get_type_hints
@@ -30,6 +31,7 @@ u1 = Annotated[float, np.dtype("<u1")]  # uint8 on air
 u2 = Annotated[float, np.dtype("<u2")]  # uint16 on air
 u4 = Annotated[float, np.dtype("<u4")]  # uint32 on air
 
+LETTERS = {"<f4": "f", "<f8": "d", "|i1": "b", "<i2": "h", "<i4": "i", "|u1": "B", "<u2": "H", "<u4": "I"}  # of struct
 SEND_NAMES = ("rows", "to")  # arguments of a VectorAgent's `send`, beside which it takes the fields
 DICT_TAG = 0  # a dict in msgpack, for prototypes; no class has this tag
 
@@ -48,6 +50,7 @@ class Message:
     on_air: ClassVar[np.dtype[Any]] = np.dtype([("tag", "<u2")])  # tag and fields, packed
     ranges: ClassVar[dict[str, tuple[float, float, bool]]] = {}  # of each field: lowest, highest, whole numbers only
     places: ClassVar[IntArray] = np.arange(TAG_BYTES)  # of the bytes
+    packing: ClassVar[struct.Struct] = struct.Struct("<H")  # `on_air` once more, for one message at a time
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -69,6 +72,7 @@ class Message:
         cls.on_air = np.dtype([("tag", "<u2"), *fields])
         cls.size_bytes = cls.on_air.itemsize
         cls.places = np.arange(cls.size_bytes)
+        cls.packing = struct.Struct("<H" + "".join(LETTERS[dtype.str] for _, dtype in fields))
         cls.ranges = {name: _range(dtype) for name, dtype in fields}
 
     def __init__(self, **fields: float) -> None:
@@ -94,15 +98,27 @@ class Message:
 
     def encode(self) -> bytes:
         """The bytes on air: tag and fields."""
-        return encode_rows(type(self), 1, dict(self.__dict__)).row(0)
+        fields = self.__dict__
+        try:
+            whole = [round(fields[name]) if whole else fields[name] for name, (_, _, whole) in self.ranges.items()]
+            return self.packing.pack(self.tag, *whole)
+        except (OverflowError, ValueError, struct.error):  # it does not fit: told there which field, and why
+            return encode_rows(type(self), 1, dict(fields)).row(0)
 
     @classmethod
     def decode(cls, payload: bytes) -> Self:
         """The message of these bytes; ValueError if they are not of this class."""
         if len(payload) != cls.size_bytes or int.from_bytes(payload[:TAG_BYTES], "little") != cls.tag:
             raise ValueError(f"{len(payload)} bytes that are no {cls.__name__}")
-        fields = np.frombuffer(payload, cls.on_air)[0]
-        return cls(**{name: float(fields[name]) for name in cls.ranges})
+        return cls.decode_at(payload, 0)
+
+    @classmethod
+    def decode_at(cls, data: bytes, start: int) -> Self:
+        """The message whose bytes start there: its tag and their number must be this class's."""
+        _, *numbers = cls.packing.unpack_from(data, start)
+        message = object.__new__(cls)  # a class adds fields and nothing else: no need of __init__, which checks them
+        message.__dict__.update(zip(cls.ranges, map(float, numbers), strict=True))
+        return message
 
 
 def message_classes(of: type[Message] = Message) -> Iterator[type[Message]]:

@@ -66,6 +66,11 @@ class Payloads:
         return cls(data, offsets(np.array([len(row) for row in rows], np.int64)))
 
     @classmethod
+    def one(cls, row: bytes) -> "Payloads":
+        """A table of one encoded message."""
+        return cls(np.frombuffer(row, np.uint8), np.array((0, len(row))))
+
+    @classmethod
     def joined(cls, parts: "list[Payloads]") -> "Payloads":
         """The rows of all parts, one after the other."""
         if not parts:

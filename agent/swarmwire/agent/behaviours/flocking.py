@@ -7,10 +7,9 @@ from swarmwire.agent.behaviours.limits import check_above_zero
 from swarmwire.agent.fields import (
     ahead,
     alignment,
-    attraction,
     mean_heard,
-    repulsion,
     repulsion_of_rays,
+    spacing,
     steered,
 )
 from swarmwire.agent.robots import Robots
@@ -51,8 +50,7 @@ class Flocking(VectorAgent):
         """Steer to the sum of all pulls, and broadcast the heading."""
         heading = robots.compass.heading_rad
         heard = robots.radio.heard(Heading)
-        place = heard.range_m, heard.bearing_rad, self.separation_m
-        pull = self.cohesion * (attraction(*place) + repulsion(*place))
+        pull = self.cohesion * spacing(heard.range_m, heard.bearing_rad, self.separation_m)
         turn = self.alignment * alignment(heard.message.heading_rad, heading[heard.row])
         near = self.avoidance * repulsion_of_rays(robots.proximity)
         wanted = self.forward * ahead(robots.n) + mean_heard(heard, pull + turn) + near

@@ -3,7 +3,7 @@
 Small functions of arrays, for `VectorAgent`s of your own: nothing is kept in them, and no row sees another.
 """
 
-from swarmwire.agent.fields.neighbours import alignment, attraction, mean_heard, repulsion
+from swarmwire.agent.fields.neighbours import alignment, attraction, mean_heard, repulsion, spacing
 from swarmwire.agent.fields.rays import repulsion_of_ranges, repulsion_of_rays
 from swarmwire.agent.fields.smoothing import hysteresis, low_pass
 from swarmwire.agent.fields.steering import steered
@@ -21,5 +21,6 @@ __all__ = [
     "repulsion",
     "repulsion_of_ranges",
     "repulsion_of_rays",
+    "spacing",
     "steered",
 ]

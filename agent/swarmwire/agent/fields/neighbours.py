@@ -18,12 +18,17 @@ def attraction(range_m: FloatArray, bearing_rad: FloatArray, rest_m: float) -> V
 
     `range_m` and `bearing_rad` (k,) are those of the packets.
     """
-    return np.clip((range_m - rest_m) / rest_m, 0.0, 1.0) * along(bearing_rad)
+    return np.minimum(np.maximum((range_m - rest_m) / rest_m, 0.0), 1.0) * along(bearing_rad)
 
 
 def repulsion(range_m: FloatArray, bearing_rad: FloatArray, rest_m: float) -> Vectors:
     """Away from each neighbour nearer than `rest_m`, (k,): (rest_m - d) / rest_m long, 0 farther."""
     return np.minimum((range_m - rest_m) / rest_m, 0.0) * along(bearing_rad)
+
+
+def spacing(range_m: FloatArray, bearing_rad: FloatArray, rest_m: float) -> Vectors:
+    """Towards each neighbour farther than `rest_m` and away from each nearer: attraction and repulsion in one, (k,)."""
+    return np.minimum((range_m - rest_m) / rest_m, 1.0) * along(bearing_rad)
 
 
 def alignment(their_heading_rad: FloatArray, own_heading_rad: FloatArray) -> Vectors:

@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)  # not frozen, which would make each of the many that a step adds up take four times as long
 class Vectors:
     """Vectors in the frame of the robot each belongs to, all without a unit, or all in the same one.
 

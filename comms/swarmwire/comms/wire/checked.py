@@ -8,7 +8,10 @@ from swarmwire.comms.wire.frames import DTYPES, Frame
 def checked_array(frame: Frame, name: str, code: str, shape: tuple[int | None, ...]) -> AnyArray:
     """An array of the frame, of this dtype and shape (None: any length); BadFrame otherwise."""
     array = frame.arrays.get(name)
-    fits = array is not None and array.dtype == DTYPES[code] and array.ndim == len(shape)
-    if array is None or not fits or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True)):
-        raise BadFrame("malformed", f"{name}: expected {code} of shape {shape}")
-    return array
+    if array is not None and array.dtype == DTYPES[code] and array.ndim == len(shape):
+        for want, got in zip(shape, array.shape, strict=True):
+            if want is not None and want != got:
+                break
+        else:
+            return array
+    raise BadFrame("malformed", f"{name}: expected {code} of shape {shape}")

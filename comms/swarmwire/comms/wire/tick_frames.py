@@ -110,7 +110,7 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0, memory: Memory
 def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     """The actions of the robots `rows` (n,); BadFrame if the frame is not for exactly these or contradicts itself."""
     n = len(rows)
-    if (checked_array(frame, "rows", "<i8", (n,)) != rows).any():
+    if checked_array(frame, "rows", "<i8", (n,)).tobytes() != rows.tobytes():
         raise BadFrame("malformed", "rows: expected the runner's own robots")
     drive, linear_mps, angular_radps, lateral_mps = checked_array(frame, "command", "<f8", (4, n))
     sent = _sent(frame, rows) if "sent" in frame.arrays else Sent.none()
@@ -125,9 +125,9 @@ def _sent(frame: Frame, rows: IntArray) -> Sent:
     sender, to = checked_array(frame, "sent", "<i8", (2, None))
     offset = checked_array(frame, "sent/offset", "<i8", (len(sender) + 1,))
     data = checked_array(frame, "sent/data", "|u1", (None,))
-    if offset[0] != 0 or offset[-1] != len(data) or (offset[1:] < offset[:-1]).any():
+    if offset[0] != 0 or offset[-1] != len(data) or np.count_nonzero(offset[1:] < offset[:-1]):
         raise BadFrame("malformed", "sent/offset: expected rising offsets into sent/data")
-    if not _own(sender, rows) or (to < BROADCAST).any():
+    if not _own(sender, rows) or np.count_nonzero(to < BROADCAST):
         raise BadFrame("malformed", "sent: expected packets of the runner's own robots")
     return Sent(sender, to, Payloads(data, offset), _outcome_id(frame, to))
 
@@ -184,5 +184,7 @@ def _own(some: IntArray, rows: IntArray) -> bool:
     """Whether all of these are among the rows."""
     if not len(some) or not len(rows):
         return not len(some)
+    if len(rows) == 1:
+        return np.count_nonzero(some == rows) == len(some)
     known = np.sort(rows)
-    return bool((known[np.searchsorted(known[:-1], some)] == some).all())
+    return np.count_nonzero(known[np.searchsorted(known[:-1], some)] == some) == len(some)
