@@ -22,6 +22,7 @@ class Controls:
         help_asked: people want to know what the keys do.
         paused_ns: wall time spent in pauses so far.
         on_wait: called while the loop is held, many times a second.
+        on_pause: the same, while it is held by a pause; it must not raise.
     """
 
     def __init__(self, clock: Clock, rate_hz: int, pace: Pace | None = None, *, speed_fixed: bool = False) -> None:
@@ -33,6 +34,7 @@ class Controls:
         self.speed = pace.factor if pace else None
         self.paused_ns = 0
         self.on_wait: Callable[[], None] = lambda: None
+        self.on_pause: Callable[[], None] = lambda: None
         self._held = False  # whether the loop waits for the end of a pause
         self._asked = False  # whether `hold` has anything to do
         self._steps = 0
@@ -138,6 +140,8 @@ class Controls:
             if wait_ns <= 0:
                 break
             self.on_wait()
+            if paused:
+                self.on_pause()
             self._clock.sleep_until(now_ns + min(wait_ns, LOOK_NS))
             paused_ns += (self._clock.now_ns() - now_ns) if paused else 0
         self._begin(tick, paused_ns)

@@ -125,7 +125,10 @@ class Interventions:
             return taken
 
     def told(self) -> list[dict[str, Any]]:
-        """The newest events by number: the tick in which each began, if it has, what it does, whether it is over."""
+        """The newest events by number: the tick in which each began, if it has, what it does, whether it is over.
+
+        `given` says that people gave it; the others are the scenario's.
+        """
         with self._lock:
             newest = sorted(self._events)[-MOST_TOLD:]
             return [
@@ -135,6 +138,7 @@ class Interventions:
                     "do": self._events[number].do,
                     "text": self._events[number].words,
                     "over": self._is_over(number),
+                    "given": number >= len(self._scenario.events),
                 }
                 for number in newest
             ]
