@@ -94,6 +94,7 @@ def test_an_event_that_is_ended_before_a_tick_never_happens():
         "do": "kill",
         "text": 'kill robots = { names = ["flock-1"] }',
         "over": True,
+        "given": True,
     }
 
 

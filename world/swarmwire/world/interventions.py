@@ -52,6 +52,7 @@ class Interventions:
         self._lock = threading.Lock()
         self._next_number = len(scenario.events)
         self._events: dict[int, Event] = dict(enumerate(scenario.events))
+        self._texts: dict[int, str] = {}  # of events that were told
         self._waiting: list[tuple[int, Mapping[str, Any] | None]] = []
         self._dropped: set[int] = set()  # events that ended before a tick began, or could not be recorded
         self._replayed: dict[int, list[Intervention]] | None = None if replayed is None else {}
@@ -136,12 +137,17 @@ class Interventions:
                     "number": number,
                     "tick": self.course.begun.get(number),
                     "do": self._events[number].do,
-                    "text": self._events[number].words,
+                    "text": self._text(number),
                     "over": self._is_over(number),
                     "given": number >= len(self._scenario.events),
                 }
                 for number in newest
             ]
+
+    def _text(self, number: int) -> str:
+        if number not in self._texts:
+            self._texts[number] = self._events[number].words
+        return self._texts[number]
 
     def _radios(self) -> list[Radio]:
         """The radio as events have made it by now, and as those that go on or wait will have made it."""
