@@ -34,8 +34,8 @@ class Controls:
         self.speed = pace.factor if pace else None
         self.paused_ns = 0
         self.on_wait: Callable[[], None] = lambda: None
-        self._held = False  # whether the loop waits for the end of a pause
         self.on_pause: Callable[[], None] = lambda: None
+        self._held = False  # whether the loop waits for the end of a pause
         self._asked = False  # whether `hold` has anything to do
         self._steps = 0
         self._next_ns = 0  # under a limit no tick begins before

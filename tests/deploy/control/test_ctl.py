@@ -149,7 +149,7 @@ def test_an_event_is_any_table_of_a_scenario(going_run):
     assert "event 0: fail" in ctl("event", table)
     simulation, control = going_run
     [event] = control.status()["events"]
-    assert event["text"] == 'fail for_s = 10.0 part = "motors" robots = { count = 3 }'
+    assert event["text"] == 'fail part = "motors", robots = { count = 3 }, for_s = 10.0'
     assert tomllib.loads(f"event = {table}")["event"] == dict(simulation.interventions._waiting[0][1])
 
 

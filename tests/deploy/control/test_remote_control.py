@@ -86,7 +86,9 @@ def test_an_event_takes_effect_at_the_next_tick_and_is_on_record_before(tmp_path
         assert lines(tmp_path / "run") == [{"tick": 3, "number": 0, "event": KILL}]
         assert status["alive"] == 18
         expected = 'kill robots = { names = ["flock-1", "flock-2"] }'
-        assert status["events"] == [{"number": 0, "tick": 3, "do": "kill", "text": expected, "over": False}]
+        assert status["events"] == [
+            {"number": 0, "tick": 3, "do": "kill", "text": expected, "over": False, "given": True}
+        ]
         loss = control.event({"do": "ramp", "what": "radio.loss", "to": 1.0})
         control.step()
         assert at_tick(control, 6)["radio"]["loss"] == 1.0

@@ -126,7 +126,9 @@ def run_command(
         raise typer.Exit(INTERRUPTED)
 
 
-def run_shown(simulation: "Simulation", folder: Path, console: Console, *, view: bool, ui: bool = False) -> "Result":
+def run_shown(
+    simulation: "Simulation", folder: Path, console: Console, *, view: bool = False, ui: bool = False
+) -> "Result":
     """The result of the run, told and shown while it goes on and afterwards."""
     from swarmwire.deploy.control.run_finder import Announced
     from swarmwire.deploy.live.live_view import LiveView
