@@ -12,7 +12,7 @@ from pathlib import Path
 
 from tests.deploy.machines.namespaces import Machine
 
-PATIENCE_S = 15.0
+PATIENCE_S = 60.0
 
 
 class Started:
