@@ -96,7 +96,9 @@ def join(joining: Joining, inbox: Inbox, say: Callable[[str], None]) -> Ended:
         session = open_runner(joining.endpoint, joining.connect_s, joining.network)
     except zenoh.ZError as error:
         reason = str(error).split(" at ")[0]
-        raise RunnerLost(runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}: {reason}") from error
+        raise RunnerLost(
+            runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}{_or_else(joining)}: {reason}"
+        ) from error
     with closed_after(session):
         run_id = joining.run or _only_run(session, runner, joining.endpoint)
         keys = Keys(run_id)
@@ -110,6 +112,10 @@ def join(joining: Joining, inbox: Inbox, say: Callable[[str], None]) -> Ended:
             say(f"{runner}: joined run {run_id} with {assignment.robots_text}")
 
         return play(session, keys, runner, inbox, asked, joined)
+
+
+def _or_else(joining: Joining) -> str:
+    return ", or one certificate or the other is not accepted" if joining.network.proves else ""
 
 
 def _only_run(session: zenoh.Session, runner: str, endpoint: str) -> str:
