@@ -1,4 +1,4 @@
-"""What the page about several machines shows is typed on three of them, as it stands there, and prints what is shown."""
+"""What the page about several machines shows is typed on three of them, as it stands, and prints what is shown."""
 
 import json
 import os
