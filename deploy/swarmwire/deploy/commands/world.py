@@ -117,7 +117,7 @@ def world_command(
             listening=Listening(tuple(listen), tuple(observe or ()), of.network, of.access, start_with, told=gathering),
         )
         simulation.watch(gathering)
-        result = run_shown(simulation, folder, view, console)
+        result = run_shown(simulation, folder, console, view=view)
     if result.ended == "interrupted":
         raise typer.Exit(INTERRUPTED)
 
