@@ -30,6 +30,7 @@ from swarmwire.comms.wire.offer import Offer
 from swarmwire.comms.wire.sessions import open_runner
 
 LOOK_S = 5.0  # for worlds at an endpoint: a router may have to find its own first
+OTHERS_S = 0.3  # for further worlds after the first
 OFFER_S = 10.0
 BY_ALL = ""  # in place of a group's name
 
@@ -95,7 +96,9 @@ def join(joining: Joining, inbox: Inbox, say: Callable[[str], None]) -> Ended:
         session = open_runner(joining.endpoint, joining.connect_s, joining.network)
     except zenoh.ZError as error:
         reason = str(error).split(" at ")[0]
-        raise RunnerLost(runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}: {reason}") from error
+        raise RunnerLost(
+            runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}{_or_else(joining)}: {reason}"
+        ) from error
     with closed_after(session):
         run_id = joining.run or _only_run(session, runner, joining.endpoint)
         keys = Keys(run_id)
@@ -111,20 +114,33 @@ def join(joining: Joining, inbox: Inbox, say: Callable[[str], None]) -> Ended:
         return play(session, keys, runner, inbox, asked, joined)
 
 
+def _or_else(joining: Joining) -> str:
+    return ", or one certificate or the other is not accepted" if joining.network.proves else ""
+
+
 def _only_run(session: zenoh.Session, runner: str, endpoint: str) -> str:
     """The id of the only run at the endpoint."""
-    arrived: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
-    looking = session.liveliness().declare_subscriber(EVERY_WORLD, Callback(arrived.put, indirect=False), history=True)
-    with suppress(queue.Empty):
-        arrived.get(timeout=LOOK_S)
-    looking.undeclare()
     replies = session.liveliness().get(EVERY_WORLD, timeout=LOOK_S)
-    runs = sorted({run_of(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None})
+    found = {run_of(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None}
+    runs = sorted(found or _runs_to_come(session))
     if len(runs) == 1:
         return runs[0]
     if runs:
         raise BadInput("--run", "", f"expected one of the runs at {endpoint}: {', '.join(runs)}")
     raise RunnerLost(runner, NO_ROBOTS, f"there is no run at {endpoint}, or it does not let {runner} in")
+
+
+def _runs_to_come(session: zenoh.Session) -> set[str]:
+    """The runs that appear soon. Beside a subscription to the same keys, zenoh answers a `get` only sometimes."""
+    arrived: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
+    looking = session.liveliness().declare_subscriber(EVERY_WORLD, Callback(arrived.put, indirect=False), history=True)
+    found, patience_s = set[str](), LOOK_S
+    with suppress(queue.Empty):
+        while True:
+            found.add(run_of(str(arrived.get(timeout=patience_s).key_expr)))
+            patience_s = OTHERS_S
+    looking.undeclare()
+    return found
 
 
 def _offer(session: zenoh.Session, keys: Keys, runner: str) -> Offer:

@@ -1,6 +1,7 @@
 """World, router and runners on three machines, with mutual TLS: the run is that of one process."""
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from swarmwire.comms.clock import WallClock
@@ -14,7 +15,7 @@ from tests.deploy.machines.on_machines import on
 SHORT = "duration_s=3"
 
 
-def lab(folder: Path, addresses: dict[str, list[str]], *runners: str) -> Path:
+def lab(folder: Path, addresses: Mapping[str, Sequence[str]], *runners: str) -> Path:
     """A CA, certificates of the world and of routers at their addresses, and of runners."""
     begin_authority(folder, WallClock())
     members = [wanted(name, at, "world" if name == "world" else "router") for name, at in addresses.items()]
