@@ -15,7 +15,7 @@ export function breaking() {
   by("kill").onclick = () => happen({ do: "kill", robots: names() });
   by("revive").onclick = () => happen({ do: "revive", robots: names() });
   by("kill-share").onclick = () => happen({ do: "kill", robots: { share: Number(by("share").value) / 100 } });
-  by("revive-all").onclick = () => happen({ do: "revive", robots: {} });
+  by("revive-all").onclick = () => happen({ do: "revive", robots: { share: 1 } });
   by("halve-x").onclick = () => happen({ do: "partition", halves: "x" });
   by("halve-y").onclick = () => happen({ do: "partition", halves: "y" });
   by("heal").onclick = () => endAll("partition");
