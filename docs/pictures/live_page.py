@@ -21,7 +21,7 @@ OPTIONS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--n
            "--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # fmt: skip
 PATIENCE_MS = 120_000
 LOAD_MS = 12_000  # until rerun's viewer has loaded and draws, without a graphics card
-DRAW_MS = 6_000  # until it has drawn the newest tick
+DRAW_MS = 15_000  # until it has drawn the newest tick
 COLORS = 128
 
 
@@ -57,10 +57,7 @@ def _break_and_mend(page: Page) -> None:
     page.click("#halve-x")
     _until(page, 60)
     page.click("#heal")
-    slider = page.locator("#radio-loss")
-    slider.focus()
-    for _ in range(15):
-        slider.press("ArrowRight")
+    page.fill("#radio-loss", "0.2")
     _until(page, 100)
     page.click("#play")
 

@@ -24,13 +24,14 @@ export function happenings() {
 // What waits for the next tick, what happened, newest first, and at last what the scenario has in store.
 function ordered(events) {
   const rank = (event) => (event.tick ?? (event.given ? Infinity : -1));
-  return [...events].sort((one, other) => rank(other) - rank(one) || (rank(one) < 0 ? one.number - other.number : other.number - one.number));
+  const real = events.filter((event) => !(event.given && event.over && event.tick === null)); // not taken back in time
+  return real.sort((one, other) => rank(other) - rank(one) || (rank(one) < 0 ? one.number - other.number : other.number - one.number));
 }
 
 function item(event, who, ended) {
   const line = document.createElement("li");
   const begun = event.tick !== null;
-  const when = begun ? `tick ${event.tick}` : !event.given ? "to come" : event.over ? "taken back" : "next tick";
+  const when = begun ? `tick ${event.tick}` : !event.given ? "to come" : "next tick";
   line.className = event.over || !begun ? "over" : "";
   line.title = event.text;
   line.append(Object.assign(document.createElement("span"), { className: "quiet", textContent: when }));
