@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from swarmwire.agent.runner import _Inbox
+from swarmwire.agent.runner import Inbox
 from swarmwire.comms.outcomes import NO_OUTCOMES
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.wire import frames
@@ -24,8 +24,8 @@ class Sample:
     payload: Bytes
 
 
-def inbox_of(*arrived: Any) -> _Inbox:
-    inbox = _Inbox()
+def inbox_of(*arrived: Any) -> Inbox:
+    inbox = Inbox()
     for item in arrived:
         inbox._arrived.put(item if isinstance(item, bool) else Sample(Bytes(item)))
     return inbox

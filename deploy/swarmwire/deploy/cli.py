@@ -17,6 +17,7 @@ from swarmwire.deploy.commands.draw import draw_command
 from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.commands.export import ExportCommand, export_command
 from swarmwire.deploy.commands.help_text import let_help_flow
+from swarmwire.deploy.commands.join import join_command
 from swarmwire.deploy.commands.list_kinds import list_command
 from swarmwire.deploy.commands.new import new_command
 from swarmwire.deploy.commands.parity import parity_command
@@ -24,6 +25,7 @@ from swarmwire.deploy.commands.radio.group import radio_app
 from swarmwire.deploy.commands.repeat import repeat_command
 from swarmwire.deploy.commands.report import report_command
 from swarmwire.deploy.commands.robots.group import robots_app
+from swarmwire.deploy.commands.router import router_command
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
@@ -32,6 +34,7 @@ from swarmwire.deploy.commands.tune import tune_command
 from swarmwire.deploy.commands.ui import ui_command
 from swarmwire.deploy.commands.verify import verify_command
 from swarmwire.deploy.commands.view import view_command
+from swarmwire.deploy.commands.world import world_command
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
 
@@ -59,6 +62,8 @@ def options(
 
 
 app.command("run")(run_command)
+app.command("world")(world_command)
+app.command("join")(join_command)
 app.command("sweep")(sweep_command)
 app.command("tune")(tune_command)
 app.command("repeat")(repeat_command)
@@ -76,6 +81,7 @@ app.command("verify")(verify_command)
 app.command("compare")(compare_command)
 app.command("report")(report_command)
 app.command("parity")(parity_command)
+app.command("router")(router_command)
 app.add_typer(radio_app, name="radio")
 app.add_typer(ctl_app, name="ctl")
 app.add_typer(robots_app, name="robots")

@@ -35,6 +35,7 @@ class Controls:
         self.paused_ns = 0
         self.on_wait: Callable[[], None] = lambda: None
         self.on_pause: Callable[[], None] = lambda: None
+        self._held = False  # whether the loop waits for the end of a pause
         self._asked = False  # whether `hold` has anything to do
         self._steps = 0
         self._next_ns = 0  # under a limit no tick begins before
@@ -46,6 +47,12 @@ class Controls:
     def real_time(self) -> bool:
         """Whether the wall clock paces the run."""
         return self._pace is not None
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether the run is paused, the tick that was under way is over, and none is to come."""
+        with self._lock:
+            return self.paused and self._held and not self._steps
 
     @property
     def missed_ticks(self) -> int:
@@ -143,9 +150,10 @@ class Controls:
         """Whether the run is paused, and how long the next tick is to wait, in ns."""
         with self._lock:
             if self.paused:
-                held = not self._steps
-                self._steps -= not held
-                return held, LOOK_NS * held
+                self._held = not self._steps
+                self._steps -= not self._held
+                return self._held, LOOK_NS * self._held
+            self._held = False
             return False, 0 if self._pace or self.speed is None else self._next_ns - now_ns
 
     def _begin(self, tick: int, paused_ns: int) -> None:

@@ -11,6 +11,7 @@ from swarmwire.deploy.record.interventions import InterventionsRecord
 from swarmwire.deploy.record.origin import Origin
 from swarmwire.deploy.result import EventResult, Result, arena_result
 from swarmwire.metrics.record.recorders import record_summary
+from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.realtime_crew import RealTimeReport
 from swarmwire.world.crews.roster import Loss
 
@@ -36,6 +37,7 @@ def outcome(
     inputs: InputsRecord | None,
     interventions: InterventionsRecord | None,
     losses: Sequence[Loss],
+    changes: Sequence[Change],
     engines: Sequence[str],
     realtime: RealTimeReport | None,
     folder: Path | None,
@@ -76,6 +78,7 @@ def outcome(
         inputs=inputs,
         interventions=interventions,
         lost_runners=tuple(str(loss) for loss in losses),
+        runner_changes=tuple(changes),
         realtime=realtime,
         gateways=dict(origin.gateways),
         record=record,

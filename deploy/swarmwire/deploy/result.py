@@ -10,6 +10,7 @@ from swarmwire.deploy.record.interventions import InterventionsRecord
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.record.formats import SUMMARY_FORMAT
 from swarmwire.metrics.whole_file import write_whole
+from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.realtime_crew import RealTimeReport
 
 
@@ -105,6 +106,7 @@ class Result:
     inputs: InputsRecord | None = None  # what came from outside, if anything did
     interventions: InterventionsRecord | None = None  # what people did to it while it went on, if anything
     lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
+    runner_changes: tuple[Change, ...] = ()  # who joined, left, was lost and returned, in order
     realtime: RealTimeReport | None = None
     gateways: dict[str, str] = field(default_factory=dict[str, str])  # by group: the kind, where it has one
     error: str | None = None  # why it failed
@@ -162,6 +164,7 @@ class Result:
             "global_senses": self.global_senses,
             "counts": self.counts,
             "lost_runners": list(self.lost_runners),
+            "runner_changes": [asdict(change) for change in self.runner_changes],
             "realtime": asdict(self.realtime) if self.realtime else None,
             "gateways": self.gateways,
             "record": self.record,

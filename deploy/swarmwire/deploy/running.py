@@ -6,6 +6,7 @@ from pathlib import Path
 from swarmwire.comms.protocols import Observer
 from swarmwire.deploy.arguments import Runners
 from swarmwire.deploy.gateways.gateways import GatewaysGiven
+from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation
@@ -25,6 +26,7 @@ def run(
     realtime: float | None = None,
     record: Recording | None = None,
     gateways: GatewaysGiven = None,
+    listening: Listening | None = None,
 ) -> Result:
     """Run a scenario and return its result; with `seeds`, one arena per seed, side by side in one world.
 
@@ -34,6 +36,7 @@ def run(
     the run to the wall clock, so many simulated seconds per second, and waits for no runner; None runs as fast as the
     machine allows. `gateways` has robots answer as real ones, in real time, for programs elsewhere to drive: "epuck2"
     all of them, {"flock": "ros2"} those of a group; `Gateways` says also options, and the network of their agents.
+    `listening` has the world wait for runners that others start, on this machine or elsewhere.
 
     Raises BadInput for anything wrong with the scenario or these arguments, AgentFailed with the agent's traceback, and
     RunnerLost if a runner's process or link is gone.
@@ -50,6 +53,7 @@ def run(
         realtime=realtime,
         record=record,
         gateways=gateways,
+        listening=listening,
     )
     return finished(simulation)
 

@@ -31,6 +31,7 @@ from swarmwire.deploy.gateways.undriven import Undriven
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.kept_memory import keep_memory
+from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.deploy.new_air import new_air
@@ -47,6 +48,7 @@ from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.judge import Judge as StopJudge
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.crews.remote_crew import RemoteCrew
@@ -71,7 +73,7 @@ class Simulation:
         print(simulation.result.metrics["order"].final)
 
     The arguments are those of `swarmwire.deploy.run`, and so are the errors. `replay` says what a run that is repeated
-    takes from its record.
+    takes from its record. `listening` is where the world waits for runners that others start, in place of `runners`.
 
     Attributes:
         scenario: as checked.
@@ -104,6 +106,7 @@ class Simulation:
         record: Recording | None = None,
         gateways: GatewaysGiven = None,
         replay: Replay | None = None,
+        listening: Listening | None = None,
     ) -> None:
         self._clock = WallClock()
         self._called_ns = self._clock.now_ns()
@@ -121,7 +124,11 @@ class Simulation:
         self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else tick_count(self.scenario)
         self.inputs = replay.inputs if replay else None
-        self.runners = runner_count(runners, self.static.arenas * self.static.robots)
+        robots = self.static.arenas * self.static.robots
+        self.runners = runner_count(runners, robots)
+        if listening is not None:
+            listening.check(self.scenario, robots)
+            self.runners = 1  # at least; how many there were is told once it is over
         self._behind.check(self.static.arenas, self.runners)
         what = record or Recording()
         what.check(self.static)
@@ -141,11 +148,13 @@ class Simulation:
         )
         self._status = self._new_status()
         self._observers: list[Guarded] = []
-        for observer in (TooLarge(self._record.say), *self._recorders(what), *observers):
+        for observer in (TooLarge(self._record.say), *self._recorders(what, listening), *observers):
             self.watch(observer)
         self._losses: list[Loss] = []
+        self._changes: list[Change] = []
+        self._incomplete = False  # whether it began before all robots had an agent
         self.served: Served | None = None
-        self._crews = self._new_crews(socket)
+        self._crews = self._new_crews(socket, listening)
         self._crew: Crew | None = None
         self._loop: Loop | None = None
         self._result: Result | None = None
@@ -222,6 +231,7 @@ class Simulation:
                 self.interventions,
             )
             crew.start()
+            self._incomplete = bool((health := self.health()) and health.robots_free)
             for observer in self._watching:
                 observer.begin(self.static)
             self._exit = stack.pop_all()
@@ -261,7 +271,7 @@ class Simulation:
                 parts,
                 ended=self._ended(error),
                 error=error,
-                runners=self.runners,
+                runners=max(self.runners, len({change.runner for change in self._changes})),
                 ticks=loop.ticks_done,
                 arena_ticks=loop.arena_ticks.tolist(),
                 stopped=(~self.world.running).tolist(),
@@ -274,6 +284,7 @@ class Simulation:
                 inputs=self._record.inputs(),
                 interventions=self._record.interventions(),
                 losses=self._losses,
+                changes=self._changes,
                 engines=self.world.engines,
                 realtime=crew.report() if isinstance(crew, PacedCrew | RealTimeCrew | GatewayCrew) else None,
                 folder=self.folder,
@@ -290,12 +301,15 @@ class Simulation:
         needs = self._behind.senses(needs, bodies_of(self.scenario, self.scenario.source))
         return World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
 
-    def _recorders(self, what: Recording) -> Sequence[Observer]:
+    def _recorders(self, what: Recording, listening: Listening | None) -> Sequence[Observer]:
         """Those that fill the run folder, which may drop something only where the run keeps to the wall clock."""
         may_drop = self._pace is not None
         given = self.interventions
+        door = listening.observers_door(self.run_id) if listening else None
         control = ControlServer(self._status, self.controls, given.give, given.end, self._record.note)
-        found = self._record.observers(what, self.run_id, self.metrics, self.hashes, control, may_drop=may_drop)
+        found = self._record.observers(
+            what, self.run_id, self.metrics, self.hashes, control, may_drop=may_drop, door=door
+        )
         for published in found:
             if isinstance(published, Published):
                 self.controls.on_pause = published.catch_up
@@ -321,7 +335,7 @@ class Simulation:
         self.controls.hold(tick, self._stopped)
         self._status.began()
 
-    def _new_crews(self, socket: Path | None) -> Crews:
+    def _new_crews(self, socket: Path | None, listening: Listening | None) -> Crews:
         """How the agents will be started."""
         return Crews(
             scenario=self.scenario,
@@ -333,7 +347,9 @@ class Simulation:
             pace=self._pace,
             socket=socket,
             stopped=self._stopped,
+            listening=listening,
             lost=self._losses.append,
+            changed=self._changes.append,
             say=self._record.say,
         )
 
@@ -341,6 +357,8 @@ class Simulation:
         """Whether the actions of this tick need not follow from scenario and seed."""
         if self.inputs is not None:
             return tick >= self.inputs.first_tick
+        if self._incomplete or any(change.tick >= 0 for change in self._changes):
+            return True
         return bool(self._losses or self._behind.kinds) or (self._pace is not None and self.runners > 0)
 
     def _stopped(self) -> bool:

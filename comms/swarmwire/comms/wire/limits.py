@@ -20,6 +20,7 @@ class Limits:
         robots_per_runner: that one runner may play; a tick of so many fits into a frame many times.
         waiting: answers and requests of one runner that wait for the world. In lockstep one is there at a time, in
             real time a few; a runner that sends more is ahead of anything that it was asked.
+        waiting_bytes: of these together; one is taken, however large.
         requests: to be told of the run, or to join it, that one runner may make in one run. A runner that comes back
             each minute for a day stays below.
         join_s: from the assignment of robots to the word that their agents are built.
@@ -29,6 +30,7 @@ class Limits:
     runners: int = 2000
     robots_per_runner: int = 20_000
     waiting: int = 64
+    waiting_bytes: int = MOST_BYTES
     requests: int = 2000
     join_s: float = 60.0
 

@@ -10,6 +10,7 @@ from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.bodies.leds import BRIGHTEST
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
+from swarmwire.comms.memory import Memory
 from swarmwire.comms.notes import MOST_STATES, Notes, checked_state
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
@@ -18,6 +19,7 @@ from swarmwire.comms.values import NO_VALUES, Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.checked import checked_array
 from swarmwire.comms.wire.frames import Frame
+from swarmwire.comms.wire.memory_frames import memory_arrays
 
 
 def encode_tick(tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> bytes:
@@ -73,8 +75,11 @@ def _outcomes(frame: Frame) -> Outcomes:
     return Outcomes(row, id_, result)
 
 
-def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
-    """An `actions` frame: what a runner's robots do and send, and how many frames to it were none that it could use."""
+def encode_actions(tick: int, actions: Actions, dropped: int = 0, memory: Memory | None = None) -> bytes:
+    """An `actions` frame: what a runner's robots do and send, and how many frames to it were none that it could use.
+
+    With `memory`, where the world keeps it, what their agents remember.
+    """
     arrays: dict[str, AnyArray] = {
         "rows": actions.rows,
         "command": np.array((actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps)),
@@ -93,6 +98,8 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
     if len(actions.values):
         arrays["values"] = actions.values.rows
         arrays["values/value"] = actions.values.value
+    if memory:
+        arrays |= memory_arrays(memory)
     values: dict[str, Any] = {"dropped": dropped} if dropped else {}
     if len(actions.notes):
         arrays["notes"] = np.array((actions.notes.rows, actions.notes.code))

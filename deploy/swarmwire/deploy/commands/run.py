@@ -107,7 +107,7 @@ def run_command(
             raise BadInput("--revoked", name, "expected a robot of the scenario")
     member = network_of(network, ca, certificate, key, revoked or [], insecure=insecure)
     gateways = gateways_of_options(gateway or [], gateway_set or [], swarm, member)
-    chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
+    chosen = choose_seeds(checked, seed, None if seeds is None else seed_list(seeds))
     folder = out or default_folder(scenario.stem, chosen)
     console = Console(quiet=quiet, highlight=False)
     with compiling_told(console):
@@ -121,12 +121,14 @@ def run_command(
             gateways=gateways,
             record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
         )
-        result = _shown(simulation, folder, console, view=view, ui=ui)
+        result = run_shown(simulation, folder, console, view=view, ui=ui)
     if result.ended == "interrupted":
         raise typer.Exit(INTERRUPTED)
 
 
-def _shown(simulation: "Simulation", folder: Path, console: Console, *, view: bool, ui: bool) -> "Result":
+def run_shown(
+    simulation: "Simulation", folder: Path, console: Console, *, view: bool = False, ui: bool = False
+) -> "Result":
     """The result of the run, told and shown while it goes on and afterwards."""
     from swarmwire.deploy.control.run_finder import Announced
     from swarmwire.deploy.live.live_view import LiveView
@@ -155,7 +157,8 @@ def _shown(simulation: "Simulation", folder: Path, console: Console, *, view: bo
     return result
 
 
-def _seed_list(text: str) -> list[int]:
+def seed_list(text: str) -> list[int]:
+    """The seeds of a text such as "1:9" or "1,5,7"; BadInput if it is none."""
     first, colon, last = text.partition(":")
     try:
         found = range(int(first), int(last)) if colon else [int(item) for item in text.split(",")]

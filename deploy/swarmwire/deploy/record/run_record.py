@@ -25,6 +25,7 @@ from swarmwire.metrics.record.names import RECORDING, SUMMARY
 from swarmwire.metrics.record.recorders import recorders
 from swarmwire.metrics.record.run_log import RunLog
 from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.world.crews.door import Door
 from swarmwire.world.interventions import Intervention
 from swarmwire.world.scenario.scenario import Scenario
 
@@ -53,8 +54,12 @@ class RunRecord:
         control: ControlServer,
         *,
         may_drop: bool,
+        door: Door | None = None,
     ) -> Sequence[Observer]:
-        """Those that fill the folder, and let others look on and control it; `metrics` must see each tick before."""
+        """Those that fill the folder, and let others look on and control it; `metrics` must see each tick before.
+
+        `door` is where others meet it beyond this machine.
+        """
         folder, clock = self.folder, self._clock
         if folder is None:
             return ()
@@ -72,7 +77,8 @@ class RunRecord:
             )
         if what.rrd:
             found.append(RerunRecording(folder / RECORDING, metrics, clock, selected=what.select))
-        return (*found, Published(folder, run_id, metrics, clock, selected=what.select, declare=control.declare))
+        published = Published(folder, run_id, metrics, clock, selected=what.select, declare=control.declare, door=door)
+        return (*found, published)
 
     def begin(
         self,

@@ -13,10 +13,12 @@ from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.protocols import Crew
 from swarmwire.comms.senses import Actions, Senses
+from swarmwire.world.crews.door import Door
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime import RealTime
 from swarmwire.world.crews.roster import OnLoss
 from swarmwire.world.crews.runner_crew import RunnerCrew, Surroundings
+from swarmwire.world.crews.terms import USUAL, Terms
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class RealTimeCrew(RunnerCrew[RealTime]):
 
     def __init__(
         self,
-        endpoint: str,
+        door: Door | str,
         run_id: str,
         assignments: list[Assignment],
         timeout_s: float,
@@ -68,9 +70,10 @@ class RealTimeCrew(RunnerCrew[RealTime]):
         on_loss: OnLoss,
         pace: Pace,
         watchdog_s: float,
+        terms: Terms = USUAL,
     ) -> None:
-        roster = RealTime(assignments, watchdog_s, timeout_s, on_loss)
-        super().__init__(endpoint, run_id, roster, timeout_s, clock, around)
+        roster = RealTime(assignments, watchdog_s, timeout_s, on_loss, terms)
+        super().__init__(door, run_id, roster, timeout_s, clock, around)
         self._pace, self._assignments = pace, assignments
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
@@ -93,12 +96,6 @@ class RealTimeCrew(RunnerCrew[RealTime]):
             packets_dropped=roster.packets_dropped,
             outcomes_dropped=roster.outcomes_dropped,
         )
-
-    def _take_in(self) -> None:
-        """All that has arrived by now, without waiting for more."""
-        for _ in range(self._inbox.qsize()):
-            self._handle(self._inbox.get())
-        self._tell_losses()
 
     def _by_robot(self, counts: IntArray) -> dict[str, int]:
         """The counts that are not 0, by robot."""

@@ -19,15 +19,17 @@ from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.keys import Keys, runner_of
-from swarmwire.comms.wire.sessions import open_world
+from swarmwire.comms.wire.sessions import listens_at, open_world
+from swarmwire.world.crews.change import Change
+from swarmwire.world.crews.door import Door
 from swarmwire.world.crews.roster import Loss, Refused, Roster
 from swarmwire.world.crews.runner_health import RunnerHealth
+from swarmwire.world.crews.runner_inbox import Item, RunnerInbox
 
 POLL_S = 0.2  # how often a wait looks up whether to go on waiting
 START_S = 60.0  # how long runners may take to join and build their agents
 FAREWELL_S = 3.0  # how long runners may take to leave after the end
 
-Item = zenoh.Sample | zenoh.Query
 R = TypeVar("R", bound=Roster[Any])
 
 
@@ -36,12 +38,17 @@ class Surroundings:
     """What a crew asks and tells whoever runs it.
 
     `trouble` says why there is no more point in waiting for runners (a process that exited), or None; it is asked while
-    any loss ends the run. `stopped` says whether the run is to end; `lost` is told of a loss that the run survives.
+    any loss ends the run. `stopped` says whether the run is to end; `lost` is told of a loss that the run survives,
+    `changed` of every runner that comes or goes and of the robots that nobody plays then, `refused` of one that may not
+    join, and why; `opened`, in an open run, of where the world listens.
     """
 
     trouble: Callable[[], str | None] = lambda: None
     stopped: Callable[[], bool] = lambda: False
     lost: Callable[[Loss], None] = lambda _: None
+    changed: Callable[[Change, tuple[str, ...]], None] = lambda _change, _free: None
+    refused: Callable[[str, str], None] = lambda _runner, _why: None
+    opened: Callable[[tuple[str, ...]], None] = lambda _: None
 
 
 class RunnerCrew(ABC, Generic[R]):
@@ -51,7 +58,7 @@ class RunnerCrew(ABC, Generic[R]):
 
     def __init__(
         self,
-        endpoint: str,
+        door: Door | str,
         run_id: str,
         roster: R,
         timeout_s: float,
@@ -59,33 +66,40 @@ class RunnerCrew(ABC, Generic[R]):
         around: Surroundings,
         start_s: float = START_S,
     ) -> None:
-        self._endpoint, self._keys = endpoint, Keys(run_id)
+        self._door = Door((door,)) if isinstance(door, str) else door
+        self._keys = Keys(run_id)
         self._roster, self._timeout_s, self._clock, self._around = roster, timeout_s, clock, around
-        self._inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
+        self._inbox = RunnerInbox(roster.limits)
         self._session: zenoh.Session | None = None
         self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to
         self._frames: dict[str, zenoh.Publisher] = {}
         self._present: set[str] = set()
-        self._losses_told = 0
+        self._building: dict[str, int] = {}  # until when runners may take, wall time
+        self._losses_told = self._changes_told = 0
         self._patience_s = start_s  # how long a wait may last; in ticks the time-out
         self._deadline_ns = 0
 
     def open(self) -> None:
-        """Listen at the endpoint, so that runners may join; BadInput if it is taken."""
+        """Listen at the endpoints, so that runners may join; BadInput if one is taken."""
+        door = self._door
         try:
-            session = self._session = open_world(self._endpoint, self._timeout_s)
+            session = open_world(door.endpoints, self._timeout_s, door.network, door.access, self._roster.limits)
         except zenoh.ZError as error:
             reason = str(error).split(" at ")[0]
             raise BadInput(
-                "", self._endpoint, f"expected an endpoint that is free and can be listened on: {reason}"
+                "", ", ".join(door.endpoints), f"expected an endpoint that is free and can be listened on: {reason}"
             ) from error
+        self._session = session
         arrived = (self._inbox.put, self._inbox)
         self._declared = (
-            session.declare_queryable(self._keys.join, arrived),
+            session.declare_queryable(self._keys.any_offer, arrived),
+            session.declare_queryable(self._keys.any_join, arrived),
             session.declare_subscriber(self._keys.any_answer, arrived),
             session.liveliness().declare_subscriber(self._keys.any_alive, arrived, history=True),
             session.liveliness().declare_token(self._keys.world),  # last: it says that runners may join
         )
+        if self._roster.is_open:
+            self._around.opened(listens_at(session))
 
     def start(self) -> None:
         """Wait until runners have taken all robots and built their agents."""
@@ -100,7 +114,7 @@ class RunnerCrew(ABC, Generic[R]):
 
     def counts(self) -> dict[str, int]:
         """Frames that were dropped and runners that were lost, by name."""
-        return self._roster.counts()
+        return {**self._roster.counts(), **self._inbox.counts()}
 
     def health(self) -> RunnerHealth:
         """How the runners are doing."""
@@ -131,6 +145,8 @@ class RunnerCrew(ABC, Generic[R]):
         would be cold for each, since the runners use the cores in between.
         """
         self._allow_time()
+        if not self._roster.waiting:  # who joins is let in also where nobody is waited for
+            self._take_in()
         arrived: list[Item] = []
         while waiting := self._roster.waiting:
             while len(arrived) < waiting:
@@ -149,7 +165,13 @@ class RunnerCrew(ABC, Generic[R]):
             if self._clock.now_ns() > self._deadline_ns:
                 self._roster.lose_silent(f"no answer for {self._patience_s:g} s")
                 self._allow_time()
-            self._tell_losses()
+            self._tell_changes()
+
+    def _take_in(self) -> None:
+        """All that has arrived by now, without waiting for more."""
+        for _ in range(self._inbox.qsize()):
+            self._handle(self._inbox.get())
+        self._tell_changes()
 
     def _allow_time(self) -> None:
         self._deadline_ns = self._clock.now_ns() + to_ns(self._patience_s)
@@ -165,7 +187,7 @@ class RunnerCrew(ABC, Generic[R]):
 
     def _handle(self, item: Item) -> None:
         if isinstance(item, zenoh.Query):
-            self._join(item)
+            self._asked(item)
             return
         key = str(item.key_expr)
         runner = runner_of(key)
@@ -179,25 +201,47 @@ class RunnerCrew(ABC, Generic[R]):
         else:
             self._present.add(runner)
 
-    def _join(self, query: zenoh.Query) -> None:
+    def _asked(self, query: zenoh.Query) -> None:
+        """A runner asks what there is to play, or for robots."""
         if self._session is None:
             return
+        key = str(query.key_expr)
+        runner = runner_of(key)
         with query:  # a query that is kept alive holds the asker until its time-out
+            if key == self._keys.offer(runner):
+                offer = self._roster.offer()
+                if offer is not None:
+                    query.reply(key, offer.encode())
+                return
             try:
-                runner, reply = self._roster.join(query.payload.to_bytes() if query.payload else b"")
+                # Only the exact key speaks for a runner, as below.
+                speaker = runner if key == self._keys.join(runner) else key
+                reply = self._roster.join(speaker, query.payload.to_bytes() if query.payload else b"")
             except Refused as refusal:
+                self._around.refused(runner, str(refusal))
                 query.reply_err(str(refusal))
                 return
             self._frames[runner] = self._session.declare_publisher(
                 self._keys.frame(runner), congestion_control=self.congestion, express=True
             )
+            self._building[runner] = self._clock.now_ns() + to_ns(self._roster.limits.join_s)
             self._allow_time()
-            query.reply(self._keys.join, reply)
+            query.reply(key, reply)
 
-    def _tell_losses(self) -> None:
+    def _tell_changes(self) -> None:
         """A runner that was lost may be but slow: it is told to leave, since it has no robots any more."""
+        for runner, until_ns in list(self._building.items()):
+            if not self._roster.is_building(runner):
+                del self._building[runner]
+            elif self._clock.now_ns() > until_ns:
+                self._roster.gone(runner, f"its agents were not ready within {self._roster.limits.join_s:g} s")
         for loss in self._roster.losses[self._losses_told :]:
-            self._frames.pop(loss.runner).put(frames.encode("end", -1, {}))
-            self._present.discard(loss.runner)
             self._around.lost(loss)
         self._losses_told = len(self._roster.losses)
+        for change in self._roster.changes[self._changes_told :]:
+            if change.what in ("lost", "left"):
+                why = {"why": change.reason} if change.reason else {}
+                self._frames.pop(change.runner).put(frames.encode("end", -1, {}, why))
+                self._present.discard(change.runner)
+            self._around.changed(change, self._roster.missing_robots)
+        self._changes_told = len(self._roster.changes)
