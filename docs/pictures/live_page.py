@@ -22,7 +22,7 @@ OPTIONS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--n
 PATIENCE_MS = 120_000
 LOAD_MS = 12_000  # until rerun's viewer has loaded and draws, without a graphics card
 DRAW_MS = 15_000  # until it has drawn the newest tick
-COLORS = 128
+COLORS = 256
 
 
 def main(picture: Path, width_px: int, height_px: int, theme: Literal["dark", "light"]) -> None:

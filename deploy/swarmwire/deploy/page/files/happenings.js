@@ -3,7 +3,7 @@ import { end } from "./ask.js";
 
 const LASTING = ["kill", "partition", "jammer", "blackout", "gain", "fail", "ramp"];
 
-const CHANGED = { ramp: /^ramp (?:what = "(.*?)") (?:to = (\S+))(.*)$/ };
+const SET = /^ramp what = "(.*?)",? to = ([^\s,]+)(.*)$/;
 
 export function happenings() {
   let shown = "";
@@ -47,8 +47,8 @@ function item(event, who, ended) {
 }
 
 function words(event, who) {
-  const ramp = event.do === "ramp" && CHANGED.ramp.exec(event.text);
-  if (ramp) return `${ramp[1]} = ${ramp[2]}${ramp[3]}`;
-  if (who === undefined) return event.text;
+  const set = SET.exec(event.text);
+  if (set) return `${set[1]} = ${set[2]}${set[3]}`;
+  if (who === undefined || who === "all") return event.text;
   return `${event.do}: ${who}`;
 }
