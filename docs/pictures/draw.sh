@@ -28,3 +28,6 @@ swarmwire export "$runs/warehouse" --pdr --to docs/delivery.png
 .ci/uv run --no-sync python -m docs.pictures.parts
 .ci/uv run --no-sync python -m docs.pictures.robots
 .ci/uv run --no-sync python -m docs.pictures.tick_figure
+if command -v chromium >/dev/null; then
+  .ci/uv run --no-sync python -m docs.pictures.live_page
+fi

@@ -15,6 +15,7 @@ from swarmwire.comms.glimpse import Glimpse, Scene, Series
 from swarmwire.comms.wire.closing import closed_after
 from swarmwire.comms.wire.frames import decode
 from swarmwire.comms.wire.keys import ObserverKeys
+from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.scene_frames import decode_scene
 from swarmwire.comms.wire.sessions import open_observer
 from swarmwire.comms.wire.truth_frames import decode_truth
@@ -69,11 +70,14 @@ Frames = zenoh.handlers.Handler[zenoh.Sample]
 
 
 @contextmanager
-def following(live: Live) -> Generator[Following]:
-    """Follow a run until the end of the block; RunGone if it does not answer."""
+def following(live: Live, network: Network | None = None) -> Generator[Following]:
+    """Follow a run until the end of the block; RunGone if it does not answer.
+
+    `network` brings the certificates that an endpoint beyond this machine asks for.
+    """
     keys = ObserverKeys(live.run)
     try:
-        session = open_observer(live.endpoint)
+        session = open_observer(live.endpoint, network)
     except zenoh.ZError as error:
         raise RunGone(f"the run of process {live.pid} cannot be reached: {str(error).split(' at ')[0]}") from error
     with closed_after(session):

@@ -72,6 +72,7 @@ def closed_to_others(frames: str) -> Mapping[str, str]:
         "Cross-Origin-Resource-Policy": "same-origin",
         "Cross-Origin-Opener-Policy": "same-origin",
         "Referrer-Policy": "same-origin",
+        "Origin-Agent-Cluster": "?1",  # in a process of its own: the viewer in its frame may be slow
         "X-Content-Type-Options": "nosniff",
         "Cache-Control": "no-store",
     }

@@ -10,7 +10,7 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from swarmwire.comms.clock import NS_PER_S, Clock
-from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.errors import BadInput, SwarmwireError
 
 START_NS = 20 * NS_PER_S
 PAUSE_NS = NS_PER_S // 100
@@ -20,9 +20,15 @@ MOST_CONNECTIONS = 64
 
 @contextmanager
 def serving(new_app: Callable[[str, int], ASGIApp], clock: Clock, port: int | None = None) -> Generator[str]:
-    """Serve what `new_app` makes of token and port until the end of the block; the address, with the token in it."""
+    """Serve what `new_app` makes of token and port until the end of the block; the address, with the token in it.
+
+    BadInput if the port is taken.
+    """
     with socket.socket() as listening:
-        listening.bind(("127.0.0.1", port or 0))
+        try:
+            listening.bind(("127.0.0.1", port or 0))
+        except OSError:
+            raise BadInput("--port", str(port), "expected a port that is free") from None
         taken: int = listening.getsockname()[1]
         token = secrets.token_urlsafe(TOKEN_BYTES)
         server = uvicorn.Server(_config(new_app(token, taken)))

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from swarmwire.comms.glimpse import Scene
+from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling
 from swarmwire.deploy.live.following import following
 from swarmwire.deploy.live.live_file import Live
@@ -18,14 +19,15 @@ from swarmwire.deploy.page.seen import Seen
 from swarmwire.deploy.page.serving import serving
 
 
-def show_page(live: Live, way: Way) -> None:
+def show_page(live: Live, way: Way, network: Network | None = None, *, begin: bool = False) -> None:
     """Show the run until `way.stopped()` or its viewer is gone; afterwards it can still be looked at. RunGone if it is.
 
-    The first tick of a run that waits for the page is asked for from here: without it there would be nothing to see.
+    `network` brings the certificates that a run on another machine asks for. With `begin` the first tick of a run that
+    waits for the page is asked for: without it there would be nothing to see.
     """
     clock = way.clock
     viewing = replace(way, web=True, port=None).viewer(None)
-    with following(live) as run, viewing as shown, controlling(live.endpoint, live.run) as control:
+    with following(live, network) as run, viewing as shown, controlling(live.endpoint, live.run, network) as control:
         assert shown.web is not None, "a viewer with pages was asked for"
         seen = Seen(run.scene.static)
         drawer = Drawer(run, shown.url, way, seen.see)
@@ -40,7 +42,8 @@ def show_page(live: Live, way: Way) -> None:
             way.say(f"open {address} in a browser; Ctrl-C ends the page")
             if has_screen():
                 webbrowser.open(address)
-            _first_tick(control)
+            if begin:
+                _first_tick(control)
             while shown.alive and not way.stopped() and drawer.fault is None:
                 way.pause()
     if drawer.fault is not None:

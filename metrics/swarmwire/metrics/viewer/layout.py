@@ -14,7 +14,7 @@ _GROUND = [16, 18, 24]
 _ARENA_SHARE = 0.44  # of the window's width, for an arena as wide as it is high; a narrow one leaves more to the plots
 _LEAST_ARENA_SHARE, _SIDE_SHARE = 0.24, 0.19
 _NARROW = 0.6  # width over height below which an arena gets the window's whole height
-_PAGE_ARENA_SHARE = 0.68
+_PAGE_ARENA_SHARE = 0.64
 _ROWS = [4.2, 1.0]  # of what is looked at, and of the events below it
 
 

@@ -4,16 +4,24 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.commands.access_options import PANEL
 
 if TYPE_CHECKING:
     from swarmwire.comms.wire.network import Network
     from swarmwire.deploy.control.remote_control import RemoteControl
     from swarmwire.deploy.control.run_finder import FoundRun
+
+Endpoint = Annotated[
+    str | None,
+    typer.Option(
+        help="Of a run on another machine: where it takes observers.", metavar="ENDPOINT", rich_help_panel=PANEL
+    ),
+]
 
 
 @dataclass

@@ -1,13 +1,13 @@
 """The group of commands `swarmwire ctl`."""
 
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
 from swarmwire.comms.one_of import one_of
-from swarmwire.deploy.commands.access_options import PANEL, Ca, Certificate, Certs, Insecure, Key, Name
-from swarmwire.deploy.commands.ctl.chosen_run import Chosen
+from swarmwire.deploy.commands.access_options import Ca, Certificate, Certs, Insecure, Key, Name
+from swarmwire.deploy.commands.ctl.chosen_run import Chosen, Endpoint
 from swarmwire.deploy.commands.ctl.given import end_command, event_command, events_command
 from swarmwire.deploy.commands.ctl.pace import (
     pause_command,
@@ -67,12 +67,7 @@ ctl_app = typer.Typer(cls=CtlGroup, help=HELP, no_args_is_help=True)
 @ctl_app.callback(help=HELP, subcommand_metavar="[RUN] COMMAND [ARGS]...")
 def _ctl(
     context: typer.Context,
-    endpoint: Annotated[
-        str | None,
-        typer.Option(
-            help="Of a run on another machine: where it takes observers.", metavar="ENDPOINT", rich_help_panel=PANEL
-        ),
-    ] = None,
+    endpoint: Endpoint = None,
     certs: Certs = None,
     name: Name = None,
     ca: Ca = None,

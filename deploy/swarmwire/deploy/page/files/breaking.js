@@ -3,6 +3,7 @@ import { end, happen } from "./ask.js";
 import { map } from "./map.js";
 import { say } from "./said.js";
 
+const LOUDER_DB = 15; // a jammer than a robot, unless somebody says otherwise
 const by = (id) => document.getElementById(id);
 
 export function breaking() {
@@ -15,7 +16,7 @@ export function breaking() {
   by("kill").onclick = () => happen({ do: "kill", robots: names() });
   by("revive").onclick = () => happen({ do: "revive", robots: names() });
   by("kill-share").onclick = () => happen({ do: "kill", robots: { share: Number(by("share").value) / 100 } });
-  by("revive-all").onclick = () => happen({ do: "revive", robots: {} });
+  by("revive-all").onclick = () => happen({ do: "revive", robots: { share: 1 } });
   by("halve-x").onclick = () => happen({ do: "partition", halves: "x" });
   by("halve-y").onclick = () => happen({ do: "partition", halves: "y" });
   by("heal").onclick = () => endAll("partition");
@@ -37,6 +38,7 @@ export function breaking() {
       by("robot").replaceChildren(...facts.robots.map((name) => new Option(name, name)));
     },
     see(now) {
+      if (status === null && now.radio) by("power").value = Math.round((now.radio["antenna.power_dbm"] ?? 0) + LOUDER_DB);
       status = now;
       show();
       const over = now.state === "over", air = now.radio !== null;

@@ -3,7 +3,7 @@ import { end } from "./ask.js";
 
 const LASTING = ["kill", "partition", "jammer", "blackout", "gain", "fail", "ramp"];
 
-const CHANGED = { ramp: /^ramp (?:what = "(.*?)") (?:to = (\S+))(.*)$/ };
+const SET = /^ramp what = "(.*?)",? to = ([^\s,]+)(.*)$/;
 
 export function happenings() {
   let shown = "";
@@ -24,13 +24,14 @@ export function happenings() {
 // What waits for the next tick, what happened, newest first, and at last what the scenario has in store.
 function ordered(events) {
   const rank = (event) => (event.tick ?? (event.given ? Infinity : -1));
-  return [...events].sort((one, other) => rank(other) - rank(one) || (rank(one) < 0 ? one.number - other.number : other.number - one.number));
+  const real = events.filter((event) => !(event.given && event.over && event.tick === null)); // not taken back in time
+  return real.sort((one, other) => rank(other) - rank(one) || (rank(one) < 0 ? one.number - other.number : other.number - one.number));
 }
 
 function item(event, who, ended) {
   const line = document.createElement("li");
   const begun = event.tick !== null;
-  const when = begun ? `tick ${event.tick}` : !event.given ? "to come" : event.over ? "taken back" : "next tick";
+  const when = begun ? `tick ${event.tick}` : !event.given ? "to come" : "next tick";
   line.className = event.over || !begun ? "over" : "";
   line.title = event.text;
   line.append(Object.assign(document.createElement("span"), { className: "quiet", textContent: when }));
@@ -46,8 +47,8 @@ function item(event, who, ended) {
 }
 
 function words(event, who) {
-  const ramp = event.do === "ramp" && CHANGED.ramp.exec(event.text);
-  if (ramp) return `${ramp[1]} = ${ramp[2]}${ramp[3]}`;
-  if (who === undefined) return event.text;
+  const set = SET.exec(event.text);
+  if (set) return `${set[1]} = ${set[2]}${set[3]}`;
+  if (who === undefined || who === "all") return event.text;
   return `${event.do}: ${who}`;
 }

@@ -1,4 +1,5 @@
 // How the runners are doing, and every count that is not 0.
+const FINE = ["ready", "robots free"];
 const by = (id) => document.getElementById(id);
 
 export function health() {
@@ -9,12 +10,14 @@ export function health() {
       if (runners === null || runners === undefined) {
         by("runners").textContent = "no runners: all agents are in the world's process";
       } else {
-        const told = Object.entries(runners).map(([name, count]) => ({ name: name.replaceAll("_", " "), count }));
+        const told = Object.entries(runners)
+          .filter(([name, count]) => count || name === "ready" || name === "lost")
+          .map(([name, count]) => ({ name: name.replaceAll("_", " "), count }));
         told.forEach(({ name, count }, at) => {
           const item = document.createElement("span");
           const number = item.appendChild(document.createElement("b"));
           number.textContent = count;
-          number.className = count && name !== "ready" ? "bad" : "";
+          number.className = count && !FINE.includes(name) ? "bad" : "";
           item.append(` ${name}${at < told.length - 1 ? " · " : ""}`);
           by("runners").append(item);
         });

@@ -1,5 +1,5 @@
 // Sliders for the radio's numbers: what is let go of holds from the next tick on.
-import { happen } from "./ask.js";
+import { askSoon } from "./ask.js";
 
 const KEYS = [
   { key: "loss", name: "loss", unit: "", least: 0, most: () => 1, step: 0.01, show: (value) => `${Math.round(100 * value)} %` },
@@ -24,7 +24,9 @@ export function radio() {
     input.oninput = () => { state.held = true; output.textContent = of.show(Number(input.value)); };
     input.onchange = async () => {
       const to = Number(input.value);
-      state.awaited = (await happen({ do: "ramp", what: `radio.${of.key}`, to })) === null ? null : to;
+      const number = await askSoon(of.key, { do: "event", event: { do: "ramp", what: `radio.${of.key}`, to } });
+      if (to !== Number(input.value)) return; // it was moved on
+      state.awaited = number === null ? null : to;
       state.held = false;
     };
     rows.set(of, state);
