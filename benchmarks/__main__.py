@@ -22,6 +22,7 @@ from benchmarks.record_cost import record_cost
 from benchmarks.report_cost import report_cost
 from benchmarks.robot_step import robot_step
 from benchmarks.robot_steps import CASES, D1, robot_steps, start
+from benchmarks.tls_cost import tls_cost
 from benchmarks.view_cost import view_cost
 from benchmarks.wire_over_floor import wire_over_floor
 
@@ -44,6 +45,7 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     "processes-200": partial(processes, robots=200, ticks=200, agent=BOID),
     "processes-1000": partial(processes, robots=1000, ticks=50, agent=BOID),
     "wire-over-floor": partial(wire_over_floor, robots=200, ticks=140),
+    "tls-cost": partial(tls_cost, robots=40, ticks=400),
     **dict.fromkeys(COMPILES, first_compile),
     "report-10000": partial(report_cost, seeds=200),
     "robot-step": partial(robot_step, kind="epuck2"),

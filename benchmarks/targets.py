@@ -69,6 +69,9 @@ TARGETS = {
         1.6,
         "a tick of `processes-200` over that of as many processes that echo as many bytes, plus the agents' own time",
     ),
+    "tls-cost": most(
+        1.15, "a lockstep tick of 40 e-pucks flocking, a process each, over mutual TLS with access control"
+    ),
     "compile-world": most(30, "a machine's first run without a radio: what it takes longer than the next"),
     "compile-disk": most(30, "with a disk radio"),
     "compile-signals": most(30, "with a radio of signals"),

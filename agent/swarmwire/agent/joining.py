@@ -5,13 +5,16 @@
 
 import hashlib
 import os
+import queue
 import socket
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from secrets import token_hex
 
 import zenoh
+from zenoh.handlers import Callback
 
 from swarmwire.agent.loading import NoAgent, agent_sha256, load_agent
 from swarmwire.agent.runner import NO_ROBOTS, Asked, Ended, Inbox, play
@@ -26,7 +29,7 @@ from swarmwire.comms.wire.network_names import fault_of_name
 from swarmwire.comms.wire.offer import Offer
 from swarmwire.comms.wire.sessions import open_runner
 
-LOOK_S = 2.0  # for worlds at an endpoint
+LOOK_S = 5.0  # for worlds at an endpoint: a router may have to find its own first
 OFFER_S = 10.0
 BY_ALL = ""  # in place of a group's name
 
@@ -92,7 +95,9 @@ def join(joining: Joining, inbox: Inbox, say: Callable[[str], None]) -> Ended:
         session = open_runner(joining.endpoint, joining.connect_s, joining.network)
     except zenoh.ZError as error:
         reason = str(error).split(" at ")[0]
-        raise RunnerLost(runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}: {reason}") from error
+        raise RunnerLost(
+            runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}{_or_else(joining)}: {reason}"
+        ) from error
     with closed_after(session):
         run_id = joining.run or _only_run(session, runner, joining.endpoint)
         keys = Keys(run_id)
@@ -108,8 +113,17 @@ def join(joining: Joining, inbox: Inbox, say: Callable[[str], None]) -> Ended:
         return play(session, keys, runner, inbox, asked, joined)
 
 
+def _or_else(joining: Joining) -> str:
+    return ", or one certificate or the other is not accepted" if joining.network.proves else ""
+
+
 def _only_run(session: zenoh.Session, runner: str, endpoint: str) -> str:
     """The id of the only run at the endpoint."""
+    arrived: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
+    looking = session.liveliness().declare_subscriber(EVERY_WORLD, Callback(arrived.put, indirect=False), history=True)
+    with suppress(queue.Empty):
+        arrived.get(timeout=LOOK_S)
+    looking.undeclare()
     replies = session.liveliness().get(EVERY_WORLD, timeout=LOOK_S)
     runs = sorted({run_of(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None})
     if len(runs) == 1:

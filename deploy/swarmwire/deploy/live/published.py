@@ -53,7 +53,7 @@ class Published:
         clock: Clock,
         arena: int = 0,
         selected: str | None = None,
-        declare: Callable[[zenoh.Session, ObserverKeys], object] = lambda *_: None,
+        declare: Callable[[zenoh.Session, ObserverKeys], object] = lambda _session, _keys: None,
         door: Door | None = None,
     ) -> None:
         """Publish the run whose folder this is; `selected` is the robot that is shown in detail.
