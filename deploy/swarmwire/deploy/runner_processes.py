@@ -14,11 +14,13 @@ LEAVE_S = 3.0
 class RunnerProcesses:
     """The processes of all runners of one run; none of them outlives `stop` or this process."""
 
+    program = "swarmwire.agent.nursery"  # that forks them
+
     def __init__(
         self, endpoint: str, run_id: str, agents: Sequence[str], names: Sequence[str], *, waited_for: bool = False
     ) -> None:
         """`waited_for` says whether the world waits for each answer, so that nothing is gained by a quick start."""
-        command = [sys.executable, "-m", "swarmwire.agent.nursery", endpoint, run_id, ",".join(agents), *names]
+        command = [sys.executable, "-m", self.program, endpoint, run_id, ",".join(agents), *names]
         # A session of its own: Ctrl-C is for the world alone, and the whole group can be ended at once. One BLAS
         # thread: a runner's arrays are small, idle threads double its memory. What this process can import, they can.
         self._nursery = subprocess.Popen(
