@@ -16,7 +16,7 @@ from benchmarks.campaign import campaign
 from benchmarks.first_compile import CASES as COMPILES
 from benchmarks.first_compile import first_compile
 from benchmarks.metrics_share import metrics_share
-from benchmarks.processes import BOID, FLOCKING, processes
+from benchmarks.processes import BOID, FLOCKING, plain_processes, processes
 from benchmarks.push_fleet import push_fleet
 from benchmarks.record_cost import record_cost
 from benchmarks.report_cost import report_cost
@@ -41,11 +41,12 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     **dict.fromkeys(AIRS, air_cost),
     "air-scaling": air_scaling,
     "campaign-1000x10": campaign,
-    "tls-cost": partial(tls_cost, robots=40, ticks=400),
     "processes-100": partial(processes, robots=100, ticks=300, agent=FLOCKING),
     "processes-200": partial(processes, robots=200, ticks=200, agent=BOID),
+    "processes-200-plain": partial(plain_processes, robots=200, ticks=200),
     "processes-1000": partial(processes, robots=1000, ticks=50, agent=BOID),
     "wire-over-floor": partial(wire_over_floor, robots=200, ticks=140),
+    "tls-cost": partial(tls_cost, robots=40, ticks=400),
     **dict.fromkeys(COMPILES, first_compile),
     "report-10000": partial(report_cost, seeds=200),
     "robot-step": partial(robot_step, kind="epuck2"),

@@ -4,6 +4,9 @@ They are clients of the same sessions as runners, read with zenoh's own handler,
 bytes. They end with their standard input, as the nursery's runners do.
 """
 
+# zenoh's stubs leave out the return type of put.
+# pyright: reportUnknownMemberType=false
+
 import os
 import signal
 import sys

@@ -2,6 +2,7 @@
 
 import statistics
 from typing import Any
+from unittest.mock import patch
 
 import psutil
 
@@ -9,8 +10,10 @@ from benchmarks import scenes
 from benchmarks.lines import report, spread
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy import run
+from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.world.scenario.scenario_file import scenario_from
 
+PLAIN = "benchmarks.plain_nursery"
 FLOCKING, BOID = "swarmwire.agent.behaviours:Flocking", "benchmarks.agents:Boid"
 
 
@@ -27,7 +30,7 @@ class OwnMemory:
         """Read at one tick."""
         if truth.tick == self.at_tick:
             world = psutil.Process()
-            nursery = [child for child in world.children() if "swarmwire.agent.nursery" in child.cmdline()]
+            nursery = [child for child in world.children() if RunnerProcesses.program in child.cmdline()]
             runners = [runner for process in nursery for runner in process.children()]
             memory = [runner.memory_full_info() for runner in runners]
             self.uss_mb = [of.uss / 1e6 for of in memory]
@@ -39,9 +42,15 @@ class OwnMemory:
         return {}
 
 
+def plain_processes(name: str, repeats: int, *, robots: int, ticks: int) -> None:
+    """The same by processes that know swarmwire by its protocol alone, as the example does."""
+    with patch.object(RunnerProcesses, "program", PLAIN):
+        processes(name, repeats, robots=robots, ticks=ticks, agent="examples/protocol/runner.py")
+
+
 def processes(name: str, repeats: int, *, robots: int, ticks: int, agent: str) -> None:
     """Real-time factor of a flock with a process per robot; its start, and what each process costs."""
-    scenario = scenario_from(scenes.flocking(robots, ticks / 10, agent), name)
+    scenario = scenario_from(scenes.flocking(robots, ticks / 10, BOID if agent.endswith(".py") else agent), name)
     run(scenario.model_copy(update={"duration_s": 1.0}))
     memory = OwnMemory(ticks // 2)
     results = [run(scenario, runners="per-robot", observers=[memory]) for _ in range(repeats)]

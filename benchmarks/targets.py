@@ -61,16 +61,17 @@ TARGETS = {
     "processes-100": Target(3, "100 e-pucks flocking, a process each, 11.4 packets heard per robot and tick"),
     "processes-100-start": most(6, "from the call to the first tick, imports left out"),
     "processes-100-uss": most(15, "memory that a runner does not share with others"),
-    "tls-cost": most(
-        1.15, "a lockstep tick of 40 e-pucks flocking, a process each, over mutual TLS with access control"
-    ),
     "processes-200": Target(2, "200 e-pucks that flock, each an `Agent` in plain Python, about 10 packets heard"),
+    "processes-200-plain": Target(2, "the same flock by 200 of `examples/protocol/runner.py`: zenoh and msgpack alone"),
     "processes-1000": Target(0.4, "1,000 of them"),
     "processes-1000-start": most(60, "from the call to the first tick, imports left out"),
     "processes-1000-memory": most(16, "of world, nursery and runners together, as sum of their PSS"),
     "wire-over-floor": most(
         1.6,
         "a tick of `processes-200` over that of as many processes that echo as many bytes, plus the agents' own time",
+    ),
+    "tls-cost": most(
+        1.15, "a lockstep tick of 40 e-pucks flocking, a process each, over mutual TLS with access control"
     ),
     "compile-world": most(30, "a machine's first run without a radio: what it takes longer than the next"),
     "compile-disk": most(30, "with a disk radio"),

@@ -104,7 +104,7 @@ def acted(arrays: dict[str, Any], assignment: dict[str, Any]) -> dict[str, Any]:
 def opened(given: argparse.Namespace) -> zenoh.Session:
     """A client of the endpoint, and of nobody else."""
     off, own = {"enabled": False}, {"connect_certificate": given.certificate, "connect_private_key": given.key}
-    config: dict[str, Any] = {"mode": "client", "connect": {"endpoints": [given.endpoint]}}
+    config: dict[str, Any] = {"mode": "client", "connect": {"endpoints": [given.endpoint], "timeout_ms": 10000}}
     config["scouting"] = {"multicast": off, "gossip": off}
     if given.ca:
         config["transport"] = {"link": {"tls": {"root_ca_certificate": given.ca, "enable_mtls": True, **own}}}
@@ -145,5 +145,5 @@ if __name__ == "__main__":
     parser.add_argument("--robots", type=int)
     options = parser.parse_args()
     joined = opened(options)
-    (world,) = [token.ok for token in joined.liveliness().get(f"swarmwire/{options.run}/world") if token.ok]
+    world = joined.liveliness().declare_subscriber(f"swarmwire/{options.run}/world", history=True).recv()
     play(joined, str(world.key_expr).removesuffix("/world"), options.name, options.robots)

@@ -219,36 +219,28 @@ class Turn:
             self.drive,
             *command,
             sent,
-            self._notes(),
-            self._led_changes(),
-            self._actuations(),
-            self._values(),
+            Notes.none() if self._state is None else self._notes(self._state),
+            NO_LED_CHANGES if self._leds is None else self._led_changes(self._leds),
+            NO_ACTUATIONS if self._own is None else self._actuations(self._own),
+            NO_VALUES if self._value is None else self._values(self._value),
         )
 
     def _require(self, need: str) -> None:
         if need not in self.needs:
             raise NotDeclared(f"reads {need!r}, which its needs do not name: {', '.join(self.needs) or 'none'}")
 
-    def _led_changes(self) -> LedChanges:
-        if self._leds is None:
-            return NO_LED_CHANGES
-        place, which = np.nonzero(self._leds != NOT_SWITCHED)
-        return LedChanges(self.senses.rows[place], which, self._leds[place, which])
+    def _led_changes(self, leds: IntArray) -> LedChanges:
+        place, which = np.nonzero(leds != NOT_SWITCHED)
+        return LedChanges(self.senses.rows[place], which, leds[place, which])
 
-    def _actuations(self) -> Actuations:
-        if self._own is None:
-            return NO_ACTUATIONS
-        at, place = np.nonzero(~np.isnan(self._own))
-        return Actuations(self.senses.rows[at], place, self._own[at, place])
+    def _actuations(self, own: FloatArray) -> Actuations:
+        at, place = np.nonzero(~np.isnan(own))
+        return Actuations(self.senses.rows[at], place, own[at, place])
 
-    def _notes(self) -> Notes:
-        if self._state is None:
-            return Notes.none()
-        noted = np.flatnonzero(self._state >= 0)
-        return Notes(self.senses.rows[noted], self._state[noted], tuple(self._states))
+    def _notes(self, state: IntArray) -> Notes:
+        noted = np.flatnonzero(state >= 0)
+        return Notes(self.senses.rows[noted], state[noted], tuple(self._states))
 
-    def _values(self) -> Values:
-        if self._value is None:
-            return NO_VALUES
-        told = np.flatnonzero(~np.isnan(self._value))
-        return Values(self.senses.rows[told], self._value[told])
+    def _values(self, value: FloatArray) -> Values:
+        told = np.flatnonzero(~np.isnan(value))
+        return Values(self.senses.rows[told], value[told])

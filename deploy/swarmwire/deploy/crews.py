@@ -91,7 +91,8 @@ class Crews:
             crew = self._remote(endpoint, parts, around)
             try:
                 crew.open()
-                processes.append(RunnerProcesses(endpoint, self.run_id, sorted(set(self.agents.values())), names))
+                specs = sorted(set(self.agents.values()))
+                processes.append(RunnerProcesses(endpoint, self.run_id, specs, names, waited_for=self.pace is None))
                 yield crew
             finally:
                 crew.close()

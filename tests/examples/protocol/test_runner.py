@@ -4,6 +4,7 @@ import ast
 import subprocess
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import pytest
 
@@ -24,7 +25,10 @@ OWN = 3  # robots that it plays
 class Mixed:
     """Runners of swarmwire, but for one robot fewer of them each: the last is a process of the example."""
 
-    def __init__(self, endpoint: str, run_id: str, agents: Sequence[str], names: Sequence[str]) -> None:
+    def __init__(
+        self, endpoint: str, run_id: str, agents: Sequence[str], names: Sequence[str], *, waited_for: bool
+    ) -> None:
+        assert waited_for
         self._others = RunnerProcesses(endpoint, run_id, agents, names[:-1])
         self._own = subprocess.Popen([sys.executable, str(PROGRAM), endpoint, "--name", "foreign"])
 
@@ -51,8 +55,8 @@ def mixed(monkeypatch: pytest.MonkeyPatch) -> list[Mixed]:
     """What started the runners of the runs of this test."""
     started: list[Mixed] = []
 
-    def start(*given: object) -> Mixed:
-        started.append(Mixed(*given))  # pyright: ignore[reportArgumentType]
+    def start(*given: Any, **more: Any) -> Mixed:
+        started.append(Mixed(*given, **more))
         return started[-1]
 
     monkeypatch.setattr(crews, "RunnerProcesses", start)

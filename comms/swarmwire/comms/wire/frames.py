@@ -3,6 +3,9 @@
 Nothing is allocated from a number that the frame claims: the bytes are there, and every array must fit its own bytes.
 """
 
+# What arrives is of unknown types until it is checked, item by item; a `cast` is a call, here in the busiest of loops.
+# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false, reportUnknownMemberType=false
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
