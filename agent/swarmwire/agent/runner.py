@@ -1,7 +1,8 @@
 """A runner: a process that plays some robots of a world behind zenoh, in lockstep or in real time.
 
 It joins (gets robots), declares its token, builds the agents, says "ready", then answers `tick` frames with one
-`actions` frame each until the world says "end" or is gone. All that arrives lands in one queue, put there by the
+`actions` frame each until the world says "end" or is gone. In real time `packets` frames may come between ticks: agents
+that read between their steps answer with a `sent` frame, for all others they wait for the tick. All that arrives lands in one queue, put there by the
 network thread itself: no Python thread per subscription, so a runner stays small.
 """
 
@@ -11,7 +12,7 @@ network thread itself: no Python thread per subscription, so a runner stays smal
 import math
 import queue
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import msgpack
 import zenoh
@@ -25,6 +26,7 @@ from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.wire.in_time_frames import decode_packets, encode_sent
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
@@ -60,6 +62,8 @@ class _Inbox:
         self._arrived: queue.SimpleQueue[zenoh.Sample | bool] = queue.SimpleQueue()
         self.put_frame = self._arrived.put
         self.dropped = 0  # frames that were no tick to come, or not acted on since a newer one was there
+        self.missed = 0  # frames with packets that never came
+        self._next_packets = 0  # the number of the next of these
 
     def put_token(self, token: zenoh.Sample) -> None:
         """The world's liveliness token appeared or vanished."""
@@ -74,16 +78,25 @@ class _Inbox:
             return False
         return arrived
 
-    def ticks(self, assignment: Assignment) -> Iterator[tuple[int, Senses, Heard, Outcomes]]:
-        """What the newest tick brings, each time, until the world says "end" or is gone; lockstep has but one."""
+    def ticks(
+        self, assignment: Assignment, receive: Callable[[Heard, Outcomes], None] = lambda *_: None
+    ) -> Iterator[tuple[int, Senses, Heard, Outcomes] | tuple[int, int]]:
+        """What the newest tick brings, each time, until the world says "end" or is gone; lockstep has but one.
+
+        What comes between ticks goes to `receive`; where no newer tick is there, its tick and time are given out.
+        """
         gives, groups = assignment.gives or (), {group.name for group in assignment.groups}
         every = math.gcd(*(group.act_every_ticks for group in assignment.groups))
         newest: tuple[int, Senses, Heard, Outcomes] | None = None
+        between: tuple[int, int] | None = None
         tick = -1
         while True:
             if newest is not None and self._arrived.empty():
                 yield newest
-                newest = None
+                newest = between = None
+            if between is not None and self._arrived.empty():
+                yield between
+                between = None
             arrived = self._arrived.get()
             if isinstance(arrived, bool):
                 if not arrived:
@@ -93,6 +106,13 @@ class _Inbox:
                 frame = frames.decode(arrived.payload.to_bytes())
                 if frame.kind == "end":
                     return
+                if frame.kind == "packets":
+                    at_ns, number, *packets = decode_packets(frame, gives)
+                    self.missed += max(0, number - self._next_packets)
+                    self._next_packets = number + 1
+                    receive(*packets)
+                    between = frame.tick, at_ns
+                    continue
                 if frame.kind != "tick" or frame.tick <= tick or frame.tick % every:
                     raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
                 told = decode_tick(frame, gives, groups)
@@ -119,8 +139,14 @@ def _answers(assignment: Assignment, inbox: _Inbox) -> Iterator[bytes]:
     try:
         host = Host(assignment)
         yield frames.encode("ready", -1, {})
-        for tick, senses, heard, outcomes in inbox.ticks(assignment):
-            actions = host.act(tick, senses, heard, outcomes)
+        for told in inbox.ticks(assignment, host.receive):
+            if len(told) == 2:
+                if len(sent := host.hear(*told)):
+                    missed, inbox.missed = inbox.missed, 0
+                    yield encode_sent(told[0], sent, missed)
+                continue
+            tick = told[0]
+            actions = host.act(*told)
             dropped, inbox.dropped = inbox.dropped, 0
             yield encode_actions(tick, actions, dropped)
         return

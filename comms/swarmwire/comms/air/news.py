@@ -11,7 +11,7 @@ from numba import njit
 from swarmwire.comms.air.hearing_order import by_receiver
 from swarmwire.comms.air.links import HEARD, OUT_OF_RANGE, THE_REST, Links
 from swarmwire.comms.air.transmissions import Transmissions
-from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.truth import Departed, Finished, Tally
@@ -26,6 +26,25 @@ class News:
     departed: Departed
     tally: Tally
     outcomes: Outcomes  # of packets whose senders ask and are alive
+
+    def of(self, arenas: BoolArray, robots: int) -> "News":
+        """What concerns these arenas (arenas,) of so many robots each."""
+        heard = self.heard.select(np.flatnonzero(arenas[self.heard.receiver // robots])).compacted()
+        outcomes = self.outcomes.select(np.flatnonzero(arenas[self.outcomes.row // robots]))
+        return News(heard, self.finished.of(arenas), self.departed.of(arenas), self.tally.of(arenas), outcomes)
+
+    @classmethod
+    def joined(cls, parts: "list[News]") -> "News":
+        """What became final in all parts, one or more."""
+        if len(parts) == 1:
+            return parts[0]
+        return cls(
+            Heard.joined([part.heard for part in parts]),
+            Finished.joined([part.finished for part in parts]),
+            Departed.joined([part.departed for part in parts]),
+            sum((part.tally for part in parts[1:]), parts[0].tally),
+            Outcomes.joined([part.outcomes for part in parts]),
+        )
 
 
 class Parted(NamedTuple):
