@@ -45,7 +45,7 @@ class Vandal:
             ):
                 session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
             # The loop, in whose thread this runs, can only answer afterwards.
-            list(session.get(self.keys.join, payload=b"let me in", timeout=0.1))
+            list(session.get(self.keys.join("x"), payload=b"let me in", timeout=0.1))
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """No part of the summary."""

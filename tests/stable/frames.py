@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import msgpack
 import numpy as np
 
 from swarmwire.comms.actuations import Actuations
@@ -18,7 +19,9 @@ from swarmwire.comms.senses import Actions, GroupSenses
 from swarmwire.comms.truth import Finished, Happened, Tally, Truth
 from swarmwire.comms.values import Values
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
+from swarmwire.comms.wire.offer import Offer, OfferedGroup
 from swarmwire.comms.wire.scene_frames import OBSERVED_VERSION, encode_scene
 from swarmwire.comms.wire.tick_frames import encode_actions, encode_tick
 from swarmwire.comms.wire.truth_frames import encode_truth
@@ -66,8 +69,9 @@ def text() -> str:
         "keys of runners": _keys(Keys("RUN"), "RUNNER"),
         "keys of observers": _keys(ObserverKeys("RUN")),
         "every frame": lines_of(paths_of({"v": 1, "kind": "", "tick": 1, "arrays": {}, "values": {}})),
-        "join, asked": lines_of(paths_of({"v": frames.VERSION, "runner": "r"})),
-        "join, answered": lines_of(paths_of(_assignment().as_mapping())),
+        "join, asked": _map(JoinRequest(1, None, {"*": "a"}, "a").encode(), JoinRequest(None, ("a",)).encode()),
+        "join, answered": lines_of(paths_of({**_assignment().as_mapping(), "v": frames.VERSION, "memory": b""})),
+        "offer, answered": _map(_offer().encode()),
         "tick": _frame(encode_tick(1, _senses(), _heard(), Outcomes(*_ints(3, OUTCOMES)))),
         "actions": _frame(encode_actions(1, _actions(), dropped=1)),
         f"scene, version {OBSERVED_VERSION}": _frame(*(encode_scene(sample(Scene, left)) for left in LEFT_OUT)),
@@ -81,6 +85,10 @@ def _keys(keys: object, *of: str) -> str:
     plain = {name: key for name, key in vars(keys).items() if name != "root"}
     called = {name: getattr(keys, name)(*of) for name in vars(type(keys)) if not name.startswith("_")}
     return "".join(f"{name}: {key}\n" for name, key in {**plain, **called}.items())
+
+
+def _map(*several: bytes) -> str:
+    return lines_of(joined(*(paths_of(msgpack.unpackb(data)) for data in several)))
 
 
 def _frame(*several: bytes) -> str:
@@ -128,6 +136,10 @@ def _assignment() -> Assignment:
     keys = np.zeros(1, np.uint64)
     group = GroupAssignment("g", "a", {"*": 0.5}, load_body("epuck"), _ints(1), ("g-0",), keys)
     return Assignment((group,), 1, ("range_m",))
+
+
+def _offer() -> Offer:
+    return Offer("RUN", "s", "a", "1", 1, 1.0, (OfferedGroup("g", "a", "a", 1, ("g-0",)),))
 
 
 def _glimpse() -> Glimpse:

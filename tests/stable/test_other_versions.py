@@ -49,7 +49,7 @@ DOORS: dict[str, tuple[int, type[Exception], Callable[[Path, int], Any]]] = {
     "static": (TABLES_FORMAT, BadInput, lambda at, v: folder_with(at, "static.json", v).static),
     "tables": (TABLES_FORMAT, BadInput, lambda at, v: folder_with(at, "static.json", v).ticks()),
     "repetition": (RUN_FORMAT, BadInput, lambda at, v: read_origin(folder_with(at, "run.json", v).path)),
-    "runner": (frames.VERSION, Refused, lambda _, v: two().join(packed(v=v, runner="a"))),
+    "runner": (frames.VERSION, Refused, lambda _, v: two().join("a", packed(v=v))),
     "frame": (frames.VERSION, BadFrame, lambda _, v: frames.decode(packed(v=v, kind="", tick=0, arrays={}, values={}))),
 }
 

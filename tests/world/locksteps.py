@@ -41,13 +41,13 @@ def two_in_real_time() -> RealTime:
     return RealTime(two_parts(), watchdog_s=0.5, timeout_s=30.0, on_loss="stop")
 
 
-def request(runner: Any, version: Any = frames.VERSION) -> bytes:
-    return msgpack.packb({"v": version, "runner": runner})
+def request(version: Any = frames.VERSION, **asked: Any) -> bytes:
+    return msgpack.packb({"v": version, **asked})
 
 
 def joined(roster: R, *names: str) -> R:
     for name in names:
-        roster.join(request(name))
+        roster.join(name, request())
     return roster
 
 

@@ -27,6 +27,7 @@ from swarmwire.comms.senses import Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.closing import closed_after
 from swarmwire.comms.wire.in_time_frames import decode_packets, encode_sent
+from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
@@ -126,8 +127,7 @@ class _Inbox:
 def _join(session: zenoh.Session, keys: Keys, runner: str, inbox: _Inbox) -> Assignment:
     if not inbox.wait_for_world():
         raise RunnerLost(runner, "none yet", "there is no world")
-    request = msgpack.packb({"v": frames.VERSION, "runner": runner})
-    for reply in session.get(keys.join, payload=request, timeout=JOIN_S):
+    for reply in session.get(keys.join(runner), payload=JoinRequest().encode(), timeout=JOIN_S):
         if reply.ok is None:
             raise RunnerLost(runner, "none yet", reply.err.payload.to_string() if reply.err else "no answer to join")
         return Assignment.from_mapping(msgpack.unpackb(reply.ok.payload.to_bytes()))

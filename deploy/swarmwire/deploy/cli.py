@@ -23,6 +23,7 @@ from swarmwire.deploy.commands.radio.group import radio_app
 from swarmwire.deploy.commands.repeat import repeat_command
 from swarmwire.deploy.commands.report import report_command
 from swarmwire.deploy.commands.robots.group import robots_app
+from swarmwire.deploy.commands.router import router_command
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
@@ -73,6 +74,7 @@ app.command("verify")(verify_command)
 app.command("compare")(compare_command)
 app.command("report")(report_command)
 app.command("parity")(parity_command)
+app.command("router")(router_command)
 app.add_typer(radio_app, name="radio")
 app.add_typer(robots_app, name="robots")
 app.add_typer(certs_app, name="certs")

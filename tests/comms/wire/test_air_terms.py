@@ -25,8 +25,8 @@ def test_what_was_told_is_what_is_learned():
 @pytest.mark.parametrize(
     "changed",
     [
-        {"v": 2},
-        {"v": "1"},
+        {"v": 3},
+        {"v": "2"},
         {"row": -1},
         {"row": "4"},
         {"row": True},

@@ -28,7 +28,9 @@ names = st.text(max_size=8)
 def whole(**changes: Any) -> bytes:
     """A frame of one array of two numbers, with parts of its map replaced."""
     item = ("<f8", [2], bytes(16))
-    return msgpack.packb({"v": 1, "kind": "tick", "tick": 3, "arrays": {"a": item}, "values": {}, **changes})
+    return msgpack.packb(
+        {"v": frames.VERSION, "kind": "tick", "tick": 3, "arrays": {"a": item}, "values": {}, **changes}
+    )
 
 
 def fault(data: bytes, **limits: int) -> str:
@@ -67,10 +69,10 @@ def test_the_frame_that_the_others_spoil_is_sound() -> None:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"v": 2},
+        {"v": 3},
         {"v": True},
-        {"v": 1.0},
-        {"v": "1"},
+        {"v": 2.0},
+        {"v": "2"},
         {"kind": b"tick"},
         {"kind": 3},
         {"tick": "3"},

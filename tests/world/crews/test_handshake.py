@@ -6,6 +6,7 @@ import pytest
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.join_request import MOST_BYTES
 from swarmwire.world.crews.lockstep import Lockstep
 from swarmwire.world.crews.realtime import RealTime
 from swarmwire.world.crews.roster import Refused
@@ -21,12 +22,10 @@ def roster(request: pytest.FixtureRequest) -> Made:
 
 
 def test_runners_get_robots_in_the_order_in_which_they_join(roster: Made) -> None:
-    name, reply = roster.join(request("second-named-first"))
-    assert name == "second-named-first"
-    got = Assignment.from_mapping(msgpack.unpackb(reply))
+    got = Assignment.from_mapping(msgpack.unpackb(roster.join("second-named-first", request())))
     assert got.robots_text == "flock-0 … lone-3 (4 robots)"
     assert got.groups[0].keys.tolist() == group("", FLOCK).keys[:2].tolist()
-    assert Assignment.from_mapping(msgpack.unpackb(roster.join(request("a"))[1])).groups[0].rows.tolist() == [4, 5]
+    assert Assignment.from_mapping(msgpack.unpackb(roster.join("a", request()))).groups[0].rows.tolist() == [4, 5]
     assert not roster.counts()
 
 
@@ -43,27 +42,36 @@ def test_an_assignment_comes_over_whole() -> None:
 
 
 @pytest.mark.parametrize(
-    "bad",
+    ("bad", "why"),
     [
-        b"",
-        b"\xc1",
-        b"\x91" * 5000,
-        msgpack.packb(None),
-        msgpack.packb({"runner": "a"}),
-        msgpack.packb({"v": frames.VERSION}),
-        request("a", version=frames.VERSION + 1),
-        request("a", version="1"),
-        request(3),
-        request(b"a"),
-        *(request(name) for name in ("", "a/b", "*", "**", "a*", "$*", "a?b", "a#b", "ä", "a b", "a\n", "x" * 65)),
+        *((data, "malformed") for data in (b"", b"\xc1", b"\x91" * 5000, msgpack.packb(None), msgpack.packb({1: 2}))),
+        (bytes(MOST_BYTES + 1), "oversized"),
+        *((request(version), "expected version 2") for version in (frames.VERSION + 1, frames.VERSION - 1, "2", None)),
+        *((request(robots=robots), "robots: expected a number") for robots in (0, -1, 1.5, "3", True)),
+        *((request(names=names), "names: expected a list") for names in ("flock-0", [1], {})),
+        (request(robots=1, names=["flock-0"]), "not both"),
+        *((request(agents=agents), "agents: expected") for agents in ([], {"flock": "beef"}, {"flock": 3})),
+        (request(scenario_sha256="0" * 63), "scenario_sha256: expected"),
     ],
     ids=repr,
 )
-def test_a_bad_request_is_refused_counted_and_changes_nothing(roster: Made, bad: bytes) -> None:
+def test_a_bad_request_is_refused_counted_and_changes_nothing(roster: Made, bad: bytes, why: str) -> None:
     joined(roster, "a")
     before = state(roster)
-    with pytest.raises(Refused, match="expected a request of version 1"):
-        roster.join(bad)
+    with pytest.raises(Refused, match=why):
+        roster.join("b", bad)
+    assert state(roster) == before
+    assert roster.counts() == {"bad_join": 1}
+
+
+@pytest.mark.parametrize(
+    "name", ["", "a/b", "*", "**", "a*", "$*", "a?b", "a#b", "ä", "a b", "a\n", "x" * 65], ids=repr
+)
+def test_a_bad_name_is_refused_counted_and_changes_nothing(roster: Made, name: str) -> None:
+    joined(roster, "a")
+    before = state(roster)
+    with pytest.raises(Refused, match="expected a name"):
+        roster.join(name, request())
     assert state(roster) == before
     assert roster.counts() == {"bad_join": 1}
 
@@ -72,7 +80,7 @@ def test_a_name_in_use_is_refused(roster: Made) -> None:
     joined(roster, "a")
     before = state(roster)
     with pytest.raises(Refused, match="in use"):
-        roster.join(request("a"))
+        roster.join("a", request())
     assert state(roster) == before
     assert roster.counts() == {"refused_join": 1}
 
@@ -81,7 +89,7 @@ def test_who_comes_too_late_gets_no_robots(roster: Made) -> None:
     joined(roster, "a", "b")
     before = state(roster)
     with pytest.raises(Refused, match="all robots are taken"):
-        roster.join(request("c"))
+        roster.join("c", request())
     assert state(roster) == before
     assert roster.counts() == {"refused_join": 1}
 

@@ -61,11 +61,11 @@ def test_robots_of_a_dead_runner_stand_still_and_nobody_waits_for_them() -> None
     assert [loss.runner for loss in lockstep.losses] == ["b"]
     assert lockstep.counts() == {"runners_lost": 1}
     with pytest.raises(Refused, match="all robots are taken"):
-        lockstep.join(request("c"))
+        lockstep.join("c", request())
 
 
 @pytest.mark.parametrize("answered", [False, True])
-def test_whoever_takes_over_gets_the_open_tick_unless_it_was_answered(answered: bool) -> None:
+def test_whoever_takes_over_gets_the_open_tick_even_if_the_lost_one_answered_it(answered: bool) -> None:
     lockstep = ready(joined(Lockstep(two_parts(), "wait"), "a", "b"), "a", "b")
     out = dict(lockstep.open_tick(0, all_senses(), Heard.none(GIVES)))
     lockstep.answer("a", encode_actions(0, actions([0, 1, 2, 3])))
@@ -76,10 +76,9 @@ def test_whoever_takes_over_gets_the_open_tick_unless_it_was_answered(answered: 
     assert (lockstep.waiting, lockstep.missing[0], len(lockstep.losses)) == (1, "that did not join", 1)
     joined(lockstep, "c")
     again = lockstep.answer("c", frames.encode("ready", -1, {}))
-    assert again == ([] if answered else [("c", out["b"])])
-    if not answered:
-        assert lockstep.waiting
-        lockstep.answer("c", encode_actions(0, actions([4, 5, 6, 7])))
+    assert again == [("c", out["b"])]
+    assert lockstep.waiting
+    lockstep.answer("c", encode_actions(0, actions([4, 5, 6, 7])))
     assert not lockstep.waiting
     assert plain(lockstep.take()) == plain(actions(list(range(8))))
     assert [name for name, _ in lockstep.open_tick(1, all_senses(1), Heard.none(GIVES))] == ["a", "c"]

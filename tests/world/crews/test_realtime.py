@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import msgpack
 import numpy as np
 import pytest
 
@@ -14,6 +13,7 @@ from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions
 from swarmwire.comms.values import Values
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.tick_frames import encode_actions
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime import RealTime
@@ -27,12 +27,8 @@ OWN = {"a": [0, 2], "b": [1, 3]}
 TICK_NS = NS_PER_S // 10  # wall time, at factor 1
 
 
-def request(runner: str) -> bytes:
-    return msgpack.packb({"v": frames.VERSION, "runner": runner})
-
-
 def join(runners: RealTime, name: str) -> None:
-    runners.join(request(name))
+    runners.join(name, JoinRequest().encode())
     runners.answer(name, frames.encode("ready", -1, {}))
 
 

@@ -11,7 +11,6 @@ from collections.abc import Generator, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
-import msgpack
 import psutil
 import pytest
 
@@ -23,6 +22,7 @@ from swarmwire.comms.errors import AgentFailed, BadInput, Interrupted, RunnerLos
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.world.crews.remote_crew import RemoteCrew
@@ -134,11 +134,11 @@ def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
             foreign.put(keys.answer("r0"), frames.encode("ready", 0, {}))
             foreign.delete(keys.answer("r0"))
             asked = [
-                foreign.get(keys.join, payload=payload)
-                for payload in (
-                    b"\xc1",
-                    msgpack.packb({"v": 1, "runner": "a*/#"}),
-                    msgpack.packb({"v": 1, "runner": "x"}),
+                foreign.get(key, payload=payload)
+                for key, payload in (
+                    (keys.join("x"), b"\xc1"),
+                    (keys.any_join, JoinRequest().encode()),
+                    (keys.join("x"), JoinRequest().encode()),
                 )
             ]
             names = {"malformed_frames", "unknown_runner_frames", "wrong_tick_frames", "unexpected_kind_frames"}
@@ -149,7 +149,7 @@ def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
                 assert got.linear_mps.tolist() == [float(tick)] * len(ROWS)
             errors = [reply.err for replies in asked for reply in replies]
         texts = [error.payload.to_string() if error else "granted" for error in errors]
-        assert [text.split()[0] for text in texts] == ["expected", "expected", "all"]
+        assert [text.split()[0] for text in texts] == ["malformed:", "expected", "all"]
         got = crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
         assert got.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
         assert set(crew.counts()) == names | {"bad_join", "refused_join"}
@@ -316,7 +316,7 @@ def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
         got = crew.act(2, one_group(2, [0, 1, 2]), Heard.none(GIVES))
         steps = dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True))
         assert steps in ({0: 1.0, 1: 1.0, 2: 3.0}, {0: 3.0, 1: 3.0, 2: 1.0})
-        assert crew.counts() == {"runners_lost": 1}
+        assert crew.counts() == {"runners_lost": 1, "runners_joined_late": 1}
         crew.close()
 
 

@@ -14,7 +14,7 @@ from msgpack.exceptions import UnpackException
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.errors import BadFrame
 
-VERSION = 1  # of frames between world and runners, and of the request to join
+VERSION = 2  # of frames between world and runners, and of what runners ask before
 KEYS = {"v", "kind", "tick", "arrays", "values"}
 MOST_BYTES = 64 * 1024 * 1024
 DTYPES = {code: np.dtype(code) for code in ("<f8", "<i8", "<u8", "|b1", "|u1")}

@@ -1,15 +1,29 @@
 """Key expressions on the agents' and on the observers' endpoint."""
 
+EVERY_WORLD = "swarmwire/*/world"  # liveliness tokens of all runs at an endpoint
+
 
 class Keys:
-    """The keys of one run on the agents' endpoint, under `swarmwire/{run}/`."""
+    """The keys of one run on the agents' endpoint, under `swarmwire/{run}/`.
+
+    A runner's name is in each key that it asks or speaks at, so that access control can hold it to its own.
+    """
 
     def __init__(self, run: str) -> None:
         self.root = f"swarmwire/{run}"
-        self.join = f"{self.root}/join"  # queryable: a runner asks for robots and gets them
         self.world = f"{self.root}/world"  # liveliness token of the world
+        self.any_offer = f"{self.root}/offer/*"
+        self.any_join = f"{self.root}/join/*"
         self.any_answer = f"{self.root}/answer/*"
         self.any_alive = f"{self.root}/alive/*"
+
+    def offer(self, runner: str) -> str:
+        """Queryable: a runner asks what there is to play."""
+        return f"{self.root}/offer/{runner}"
+
+    def join(self, runner: str) -> str:
+        """Queryable: a runner asks for robots and gets them."""
+        return f"{self.root}/join/{runner}"
 
     def frame(self, runner: str) -> str:
         """World to runner, one frame a tick."""
@@ -25,8 +39,13 @@ class Keys:
 
 
 def runner_of(key: str) -> str:
-    """The runner that an `answer` or `alive` key names."""
+    """The runner that a key names at its end."""
     return key.rsplit("/", 1)[-1]
+
+
+def run_of(world: str) -> str:
+    """The run whose world's token this key is."""
+    return world.split("/")[1]
 
 
 class ObserverKeys:

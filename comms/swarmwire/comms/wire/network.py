@@ -61,7 +61,7 @@ class Network:
         for name in ("listen", "connect"):
             for endpoint in cast("tuple[str, ...]", getattr(self, name)):
                 _check_endpoint(endpoint, where, f"{key}.{name}")
-        self._check_files(where, key)
+        self.check_files(where, key)
         for name in ("listen", "connect"):
             for endpoint in cast("tuple[str, ...]", getattr(self, name)):
                 self._check_proven(endpoint, where, f"{key}.{name}")
@@ -81,7 +81,8 @@ class Network:
             return None
         return "network: insecure = true: whoever is in the network can drive, stop and overhear the robots"
 
-    def _check_files(self, where: str, key: str) -> None:
+    def check_files(self, where: str, key: str) -> None:
+        """BadInput unless there are all three files of a certificate, or none, and others cannot read the key."""
         files = {name: cast("Path | None", getattr(self, name)) for name in ("ca", "certificate", "key")}
         if all(path is None for path in files.values()):
             return
@@ -98,8 +99,18 @@ class Network:
         if self.key.stat().st_mode & OF_OTHERS:
             raise BadInput(where, f"{key}.key", f"expected a file that its owner alone may read: chmod 600 {self.key}")
 
+    def check_endpoint(self, endpoint: str, where: str, key: str) -> None:
+        """BadInput unless it is an endpoint, and one that may be used with this member's certificates, or without."""
+        _check_endpoint(endpoint, where, key)
+        self.check_safe(endpoint, where, key)
+
+    def check_safe(self, endpoint: str, where: str, key: str) -> None:
+        """BadInput if others could be at its other end who prove nothing; of one on this machine it asks nothing."""
+        if protocol_of(endpoint) in PROVEN or not is_local(endpoint):
+            self._check_proven(endpoint, where, key)
+
     def _check_proven(self, endpoint: str, where: str, key: str) -> None:
-        protocol = endpoint.partition("/")[0]
+        protocol = protocol_of(endpoint)
         if self.proves:
             if protocol not in PROVEN:
                 raise BadInput(where, key, f'expected {" or ".join(PROVEN)} with a certificate, got "{endpoint}"')
@@ -110,6 +121,15 @@ class Network:
 
 
 _SAFE = "{}; expected ca, certificate and key, or insecure = true"
+
+
+def protocol_of(endpoint: str) -> str:
+    """What an endpoint begins with.
+
+    >>> protocol_of("tls/10.0.0.5:7447")
+    'tls'
+    """
+    return endpoint.partition("/")[0]
 
 
 def is_local(endpoint: str) -> bool:

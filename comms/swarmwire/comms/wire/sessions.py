@@ -1,48 +1,121 @@
-"""zenoh sessions: the world routes on an endpoint for runners and on one for observers, who are clients of it.
+"""zenoh sessions: the world routes on some endpoints for runners and on others for observers, who are clients of it.
 
-Nothing scouts, nothing gossips. The two endpoints are sessions of their own, so that no runner can see the truth.
+Nothing scouts, nothing gossips. The two are sessions of their own, so that no runner can see the truth. Routers may
+stand between a world and its runners, in a chain: each listens for the next and calls the one before.
 
 Two peers on one hub are not routed by zenoh, or link past it; so the world is a router and runners are clients. The
 start-up delay of scouting is set to 0 even where it is off (it costs half a second otherwise). Frames in lockstep block
 rather than drop; a put that blocks closes its link after `BLOCK_S` or half a runner's time-out.
 """
 
+# zenoh's stubs leave out the type of what a session answers.
+# pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false
+
 import json
 import os
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import zenoh
+
+from swarmwire.comms.wire.limits import LIMITS, Limits
+from swarmwire.comms.wire.mutual_tls import mutual_tls
+from swarmwire.comms.wire.network import Network, protocol_of
 
 PRIVATE = "sw-"  # how the name of a private directory for a socket begins
 BLOCK_S = 5.0
 LEASE_MS = 10_000  # a frozen peer is noticed after this; a dead one at once, by its closed socket
+LOCATORS_S = 2.0
+RETRY = {"period_init_ms": 50, "period_max_ms": 1000, "period_increase_factor": 1.5}
+SPARE_LINKS = 64  # of routers, and of runners whose old link is not yet known to be dead
 # A runner has one session and little traffic: three threads instead of ten, and half the memory.
 SMALL_RUNTIME = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app),app:(worker_threads:1))"
 
-
-def open_world(endpoint: str, runner_timeout_s: float) -> zenoh.Session:
-    """A router that listens on `endpoint`, for runners that may be silent so long; zenoh.ZError if it is taken."""
-    return zenoh.open(_config("router", {"listen": {"endpoints": [endpoint]}}, runner_timeout_s))
+Endpoints = str | Sequence[str]
 
 
-def open_runner(endpoint: str, connect_s: float = 10.0) -> zenoh.Session:
-    """A client of the world at `endpoint`, tried for `connect_s`; zenoh.ZError if nobody answers."""
+def open_world(
+    endpoints: Endpoints,
+    runner_timeout_s: float,
+    network: Network | None = None,
+    access: Mapping[str, Any] | None = None,
+    limits: Limits = LIMITS,
+) -> zenoh.Session:
+    """A router that listens at `endpoints`, for runners that may be silent so long.
+
+    `network` brings the certificates, `access` is zenoh's access control. zenoh.ZError if an endpoint is taken or a
+    file of the certificates is not fit; BadInput for an endpoint beyond this machine without certificates.
+    """
+    return zenoh.open(_router(endpoints, (), runner_timeout_s, network, access, limits))
+
+
+def open_router(
+    listen: Endpoints,
+    connect: Endpoints,
+    network: Network | None = None,
+    access: Mapping[str, Any] | None = None,
+    limits: Limits = LIMITS,
+) -> zenoh.Session:
+    """A router between a world and its runners: it calls the endpoints in `connect` for ever. Errors as `open_world`.
+
+    It waits for nobody: whom it calls may come later, or again.
+    """
+    return zenoh.open(_router(listen, connect, 2 * BLOCK_S, network, access, limits))
+
+
+def open_runner(endpoint: str, connect_s: float = 10.0, network: Network | None = None) -> zenoh.Session:
+    """A client of the world at `endpoint`, tried for `connect_s`; zenoh.ZError if nobody answers.
+
+    BadInput for an endpoint beyond this machine without certificates.
+    """
     os.environ.setdefault("ZENOH_RUNTIME", SMALL_RUNTIME)
-    connect = {
-        "endpoints": [endpoint],
-        "timeout_ms": round(connect_s * 1000),
-        "retry": {"period_init_ms": 50, "period_max_ms": 1000, "period_increase_factor": 1.5},
-    }
-    return zenoh.open(_config("client", {"connect": connect}))
+    connect = {"endpoints": [endpoint], "timeout_ms": round(connect_s * 1000), "retry": RETRY}
+    return zenoh.open(_config("client", {"connect": connect}, [endpoint], network))
 
 
-def open_observed(endpoint: str) -> zenoh.Session:
-    """A router that listens on `endpoint`, for observers; zenoh.ZError if it is taken."""
-    return zenoh.open(_config("router", {"listen": {"endpoints": [endpoint]}}))
+def open_observed(
+    endpoints: Endpoints, network: Network | None = None, access: Mapping[str, Any] | None = None
+) -> zenoh.Session:
+    """A router that listens at `endpoints`, for observers. Errors as `open_world`."""
+    return zenoh.open(_router(endpoints, (), 2 * BLOCK_S, network, access, LIMITS))
 
 
-def open_observer(endpoint: str) -> zenoh.Session:
+def open_observer(endpoint: str, network: Network | None = None) -> zenoh.Session:
     """A client of the observers' endpoint; zenoh.ZError if nobody answers within 2 s."""
-    return open_runner(endpoint, connect_s=2.0)
+    return open_runner(endpoint, 2.0, network)
+
+
+def listens_at(session: zenoh.Session) -> tuple[str, ...]:
+    """Where a router's session can be called, with the ports that the system chose."""
+    for reply in session.get(f"@/{session.zid()}/router", timeout=LOCATORS_S):
+        if reply.ok is not None:
+            return tuple(json.loads(reply.ok.payload.to_string())["locators"])
+    return ()
+
+
+def router_config(
+    listen: Endpoints,
+    connect: Endpoints,
+    runner_timeout_s: float = 2 * BLOCK_S,
+    network: Network | None = None,
+    access: Mapping[str, Any] | None = None,
+    limits: Limits = LIMITS,
+) -> dict[str, Any]:
+    """The configuration, as zenoh has it, of a router between a world and its runners, and of a world."""
+    listened, called = _several(listen), _several(connect)
+    more: dict[str, Any] = {
+        "listen": {"endpoints": listened},
+        # Only the session itself may ask: an access control that denies what it does not name denies this to links.
+        "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},
+    }
+    if called:
+        more["connect"] = {"endpoints": called, "timeout_ms": -1, "exit_on_failure": False, "retry": RETRY}
+    if access is not None:
+        more["access_control"] = dict(access)
+    config = _settings("router", more, [*listened, *called], network, runner_timeout_s)
+    config["transport"]["link"]["rx"] = {"max_message_size": limits.link_bytes}
+    config["transport"]["unicast"] = {"max_sessions": limits.runners + SPARE_LINKS}
+    return config
 
 
 def unix_endpoint(path: str) -> str:
@@ -50,19 +123,46 @@ def unix_endpoint(path: str) -> str:
     return f"unixsock-stream/{path}"
 
 
-def _config(mode: str, more: dict[str, object], runner_timeout_s: float = 2 * BLOCK_S) -> zenoh.Config:
+def _router(
+    listen: Endpoints,
+    connect: Endpoints,
+    runner_timeout_s: float,
+    network: Network | None,
+    access: Mapping[str, Any] | None,
+    limits: Limits,
+) -> zenoh.Config:
+    return _as_config(router_config(listen, connect, runner_timeout_s, network, access, limits))
+
+
+def _config(mode: str, more: dict[str, Any], endpoints: Sequence[str], network: Network | None) -> zenoh.Config:
+    return _as_config(_settings(mode, more, endpoints, network))
+
+
+def _as_config(settings: dict[str, Any]) -> zenoh.Config:
+    return zenoh.Config.from_json5(json.dumps(settings))
+
+
+def _several(endpoints: Endpoints) -> list[str]:
+    return [endpoints] if isinstance(endpoints, str) else list(endpoints)
+
+
+def _settings(
+    mode: str,
+    more: dict[str, Any],
+    endpoints: Sequence[str],
+    network: Network | None,
+    runner_timeout_s: float = 2 * BLOCK_S,
+) -> dict[str, Any]:
+    for endpoint in endpoints:
+        (network or Network()).check_safe(endpoint, "network", "endpoint")
     block = {"wait_before_close": round(min(BLOCK_S, runner_timeout_s / 2) * 1e6)}
     lease_ms = max(LEASE_MS, round(runner_timeout_s * 1000))
-    return zenoh.Config.from_json5(
-        json.dumps(
-            {
-                "mode": mode,
-                "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
-                "transport": {
-                    "shared_memory": {"enabled": False},
-                    "link": {"tx": {"lease": lease_ms, "queue": {"congestion_control": {"block": block}}}},
-                },
-                **more,
-            }
-        )
-    )
+    link: dict[str, Any] = {"tx": {"lease": lease_ms, "queue": {"congestion_control": {"block": block}}}}
+    if network is not None and network.proves:
+        link |= {"protocols": sorted({protocol_of(endpoint) for endpoint in endpoints}), "tls": mutual_tls(network)}
+    return {
+        "mode": mode,
+        "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "transport": {"shared_memory": {"enabled": False}, "link": link},
+        **more,
+    }

@@ -19,6 +19,7 @@ from typing import Any
 import zenoh
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.mutual_tls import mutual_tls
 from swarmwire.comms.wire.network import PROVEN, Network
 from swarmwire.comms.wire.sessions import SMALL_RUNTIME
 
@@ -48,7 +49,7 @@ def swarm_config(network: Network, access: Mapping[str, Any] | None = None) -> d
     listen = _listens(network)
     link: dict[str, Any] = {"tx": {"lease": LEASE_MS, "keep_alive": 4}}
     if network.proves:
-        link |= {"protocols": list(PROVEN), "tls": _mutual_tls(network)}
+        link |= {"protocols": list(PROVEN), "tls": mutual_tls(network)}
     config: dict[str, Any] = {
         "mode": "peer",
         "listen": {"endpoints": list(listen)},
@@ -83,16 +84,3 @@ def _listens(network: Network) -> tuple[str, ...]:
 
 def _any_port(listen: tuple[str, ...]) -> bool:
     return any(endpoint.endswith(":0") for endpoint in listen)
-
-
-def _mutual_tls(network: Network) -> dict[str, Any]:
-    """Both ends show a certificate, whoever called."""
-    certificate, key = str(network.certificate), str(network.key)
-    return {
-        "root_ca_certificate": str(network.ca),
-        "enable_mtls": True,
-        "listen_certificate": certificate,
-        "listen_private_key": key,
-        "connect_certificate": certificate,
-        "connect_private_key": key,
-    }

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.access import OPERATOR, TRACKER
 from swarmwire.comms.wire.network_names import fault_of_name
 from swarmwire.deploy.certificates.files import AUTHORITY
+from swarmwire.deploy.certificates.purposes import PURPOSES, ROBOT, checked_purpose
 
-ROBOT = "robot"
 _LABEL = "[A-Za-z0-9_](?:[A-Za-z0-9_-]{0,61}[A-Za-z0-9_])?"
 _HOST = re.compile(rf"(?=.{{1,253}}$){_LABEL}(?:\.{_LABEL})*")
 
@@ -29,11 +28,11 @@ class Wanted:
     @property
     def usual_purpose(self) -> str:
         """What a first certificate of the name is for, unless it is told."""
-        return self.name if self.name in (TRACKER, OPERATOR) else ROBOT
+        return self.name if self.name in PURPOSES else ROBOT
 
 
 def wanted(name: str, hosts: Sequence[str] = (), purpose: str | None = None) -> Wanted:
-    """What is asked for; BadInput for a name or a host that is none, and for the name that the CA's files have."""
+    """What is asked for; BadInput for a name, host or purpose that is none, and for the name of the CA's own files."""
     fault = fault_of_name(name)
     if fault is None and name.lower() == AUTHORITY:
         fault = f"expected another name: {AUTHORITY}.pem is the CA's own"
@@ -42,7 +41,7 @@ def wanted(name: str, hosts: Sequence[str] = (), purpose: str | None = None) -> 
     for host in hosts:
         if not _is_host(host):
             raise BadInput("--host", "", f"expected an IP address or the name of a host, got {host!r}")
-    return Wanted(name, purpose, tuple(dict.fromkeys(host for host in hosts if host != name)))
+    return Wanted(name, checked_purpose(purpose), tuple(dict.fromkeys(host for host in hosts if host != name)))
 
 
 def _is_host(host: str) -> bool:

@@ -33,10 +33,12 @@ from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.values import Values
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
-from swarmwire.world.crews.roster import OnLoss, Roster
+from swarmwire.world.crews.change import What
+from swarmwire.world.crews.roster import GOES_ON, OnLoss, Roster
 from swarmwire.world.crews.runner_health import RunnerHealth
 from swarmwire.world.crews.slot import Slot, rows_of
 from swarmwire.world.crews.split_tick import acting, split_heard, split_outcomes, split_senses
+from swarmwire.world.crews.terms import USUAL, Terms
 
 ANSWERED = -1
 
@@ -68,10 +70,12 @@ class RealTime(Roster[_Slot]):
         outcomes_dropped: outcomes in them, or for such robots: known to a radio, never to its agent.
     """
 
-    def __init__(self, assignments: list[Assignment], watchdog_s: float, timeout_s: float, on_loss: OnLoss) -> None:
-        super().__init__([_Slot(assignment, rows_of(assignment)) for assignment in assignments], on_loss)
+    def __init__(
+        self, parts: list[Assignment], watchdog_s: float, timeout_s: float, on_loss: OnLoss, terms: Terms = USUAL
+    ) -> None:
+        super().__init__(parts, on_loss, terms)
         rows = len(self._owner)
-        self._rate_hz = assignments[0].rate_hz
+        self._rate_hz = parts[0].rate_hz
         self._watchdog_ns, self._timeout_ns = to_ns(watchdog_s), to_ns(timeout_s)
         self._asked_ns = np.full(rows, ANSWERED, np.int64)  # simulated time of the first question without an answer
         self._stopped = np.zeros(rows, np.bool_)
@@ -109,7 +113,8 @@ class RealTime(Roster[_Slot]):
             if not part:  # none of its groups acts
                 continue
             rows = acting(part)
-            self._asked_ns[rows[self._asked_ns[rows] == ANSWERED]] = start_ns
+            if slot.state == "ready" or self._on_loss not in GOES_ON:
+                self._asked_ns[rows[self._asked_ns[rows] == ANSWERED]] = start_ns
             if slot.state == "ready":
                 slot.asked.append(_Asked(tick, rows, len(own), len(its), now_ns))
                 out.append((slot.runner or "", encode_tick(tick, part, own, its)))
@@ -137,7 +142,7 @@ class RealTime(Roster[_Slot]):
         asked = next((asked for asked in slot.asked if asked.tick == frame.tick), None)
         if asked is None:
             raise BadFrame("wrong_tick", str(frame.tick))
-        actions = decode_actions(frame, asked.rows)
+        actions, slot.memory = decode_actions(frame, asked.rows), self._memory(slot, frame)
         while slot.asked[0] is not asked:
             self._drop(slot.asked.popleft())
         slot.asked.popleft()
@@ -153,14 +158,19 @@ class RealTime(Roster[_Slot]):
         self._own.append(actions.own)
         self._values.append(actions.values)
 
+    def _slot(self, assignment: Assignment) -> _Slot:
+        return _Slot(assignment, rows_of(assignment))
+
     def _catch_up(self, slot: _Slot) -> Sequence[bytes]:
         return ()  # the next tick is soon
 
-    def _lose(self, slot: _Slot, reason: str) -> None:
-        super()._lose(slot, reason)
+    def _free(self, slot: _Slot, runner: str, what: What, reason: str) -> None:
+        super()._free(slot, runner, what, reason)
         while slot.asked:
             self._drop(slot.asked.popleft())
-        if slot.state == "dead":
+        if self._on_loss in GOES_ON:
+            self._asked_ns[slot.all_rows] = ANSWERED  # nobody is asked any more: the watchdog has nothing to watch
+        if slot.state == "dead" or self._on_loss == "stand":
             self._stop(slot.all_rows)
 
     def _latest_notes(self) -> Notes:

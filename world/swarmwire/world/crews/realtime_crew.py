@@ -17,6 +17,7 @@ from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime import RealTime
 from swarmwire.world.crews.roster import OnLoss
 from swarmwire.world.crews.runner_crew import RunnerCrew, Surroundings
+from swarmwire.world.crews.terms import USUAL, Terms
 
 
 @dataclass(frozen=True)
@@ -68,8 +69,9 @@ class RealTimeCrew(RunnerCrew[RealTime]):
         on_loss: OnLoss,
         pace: Pace,
         watchdog_s: float,
+        terms: Terms = USUAL,
     ) -> None:
-        roster = RealTime(assignments, watchdog_s, timeout_s, on_loss)
+        roster = RealTime(assignments, watchdog_s, timeout_s, on_loss, terms)
         super().__init__(endpoint, run_id, roster, timeout_s, clock, around)
         self._pace, self._assignments = pace, assignments
 
@@ -93,12 +95,6 @@ class RealTimeCrew(RunnerCrew[RealTime]):
             packets_dropped=roster.packets_dropped,
             outcomes_dropped=roster.outcomes_dropped,
         )
-
-    def _take_in(self) -> None:
-        """All that has arrived by now, without waiting for more."""
-        for _ in range(self._inbox.qsize()):
-            self._handle(self._inbox.get())
-        self._tell_losses()
 
     def _by_robot(self, counts: IntArray) -> dict[str, int]:
         """The counts that are not 0, by robot."""

@@ -8,6 +8,7 @@ from swarmwire.comms.senses import Actions, Senses
 from swarmwire.world.crews.lockstep import Lockstep
 from swarmwire.world.crews.roster import OnLoss
 from swarmwire.world.crews.runner_crew import START_S, RunnerCrew, Surroundings
+from swarmwire.world.crews.terms import USUAL, Terms
 
 ALONE = Surroundings()
 
@@ -25,8 +26,9 @@ class RemoteCrew(RunnerCrew[Lockstep]):
         around: Surroundings = ALONE,
         on_loss: OnLoss = "stop",
         start_s: float = START_S,
+        terms: Terms = USUAL,
     ) -> None:
-        super().__init__(endpoint, run_id, Lockstep(assignments, on_loss), timeout_s, clock, around, start_s)
+        super().__init__(endpoint, run_id, Lockstep(assignments, on_loss, terms), timeout_s, clock, around, start_s)
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """One frame to every runner, one answer from each."""

@@ -1,13 +1,17 @@
 """Who plays which robots, without any I/O: slots, the runners that join them, and what follows when one is lost.
 
-The states of a slot and the moves between them stand in `slot`. Beside them,
+The states of a slot and the moves between them stand in `slot`. A slot that is free holds robots that nobody plays; a
+runner that asks for some of them gets a slot of its own, cut from those that are free. Beside them,
 
     a frame "failed"        AgentFailed               (ends the run)
     a loss    stop          RunnerLost                (ends the run; so does any loss before the first tick)
               dead          the slot is given up      (its robots stand still to the end)
-              wait          the slot is free again    (whoever joins next takes over, with fresh agents)
+              wait          the slot is free again    (the run waits until somebody plays its robots)
+              stand, coast  the slot is free again    (the run goes on: its robots stand, or do what they did last)
+    a frame "leave"         as a loss, but that stop raises Interrupted: nobody failed
 
-Whatever else does not fit is counted by name and dropped; it never changes the state.
+An open run, whose runners come from elsewhere, bears losses before the first tick, too. Whatever else does not fit is
+counted by name and dropped; it never changes the state.
 """
 
 import re
@@ -15,19 +19,29 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar
+from typing import Generic, Literal, NoReturn, TypeVar
 
 import msgpack
 import numpy as np
-from msgpack.exceptions import UnpackException
 
-from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.assignment import Assignment, robots_text
+from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted, RunnerLost
+from swarmwire.comms.memory import GroupMemory
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.memory_frames import decode_memory, encode_memory
+from swarmwire.comms.wire.offer import Offer
+from swarmwire.world.crews.change import Change, What
 from swarmwire.world.crews.runner_health import RunnerHealth
 from swarmwire.world.crews.slot import Slot
+from swarmwire.world.crews.split_robots import merged, part_of
+from swarmwire.world.crews.terms import USUAL, Terms
 
 NAME = re.compile(r"[\w.-]{1,64}", re.ASCII)  # of a runner: it is part of a key, so no wildcard, slash or hash
-OnLoss = Literal["stop", "dead", "wait"]
+NOBODY = -1  # owner of a robot that no slot holds
+OnLoss = Literal["stop", "dead", "wait", "stand", "coast"]
+GOES_ON = ("stand", "coast")  # where the run waits for nobody once it began
 
 
 class Refused(Exception):
@@ -50,27 +64,46 @@ S = TypeVar("S", bound=Slot)
 
 
 class Roster(ABC, Generic[S]):
-    """The runners of a run: what lockstep and real time share."""
+    """The runners of a run: what lockstep and real time share.
 
-    def __init__(self, slots: list[S], on_loss: OnLoss) -> None:
-        self._slots, self._on_loss = slots, on_loss
+    Attributes:
+        losses: runners that were lost while the run went on.
+        changes: runners that came and went; those that a run starts itself are told of only once it began.
+    """
+
+    def __init__(self, parts: list[Assignment], on_loss: OnLoss, terms: Terms = USUAL) -> None:
+        """`parts` of the robots are free: a runner that asks for nothing in particular gets the next one."""
+        self._slots, self._on_loss, self._terms = [self._slot(part) for part in parts], on_loss, terms
         self._by_runner: dict[str, S] = {}
-        rows = np.concatenate([slot.rows for slot in slots])
-        self._owner = np.empty(len(rows), np.int64)  # slot of each robot row
-        self._owner[rows] = np.concatenate([np.full(len(slot.rows), i) for i, slot in enumerate(slots)])
+        self._owner = self._owners()
+        self._rows = {name: row for part in parts for name, row in _named(part)}
+        self._gone: set[str] = set()  # runners that left or were lost
         self._tick = -1
         self._counts: Counter[str] = Counter()
         self.losses: list[Loss] = []
+        self.changes: list[Change] = []
 
     @property
     def waiting(self) -> int:
-        """How many runners are not ready: 0 before the first tick, once all are there, and when all have answered."""
-        return sum(slot.state not in ("ready", "dead") for slot in self._slots)
+        """How many runners are not ready: 0 once the first tick may begin, and when all have answered."""
+        if self._tick < 0 and self._terms.start_with is not None:
+            return int(self.robots_played < self._terms.start_with)
+        return sum(self._holds_up(slot) for slot in self._slots)
+
+    @property
+    def robots_played(self) -> int:
+        """Robots whose agents are ready."""
+        return sum(len(slot.all_rows) for slot in self._slots if slot.state in ("ready", "waiting"))
+
+    @property
+    def robots_free(self) -> int:
+        """Robots that nobody plays, and whose agents are still to be built."""
+        return sum(len(slot.all_rows) for slot in self._slots if slot.state in ("free", "joined"))
 
     @property
     def bears_losses(self) -> bool:
         """Whether the run goes on without a runner that is lost now."""
-        return self._on_loss != "stop" and self._tick >= 0
+        return self._terms.open if self._tick < 0 else self._on_loss != "stop"
 
     @property
     def missing(self) -> tuple[str, str]:
@@ -85,28 +118,51 @@ class Roster(ABC, Generic[S]):
     def health(self) -> RunnerHealth:
         """How the runners are doing."""
         playing = sum(slot.state in ("ready", "waiting") for slot in self._slots)
-        return RunnerHealth(playing, len(self.losses), frames_dropped=self._counts["frames_dropped_by_runners"])
+        return RunnerHealth(
+            playing,
+            len(self.losses),
+            frames_dropped=self._counts["frames_dropped_by_runners"],
+            left=self._counts["runners_left"],
+            robots_free=self.robots_free,
+        )
 
-    def join(self, request: bytes) -> tuple[str, bytes]:
-        """Give the next free robots to a runner: its name and the reply; Refused with a reason for the runner."""
+    def is_building(self, runner: str) -> bool:
+        """Whether a runner has robots whose agents are not ready yet."""
+        slot = self._by_runner.get(runner)
+        return slot is not None and slot.state == "joined"
+
+    def offer(self) -> Offer | None:
+        """What there is to play at present; None: nothing is told."""
+        if self._terms.offer is None:
+            return None
+        free: dict[str, list[str]] = {}
+        for slot in self._slots:
+            if slot.may("joins"):
+                for group in slot.assignment.groups:
+                    free.setdefault(group.name, []).extend(group.robot_names)
+        return self._terms.offer.with_free(free)
+
+    def join(self, runner: str, request: bytes) -> bytes:
+        """Give a runner the free robots that it asks for: the reply; Refused with a reason for the runner."""
         try:
-            asked: object = msgpack.unpackb(request)
-        except (ValueError, UnpackException):
-            asked = None
-        match asked:
-            case {"v": frames.VERSION, "runner": str(runner)} if NAME.fullmatch(runner):
-                pass
-            case _:
-                self._counts["bad_join"] += 1
-                raise Refused(f"expected a request of version {frames.VERSION} with a runner's name")
-        free = next((slot for slot in self._slots if slot.may("joins")), None)
-        if runner in self._by_runner or free is None:
-            self._counts["refused_join"] += 1
-            raise Refused("this name is in use" if runner in self._by_runner else "all robots are taken")
-        free.move("joins")
-        free.runner = runner
-        self._by_runner[runner] = free
-        return runner, msgpack.packb(free.assignment.as_mapping())
+            asked = JoinRequest.decode(request)
+        except BadFrame as fault:
+            self._refuse(str(fault), "bad_join")
+        if not NAME.fullmatch(runner):
+            self._refuse("expected a name of letters, digits, '_', '-' and '.', 64 at most", "bad_join")
+        if runner in self._by_runner:
+            self._refuse(f"the name {runner} is in use: another runner of this name plays")
+        if self._terms.most_runners is not None and len(self._by_runner) >= self._terms.most_runners:
+            self._refuse(f"there are {len(self._by_runner)} runners already, the most that this run takes")
+        self._check_scenario(asked)
+        slot = self._granted(asked)
+        slot.move("joins")
+        slot.runner = runner
+        self._by_runner[runner] = slot
+        memory = None
+        if self._terms.memory is not None:
+            memory = encode_memory({name: GroupMemory.joined(parts) for name, parts in slot.memory.items()})
+        return msgpack.packb({**slot.assignment.as_mapping(), "v": frames.VERSION, "memory": memory})
 
     def gone(self, runner: str, reason: str) -> None:
         """A runner's token vanished: it is lost if it plays robots."""
@@ -116,8 +172,8 @@ class Roster(ABC, Generic[S]):
 
     def lose_silent(self, reason: str) -> None:
         """Whoever keeps the others waiting is lost; robots that a run already waits for go on waiting."""
-        for slot in self._slots:
-            if slot.state not in ("ready", "dead") and (slot.state != "free" or not self.bears_losses):
+        for slot in list(self._slots):
+            if self._holds_up(slot) and (slot.state != "free" or not self.bears_losses):
                 self._lose(slot, reason)
 
     def answer(self, runner: str, data: bytes) -> list[tuple[str, bytes]]:
@@ -127,21 +183,28 @@ class Roster(ABC, Generic[S]):
             if slot is None:
                 raise BadFrame("unknown_runner", runner)
             frame = frames.decode(data)
-            if frame.kind == "failed":
-                self._failed(slot, frame)
-            elif frame.kind == "ready" and slot.may("is ready"):
-                slot.move("is ready")
-                return [(runner, missed) for missed in self._catch_up(slot)]
-            elif frame.kind != "actions":
-                raise BadFrame("unexpected_kind", frame.kind)
-            else:
+            if frame.kind == "actions":
                 self._acted(slot, frame)
                 dropped = frame.values.get("dropped", 0)
                 if type(dropped) is int and dropped > 0:
                     self._counts["frames_dropped_by_runners"] += dropped
+            elif frame.kind == "failed":
+                self._failed(slot, frame)
+            elif frame.kind == "leave":
+                self._leave(slot)
+            elif frame.kind == "ready" and slot.may("is ready"):
+                slot.move("is ready")
+                self._came(slot)
+                return [(runner, missed) for missed in self._catch_up(slot)]
+            else:
+                raise BadFrame("unexpected_kind", frame.kind)
         except BadFrame as fault:
             self._counts[f"{fault.fault}_frames"] += 1
         return []
+
+    @abstractmethod
+    def _slot(self, assignment: Assignment) -> S:
+        """A slot of these robots, free."""
 
     @abstractmethod
     def _catch_up(self, slot: S) -> Sequence[bytes]:
@@ -151,15 +214,52 @@ class Roster(ABC, Generic[S]):
     def _acted(self, slot: S, frame: frames.Frame) -> None:
         """Take an "actions" frame; BadFrame, and nothing changed, if it does not fit."""
 
+    def _memory(self, slot: S, frame: frames.Frame) -> dict[str, list[GroupMemory]]:
+        """What is remembered of a slot's robots once this answer counts; BadFrame if it is not as it should be."""
+        if self._terms.memory is None:
+            return slot.memory
+        rows = {group.name: group.rows for group in slot.assignment.groups}
+        return slot.memory | {name: [of] for name, of in decode_memory(frame, self._terms.memory, rows).items()}
+
+    def _holds_up(self, slot: S) -> bool:
+        """Whether the loop cannot go on before this slot's runner did something."""
+        if self._tick >= 0 and self._on_loss in GOES_ON:
+            return slot.state == "waiting"
+        return slot.state not in ("ready", "dead")
+
     def _lose(self, slot: S, reason: str) -> None:
-        loss = Loss(slot.runner or "that did not join", slot.assignment.robots_text, reason)
+        runner, robots = slot.runner or "that did not join", slot.assignment.robots_text
         if not self.bears_losses:
-            raise RunnerLost(loss.runner, loss.robots, reason)
-        slot.move("is given up" if self._on_loss == "dead" else "is lost")
-        del self._by_runner[loss.runner]
+            raise RunnerLost(runner, robots, reason)
+        self._free(slot, runner, "lost", reason)
+        self.losses.append(Loss(runner, robots, reason))
+
+    def _leave(self, slot: S) -> None:
+        runner = slot.runner or ""
+        if not self.bears_losses:
+            raise Interrupted(f"runner {runner} left, which played {slot.assignment.robots_text}")
+        self._free(slot, runner, "left", "")
+
+    def _free(self, slot: S, runner: str, what: What, reason: str) -> None:
+        """A slot's runner is gone: its robots are free again, or given up."""
+        slot.move("is given up" if self._tick >= 0 and self._on_loss == "dead" else "is lost")
+        del self._by_runner[runner]
         slot.runner = None
-        self._counts["runners_lost"] += 1
-        self.losses.append(loss)
+        self._gone.add(runner)
+        self._counts[f"runners_{what}"] += 1
+        self._changed(what, runner, slot, reason)
+
+    def _came(self, slot: S) -> None:
+        """A slot's agents are ready."""
+        runner = slot.runner or ""
+        back = runner in self._gone
+        if back or self._tick >= 0:
+            self._counts["runners_returned" if back else "runners_joined_late"] += 1
+        if self._terms.open or self._tick >= 0:
+            self._changed("returned" if back else "joined", runner, slot)
+
+    def _changed(self, what: What, runner: str, slot: S, reason: str = "") -> None:
+        self.changes.append(Change(what, runner, slot.assignment.robots_text, self._tick, reason))
 
     def _failed(self, slot: S, frame: frames.Frame) -> None:
         match frame.values:
@@ -167,3 +267,87 @@ class Roster(ABC, Generic[S]):
                 raise AgentFailed(robots, traceback)
             case _:
                 raise AgentFailed(slot.assignment.robots_text, "(the runner sent no traceback)")
+
+    def _refuse(self, text: str, count: str = "refused_join") -> NoReturn:
+        self._counts[count] += 1
+        raise Refused(text)
+
+    def _check_scenario(self, asked: JoinRequest) -> None:
+        offer = self._terms.offer
+        if offer is not None and asked.scenario_sha256 not in (None, offer.scenario_sha256):
+            self._refuse(f"another scenario: here is {offer.scenario!r}, whose file has another sha256")
+
+    def _check_agents(self, asked: JoinRequest, groups: Sequence[str]) -> None:
+        """The runner's own agents must be those of the run, unless it says nothing of them."""
+        if asked.agents is None or self._terms.offer is None:
+            return
+        for group in self._terms.offer.groups:
+            got = asked.agents.get(group.name)
+            if group.name in groups and got != group.agent_sha256:
+                its = "none" if got is None else f"{got[:12]}…"
+                here = f"{group.agent} has sha256 {group.agent_sha256[:12]}… here"
+                self._refuse(f"another agent for {group.name}: {here}, the runner's own has {its}")
+
+    def _granted(self, asked: JoinRequest) -> S:
+        """The slot of the robots that are asked for; Refused, and nothing changed, if they are not to be had."""
+        free = [slot for slot in self._slots if slot.may("joins")]
+        if asked.names is not None:
+            rows = self._named(asked.names)
+        elif not free:
+            self._refuse("all robots are taken")
+        elif asked.robots is None:
+            rows = free[0].all_rows
+        else:
+            rows = np.sort(np.concatenate([slot.all_rows for slot in free]))[: asked.robots]
+            if len(rows) < asked.robots:
+                self._refuse(f"expected at most {len(rows)} robots, which are free, got {asked.robots}")
+        most = self._terms.most_robots
+        if most is not None and len(rows) > most:
+            self._refuse(f"expected at most {most} robots for one runner, got {len(rows)}")
+        from_slots = [slot for slot in free if np.isin(slot.all_rows, rows).any()]
+        self._check_agents(asked, [group.name for slot in from_slots for group in slot.assignment.groups])
+        return self._cut(from_slots, rows)
+
+    def _named(self, names: Sequence[str]) -> IntArray:
+        """The rows of robots that are free; Refused if one is not, or is none."""
+        strange = [name for name in names if name not in self._rows]
+        if strange or len(set(names)) < len(names) or not names:
+            every = robots_text(list(self._rows))
+            self._refuse(f"expected names of robots, each once ({every}), got {robots_text(list(names))}")
+        rows = np.sort(np.array([self._rows[name] for name in names], np.int64))
+        for slot in self._slots:
+            theirs = np.isin(rows, slot.all_rows)
+            if theirs.any() and not slot.may("joins"):
+                taken = robots_text([name for name in names if self._rows[name] in rows[theirs]])
+                self._refuse(f"taken, by {slot.runner}: {taken}" if slot.runner else f"given up: {taken}")
+        return rows
+
+    def _cut(self, free: Sequence[S], rows: IntArray) -> S:
+        """A slot of exactly these rows, all of which are in these free slots."""
+        if len(free) == 1 and len(free[0].all_rows) == len(rows):
+            return free[0]
+        slot = self._slot(merged([part_of(old.assignment, rows) for old in free]))
+        for old in free:
+            slot.remember(old, rows)
+            rest = old.all_rows[~np.isin(old.all_rows, rows)]
+            place = self._slots.index(old)
+            if len(rest):
+                kept = self._slots[place] = self._slot(part_of(old.assignment, rest))
+                kept.remember(old, rest)
+            else:
+                del self._slots[place]
+        self._slots.append(slot)
+        self._owner = self._owners()
+        return slot
+
+    def _owners(self) -> IntArray:
+        """The slot of each robot row."""
+        rows = [slot.all_rows for slot in self._slots]
+        owner = np.full(1 + max(int(own.max()) for own in rows), NOBODY)
+        for place, own in enumerate(rows):
+            owner[own] = place
+        return owner
+
+
+def _named(part: Assignment) -> list[tuple[str, int]]:
+    return [pair for group in part.groups for pair in zip(group.robot_names, group.rows.tolist(), strict=True)]

@@ -20,6 +20,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.keys import Keys, runner_of
 from swarmwire.comms.wire.sessions import open_world
+from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.roster import Loss, Refused, Roster
 from swarmwire.world.crews.runner_health import RunnerHealth
 
@@ -36,12 +37,15 @@ class Surroundings:
     """What a crew asks and tells whoever runs it.
 
     `trouble` says why there is no more point in waiting for runners (a process that exited), or None; it is asked while
-    any loss ends the run. `stopped` says whether the run is to end; `lost` is told of a loss that the run survives.
+    any loss ends the run. `stopped` says whether the run is to end; `lost` is told of a loss that the run survives,
+    `changed` of every runner that comes or goes, `refused` of one that may not join, and why.
     """
 
     trouble: Callable[[], str | None] = lambda: None
     stopped: Callable[[], bool] = lambda: False
     lost: Callable[[Loss], None] = lambda _: None
+    changed: Callable[[Change], None] = lambda _: None
+    refused: Callable[[str, str], None] = lambda _runner, _why: None
 
 
 class RunnerCrew(ABC, Generic[R]):
@@ -66,7 +70,8 @@ class RunnerCrew(ABC, Generic[R]):
         self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to
         self._frames: dict[str, zenoh.Publisher] = {}
         self._present: set[str] = set()
-        self._losses_told = 0
+        self._building: dict[str, int] = {}  # until when runners may take, wall time
+        self._losses_told = self._changes_told = 0
         self._patience_s = start_s  # how long a wait may last; in ticks the time-out
         self._deadline_ns = 0
 
@@ -81,7 +86,8 @@ class RunnerCrew(ABC, Generic[R]):
             ) from error
         arrived = (self._inbox.put, self._inbox)
         self._declared = (
-            session.declare_queryable(self._keys.join, arrived),
+            session.declare_queryable(self._keys.any_offer, arrived),
+            session.declare_queryable(self._keys.any_join, arrived),
             session.declare_subscriber(self._keys.any_answer, arrived),
             session.liveliness().declare_subscriber(self._keys.any_alive, arrived, history=True),
             session.liveliness().declare_token(self._keys.world),  # last: it says that runners may join
@@ -131,6 +137,8 @@ class RunnerCrew(ABC, Generic[R]):
         would be cold for each, since the runners use the cores in between.
         """
         self._allow_time()
+        if not self._roster.waiting:  # who joins is let in also where nobody is waited for
+            self._take_in()
         arrived: list[Item] = []
         while waiting := self._roster.waiting:
             while len(arrived) < waiting:
@@ -149,7 +157,13 @@ class RunnerCrew(ABC, Generic[R]):
             if self._clock.now_ns() > self._deadline_ns:
                 self._roster.lose_silent(f"no answer for {self._patience_s:g} s")
                 self._allow_time()
-            self._tell_losses()
+            self._tell_changes()
+
+    def _take_in(self) -> None:
+        """All that has arrived by now, without waiting for more."""
+        for _ in range(self._inbox.qsize()):
+            self._handle(self._inbox.get())
+        self._tell_changes()
 
     def _allow_time(self) -> None:
         self._deadline_ns = self._clock.now_ns() + to_ns(self._patience_s)
@@ -165,7 +179,7 @@ class RunnerCrew(ABC, Generic[R]):
 
     def _handle(self, item: Item) -> None:
         if isinstance(item, zenoh.Query):
-            self._join(item)
+            self._asked(item)
             return
         key = str(item.key_expr)
         runner = runner_of(key)
@@ -179,25 +193,47 @@ class RunnerCrew(ABC, Generic[R]):
         else:
             self._present.add(runner)
 
-    def _join(self, query: zenoh.Query) -> None:
+    def _asked(self, query: zenoh.Query) -> None:
+        """A runner asks what there is to play, or for robots."""
         if self._session is None:
             return
+        key = str(query.key_expr)
+        runner = runner_of(key)
         with query:  # a query that is kept alive holds the asker until its time-out
+            if key == self._keys.offer(runner):
+                offer = self._roster.offer()
+                if offer is not None:
+                    query.reply(key, offer.encode())
+                return
             try:
-                runner, reply = self._roster.join(query.payload.to_bytes() if query.payload else b"")
+                # Only the exact key speaks for a runner, as below.
+                speaker = runner if key == self._keys.join(runner) else key
+                reply = self._roster.join(speaker, query.payload.to_bytes() if query.payload else b"")
             except Refused as refusal:
+                self._around.refused(runner, str(refusal))
                 query.reply_err(str(refusal))
                 return
             self._frames[runner] = self._session.declare_publisher(
                 self._keys.frame(runner), congestion_control=self.congestion, express=True
             )
+            self._building[runner] = self._clock.now_ns() + to_ns(START_S)
             self._allow_time()
-            query.reply(self._keys.join, reply)
+            query.reply(key, reply)
 
-    def _tell_losses(self) -> None:
+    def _tell_changes(self) -> None:
         """A runner that was lost may be but slow: it is told to leave, since it has no robots any more."""
+        for runner, until_ns in list(self._building.items()):
+            if not self._roster.is_building(runner):
+                del self._building[runner]
+            elif self._clock.now_ns() > until_ns:
+                self._roster.gone(runner, f"its agents were not ready within {START_S:g} s")
         for loss in self._roster.losses[self._losses_told :]:
-            self._frames.pop(loss.runner).put(frames.encode("end", -1, {}))
-            self._present.discard(loss.runner)
             self._around.lost(loss)
         self._losses_told = len(self._roster.losses)
+        for change in self._roster.changes[self._changes_told :]:
+            if change.what in ("lost", "left"):
+                why = {"why": change.reason} if change.reason else {}
+                self._frames.pop(change.runner).put(frames.encode("end", -1, {}, why))
+                self._present.discard(change.runner)
+            self._around.changed(change)
+        self._changes_told = len(self._roster.changes)

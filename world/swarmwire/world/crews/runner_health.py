@@ -12,3 +12,5 @@ class RunnerHealth:
     late_answers: int = 0  # after their own tick, one per robot; in real time
     frames_dropped: int = 0  # to runners, never acted on
     watchdog_stops: int = 0  # of robots; in real time
+    left: int = 0  # runners that said so
+    robots_free: int = 0  # that no agent plays now

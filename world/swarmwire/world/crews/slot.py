@@ -4,13 +4,14 @@
 waited for: there a runner that is asked stays ready.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.memory import GroupMemory
 
 State = Literal["free", "joined", "ready", "waiting", "dead"]
 Move = Literal["joins", "is ready", "is asked", "answers", "is lost", "is given up"]
@@ -32,11 +33,22 @@ class Slot:
     rows: IntArray  # (n,) that act in the tick that is open, in the order of the answer: group after group
     runner: str | None = None
     state: State = "free"
+    memory: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])  # of all rows, by group
+
+    def __post_init__(self) -> None:
+        self._all_rows = rows_of(self.assignment)
 
     @property
     def all_rows(self) -> IntArray:
         """Every robot of the slot, (n,)."""
-        return rows_of(self.assignment)
+        return self._all_rows
+
+    def remember(self, other: "Slot", rows: IntArray) -> None:
+        """What another slot remembers of these robots is remembered here, too."""
+        for name, parts in other.memory.items():
+            own = [part for part in (part.of(rows) for part in parts) if len(part.rows)]
+            if own:
+                self.memory.setdefault(name, []).extend(own)
 
     def may(self, move: Move) -> bool:
         """Whether the move leads anywhere from the state."""

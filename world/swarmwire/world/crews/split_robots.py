@@ -35,10 +35,11 @@ def whole(scenario: Scenario, static: Static, agents: Mapping[str, str]) -> Assi
 def split(assignment: Assignment, runners: int) -> list[Assignment]:
     """The robots in as many nearly equal parts, at most one part per robot, along the robot rows."""
     rows = np.sort(np.concatenate([group.rows for group in assignment.groups]))
-    return [_part(assignment, part) for part in np.array_split(rows, min(runners, len(rows)))]
+    return [part_of(assignment, part) for part in np.array_split(rows, min(runners, len(rows)))]
 
 
-def _part(assignment: Assignment, rows: IntArray) -> Assignment:
+def part_of(assignment: Assignment, rows: IntArray) -> Assignment:
+    """The assignment's robots that are among these rows."""
     groups: list[GroupAssignment] = []
     for group in assignment.groups:
         at = np.flatnonzero(np.isin(group.rows, rows))
@@ -54,6 +55,33 @@ def _part(assignment: Assignment, rows: IntArray) -> Assignment:
                 )
             )
     return Assignment(tuple(groups), assignment.rate_hz, assignment.gives)
+
+
+def merged(parts: list[Assignment]) -> Assignment:
+    """The robots of all parts of one run, in one assignment."""
+    if len(parts) == 1:
+        return parts[0]
+    names = list(dict.fromkeys(group.name for part in parts for group in part.groups))
+    groups = [_one([group for part in parts for group in part.groups if group.name == name]) for name in names]
+    return replace(parts[0], groups=tuple(groups))
+
+
+def _one(parts: list[GroupAssignment]) -> GroupAssignment:
+    """The robots of all parts of one group."""
+    rows = np.concatenate([part.rows for part in parts])
+    order = np.argsort(rows)
+    names = [name for part in parts for name in part.robot_names]
+    params = {
+        name: [item for part in parts for item in part.params[name]] if isinstance(value, list) else value
+        for name, value in parts[0].params.items()
+    }
+    return replace(
+        parts[0],
+        params=params_of(params, order),
+        rows=rows[order],
+        robot_names=tuple(names[at] for at in order.tolist()),
+        keys=np.concatenate([part.keys for part in parts])[order],
+    )
 
 
 def _rows(static: Static, start: int, stop: int) -> IntArray:

@@ -7,6 +7,7 @@ import typer
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.certificates.purposes import PURPOSES
 from swarmwire.deploy.commands.certs.needed import AuthorityFolder, need_cryptography
 
 if TYPE_CHECKING:
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
 def issue_command(
     folder: AuthorityFolder,
     names: Annotated[
-        list[str] | None, typer.Argument(help="Whose: robots' names, tracker, operator.", metavar="NAME…")
+        list[str] | None,
+        typer.Argument(help="Whose: names of robots, runners, …; tracker, operator, world.", metavar="NAME…"),
     ] = None,
     hosts: Annotated[
         list[str] | None,
@@ -30,7 +32,13 @@ def issue_command(
     ] = None,
     days: Annotated[int, typer.Option(min=1, max=3650, help="How long they hold.")] = 365,
     purpose: Annotated[
-        str | None, typer.Option("--for", help="What for, as the list tells. Default: robot, tracker or operator.")
+        str | None,
+        typer.Option(
+            "--for",
+            help=f"{', '.join(PURPOSES)}. Default: what the name's last one is for, or the name, if it is in this "
+            "list, or robot.",
+            metavar="PURPOSE",
+        ),
     ] = None,
     renew: Annotated[
         bool, typer.Option("--renew", help="Also for names whose certificate is good; the old one holds to its end.")
@@ -43,6 +51,8 @@ def issue_command(
       swarmwire certs issue lab-ca flock-0 --host 10.0.0.10
 
       swarmwire certs issue lab-ca --fleet fleet.toml
+
+      swarmwire certs issue lab-ca laptop-1 laptop-2 --for runner
     """
     need_cryptography()
     from swarmwire.deploy.certificates.certificate_folder import issue

@@ -1,0 +1,16 @@
+"""What a certificate of a swarm's network is for; the register keeps it, the certificate itself is the same for all."""
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.one_of import one_of
+from swarmwire.comms.wire.access import OPERATOR, TRACKER
+from swarmwire.comms.wire.run_access import WORLD
+
+ROBOT, RUNNER, OBSERVER, ROUTER = "robot", "runner", "observer", "router"
+PURPOSES = (ROBOT, TRACKER, OPERATOR, RUNNER, OBSERVER, ROUTER, WORLD)
+
+
+def checked_purpose(purpose: str | None) -> str | None:
+    """The purpose, if one is told; BadInput for one that nobody looks for."""
+    if purpose is not None and purpose not in PURPOSES:
+        raise BadInput("--for", "", f"expected {one_of(PURPOSES, purpose)}, got {purpose!r}")
+    return purpose

@@ -1,0 +1,29 @@
+"""What became of runners while a run went on: who joined, left, was lost and returned."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+What = Literal["joined", "left", "lost", "returned"]
+
+
+@dataclass(frozen=True)
+class Change:
+    """One runner that came or went."""
+
+    what: What
+    runner: str
+    robots: str  # in a few words
+    tick: int  # that was open; -1: before the first
+    reason: str = ""  # why it was lost
+
+    def __str__(self) -> str:
+        when = "before the first tick" if self.tick < 0 else f"in tick {self.tick}"
+        return f"{self.runner} {_SAID[self.what]} {self.robots} {when}" + (f": {self.reason}" if self.reason else "")
+
+
+_SAID: dict[What, str] = {
+    "joined": "joined with",
+    "left": "left",
+    "lost": "was lost with",
+    "returned": "returned to",
+}

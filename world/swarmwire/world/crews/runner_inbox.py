@@ -1,0 +1,64 @@
+"""What arrives from runners, between the network's threads and the loop: so much of each runner waits, and no more.
+
+A runner that sends more than it is asked for takes nobody else's place and no memory without bound. What is dropped is
+counted by name; a token that is dropped shows in the time-out of its runner.
+"""
+
+import queue
+import threading
+from collections import Counter
+
+import zenoh
+
+from swarmwire.comms.wire.keys import runner_of
+from swarmwire.comms.wire.limits import LIMITS, Limits
+
+Item = zenoh.Sample | zenoh.Query
+
+
+class RunnerInbox:
+    """The runners' answers, tokens and requests, in the order in which they arrived."""
+
+    def __init__(self, limits: Limits = LIMITS) -> None:
+        self._limits = limits
+        self._arrived: queue.SimpleQueue[tuple[str, int, Item]] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        self._waiting: dict[str, tuple[int, int]] = {}  # of each runner: items, and their bytes
+        self._asked: Counter[str] = Counter()
+        self._dropped: Counter[str] = Counter()
+
+    def put(self, item: Item) -> None:
+        """Called from the network's threads; it returns at once."""
+        runner, payload = runner_of(str(item.key_expr)), item.payload
+        size = 0 if payload is None else len(payload)
+        limits = self._limits
+        with self._lock:
+            if isinstance(item, zenoh.Query):
+                self._asked[runner] += 1
+                if self._asked[runner] > limits.requests:
+                    self._dropped["flooded_requests"] += 1
+                    return  # the asker gets no answer as soon as nobody holds the query
+            items, waiting_bytes = self._waiting.get(runner, (0, 0))
+            if items >= limits.waiting or (items and waiting_bytes + size > limits.waiting_bytes):
+                self._dropped["flooded_frames"] += 1
+                return
+            self._waiting[runner] = items + 1, waiting_bytes + size
+        self._arrived.put((runner, size, item))
+
+    def get(self, timeout: float | None = None) -> Item:
+        """The next item; queue.Empty if there is none in time."""
+        runner, size, item = self._arrived.get(timeout=timeout)
+        with self._lock:
+            items, waiting_bytes = self._waiting.pop(runner)
+            if items > 1:
+                self._waiting[runner] = items - 1, waiting_bytes - size
+        return item
+
+    def qsize(self) -> int:
+        """How many wait, about."""
+        return self._arrived.qsize()
+
+    def counts(self) -> dict[str, int]:
+        """What was dropped, by name."""
+        with self._lock:
+            return dict(self._dropped)

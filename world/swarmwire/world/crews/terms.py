@@ -1,0 +1,32 @@
+"""On what terms runners join a run: what they are offered, whether they may come late, and how many."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from swarmwire.comms.memory import Layout
+from swarmwire.comms.wire.offer import Offer
+
+
+@dataclass(frozen=True)
+class Terms:
+    """What a world asks of its runners.
+
+    Attributes:
+        offer: what there is to play; None: nothing is told, and no agent is compared.
+        open: whether runners come from elsewhere and when they like: nobody is waited for in vain, and who leaves
+            before the first tick only frees its robots.
+        start_with: robots with an agent that are enough for the first tick; None: all.
+        most_runners: at a time; None: as many as there are robots.
+        most_robots: of one runner; None: all.
+        memory: by group, what is kept of its robots for whoever plays them next; None: nothing is.
+    """
+
+    offer: Offer | None = None
+    open: bool = False
+    start_with: int | None = None
+    most_runners: int | None = None
+    most_robots: int | None = None
+    memory: Mapping[str, Layout] | None = None
+
+
+USUAL = Terms()  # of runners that the run starts itself
