@@ -30,7 +30,7 @@ class Limits:
     runners: int = 2000
     robots_per_runner: int = 20_000
     waiting: int = 64
-    waiting_bytes: int = MOST_BYTES
+    waiting_bytes: int = 2 * MOST_BYTES
     requests: int = 2000
     join_s: float = 60.0
 

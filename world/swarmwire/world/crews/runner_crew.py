@@ -23,12 +23,12 @@ from swarmwire.comms.wire.sessions import open_world
 from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.roster import Loss, Refused, Roster
 from swarmwire.world.crews.runner_health import RunnerHealth
+from swarmwire.world.crews.runner_inbox import Item, RunnerInbox
 
 POLL_S = 0.2  # how often a wait looks up whether to go on waiting
 START_S = 60.0  # how long runners may take to join and build their agents
 FAREWELL_S = 3.0  # how long runners may take to leave after the end
 
-Item = zenoh.Sample | zenoh.Query
 R = TypeVar("R", bound=Roster[Any])
 
 
@@ -65,7 +65,7 @@ class RunnerCrew(ABC, Generic[R]):
     ) -> None:
         self._endpoint, self._keys = endpoint, Keys(run_id)
         self._roster, self._timeout_s, self._clock, self._around = roster, timeout_s, clock, around
-        self._inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
+        self._inbox = RunnerInbox()
         self._session: zenoh.Session | None = None
         self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to
         self._frames: dict[str, zenoh.Publisher] = {}
@@ -106,7 +106,7 @@ class RunnerCrew(ABC, Generic[R]):
 
     def counts(self) -> dict[str, int]:
         """Frames that were dropped and runners that were lost, by name."""
-        return self._roster.counts()
+        return {**self._roster.counts(), **self._inbox.counts()}
 
     def health(self) -> RunnerHealth:
         """How the runners are doing."""
