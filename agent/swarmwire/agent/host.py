@@ -37,14 +37,14 @@ class Host:
         self._waiting: Told | None = None  # that came between ticks; None: nothing
 
     def receive(self, heard: Heard, outcomes: Outcomes) -> None:
-        """Keep what came between ticks until the robots that it is for step, or hear; what is for others is left out."""
+        """Keep what came between ticks until the robots that it is for step, or hear; what is for others is lost."""
         rows = np.concatenate([agents.group.rows for agents in self._groups.values()])
         came = Told(heard, outcomes).of(np.sort(rows))
         if came:
             self._waiting = self._waiting.followed_by(came) if self._waiting else came
 
     def hear(self, tick: int, at_ns: int) -> Sent:
-        """Let agents that read between ticks read, at a time in this tick; what they sent. AgentFailed if one raises."""
+        """Let agents that read between ticks read, at a time in this tick: what they sent. AgentFailed as for `act`."""
         sent: list[Sent] = []
         for agents in self._groups.values():
             if self._waiting and agents.hears:

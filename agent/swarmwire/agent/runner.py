@@ -2,8 +2,8 @@
 
 It joins (gets robots), declares its token, builds the agents, says "ready", then answers `tick` frames with one
 `actions` frame each until the world says "end" or is gone. In real time `packets` frames may come between ticks: agents
-that read between their steps answer with a `sent` frame, for all others they wait for the tick. All that arrives lands in one queue, put there by the
-network thread itself: no Python thread per subscription, so a runner stays small.
+that read between their steps answer with a `sent` frame, for all others they wait for the tick. All that arrives lands
+in one queue, put there by the network thread itself: no Python thread per subscription, so a runner stays small.
 """
 
 # zenoh's stubs leave out the return types of put, reply and close.

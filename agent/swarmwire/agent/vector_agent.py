@@ -126,7 +126,7 @@ class VectorAgent(ABC, Generic[S]):
         """Called once a tick with the robots that act in it: read `robots`, then drive and send."""
 
     def hear(self, robots: Robots, state: S) -> None:
-        """If it is defined: called between steps when packets have come, as for Agent, with all robots of the last step."""
+        """If it is defined: called between steps when packets have come, as for Agent, with the last step's robots."""
 
 
 def freeze(agent: VectorAgent[Any], per_robot: dict[str, FloatArray | IntArray]) -> None:

@@ -1,4 +1,4 @@
-"""The seam within a tick: crews that keep to the wall clock send while it goes on, and hand over what is heard in it."""
+"""The seam within a tick: crews that keep to the wall clock send while it goes on, and hand over what is heard."""
 
 from typing import NamedTuple, Protocol
 

@@ -15,6 +15,7 @@ from swarmwire.deploy.gateways.served import Served
 from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.world.crews import split_robots as assignments
 from swarmwire.world.crews.pace import Pace
+from swarmwire.world.crews.quanta import Quanta
 from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.crews.remote_crew import RemoteCrew
 from swarmwire.world.crews.roster import Loss
@@ -38,6 +39,7 @@ class Crews:
     stopped: Callable[[], bool]  # whether waiting for runners is to end
     lost: Callable[[Loss], None]  # is told of a runner that was lost while the run went on
     say: Callable[[str], None]  # what people should know at once
+    quanta: Quanta | None = None  # of real time, in which packets cross also between ticks
 
     @contextmanager
     def crew(self, served: Served | None = None) -> Generator[Crew]:
@@ -55,11 +57,12 @@ class Crews:
                     self.static.rate_hz,
                     served.show,
                     served.show_counts,
+                    self.quanta,
                 )
             return
         if not self.runners:
             with closing(LocalCrew(whole)) as local:
-                yield PacedCrew(local, self.pace) if self.pace else local
+                yield PacedCrew(local, self.pace, self.quanta) if self.pace else local
             return
         processes: list[RunnerProcesses] = []
 
@@ -83,7 +86,9 @@ class Crews:
     def _remote(self, endpoint: str, parts: list[Assignment], around: Surroundings) -> RemoteCrew | RealTimeCrew:
         table = self.scenario.run
         common = endpoint, self.run_id, parts, table.runner_timeout_s, self.clock, around, table.on_runner_loss
-        return RealTimeCrew(*common, self.pace, table.watchdog_s) if self.pace else RemoteCrew(*common)
+        if self.pace is None:
+            return RemoteCrew(*common)
+        return RealTimeCrew(*common, self.pace, table.watchdog_s, quanta=self.quanta)
 
     def _survive(self, loss: Loss, endpoint: str) -> None:
         """Tell people of a runner that was lost, and of what they can do."""

@@ -4,16 +4,18 @@ from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, cast
 
-from swarmwire.comms.clock import WallClock, to_s
+from swarmwire.comms.clock import PreciseClock, WallClock, to_s
 from swarmwire.comms.errors import Interrupted
+from swarmwire.comms.in_time import TimedCrew
 from swarmwire.comms.protocols import Crew, Judge, Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.arguments import (
     Runners,
     choose_seeds,
+    quantum_of,
     real_time_factor,
     runner_count,
     scenario_of,
@@ -45,6 +47,7 @@ from swarmwire.metrics.judge import Judge as StopJudge
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.world.crews.pace import Pace
+from swarmwire.world.crews.quanta import Quanta
 from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.crews.remote_crew import RemoteCrew
 from swarmwire.world.crews.roster import Loss
@@ -96,6 +99,7 @@ class Simulation:
         observers: Sequence[Observer] = (),
         socket: Path | None = None,
         realtime: float | str | None = None,
+        quantum: float | None = None,
         record: Recording | None = None,
         gateways: GatewaysGiven = None,
         replay: Replay | None = None,
@@ -105,6 +109,7 @@ class Simulation:
         self.scenario = scenario_of(scenario, overrides)
         self._behind = Behind(as_gateways(gateways), self.scenario)
         factor = self._behind.factor(real_time_factor(realtime))
+        self._quantum_s = quantum_of(quantum, factor, self.scenario)
         self.agents = agent_specs(self.scenario)
         self.world = self._new_world(seed, seeds)
         measures = measuring(self.scenario)
@@ -125,7 +130,9 @@ class Simulation:
         # Only now a folder: what is refused leaves none.
         self._record = RunRecord(None if out is None else Path(out), self._clock)
         rate_hz = self.scenario.time.rate_hz
-        self._pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
+        clock = PreciseClock(self._clock) if self._quantum_s else self._clock
+        self._pace = None if factor is None else Pace(clock, rate_hz, factor, self._record.say)
+        self._in_time = self._quantum_s is not None or (replay is not None and replay.within_ticks)
         self.controls = Controls(self._clock, rate_hz, self._pace, speed_fixed=bool(self._behind.kinds))
         self.run_id, self.interrupt = new_run_id(), Interrupt()
         self._observers: list[Guarded] = []
@@ -181,6 +188,7 @@ class Simulation:
             ticks=self.ticks,
             runners=self.runners,
             realtime=realtime,
+            quantum_s=self._quantum_s,
             gateways=self._behind.kinds,
             metrics=self.metrics,
         )
@@ -206,6 +214,7 @@ class Simulation:
                 self._watching,
                 self.scenario.events,
                 self.judge,
+                cast("TimedCrew", acting) if self._in_time else None,
             )
             crew.start()
             for observer in self._watching:
@@ -287,13 +296,17 @@ class Simulation:
             stopped=self._stopped,
             lost=self._losses.append,
             say=self._record.say,
+            quanta=Quanta(self._clock, self._pace, self.static.rate_hz, self._quantum_s)
+            if self._pace and self._quantum_s
+            else None,
         )
 
     def _from_outside(self, tick: int) -> bool:
         """Whether the actions of this tick need not follow from scenario and seed."""
         if self.inputs is not None:
             return tick >= self.inputs.first_tick
-        return bool(self._losses or self._behind.kinds) or (self._pace is not None and self.runners > 0)
+        in_real_time = self._pace is not None and (self.runners > 0 or self._quantum_s is not None)
+        return bool(self._losses or self._behind.kinds) or in_real_time
 
     def _stopped(self) -> bool:
         return self.interrupt.asked or self.controls.quit_asked

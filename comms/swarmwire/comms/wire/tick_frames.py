@@ -1,6 +1,7 @@
 """What a tick carries across the wire: senses and heard packets to a runner, actions back; checked on arrival."""
 
 from collections.abc import Mapping, Set
+from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
@@ -18,6 +19,8 @@ from swarmwire.comms.values import NO_VALUES, Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.checked import checked_array
 from swarmwire.comms.wire.frames import Frame
+
+NOTHING_BESIDE: Mapping[str, AnyArray] = MappingProxyType({})
 
 
 def encode_tick(tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> bytes:
@@ -84,9 +87,15 @@ def _outcomes(frame: Frame) -> Outcomes:
     return Outcomes(row, id_, result)
 
 
-def encode_actions(tick: int, actions: Actions, dropped: int = 0) -> bytes:
-    """An `actions` frame: what a runner's robots do and send, and how many frames to it were none that it could use."""
+def encode_actions(
+    tick: int, actions: Actions, dropped: int = 0, beside: Mapping[str, AnyArray] = NOTHING_BESIDE
+) -> bytes:
+    """An `actions` frame: what a runner's robots do and send, and how many frames to it were none that it could use.
+
+    `beside` are arrays that a record of actions has more.
+    """
     arrays: dict[str, AnyArray] = {
+        **beside,
         "rows": actions.rows,
         "command": np.array((actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps)),
     }

@@ -33,7 +33,8 @@ class Senders:
     def accept(self, sent_at_ns: IntArray, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """The packets as the radios take them up, sorted by sender; also kept in `queued`.
 
-        `sent_at_ns` (rows,) is when each robot hands its packets over, `others_alive` (rows,) are the receivers that a robot's broadcast intends, those of the epoch.
+        `sent_at_ns` (rows,) is when each robot hands its packets over, `others_alive` (rows,) are the receivers that a
+        robot's broadcast intends, those of the epoch.
         """
         packets = self._intake.take(sent_at_ns, sent, others_alive, epoch)
         on_air_at_ns, off_air_at_ns, fate = self._access(sent_at_ns, packets.sender, packets.payloads.sizes)
