@@ -38,7 +38,8 @@ class AirInTime:
         """Let the tick end that is under way; what became final in it, and what of that was not handed over."""
         self._release(start_ns)
         self._now_ns = start_ns
-        rest = self._air.advance(start_ns)
+        # What has been heard by now was heard, also by who dies now: as if it had been handed over in the tick.
+        rest = News.joined([self._air.advance_within(start_ns), self._air.advance(start_ns)])
         told, self._told = News.joined([*self._told, rest]), []
         return told, rest.heard, rest.outcomes
 
