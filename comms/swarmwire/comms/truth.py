@@ -1,5 +1,6 @@
 """Ground truth for observers: `Static` once, `Truth` per tick. It never crosses to a runner."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from math import inf
 from typing import Any, Literal
@@ -162,7 +163,7 @@ class Finished:
         some = [part for part in parts if len(part.arena)]
         if len(some) < 2:
             return some[0] if some else parts[0]
-        columns = {name: np.concatenate([_columns(part)[name] for part in some]) for name in _columns(some[0])}
+        columns = _joined_columns(some)
         if all(part.payload is not None and part.payloads is not None for part in some):
             tables = [part.payloads for part in some if part.payloads is not None]
             first = offsets(np.array([len(table) for table in tables]))
@@ -175,6 +176,11 @@ def _columns(table: "Finished | Departed") -> dict[str, Any]:
     """The arrays that a table has, by name; the payloads are none."""
     named = ((field.name, getattr(table, field.name)) for field in fields(table) if field.name != "payloads")
     return {name: column for name, column in named if column is not None}
+
+
+def _joined_columns(tables: "Sequence[Finished] | Sequence[Departed]") -> dict[str, Any]:
+    """The arrays of tables that have the same ones, by name, one after the other."""
+    return {name: np.concatenate([getattr(table, name) for table in tables]) for name in _columns(tables[0])}
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +208,7 @@ class Departed:
     @classmethod
     def joined(cls, parts: "list[Departed]") -> "Departed":
         """The packets of all parts, one or more."""
-        return cls(**{name: np.concatenate([_columns(part)[name] for part in parts]) for name in _columns(parts[0])})
+        return cls(**_joined_columns([part for part in parts if len(part.arena)] or parts[:1]))
 
 
 @dataclass(frozen=True, slots=True)

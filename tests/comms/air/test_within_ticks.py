@@ -11,6 +11,7 @@ from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.news import News
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.packets import Heard
 from tests.comms.air.runs import RATE_HZ, TICK_NS, make_air, packets, scattered
 from tests.comms.air.signal.radios import METHODS, with_access
 from tests.comms.air.test_accounts import RADIOS
@@ -43,7 +44,7 @@ def played(air: Air, parts: list[float], seed: int, out: int | None) -> tuple[li
     """
     rng = np.random.default_rng(seed)
     pose, alive = scattered(ROBOTS, seed), np.ones(ROBOTS, np.bool_)
-    news: list[News] = []
+    news, within = list[News](), list[Heard]()
     for tick in range(TICKS):
         start_ns = tick_start_ns(tick, RATE_HZ)
         if out is not None and tick in (1, 3):
@@ -52,19 +53,22 @@ def played(air: Air, parts: list[float], seed: int, out: int | None) -> tuple[li
                 off.radio_on[out] = off.alive[(out + 1) % ROBOTS] = False
             air.disrupt(off)
             alive = off.alive.copy()
-        news += [air.advance_within(start_ns), air.advance(start_ns)]
+        within.append(air.advance_within(start_ns)[0])
+        news.append(air.advance(start_ns))
         air.hold(pose, alive)
         sends = [(start_ns + int(at), rng.integers(0, ROBOTS, 3)) for at in sorted(rng.integers(0, TICK_NS, 3))]
         looks = [(start_ns + round(part * TICK_NS), None) for part in parts]
         for at_ns, sender in sorted(sends + looks, key=lambda one: (one[0], one[1] is None)):
             if sender is None:
-                news.append(air.advance_within(at_ns))
+                within.append(air.advance_within(at_ns)[0])
             else:
                 air.send_at(np.full(ROBOTS, at_ns), packets(sender, size=12))
+    within.append(air.advance_within(tick_start_ns(TICKS, RATE_HZ))[0])
     news.append(air.advance(tick_start_ns(TICKS, RATE_HZ)))
     last = air.end()
     tallies = sum((one.tally for one in news[1:]), news[0].tally) + last
     assert tallies.fates.sum() == tallies.intended.sum()
+    assert sum(map(len, within)) == sum(len(one.heard) for one in news)  # each is handed over once
     return told(news), [int(count.sum()) for count in (tallies.sent, tallies.intended, tallies.in_range)]
 
 

@@ -3,7 +3,6 @@
     a tick begins    `begin`      what became final since the last tick, for observers; what of it nobody was handed yet
     it goes on       `send`       packets come: those of a step wait for their robot's turn, others go out at once
                      `advance`    what is heard is handed over when it is due
-    arenas leave     `leave`      what they sent and heard in the tick under way counts as theirs
 
 When which part of a packet's way is asked for changes nothing of it; so a run is repeated from what came in, and when.
 """
@@ -19,7 +18,7 @@ from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.in_time import Put
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Heard, Sent
-from swarmwire.comms.truth import Static, Tally
+from swarmwire.comms.truth import Static
 
 NEVER_NS = 2**63 - 1
 
@@ -31,7 +30,6 @@ class AirInTime:
         """`addressable` makes packets fit for the air, and counts what was wrong with them."""
         self._air, self._static, self._addressable = air, static, addressable
         self._waiting, self._turn_ns = Sent.none(), np.empty(0, np.int64)  # (k,) until their robots' turn comes
-        self._told: list[News] = []  # in the tick under way: observers have not seen it
         self._now_ns = 0
 
     def begin(self, start_ns: int) -> tuple[News, Heard, Outcomes]:
@@ -39,9 +37,8 @@ class AirInTime:
         self._release(start_ns)
         self._now_ns = start_ns
         # What has been heard by now was heard, also by who dies now: as if it had been handed over in the tick.
-        rest = News.joined([self._air.advance_within(start_ns), self._air.advance(start_ns)])
-        told, self._told = News.joined([*self._told, rest]), []
-        return told, rest.heard, rest.outcomes
+        heard, outcomes = self._air.advance_within(start_ns)
+        return self._air.advance(start_ns), heard, outcomes
 
     def send(self, put: Put) -> None:
         """Take packets that came no sooner than those before them, and within the tick."""
@@ -61,23 +58,15 @@ class AirInTime:
         """Let time pass; what robots heard, and learned of their packets, that nobody was handed before."""
         self._release(until_ns)
         self._now_ns = until_ns
-        told = self._air.advance_within(until_ns)
-        self._told.append(told)
-        return told.heard, told.outcomes
+        return self._air.advance_within(until_ns)
 
-    def leave(self, over: BoolArray) -> Tally | None:
-        """The arenas (arenas,) are over: what waits is the air's; what no observer has seen of them."""
+    def leave(self, over: BoolArray) -> None:
+        """The arenas (arenas,) are over: what waits there for a turn is the air's to end."""
         self._release(NEVER_NS, over)
-        if not self._told:
-            return None
-        told = News.joined(self._told)
-        self._told = [told.of(~over, self._static.robots)]
-        return told.tally.of(over)
 
-    def end(self) -> Tally | None:
-        """The run is over: what waits is the air's; what no observer has seen."""
+    def end(self) -> None:
+        """The run is over: what waits for a turn is the air's to end."""
         self._release(NEVER_NS)
-        return News.joined(self._told).tally if self._told else None
 
     def _release(self, until_ns: int, arenas: BoolArray | None = None) -> None:
         """Hand to the radios what robots, of these arenas (arenas,), send until then, in the order of their turns."""

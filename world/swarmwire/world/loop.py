@@ -123,9 +123,10 @@ class Loop:
         """End the air: what was in flight, and what no observer has seen of a tick that was broken off."""
         if self.air is None:
             return None
-        told = self._in_time.end() if self._in_time else None
+        if self._in_time:
+            self._in_time.end()
         last = self.air.end()
-        for more in (self._stranded, self._open, told):
+        for more in (self._stranded, self._open):
             last = last if more is None else last + more
         return last
 
@@ -189,10 +190,10 @@ class Loop:
         self._hash.close(over)
         self.world.leave(over)
         if self.air:
-            told = self._in_time.leave(over) if self._in_time else None
-            for more in (self.air.leave(over), told):
-                if more is not None:
-                    self._stranded = more if self._stranded is None else self._stranded + more
+            if self._in_time:
+                self._in_time.leave(over)
+            stranded = self.air.leave(over)
+            self._stranded = stranded if self._stranded is None else self._stranded + stranded
 
     def _addressable(self, sent: Sent) -> Sent:
         """Packets for a robot that is not there, or for the sender itself, are counted and go NOWHERE."""

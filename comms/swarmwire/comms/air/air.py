@@ -21,7 +21,8 @@ from swarmwire.comms.air.way import Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import Obstacles
-from swarmwire.comms.packets import BROADCAST, NOWHERE, Sent
+from swarmwire.comms.outcomes import Outcomes
+from swarmwire.comms.packets import BROADCAST, NOWHERE, Heard, Sent
 from swarmwire.comms.truth import Boundary, Tally
 
 
@@ -86,6 +87,7 @@ class Air:
         self._gone: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that left
         self._others_alive = np.zeros(rows, np.int64)
         self._now_ns = 0
+        self._within: list[news.Final] = []  # told in the tick under way
         self._on_air = Transmissions.none()  # packets of `_links`
         self._links = self._no_links = Links.none(len(radio.gives.columns))
 
@@ -150,12 +152,20 @@ class Air:
         if self._coming.anyone_out or self._held.anyone_out:
             self._take(*self._way.disrupt(until_ns, self._coming, self._lives))
             self._cut_off(until_ns)
-        return self._tell(until_ns)
+        told = news.joined([*self._within, self._final(until_ns)])
+        self._within = []
+        return news.News(told.heard, told.finished, told.departed, self._accounts.close(), told.outcomes)
 
-    def advance_within(self, until_ns: int) -> news.News:
-        """The same in the middle of a tick, where no event begins: in how many parts time passes changes nothing."""
+    def advance_within(self, until_ns: int) -> tuple[Heard, Outcomes]:
+        """The same in the middle of a tick, where no event begins: in how many parts time passes changes nothing.
+
+        What became final is told again with all of the tick by the next `advance`.
+        """
         self._pass(until_ns)
-        return self._tell(until_ns)
+        told = self._final(until_ns)
+        if told.anything:
+            self._within.append(told)
+        return told.heard, told.outcomes
 
     def end(self) -> Tally:
         """The run is over: what is queued or on its way ends as IN_FLIGHT."""
@@ -172,6 +182,7 @@ class Air:
         lost = going[self._links.sender]
         self._accounts.strand(self._links.select(np.flatnonzero(lost)), queued.parted(going[queued.sender])[0])
         self._keep(np.flatnonzero(~lost))
+        self._within = [news.joined(self._within).of(~over, self._robots)] if self._within else []
         self._gone |= going
         self._running &= ~over
         return self._accounts.close(over)
@@ -193,17 +204,16 @@ class Air:
         self._now_ns = until_ns
         self._take(*self._way.pass_time(until_ns, self._lives))
 
-    def _tell(self, until_ns: int) -> news.News:
+    def _final(self, until_ns: int) -> news.Final:
         """What is final by `until_ns`; links that are not are kept."""
         self._lives.forget(self._way.queued.epoch)
         links, packets, robots = self._links, self._on_air, self._robots
         rows = news.parted(links.fate, links.receiver, links.final_at_ns, until_ns)
         self._accounts.settle(links, until_ns)
-        told = news.News(
+        told = news.Final(
             news.heard(rows.heard, links, packets, self.radio.gives.columns, robots, len(self._others_alive)),
             news.finished(rows.finished, links, packets, robots, self.radio.is_signal),
             news.departed(rows.departed, links, packets, robots),
-            self._accounts.close(),
             self._way.outcomes(self._coming.alive & ~self._gone),
         )
         self._keep(rows.open)

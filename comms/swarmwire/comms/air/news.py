@@ -27,24 +27,33 @@ class News:
     tally: Tally
     outcomes: Outcomes  # of packets whose senders ask and are alive
 
-    def of(self, arenas: BoolArray, robots: int) -> "News":
+
+class Final(NamedTuple):
+    """What became final in a part of a tick."""
+
+    heard: Heard
+    finished: Finished
+    departed: Departed
+    outcomes: Outcomes
+
+    @property
+    def anything(self) -> bool:
+        """Whether anything did."""
+        return bool(len(self.finished.arena) or len(self.departed.arena) or len(self.outcomes))
+
+    def of(self, arenas: BoolArray, robots: int) -> "Final":
         """What concerns these arenas (arenas,) of so many robots each."""
         heard = self.heard.select(np.flatnonzero(arenas[self.heard.receiver // robots])).compacted()
         outcomes = self.outcomes.select(np.flatnonzero(arenas[self.outcomes.row // robots]))
-        return News(heard, self.finished.of(arenas), self.departed.of(arenas), self.tally.of(arenas), outcomes)
+        return Final(heard, self.finished.of(arenas), self.departed.of(arenas), outcomes)
 
-    @classmethod
-    def joined(cls, parts: "list[News]") -> "News":
-        """What became final in all parts, one or more."""
-        if len(parts) == 1:
-            return parts[0]
-        return cls(
-            Heard.joined([part.heard for part in parts]),
-            Finished.joined([part.finished for part in parts]),
-            Departed.joined([part.departed for part in parts]),
-            sum((part.tally for part in parts[1:]), parts[0].tally),
-            Outcomes.joined([part.outcomes for part in parts]),
-        )
+
+def joined(parts: list[Final]) -> Final:
+    """What became final in all parts, one or more."""
+    if len(parts) == 1:
+        return parts[0]
+    heard, finished, departed, outcomes = (list(of) for of in zip(*parts, strict=True))
+    return Final(Heard.joined(heard), Finished.joined(finished), Departed.joined(departed), Outcomes.joined(outcomes))
 
 
 class Parted(NamedTuple):
