@@ -11,4 +11,4 @@ class Replay:
 
     ticks: int  # instead of the scenario's
     inputs: RecordedInputs | None  # None: all follows from scenario and seed
-    within_ticks: bool = False  # whether packets came in the middle of ticks
+    quantum_s: float | None = None  # at which packets came in the middle of ticks; None: at their starts

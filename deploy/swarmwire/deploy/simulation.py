@@ -205,7 +205,7 @@ class Simulation:
             self._watching: list[Observer] = [self.metrics, *judging, RadioTally(), EventLog(), *self._observers]
             if self.served:
                 self._watching.append(Undriven(self.served, pace, self._record.say))
-            acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows)
+            acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows, self.static.rate_hz)
             acting = self._record.recorded(acting, self._from_outside)
             self._loop = Loop(
                 self.world,

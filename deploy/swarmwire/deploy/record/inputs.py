@@ -17,6 +17,7 @@ from typing import cast
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray
+from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.in_time import AirTime, Put, TimedCrew
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
@@ -177,9 +178,9 @@ class RecordedInputs:
 class ReplayedCrew:
     """A crew whose agents act until the first recorded tick; from there on the record does."""
 
-    def __init__(self, agents: Crew, inputs: RecordedInputs, robots: int) -> None:
+    def __init__(self, agents: Crew, inputs: RecordedInputs, robots: int, rate_hz: int) -> None:
         """`robots` in all arenas."""
-        self._agents, self._inputs, self._robots = agents, inputs, robots
+        self._agents, self._inputs, self._robots, self._rate_hz = agents, inputs, robots, rate_hz
         self.start, self.counts, self.close = agents.start, agents.counts, agents.close
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
@@ -192,6 +193,7 @@ class ReplayedCrew:
         """What every robot did; packets go on the air when they did. Nobody hears: who would is in the record."""
         for put in self._inputs.puts(tick, self._robots):
             air.send(put)
+        air.advance(tick_start_ns(tick + 1, self._rate_hz))  # as far as in the run, if this is its last tick
         return self._inputs.actions(tick, self._robots)
 
 

@@ -74,7 +74,7 @@ class PacedCrew:
         self._pace.begin()
         self._pace.handed_over(heard.heard_at_ns)
         self._crew.receive(heard, outcomes)
-        actions = self._crew.act(tick, senses, Heard.none(), NO_OUTCOMES)
+        actions = self._crew.act(tick, senses, Heard.none(tuple(heard.given)), NO_OUTCOMES)
         self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
         self._quanta.pass_tick(tick, air, self)
         return replace(actions, sent=Sent.none())

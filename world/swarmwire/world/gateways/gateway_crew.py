@@ -86,7 +86,7 @@ class GatewayCrew:
         assert self._quanta
         others = self._begin(tick, senses, heard, outcomes)
         self._inner.receive(heard, outcomes)
-        actions = self._inner.act(tick, others, Heard.none(), NO_OUTCOMES)
+        actions = self._inner.act(tick, others, Heard.none(tuple(heard.given)), NO_OUTCOMES)
         self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
         self._quanta.pass_tick(tick, air, self)
         self._catch_up(tick)
