@@ -90,7 +90,7 @@ class RepeatedRun:
             out=out,
             observers=observers,
             record=record,
-            replay=Replay(self._ticks(recorded_anew=out is not None), self._inputs, self.origin.quantum_s is not None),
+            replay=Replay(self._ticks(recorded_anew=out is not None), self._inputs, self.origin.quantum_s),
         )
         self._check = TrajectoryCheck(folder, self.simulation.hashes)
         self.simulation.watch(self._check)

@@ -132,7 +132,7 @@ class Simulation:
         rate_hz = self.scenario.time.rate_hz
         clock = PreciseClock(self._clock) if self._quantum_s else self._clock
         self._pace = None if factor is None else Pace(clock, rate_hz, factor, self._record.say)
-        self._in_time = self._quantum_s is not None or (replay is not None and replay.within_ticks)
+        self._recorded_quantum_s = replay.quantum_s if replay else self._quantum_s
         self.controls = Controls(self._clock, rate_hz, self._pace, speed_fixed=bool(self._behind.kinds))
         self.run_id, self.interrupt = new_run_id(), Interrupt()
         self._observers: list[Guarded] = []
@@ -188,7 +188,7 @@ class Simulation:
             ticks=self.ticks,
             runners=self.runners,
             realtime=realtime,
-            quantum_s=self._quantum_s,
+            quantum_s=self._recorded_quantum_s,
             gateways=self._behind.kinds,
             metrics=self.metrics,
         )
@@ -214,7 +214,7 @@ class Simulation:
                 self._watching,
                 self.scenario.events,
                 self.judge,
-                cast("TimedCrew", acting) if self._in_time else None,
+                cast("TimedCrew", acting) if self._recorded_quantum_s is not None else None,
             )
             crew.start()
             for observer in self._watching:
