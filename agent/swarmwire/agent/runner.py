@@ -80,7 +80,7 @@ class _Inbox:
         return arrived
 
     def ticks(
-        self, assignment: Assignment, receive: Callable[[Heard, Outcomes], None] = lambda *_: None
+        self, assignment: Assignment, receive: Callable[[Heard, Outcomes], None] = lambda _heard, _outcomes: None
     ) -> Iterator[tuple[int, Senses, Heard, Outcomes] | tuple[int, int]]:
         """What the newest tick brings, each time, until the world says "end" or is gone; lockstep has but one.
 
@@ -108,10 +108,10 @@ class _Inbox:
                 if frame.kind == "end":
                     return
                 if frame.kind == "packets":
-                    at_ns, number, *packets = decode_packets(frame, gives)
+                    at_ns, number, heard, outcomes = decode_packets(frame, gives)
                     self.missed += max(0, number - self._next_packets)
                     self._next_packets = number + 1
-                    receive(*packets)
+                    receive(heard, outcomes)
                     between = frame.tick, at_ns
                     continue
                 if frame.kind != "tick" or frame.tick <= tick or frame.tick % every:

@@ -16,7 +16,7 @@ from typing import cast
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray
+from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.in_time import AirTime, Put, TimedCrew
@@ -154,14 +154,18 @@ class RecordedInputs:
             arrays = {name.removeprefix(WITHIN): array for name, array in named}
             sent = sent_of(frames.Frame("sent", tick, arrays), np.arange(robots))
             at_ns, of_tick, count = checked_array(frame, WITHIN, "<i8", (3, None))
-            end = np.cumsum(count)
+            end: IntArray = np.cumsum(count)
             if (count < 1).any() or (end[-1:] != len(sent)).any() or (at_ns[1:] < at_ns[:-1]).any():
                 raise BadFrame("malformed", "within: expected packets in the order in which they came")
         except BadFrame as fault:
             raise self._damaged(tick, fault) from None
-        parts = zip(at_ns.tolist(), of_tick.tolist(), (end - count).tolist(), end.tolist(), strict=True)
         return [
-            Put(at, None if of == AT_ONCE else of, sent.select(np.arange(first, stop))) for at, of, first, stop in parts
+            Put(
+                int(at_ns[i]),
+                None if of_tick[i] == AT_ONCE else int(of_tick[i]),
+                sent.select(np.arange(int(end[i] - count[i]), int(end[i]))),
+            )
+            for i in range(len(count))
         ]
 
     def _frame(self, place: int) -> frames.Frame:

@@ -47,6 +47,7 @@ class Lateness:
 
     def _percentile_s(self, share: float) -> float:
         """So that this share is no later: the upper end of its class, but never above the worst."""
-        place = int(np.searchsorted(self._counted.cumsum(), share * self._counted.sum()))
+        below: IntArray = np.cumsum(self._counted)
+        place = int(np.searchsorted(below, share * int(below[-1])))
         upper_ns = float(np.expm1((place + 1) / PER_FOLD)) * NS_PER_US
         return to_s(min(round(upper_ns), self._worst_ns))
