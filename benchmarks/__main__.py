@@ -23,6 +23,7 @@ from benchmarks.record_cost import record_cost
 from benchmarks.report_cost import report_cost
 from benchmarks.robot_step import robot_step
 from benchmarks.robot_steps import CASES, D1, robot_steps, start
+from benchmarks.tls_cost import tls_cost
 from benchmarks.view_cost import view_cost
 
 REPEATS = 3
@@ -42,6 +43,7 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     "campaign-1000x10": campaign,
     "processes-100": partial(processes, robots=100, ticks=300),
     "realtime-50": partial(realtime, robots=50, runners=2, quantum_s=0.001, duration_s=30.0),
+    "tls-cost": partial(tls_cost, robots=40, ticks=400),
     **dict.fromkeys(COMPILES, first_compile),
     "report-10000": partial(report_cost, seeds=200),
     "robot-step": partial(robot_step, kind="epuck2"),

@@ -64,6 +64,9 @@ TARGETS = {
     "realtime-50": most(
         2, "50 robots that relay, 2 runners, 1 ms quantum: 99 % of packets are handed over no later than so after due"
     ),
+    "tls-cost": most(
+        1.15, "a lockstep tick of 40 e-pucks flocking, a process each, over mutual TLS with access control"
+    ),
     "compile-world": most(30, "a machine's first run without a radio: what it takes longer than the next"),
     "compile-disk": most(30, "with a disk radio"),
     "compile-signals": most(30, "with a radio of signals"),

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.agent.runner import _Inbox
+from swarmwire.agent.runner import Inbox
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.wire import frames
@@ -27,8 +27,8 @@ class Sample:
     payload: Bytes
 
 
-def inbox_of(*arrived: Any) -> _Inbox:
-    inbox = _Inbox()
+def inbox_of(*arrived: Any) -> Inbox:
+    inbox = Inbox()
     for item in arrived:
         inbox._arrived.put(item if isinstance(item, bool) else Sample(Bytes(item)))
     return inbox

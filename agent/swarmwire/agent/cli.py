@@ -1,4 +1,4 @@
-"""`swarmwire-agent`: runs an agent on a robot, says whether it could, lists drivers, stops motors."""
+"""`swarmwire-agent`: runs an agent on a robot, says whether it could, lists drivers, stops motors, joins a run."""
 
 import argparse
 import os
@@ -10,6 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import NoReturn
 
+from swarmwire.agent.join_cli import ABOUT as JOIN
+from swarmwire.agent.join_cli import add_join, join_parsed
 from swarmwire.agent.on_robot.end import SIGNALS, End, by_signals
 from swarmwire.agent.on_robot.exit_codes import BAD_INPUT, ENDED, FAILED, INTERRUPTED
 from swarmwire.agent.on_robot.flags import AGENT, add_flags, by_flag, given_flags
@@ -29,6 +31,7 @@ EXAMPLE = """examples:
   swarmwire-agent check avoid.py:Avoid --driver epuck2 --address 192.168.1.23
   swarmwire-agent run avoid.py:Avoid --driver epuck2 --address 192.168.1.23 --duration-s 60
   swarmwire-agent run --config robot.toml --log log
+  swarmwire-agent join tls/10.0.0.5:7447 --robots 5 --ca ca.pem --certificate r1.pem --key r1.key
 
 robot.toml:
   format = 1
@@ -69,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _told(error: BadInput, parsed: argparse.Namespace) -> BadInput:
     """The fault, told of the flag that it came by, if it did."""
-    if parsed.command == "drivers" or error.where != _where(parsed):
+    if parsed.command in ("drivers", "join") or error.where != _where(parsed):
         return error
     return by_flag(error, error.where, given_flags(parsed))
 
@@ -102,6 +105,8 @@ def _parser() -> argparse.ArgumentParser:
         )
         command.add_argument("--heartbeats", type=int, help=argparse.SUPPRESS)
         command.add_argument("--standby", action="store_true", help=argparse.SUPPRESS)
+    text = "play robots of a run elsewhere, with the agent that is installed here"
+    add_join(commands.add_parser("join", help=text, description=JOIN, formatter_class=raw))
     commands.add_parser("drivers", help="list the drivers that are installed, with their options")
     return parser
 
@@ -179,7 +184,11 @@ def _drivers(_: argparse.Namespace) -> int:
     return ENDED
 
 
-_COMMANDS = {"run": _run, "check": _check, "stop-motors": _stop_motors, "drivers": _drivers}
+def _join(parsed: argparse.Namespace) -> int:
+    return join_parsed(parsed)
+
+
+_COMMANDS = {"join": _join, "run": _run, "check": _check, "stop-motors": _stop_motors, "drivers": _drivers}
 
 
 def _settings(parsed: argparse.Namespace, needs_agent: bool = True) -> RobotSettings:

@@ -2,7 +2,7 @@
 
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, cast
 
 import numpy as np
@@ -15,10 +15,11 @@ from swarmwire.agent.robots import Robots
 from swarmwire.agent.told import Told
 from swarmwire.agent.turn import Turn
 from swarmwire.agent.vector_agent import State, VectorAgent, freeze, state_of
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.memory import GroupMemory, Layout, Memory
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
@@ -26,15 +27,20 @@ from swarmwire.comms.senses import Actions, GroupSenses, Senses
 NOT_OWN = -1
 NOBODY = np.empty(0, np.int64)
 DRAWS_APART = 1 << 20  # calls for a purpose that a step, or a hearing, does not reach
+# Columns of memory that are the host's own, for robots of either kind of agent.
+SENT, FIRST_OWN, ACTED = "host.sent", "host.first_own", "host.acted"
 
 
 class Host:
     """The agents of all robots of an assignment."""
 
-    def __init__(self, assignment: Assignment) -> None:
+    def __init__(self, assignment: Assignment, memory: Memory | None = None) -> None:
+        """`memory` is what earlier agents of some of these robots remembered; others start afresh."""
         self._rate_hz = assignment.rate_hz
         self._groups = {group.name: hosted(group, load_agent(group.agent)) for group in assignment.groups}
         self._waiting: Told | None = None  # that came between ticks; None: nothing
+        for name, kept in (memory or {}).items():
+            self._groups[name].recall(kept)
 
     def receive(self, heard: Heard, outcomes: Outcomes) -> None:
         """Keep what came between ticks until the robots that it is for step, or hear; what is for others is lost."""
@@ -64,6 +70,10 @@ class Host:
         return Actions.joined(
             [agents.act(self._time(tick, agents.group), group, heard, outcomes) for agents, group in acting]
         )
+
+    def memory(self, names: Iterable[str]) -> Memory:
+        """What is remembered of the robots of these groups."""
+        return {name: self._groups[name].memory() for name in names}
 
     def _time(self, tick: int, group: GroupAssignment) -> tuple[int, int, int]:
         time_ns = tick_start_ns(tick, self._rate_hz)
@@ -143,6 +153,33 @@ class Hosted(ABC):
         """Whether any robot has: who has not does not hear."""
         return self._senses is not None
 
+    def memory(self) -> GroupMemory:
+        """What is remembered of every robot of the group."""
+        group_rows = self.group.rows
+        acted = np.isin(group_rows, self.rows)
+        own = {SENT: self._sent_before, FIRST_OWN: self._first_own, ACTED: acted}
+        return GroupMemory(group_rows, {**own, **self.columns()})
+
+    def recall(self, kept: GroupMemory) -> None:
+        """Go on from what earlier agents of some robots of the group remembered."""
+        at = np.searchsorted(self.group.rows, kept.rows)
+        self._sent_before[at], self._first_own[at] = kept.columns[SENT], kept.columns[FIRST_OWN]
+        acted = np.ones(len(self.group.rows), np.bool_)
+        acted[at] = kept.columns[ACTED]
+        rows = self.group.rows[acted]
+        self.keep(rows)
+        self.rows = rows
+        if not self.fill(kept):
+            self._first_own[at] = self._sent_before[at]
+
+    @abstractmethod
+    def columns(self) -> dict[str, AnyArray]:
+        """The agents' own memory of every robot of the group."""
+
+    @abstractmethod
+    def fill(self, kept: GroupMemory) -> bool:
+        """Take over the memory of the robots that it is of, whose rows are kept; whether agents have any."""
+
     def _own_outcomes(self, outcomes: Outcomes, rows: IntArray, place: slice | IntArray) -> Outcomes:
         """The outcomes of the robots `rows`, with the sender as a place in `rows`; a copy, which agents may write to.
 
@@ -198,6 +235,16 @@ class _Vector(Hosted):
     def keep(self, rows: IntArray) -> None:
         self._state = self._state.moved(self.rows, rows)
 
+    def columns(self) -> dict[str, AnyArray]:
+        whole = self._state if len(self.rows) == len(self.group.rows) else self._state.moved(self.rows, self.group.rows)
+        return {of_state(name): getattr(whole, name) for name in whole.columns}
+
+    def fill(self, kept: GroupMemory) -> bool:
+        _, here, there = np.intersect1d(self.rows, kept.rows, assume_unique=True, return_indices=True)
+        for name in self._state.columns:
+            getattr(self._state, name)[here] = kept.columns[of_state(name)][there]
+        return True
+
 
 class _Single(Hosted):
     """An Agent for each robot of the group."""
@@ -229,6 +276,25 @@ class _Single(Hosted):
         self._agents = {
             row: known[row] if row in known else make(self._kind, self.group.params) for row in rows.tolist()
         }
+
+    def columns(self) -> dict[str, AnyArray]:
+        return {}
+
+    def fill(self, kept: GroupMemory) -> bool:
+        return False  # what an Agent remembers is its own affair: another starts afresh
+
+
+def layout_of(kind: AgentClass) -> Layout:
+    """The columns of what is remembered of a robot of this agent."""
+    own = {SENT: ("<i8", ()), FIRST_OWN: ("<i8", ()), ACTED: ("|b1", ())}
+    if not issubclass(kind, VectorAgent):
+        return own
+    return {**own, **{of_state(name): (dtype.str, shape) for name, (dtype, _, shape) in state_of(kind).columns.items()}}
+
+
+def of_state(name: str) -> str:
+    """The column of memory in which a column of a State is kept."""
+    return f"state.{name}"
 
 
 def hosted(group: GroupAssignment, kind: AgentClass) -> Hosted:

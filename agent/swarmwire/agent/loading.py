@@ -1,5 +1,8 @@
 """From the text that names an agent to its class."""
 
+import hashlib
+import inspect
+from pathlib import Path
 from typing import Any, cast
 
 from swarmwire.agent.agent import Agent
@@ -41,6 +44,18 @@ def load_agent(spec: str) -> AgentClass:
     except (TypeError, NameError) as error:
         raise NoAgent(str(error)) from error
     return kind
+
+
+def agent_sha256(kind: AgentClass) -> str:
+    """The sha256 of the file in which an agent's class is defined, by which two machines tell that they have the same.
+
+    NoAgent if it has none: a class that was typed in at a prompt.
+    """
+    try:
+        path = inspect.getfile(kind)
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except (TypeError, OSError) as error:
+        raise NoAgent(f"{kind.__name__} comes from no file that can be read: {error}") from error
 
 
 def _is_shared(attribute: str, value: object) -> bool:

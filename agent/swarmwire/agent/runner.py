@@ -1,9 +1,10 @@
 """A runner: a process that plays some robots of a world behind zenoh, in lockstep or in real time.
 
 It joins (gets robots), declares its token, builds the agents, says "ready", then answers `tick` frames with one
-`actions` frame each until the world says "end" or is gone. In real time `packets` frames may come between ticks: agents
-that read between their steps answer with a `sent` frame, for all others they wait for the tick. All that arrives lands
-in one queue, put there by the network thread itself: no Python thread per subscription, so a runner stays small.
+`actions` frame each until the world says "end" or is gone, or until it is asked to leave, which it says. In real time
+`packets` frames may come between ticks: agents that read between their steps answer with a `sent` frame, for all others
+they wait for the tick. All that arrives lands in one queue, put there by the network thread itself: no Python thread
+per subscription, so a runner stays small. Where the world keeps memory, each answer carries what the agents remember.
 """
 
 # zenoh's stubs leave out the return types of put, reply and close.
@@ -12,15 +13,20 @@ in one queue, put there by the network thread itself: no Python thread per subsc
 import math
 import queue
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
 
 import msgpack
 import zenoh
 from zenoh.handlers import Callback
 
-from swarmwire.agent.host import Host
+from swarmwire.agent.host import Host, layout_of
+from swarmwire.agent.loading import NoAgent, load_agent
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
+from swarmwire.comms.memory import Memory
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Senses
@@ -29,42 +35,91 @@ from swarmwire.comms.wire.closing import closed_after
 from swarmwire.comms.wire.in_time_frames import decode_packets, encode_sent
 from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.memory_frames import decode_memory
 from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 
 JOIN_S = 30.0
+FAREWELL_S = 3.0
+NO_ROBOTS = ""
 
 
-def run(endpoint: str, run_id: str, runner: str) -> None:
+class Ended(NamedTuple):
+    """How a runner's play ended."""
+
+    how: Literal["over", "left", "let go", "gone"]
+    why: str = ""  # it was let go
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a runner asks for when it joins, and its own agents."""
+
+    request: JoinRequest = field(default_factory=JoinRequest)
+    agents: Mapping[str, str] = field(default_factory=dict[str, str])  # spec by group; else as the world names them
+
+
+PLAIN = Asked()  # the next part that is free, with the world's own agents
+
+
+def run(endpoint: str, run_id: str, runner: str) -> Ended:
     """Play robots of the run at `endpoint` until it ends; RunnerLost if there is no world or it gives no robots."""
-    keys = Keys(run_id)
     with closed_after(open_runner(endpoint)) as session:
-        inbox = _Inbox()
-        declared = (  # zenoh takes back what nobody holds on to
-            session.liveliness().declare_subscriber(
-                keys.world, Callback(inbox.put_token, indirect=False), history=True
-            ),
-            session.declare_subscriber(keys.frame(runner), Callback(inbox.put_frame, indirect=False)),
-            session.liveliness().declare_token(keys.alive(runner)),
-        )
-        assignment = _join(session, keys, runner, inbox)
-        answer = session.declare_publisher(
-            keys.answer(runner), congestion_control=zenoh.CongestionControl.BLOCK, express=True
-        )
-        for data in _answers(assignment, inbox):
-            answer.put(data)
-        del declared
+        return play(session, Keys(run_id), runner, Inbox(), lambda: PLAIN)
 
 
-class _Inbox:
-    """What arrives from the world, put in by the network thread: frames, and whether the world is there."""
+def play(
+    session: zenoh.Session,
+    keys: Keys,
+    runner: str,
+    inbox: "Inbox",
+    asked: Callable[[], Asked],
+    joined: Callable[[Assignment], None] = lambda _: None,
+) -> Ended:
+    """Play robots of a run. `asked` is called once its world is there, `joined` when it gave robots.
+
+    RunnerLost if there is no world or it gives no robots.
+    """
+    declared = (  # zenoh takes back what nobody holds on to
+        session.liveliness().declare_subscriber(keys.world, Callback(inbox.put_token, indirect=False), history=True),
+        session.declare_subscriber(keys.frame(runner), Callback(inbox.put_frame, indirect=False)),
+        session.liveliness().declare_token(keys.alive(runner)),
+    )
+    if not inbox.wait_for_world():
+        raise RunnerLost(runner, NO_ROBOTS, "there is no world")
+    assignment, memory = _join(session, keys, runner, asked())
+    joined(assignment)
+    answer = session.declare_publisher(
+        keys.answer(runner), congestion_control=zenoh.CongestionControl.BLOCK, express=True
+    )
+    for data in _answers(assignment, memory, inbox):
+        answer.put(data)
+    if inbox.ended.how == "left":
+        answer.put(frames.encode("leave", -1, {}))
+        inbox.wait_for_farewell()  # the world must read this before the runner's token vanishes, as below
+    del declared
+    return inbox.ended
+
+
+class Inbox:
+    """What arrives from the world, put in by the network thread: frames, and whether the world is there.
+
+    Attributes:
+        dropped: frames that were no tick to come, or not acted on since a newer one was there.
+        missed: frames with packets that never came.
+        ended: how it ended; meaningless before.
+    """
 
     def __init__(self) -> None:
-        self._arrived: queue.SimpleQueue[zenoh.Sample | bool] = queue.SimpleQueue()
+        self._arrived: queue.SimpleQueue[zenoh.Sample | bool | None] = queue.SimpleQueue()
         self.put_frame = self._arrived.put
-        self.dropped = 0  # frames that were no tick to come, or not acted on since a newer one was there
-        self.missed = 0  # frames with packets that never came
-        self._next_packets = 0  # the number of the next of these
+        self.dropped = self.missed = 0
+        self._next_packets = 0  # the number of the next frame with packets
+        self.ended = Ended("gone")
+
+    def leave(self) -> None:
+        """End the play before its time; may be called from a signal's handler, and before it began."""
+        self._arrived.put(None)
 
     def put_token(self, token: zenoh.Sample) -> None:
         """The world's liveliness token appeared or vanished."""
@@ -74,6 +129,8 @@ class _Inbox:
         """Whether the world's token appeared in time; it declares it last, when it can answer."""
         try:
             while not isinstance(arrived := self._arrived.get(timeout=JOIN_S), bool):
+                if arrived is None:
+                    raise KeyboardInterrupt
                 self.dropped += 1
         except queue.Empty:
             return False
@@ -99,13 +156,18 @@ class _Inbox:
                 yield between
                 between = None
             arrived = self._arrived.get()
+            if arrived is None:
+                self.ended = Ended("left")
+                return
             if isinstance(arrived, bool):
                 if not arrived:
+                    self.ended = Ended("gone")
                     return
                 continue
             try:
                 frame = frames.decode(arrived.payload.to_bytes())
                 if frame.kind == "end":
+                    self.ended = _end(frame)
                     return
                 if frame.kind == "packets":
                     at_ns, number, heard, outcomes = decode_packets(frame, gives)
@@ -123,21 +185,44 @@ class _Inbox:
             self.dropped += newest is not None
             newest, tick = (frame.tick, *told), frame.tick
 
+    def wait_for_farewell(self) -> None:
+        """Until the world says that it has read that the runner left, or is gone; not for long."""
+        with suppress(queue.Empty):
+            while arrived := self._arrived.get(timeout=FAREWELL_S):
+                if not isinstance(arrived, bool) and b"end" in arrived.payload.to_bytes():
+                    return
 
-def _join(session: zenoh.Session, keys: Keys, runner: str, inbox: _Inbox) -> Assignment:
-    if not inbox.wait_for_world():
-        raise RunnerLost(runner, "none yet", "there is no world")
-    for reply in session.get(keys.join(runner), payload=JoinRequest().encode(), timeout=JOIN_S):
+
+def _end(frame: frames.Frame) -> Ended:
+    why = frame.values.get("why")
+    return Ended("let go", why) if isinstance(why, str) else Ended("over")
+
+
+def _join(session: zenoh.Session, keys: Keys, runner: str, asked: Asked) -> tuple[Assignment, Memory | None]:
+    """The robots that the world gives, and what is remembered of them; None: nothing is to be kept."""
+    for reply in session.get(keys.join(runner), payload=asked.request.encode(), timeout=JOIN_S):
         if reply.ok is None:
-            raise RunnerLost(runner, "none yet", reply.err.payload.to_string() if reply.err else "no answer to join")
-        return Assignment.from_mapping(msgpack.unpackb(reply.ok.payload.to_bytes()))
-    raise RunnerLost(runner, "none yet", "the world did not answer to join")
+            raise RunnerLost(runner, NO_ROBOTS, reply.err.payload.to_string() if reply.err else "no answer to join")
+        given = msgpack.unpackb(reply.ok.payload.to_bytes())
+        assignment = Assignment.from_mapping(given).with_agents(asked.agents)
+        return assignment, None if given["memory"] is None else _memory(assignment, given["memory"])
+    raise RunnerLost(runner, NO_ROBOTS, "the world did not answer to join")
 
 
-def _answers(assignment: Assignment, inbox: _Inbox) -> Iterator[bytes]:
+def _memory(assignment: Assignment, data: bytes) -> Memory:
+    """What earlier agents remembered; nothing of those whose memory does not fit these agents."""
+    frame = frames.decode(data)
+    memory: Memory = {}
+    for group in assignment.groups:
+        with suppress(BadFrame, NoAgent):  # without memory it starts afresh, and a missing agent is told of later
+            memory |= decode_memory(frame, {group.name: layout_of(load_agent(group.agent))})
+    return memory
+
+
+def _answers(assignment: Assignment, memory: Memory | None, inbox: Inbox) -> Iterator[bytes]:
     """A frame "ready", then an answer to every tick; a failure, if there is one, is the last."""
     try:
-        host = Host(assignment)
+        host = Host(assignment, memory)
         yield frames.encode("ready", -1, {})
         for told in inbox.ticks(assignment, host.receive):
             if len(told) == 2:
@@ -145,10 +230,10 @@ def _answers(assignment: Assignment, inbox: _Inbox) -> Iterator[bytes]:
                     missed, inbox.missed = inbox.missed, 0
                     yield encode_sent(told[0], sent, missed)
                 continue
-            tick = told[0]
-            actions = host.act(*told)
+            tick, senses, heard, outcomes = told
+            actions = host.act(tick, senses, heard, outcomes)
             dropped, inbox.dropped = inbox.dropped, 0
-            yield encode_actions(tick, actions, dropped)
+            yield encode_actions(tick, actions, dropped, None if memory is None else host.memory(senses))
         return
     except AgentFailed as error:
         failure = {"robots": error.robots, "traceback": error.traceback}

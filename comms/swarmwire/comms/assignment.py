@@ -1,6 +1,7 @@
 """Which robots a crew or a runner plays, and all that its agents may know before the first tick."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -32,9 +33,18 @@ class Assignment:
     gives: tuple[str, ...] | None  # columns that the radio tells with a packet; None: there is no radio
 
     @property
+    def robot_names(self) -> tuple[str, ...]:
+        """The robots' names, group after group."""
+        return tuple(name for group in self.groups for name in group.robot_names)
+
+    @property
     def robots_text(self) -> str:
         """The robots in a few words: "flock-3", or "flock-0 … flock-9 (10 robots)"."""
-        return robots_text([name for group in self.groups for name in group.robot_names])
+        return robots_text(list(self.robot_names))
+
+    def with_agents(self, agents: Mapping[str, str]) -> "Assignment":
+        """The same, with these agents, by group, in place of those that it names."""
+        return replace(self, groups=tuple(replace(of, agent=agents.get(of.name, of.agent)) for of in self.groups))
 
     def as_mapping(self) -> dict[str, Any]:
         """The assignment as plain values that msgpack takes."""

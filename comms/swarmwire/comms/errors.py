@@ -55,11 +55,12 @@ class OwnCodeFailed(SwarmwireError):
 
 
 class RunnerLost(SwarmwireError):
-    """A runner's token is gone or it did not answer in time; `robots` are those that it ran."""
+    """A runner's token is gone or it did not answer in time; `robots` are those that it ran, "" if it never got any."""
 
     def __init__(self, runner: str, robots: str, reason: str) -> None:
         self.runner, self.robots, self.reason = runner, robots, reason
-        super().__init__(f"runner {runner} ({robots}) was lost: {reason}")
+        what = f"({robots}) was lost" if robots else "got no robots"
+        super().__init__(f"runner {runner} {what}: {reason}")
 
 
 class RecordFailed(SwarmwireError):

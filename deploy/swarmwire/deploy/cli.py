@@ -11,11 +11,13 @@ from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.commands.certs.group import certs_app
 from swarmwire.deploy.commands.check import check_command
 from swarmwire.deploy.commands.compare import compare_command
+from swarmwire.deploy.commands.ctl.group import ctl_app
 from swarmwire.deploy.commands.describe import describe_command
 from swarmwire.deploy.commands.draw import draw_command
 from swarmwire.deploy.commands.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.commands.export import ExportCommand, export_command
 from swarmwire.deploy.commands.help_text import let_help_flow
+from swarmwire.deploy.commands.join import join_command
 from swarmwire.deploy.commands.list_kinds import list_command
 from swarmwire.deploy.commands.new import new_command
 from swarmwire.deploy.commands.parity import parity_command
@@ -31,6 +33,7 @@ from swarmwire.deploy.commands.sweep import sweep_command
 from swarmwire.deploy.commands.tune import tune_command
 from swarmwire.deploy.commands.verify import verify_command
 from swarmwire.deploy.commands.view import view_command
+from swarmwire.deploy.commands.world import world_command
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
 
@@ -58,6 +61,8 @@ def options(
 
 
 app.command("run")(run_command)
+app.command("world")(world_command)
+app.command("join")(join_command)
 app.command("sweep")(sweep_command)
 app.command("tune")(tune_command)
 app.command("repeat")(repeat_command)
@@ -76,6 +81,7 @@ app.command("report")(report_command)
 app.command("parity")(parity_command)
 app.command("router")(router_command)
 app.add_typer(radio_app, name="radio")
+app.add_typer(ctl_app, name="ctl")
 app.add_typer(robots_app, name="robots")
 app.add_typer(certs_app, name="certs")
 let_help_flow(app)

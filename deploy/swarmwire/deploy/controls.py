@@ -4,9 +4,11 @@ import threading
 from collections.abc import Callable
 
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.errors import BadInput
 from swarmwire.world.crews.pace import Pace
 
 SPEEDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # simulated s per s of wall time
+SLOWEST, FASTEST = 0.001, 1e6  # that may be asked for
 LOOK_NS = to_ns(0.02)  # how often a loop that is held looks up what people ask
 
 
@@ -53,6 +55,22 @@ class Controls:
         with self._lock:
             self.paused, self._steps, self._asked = not self.paused, 0, True
 
+    def pause(self) -> None:
+        """No tick begins from now on; ticks that were asked for and have not begun are not done."""
+        with self._lock:
+            self.paused, self._steps, self._asked = True, 0, True
+
+    def resume(self) -> None:
+        """Go on."""
+        with self._lock:
+            self.paused, self._steps, self._asked = False, 0, True
+
+    def step_by(self, ticks: int) -> None:
+        """So many ticks more, then pause, whether the run is paused or not; those asked for before come first."""
+        with self._lock:
+            self._steps += ticks
+            self.paused = self._asked = True
+
     def step(self) -> None:
         """One tick, then pause again; a run that is not paused pauses."""
         with self._lock:
@@ -77,6 +95,19 @@ class Controls:
                 self._free_speed = self._measured()
             present = self.speed or self._free_speed
             self._set_speed(max((speed for speed in SPEEDS if speed < present), default=min(present, SPEEDS[0])))
+
+    def set_speed(self, speed: float | None) -> None:
+        """This speed from the next tick on, None: without a limit; BadInput if the run cannot have it."""
+        if self._speed_fixed:
+            raise BadInput("", "factor", "expected no other speed: programs elsewhere keep to that of the run")
+        if speed is None and self._pace:
+            raise BadInput(
+                "", "factor", "expected a number: the run keeps to the wall clock, and has no unlimited speed"
+            )
+        if speed is not None and not SLOWEST <= speed <= FASTEST:
+            raise BadInput("", "factor", f"expected {SLOWEST:g} to {FASTEST:g} times real time, got {speed!r}")
+        with self._lock:
+            self._set_speed(speed)
 
     def quit(self) -> None:
         """End the run after the tick that is under way."""

@@ -12,8 +12,12 @@ from swarmwire.comms.protocols import Crew
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.endpoint import local_endpoint
 from swarmwire.deploy.gateways.served import Served
+from swarmwire.deploy.listening import Listening
+from swarmwire.deploy.new_terms import new_terms
 from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.world.crews import split_robots as assignments
+from swarmwire.world.crews.change import Change
+from swarmwire.world.crews.door import Door
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.quanta import Quanta
 from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
@@ -37,7 +41,9 @@ class Crews:
     pace: Pace | None  # of real time; None: as fast as the machine allows
     socket: Path | None  # where runners meet the world; None: at a private place
     stopped: Callable[[], bool]  # whether waiting for runners is to end
+    listening: Listening | None  # for runners that others start, if it does
     lost: Callable[[Loss], None]  # is told of a runner that was lost while the run went on
+    changed: Callable[[Change], None]  # is told of every runner that came or went
     say: Callable[[str], None]  # what people should know at once
     quanta: Quanta | None = None  # of real time, in which packets cross also between ticks
 
@@ -60,6 +66,12 @@ class Crews:
                     self.quanta,
                 )
             return
+        if self.listening is not None:
+            crew = self._remote(self.listening.door(self.run_id), [whole], self._around_open(self.listening))
+            with closing(crew):
+                crew.open()
+                yield crew
+            return
         if not self.runners:
             with closing(LocalCrew(whole)) as local:
                 yield PacedCrew(local, self.pace, self.quanta) if self.pace else local
@@ -72,7 +84,13 @@ class Crews:
         parts = assignments.split(whole, self.runners)
         names = [f"r{i}" for i in range(len(parts))]
         with local_endpoint(self.socket) as endpoint:
-            around = Surroundings(trouble, self.stopped, lambda loss: self._survive(loss, endpoint))
+            around = Surroundings(
+                trouble,
+                self.stopped,
+                lambda loss: self._survive(loss, endpoint),
+                lambda change, _: self.changed(change),
+                self._refused,
+            )
             crew = self._remote(endpoint, parts, around)
             try:
                 crew.open()
@@ -83,12 +101,49 @@ class Crews:
                 for process in processes:
                     process.stop()
 
-    def _remote(self, endpoint: str, parts: list[Assignment], around: Surroundings) -> RemoteCrew | RealTimeCrew:
-        table = self.scenario.run
-        common = endpoint, self.run_id, parts, table.runner_timeout_s, self.clock, around, table.on_runner_loss
-        if self.pace is None:
-            return RemoteCrew(*common)
-        return RealTimeCrew(*common, self.pace, table.watchdog_s, quanta=self.quanta)
+    def _around_open(self, listening: Listening) -> Surroundings:
+        """What the crew of a world that listens asks and tells."""
+        told = listening.told
+
+        def changed(change: Change, free: tuple[str, ...]) -> None:
+            self.changed(change)
+            self.say(str(change))
+            if told is not None:
+                told.changed(change, free)
+
+        def refused(runner: str, why: str) -> None:
+            self._refused(runner, why)
+            if told is not None:
+                told.refused(runner, why)
+
+        def opened(endpoints: tuple[str, ...]) -> None:
+            if told is not None:
+                told.opened(endpoints, self.run_id)
+
+        return Surroundings(lambda: None, self.stopped, self.lost, changed, refused, opened)
+
+    def _refused(self, runner: str, why: str) -> None:
+        self.say(f"refused {runner!r}: {why}")
+
+    def _remote(self, door: Door | str, parts: list[Assignment], around: Surroundings) -> RemoteCrew | RealTimeCrew:
+        table, factor = self.scenario.run, self.pace.factor if self.pace else None
+        terms = new_terms(self.scenario, self.static, self.agents, self.run_id, factor, self.listening)
+        timeout_s, on_loss = table.runner_timeout_s, table.on_runner_loss
+        if self.pace:
+            return RealTimeCrew(
+                door,
+                self.run_id,
+                parts,
+                timeout_s,
+                self.clock,
+                around,
+                on_loss,
+                self.pace,
+                table.watchdog_s,
+                terms,
+                self.quanta,
+            )
+        return RemoteCrew(door, self.run_id, parts, timeout_s, self.clock, around, on_loss, terms=terms)
 
     def _survive(self, loss: Loss, endpoint: str) -> None:
         """Tell people of a runner that was lost, and of what they can do."""
@@ -98,4 +153,5 @@ class Crews:
             return
         agents = ",".join(sorted(set(self.agents.values())))
         takeover = f"python -m swarmwire.agent.nursery {endpoint} {self.run_id} {agents} NAME"
-        self.say(f"lost runner {loss}; waiting for another, such as: {takeover}")
+        until = "waiting for another" if self.scenario.run.on_runner_loss == "wait" else "another may take over"
+        self.say(f"lost runner {loss}; {until}, such as: {takeover}")

@@ -7,9 +7,11 @@ from typing import Any
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.record.inputs import InputsRecord
+from swarmwire.deploy.record.interventions import InterventionsRecord
 from swarmwire.deploy.record.origin import Origin
 from swarmwire.deploy.result import EventResult, Result, arena_result
 from swarmwire.metrics.record.recorders import record_summary
+from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.realtime_crew import RealTimeReport
 from swarmwire.world.crews.roster import Loss
 
@@ -33,7 +35,9 @@ def outcome(
     arena_counts: Sequence[dict[str, int]],
     origin: Origin,
     inputs: InputsRecord | None,
+    interventions: InterventionsRecord | None,
     losses: Sequence[Loss],
+    changes: Sequence[Change],
     engines: Sequence[str],
     realtime: RealTimeReport | None,
     folder: Path | None,
@@ -72,7 +76,9 @@ def outcome(
         modules=dict(origin.modules),
         files=origin.files,
         inputs=inputs,
+        interventions=interventions,
         lost_runners=tuple(str(loss) for loss in losses),
+        runner_changes=tuple(changes),
         realtime=realtime,
         gateways=dict(origin.gateways),
         record=record,

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from swarmwire.deploy.record.inputs import RecordedInputs
+from swarmwire.world.interventions import Intervention
 
 
 @dataclass(frozen=True)
@@ -11,4 +12,5 @@ class Replay:
 
     ticks: int  # instead of the scenario's
     inputs: RecordedInputs | None  # None: all follows from scenario and seed
+    interventions: tuple[Intervention, ...] = ()  # what people did to it
     quantum_s: float | None = None  # at which packets came in the middle of ticks; None: at their starts

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.deploy.record.inputs import InputsRecord
+from swarmwire.deploy.record.interventions import InterventionsRecord
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.record.formats import SUMMARY_FORMAT
 from swarmwire.metrics.whole_file import write_whole
+from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.realtime_crew import RealTimeReport
 
 
@@ -102,7 +104,9 @@ class Result:
     stop: tuple[str, ...] = ()  # what ends an arena, in words: "order at least 0.9 for 5 s"
     files: tuple[CopiedFile, ...] = ()  # in the run folder, from which the run can be repeated
     inputs: InputsRecord | None = None  # what came from outside, if anything did
+    interventions: InterventionsRecord | None = None  # what people did to it while it went on, if anything
     lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
+    runner_changes: tuple[Change, ...] = ()  # who joined, left, was lost and returned, in order
     realtime: RealTimeReport | None = None
     gateways: dict[str, str] = field(default_factory=dict[str, str])  # by group: the kind, where it has one
     error: str | None = None  # why it failed
@@ -160,6 +164,7 @@ class Result:
             "global_senses": self.global_senses,
             "counts": self.counts,
             "lost_runners": list(self.lost_runners),
+            "runner_changes": [asdict(change) for change in self.runner_changes],
             "realtime": asdict(self.realtime) if self.realtime else None,
             "gateways": self.gateways,
             "record": self.record,
@@ -168,6 +173,7 @@ class Result:
             "modules": self.modules,
             "files": [asdict(file) for file in self.files],
             "inputs": asdict(self.inputs) if self.inputs else None,
+            "interventions": asdict(self.interventions) if self.interventions else None,
         }
 
     def write(self, path: Path) -> None:

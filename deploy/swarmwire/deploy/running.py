@@ -6,6 +6,7 @@ from pathlib import Path
 from swarmwire.comms.protocols import Observer
 from swarmwire.deploy.arguments import Runners
 from swarmwire.deploy.gateways.gateways import GatewaysGiven
+from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation
@@ -26,6 +27,7 @@ def run(
     quantum: float | None = None,
     record: Recording | None = None,
     gateways: GatewaysGiven = None,
+    listening: Listening | None = None,
 ) -> Result:
     """Run a scenario and return its result; with `seeds`, one arena per seed, side by side in one world.
 
@@ -36,6 +38,7 @@ def run(
     machine allows; with a `quantum`, 0.001 s or more of wall time, packets cross also between its ticks, when they are
     sent and due. `gateways` has robots answer as real ones, in real time, for programs elsewhere to drive: "epuck2"
     all of them, {"flock": "ros2"} those of a group; `Gateways` says also options, and the network of their agents.
+    `listening` has the world wait for runners that others start, on this machine or elsewhere.
 
     Raises BadInput for anything wrong with the scenario or these arguments, AgentFailed with the agent's traceback, and
     RunnerLost if a runner's process or link is gone.
@@ -53,6 +56,7 @@ def run(
         quantum=quantum,
         record=record,
         gateways=gateways,
+        listening=listening,
     )
     return finished(simulation)
 

@@ -1,6 +1,6 @@
 """One execution of a scenario, tick by tick or to its end."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +21,8 @@ from swarmwire.deploy.arguments import (
     scenario_of,
     tick_count,
 )
+from swarmwire.deploy.control.control_server import ControlServer
+from swarmwire.deploy.control.status import Status
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.crews import Crews
 from swarmwire.deploy.endpoint import check_socket, new_run_id
@@ -31,6 +33,7 @@ from swarmwire.deploy.gateways.undriven import Undriven
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.kept_memory import keep_memory
+from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.deploy.new_air import new_air
 from swarmwire.deploy.outcome import outcome
@@ -46,6 +49,7 @@ from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.judge import Judge as StopJudge
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.quanta import Quanta
 from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
@@ -53,6 +57,7 @@ from swarmwire.world.crews.remote_crew import RemoteCrew
 from swarmwire.world.crews.roster import Loss
 from swarmwire.world.crews.runner_health import RunnerHealth
 from swarmwire.world.gateways.gateway_crew import GatewayCrew
+from swarmwire.world.interventions import Interventions
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of, own_code
 from swarmwire.world.scenario.scenario import Scenario
@@ -70,7 +75,7 @@ class Simulation:
         print(simulation.result.metrics["order"].final)
 
     The arguments are those of `swarmwire.deploy.run`, and so are the errors. `replay` says what a run that is repeated
-    takes from its record.
+    takes from its record. `listening` is where the world waits for runners that others start, in place of `runners`.
 
     Attributes:
         scenario: as checked.
@@ -84,6 +89,7 @@ class Simulation:
         interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
         judge: says which arenas are over, by the scenario's stop conditions; another may take its place before the run.
         controls: pause, step, speed and end of `run`, for other threads.
+        interventions: events given while it goes on, and ended, from any thread.
         served: entered, the robots that answer as real ones, if any.
     """
 
@@ -103,6 +109,7 @@ class Simulation:
         record: Recording | None = None,
         gateways: GatewaysGiven = None,
         replay: Replay | None = None,
+        listening: Listening | None = None,
     ) -> None:
         self._clock = WallClock()
         self._called_ns = self._clock.now_ns()
@@ -121,7 +128,11 @@ class Simulation:
         self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else tick_count(self.scenario)
         self.inputs = replay.inputs if replay else None
-        self.runners = runner_count(runners, self.static.arenas * self.static.robots)
+        robots = self.static.arenas * self.static.robots
+        self.runners = runner_count(runners, robots)
+        if listening is not None:
+            listening.check(self.scenario, robots)
+            self.runners = 1  # at least; how many there were is told once it is over
         self._behind.check(self.static.arenas, self.runners)
         what = record or Recording()
         what.check(self.static)
@@ -135,12 +146,21 @@ class Simulation:
         self._recorded_quantum_s = replay.quantum_s if replay else self._quantum_s
         self.controls = Controls(self._clock, rate_hz, self._pace, speed_fixed=bool(self._behind.kinds))
         self.run_id, self.interrupt = new_run_id(), Interrupt()
+        self.interventions = Interventions(
+            self.scenario,
+            {group.name: group.body for group in self.static.groups},
+            self._record.keep,
+            replay.interventions if replay else None,
+        )
+        self._status = self._new_status()
         self._observers: list[Guarded] = []
-        for observer in (TooLarge(self._record.say), *self._recorders(what), *observers):
+        for observer in (TooLarge(self._record.say), *self._recorders(what, listening), *observers):
             self.watch(observer)
         self._losses: list[Loss] = []
+        self._changes: list[Change] = []
+        self._incomplete = False  # whether it began before all robots had an agent
         self.served: Served | None = None
-        self._crews = self._new_crews(socket)
+        self._crews = self._new_crews(socket, listening)
         self._crew: Crew | None = None
         self._loop: Loop | None = None
         self._result: Result | None = None
@@ -202,7 +222,8 @@ class Simulation:
             self.served = stack.enter_context(served)
             crew = self._crew = stack.enter_context(self._crews.crew(self.served))
             judging = [self._stop] if self._stop else []
-            self._watching: list[Observer] = [self.metrics, *judging, RadioTally(), EventLog(), *self._observers]
+            looking = [self.metrics, *judging, self._status, RadioTally(), EventLog()]
+            self._watching: list[Observer] = [*looking, *self._observers]
             if self.served:
                 self._watching.append(Undriven(self.served, pace, self._record.say))
             acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows, self.static.rate_hz)
@@ -214,9 +235,11 @@ class Simulation:
                 self._watching,
                 self.scenario.events,
                 self.judge,
+                self.interventions,
                 cast("TimedCrew", acting) if self._recorded_quantum_s is not None else None,
             )
             crew.start()
+            self._incomplete = bool((health := self.health()) and health.robots_free)
             for observer in self._watching:
                 observer.begin(self.static)
             self._exit = stack.pop_all()
@@ -227,12 +250,19 @@ class Simulation:
         """One tick; what the observers saw of it. It may go on beyond the scenario's duration."""
         return self._entered().step()
 
+    def intervene(self, event: Mapping[str, Any]) -> int:
+        """Have an event happen at the start of the next tick: a table as in a scenario, without at_s. Its number.
+
+        BadInput says what is wrong with it. `interventions.end` undoes one that lasts.
+        """
+        return self.interventions.give(event)
+
     def run(self, ticks: int | None = None) -> None:
         """Run up to tick `ticks`, or to the scenario's end, until all arenas have stopped, or until an interrupt."""
         loop = self._entered()
         with suppress(Interrupted):  # asked for while it waited for runners: the summary says how far it came
             until = self.ticks if ticks is None else ticks
-            loop.run(until, self._stopped, lambda tick: self.controls.hold(tick, self._stopped))
+            loop.run(until, self._stopped, self._hold)
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         """End the agents, and close the records with a summary: also of a run that failed, when it is worth most."""
@@ -249,7 +279,7 @@ class Simulation:
                 parts,
                 ended=self._ended(error),
                 error=error,
-                runners=self.runners,
+                runners=max(self.runners, len({change.runner for change in self._changes})),
                 ticks=loop.ticks_done,
                 arena_ticks=loop.arena_ticks.tolist(),
                 stopped=(~self.world.running).tolist(),
@@ -260,7 +290,9 @@ class Simulation:
                 arena_counts=loop.arena_counts(),
                 origin=self._origin,
                 inputs=self._record.inputs(),
+                interventions=self._record.interventions(),
                 losses=self._losses,
+                changes=self._changes,
                 engines=self.world.engines,
                 realtime=crew.report() if isinstance(crew, PacedCrew | RealTimeCrew | GatewayCrew) else None,
                 folder=self.folder,
@@ -277,12 +309,37 @@ class Simulation:
         needs = self._behind.senses(needs, bodies_of(self.scenario, self.scenario.source))
         return World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
 
-    def _recorders(self, what: Recording) -> Sequence[Observer]:
+    def _recorders(self, what: Recording, listening: Listening | None) -> Sequence[Observer]:
         """Those that fill the run folder, which may drop something only where the run keeps to the wall clock."""
         may_drop = self._pace is not None
-        return self._record.observers(what, self.run_id, self.metrics, self.hashes, may_drop=may_drop)
+        given = self.interventions
+        door = listening.observers_door(self.run_id) if listening else None
+        control = ControlServer(self._status, self.controls, given.give, given.end, self._record.note)
+        return self._record.observers(
+            what, self.run_id, self.metrics, self.hashes, control, may_drop=may_drop, door=door
+        )
 
-    def _new_crews(self, socket: Path | None) -> Crews:
+    def _new_status(self) -> Status:
+        """What tells how the run is doing."""
+        return Status(
+            run_id=self.run_id,
+            scenario=self.scenario.name,
+            ticks=self.ticks,
+            metrics=self.metrics,
+            controls=self.controls,
+            clock=self._clock,
+            health=self.health,
+            counts=lambda: self._loop.counts() if self._loop else {},
+            radio=lambda: self.interventions.course.radio,
+            events=self.interventions.told,
+        )
+
+    def _hold(self, tick: int) -> None:
+        """Return when the tick may begin."""
+        self.controls.hold(tick, self._stopped)
+        self._status.began()
+
+    def _new_crews(self, socket: Path | None, listening: Listening | None) -> Crews:
         """How the agents will be started."""
         return Crews(
             scenario=self.scenario,
@@ -294,7 +351,9 @@ class Simulation:
             pace=self._pace,
             socket=socket,
             stopped=self._stopped,
+            listening=listening,
             lost=self._losses.append,
+            changed=self._changes.append,
             say=self._record.say,
             quanta=Quanta(self._clock, self._pace, self.static.rate_hz, self._quantum_s)
             if self._pace and self._quantum_s
@@ -305,6 +364,8 @@ class Simulation:
         """Whether the actions of this tick need not follow from scenario and seed."""
         if self.inputs is not None:
             return tick >= self.inputs.first_tick
+        if self._incomplete or any(change.tick >= 0 for change in self._changes):
+            return True
         in_real_time = self._pace is not None and (self.runners > 0 or self._quantum_s is not None)
         return bool(self._losses or self._behind.kinds) or in_real_time
 

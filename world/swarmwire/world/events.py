@@ -1,15 +1,15 @@
 """The dispatcher of events: what is due at the start of a tick changes world and air before anything else."""
 
-from collections import deque
+from bisect import insort
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import KeyArray
-from swarmwire.comms.clock import to_ns, to_s
+from swarmwire.comms.clock import NS_PER_S, to_ns, to_s
 from swarmwire.comms.events.conditions import Conditions
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.swarm import Swarm
@@ -19,23 +19,52 @@ from swarmwire.world.world import World
 RUN_DOWN = -1  # in place of an event's place in the scenario: batteries that are empty
 
 
-class Events:
-    """The events of a run in order of time; at equal times those that end come first, then the scenario's order."""
+@dataclass
+class Course:
+    """How far the events of a run have come, by number; the loop writes it, others may look."""
 
-    def __init__(self, events: Sequence[Event], static: Static, keys: KeyArray, radio: Radio | None = None) -> None:
-        """`radio` is the scenario's."""
-        self._events = tuple(events)
+    begun: dict[int, int] = field(default_factory=dict[int, int])  # the tick at whose start each one began
+    over: set[int] = field(default_factory=set[int])  # those that happen once, and those that were undone
+    radio: Radio | None = None  # as events have made it by now
+
+
+class Events:
+    """The events of a run in order of time; at equal times those that end come first, then by number.
+
+    The number of an event is its place in the scenario; those that are given while the run goes on have higher ones.
+    """
+
+    def __init__(
+        self,
+        events: Sequence[Event],
+        static: Static,
+        keys: KeyArray,
+        radio: Radio | None = None,
+        course: Course | None = None,
+    ) -> None:
+        """`radio` is the scenario's; `course` is told how far the events have come."""
+        self._events = dict(enumerate(events))
+        self._course, self._rate_hz = course or Course(), static.rate_hz
         groups = {group.name: range(group.start, group.stop) for group in static.groups}
         rows = len(keys) * static.robots
         self._swarm = Swarm(groups, static.robots, keys, np.zeros((rows, 3)))
-        self._radio = self._tuned = radio
+        self._radio = self._course.radio = radio
         self._conditions = Conditions(self._swarm.rows)
-        self._evolving: list[int] = []  # places in the scenario of events that go on changing things
-        due = [(to_ns(event.at_s), True, serial) for serial, event in enumerate(events)]
-        for (at_ns, _, serial), event in zip(tuple(due), events, strict=True):
-            if event.lasts_s is not None:
-                due.append((at_ns + to_ns(event.lasts_s), False, serial))
-        self._coming = deque(sorted(due))  # (time in ns, whether it begins, place in the scenario)
+        self._evolving: list[int] = []  # numbers of events that go on changing things
+        self._coming: list[tuple[int, bool, int]] = []  # in order: time in ns, whether it begins, number
+        for serial, event in self._events.items():
+            self._plan(serial, event, to_ns(event.at_s))
+
+    def begin(self, serial: int, event: Event, start_ns: int) -> None:
+        """Have an event begin in the tick that starts then, in ns, which is about to be applied."""
+        self._events[serial] = event
+        self._plan(serial, event, start_ns)
+
+    def end(self, serial: int, start_ns: int) -> None:
+        """Undo an event in the tick that starts then, instead of at its own time; none if it is over by then."""
+        self._coming = [item for item in self._coming if item[2] != serial or item[1]]
+        if serial in self._course.begun and serial not in self._course.over:
+            insort(self._coming, (start_ns, False, serial))
 
     def apply(self, start_ns: int, world: World, air: Air | None) -> tuple[Happened, ...]:
         """Let happen what is due by the start of a tick, in ns; world and air go on under what holds after that."""
@@ -45,13 +74,15 @@ class Events:
         if self._evolving or (self._coming and self._coming[0][0] <= start_ns):
             self._swarm = replace(self._swarm, pose=world.pose)
         while self._coming and self._coming[0][0] <= start_ns:
-            _, begins, serial = self._coming.popleft()
-            happened.extend(self._happen(serial, begins, world))
+            _, begins, serial = self._coming.pop(0)
+            happened.extend(self._happen(serial, begins, start_ns, world))
         for serial in self._evolving:
             happened.extend(self._go_on(serial, start_ns, world))
         if happened:
             world.live(self._conditions.alive)
             world.fail(self._conditions.failed_parts)
+            if (by_mps := self._conditions.take_pushes()) is not None:
+                world.push(by_mps)
             if air:
                 air.disrupt(self._conditions.disruption())
         if air and self._radio:
@@ -59,14 +90,25 @@ class Events:
         return tuple(happened)
 
     def _tune(self, air: Air, radio: Radio) -> None:
-        if radio is not self._tuned and radio != self._tuned:  # as most often it is the same, which costs nothing
+        known = self._course.radio
+        if radio is not known and radio != known:  # as most often it is the same, which costs nothing
             air.tune(radio)
-            self._tuned = radio
+            self._course.radio = radio
 
-    def _happen(self, serial: int, begins: bool, world: World) -> list[Happened]:
+    def _plan(self, serial: int, event: Event, at_ns: int) -> None:
+        insort(self._coming, (at_ns, True, serial))
+        if event.lasts_s is not None:
+            insort(self._coming, (at_ns + to_ns(event.lasts_s), False, serial))
+
+    def _happen(self, serial: int, begins: bool, start_ns: int, world: World) -> list[Happened]:
         event, conditions = self._events[serial], self._conditions
+        if begins:
+            # The tick is rounded up, as its start was rounded down to a whole number of ns.
+            self._course.begun[serial] = -(-start_ns * self._rate_hz // NS_PER_S)
+        if not begins or not event.undoable:
+            self._course.over.add(serial)
         if event.evolves:
-            self._evolving.append(serial)
+            (self._evolving.append if begins else self._evolving.remove)(serial)
         changed = event.begin(serial, self._swarm, conditions) if begins else event.end(serial, conditions)
         changed = changed & world.rows_running
         if event.evolves and not changed.any():  # what it does is yet to come

@@ -18,6 +18,7 @@ from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.truth import Tally, Truth
 from swarmwire.world.air_in_time import AirInTime
 from swarmwire.world.events import Events
+from swarmwire.world.interventions import Interventions
 from swarmwire.world.mailbox import Mailbox
 from swarmwire.world.trajectory_hash import TrajectoryHash
 from swarmwire.world.world import World
@@ -42,17 +43,21 @@ class Loop:
         observers: Sequence[Observer],
         events: Sequence[Event] = (),
         judge: Judge | None = None,
+        interventions: Interventions | None = None,
         timed: TimedCrew | None = None,
     ) -> None:
         """`judge` is asked after each tick, once observers saw it; without one no arena is over before the run is.
 
-        `timed` is the crew, if it is to put packets on the air and hand them over while a tick goes on.
+        `interventions` are asked at the start of each tick for events that people want. `timed` is the crew, if it is
+        to put packets on the air and hand them over while a tick goes on.
         """
         self.world, self.air, self.crew, self.observers = world, air, crew, observers
         self.ticks_done = 0
         self._judge = judge
         self._running, self._left_after = world.running.copy(), np.zeros(world.static.arenas, np.int64)
-        self._events = Events(events, world.static, world.keys, air.radio if air else None)
+        self._interventions = interventions
+        course = interventions.course if interventions else None
+        self._events = Events(events, world.static, world.keys, air.radio if air else None, course)
         self._mailbox = Mailbox(world.static)
         self._timed = timed
         self._in_time = AirInTime(air, world.static, self._addressable) if air and timed else None
@@ -78,6 +83,7 @@ class Loop:
         """One tick, in the order of the design: events, air, senses, crew, air, physics, observers, judge."""
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
+        self._intervene(tick, start_ns)
         events = self._events.apply(start_ns, world, self.air)
         news, packets, outcomes = self._receive(start_ns)
         senses = world.sense(tick)
@@ -180,6 +186,16 @@ class Loop:
         elif len(actions.sent):
             np.add.at(self._without_radio, actions.sent.sender // world.static.robots, 1)
         return actions
+
+    def _intervene(self, tick: int, start_ns: int) -> None:
+        """Have begin and end what people want of this tick."""
+        if self._interventions is None:
+            return
+        for number, event in self._interventions.take(tick, self.world.static.rate_hz):
+            if event is None:
+                self._events.end(number, start_ns)
+            else:
+                self._events.begin(number, event, start_ns)
 
     def _leave(self, over: BoolArray) -> None:
         """These arenas (arenas,) take no part in the ticks to come."""

@@ -3,8 +3,8 @@
 from abc import ABC, abstractmethod
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
-from typing import ClassVar
+from dataclasses import dataclass, fields, is_dataclass
+from typing import ClassVar, cast
 
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import BoolArray
@@ -33,6 +33,19 @@ class Event(ABC):
     def lasts_s(self) -> float | None:
         """How long until it is undone; None: never."""
         return None
+
+    @property
+    def undoable(self) -> bool:
+        """Whether it goes on until somebody or its own time undoes it; else it happens once."""
+        return False
+
+    @property
+    def words(self) -> str:
+        """What it does, as a scenario would say it: the action, and what is not left out."""
+        given = [(of.name, getattr(self, of.name), of.default) for of in fields(self) if of.name not in ("at_s", "do")]
+        return " ".join(
+            [self.do, *(f"{name} = {as_toml(value)}" for name, value, default in given if value != default)]
+        )
 
     @property
     def failing_part(self) -> str:
@@ -89,6 +102,11 @@ class LastingEvent(Event):
         """`for_s`."""
         return self.for_s
 
+    @property
+    def undoable(self) -> bool:
+        """Until then it may be undone at any time."""
+        return True
+
     @abstractmethod
     def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
         """Put what it holds from now on into `conditions`, under `serial`: `end` takes out all that is there."""
@@ -107,6 +125,22 @@ class LastingEvent(Event):
         changed = self.changed(serial, conditions)
         conditions.let_go(serial)
         return changed
+
+
+def as_toml(value: object) -> str:
+    """A value of an event's table as TOML has it; what is left out of a table within stays out.
+
+    >>> as_toml(Selection(group="flock", count=3))
+    '{ group = "flock", count = 3 }'
+    """
+    if is_dataclass(value):
+        given = {of.name: getattr(value, of.name) for of in fields(value)}
+        return f"{{ {', '.join(f'{name} = {as_toml(item)}' for name, item in given.items() if item is not None)} }}"
+    if isinstance(value, tuple):
+        return f"[{', '.join(as_toml(item) for item in cast('tuple[object, ...]', value))}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 @contextmanager

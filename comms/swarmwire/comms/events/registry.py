@@ -11,8 +11,9 @@ from swarmwire.comms.events.gain import Gain
 from swarmwire.comms.events.jammer import Jammer
 from swarmwire.comms.events.kill import Kill
 from swarmwire.comms.events.partition import Partition
+from swarmwire.comms.events.push import Push
 from swarmwire.comms.events.ramp import Ramp
 from swarmwire.comms.events.revive import Revive
 
 # All that `do` may name.
-ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Fail, Blackout, Partition, Ramp, Gain, Jammer)
+ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Fail, Blackout, Partition, Ramp, Gain, Jammer, Push)

@@ -56,3 +56,5 @@ class ObserverKeys:
         self.published = f"{root}/published"  # liveliness token: the run goes on and can be looked at
         self.scene = f"{root}/scene"  # queryable: what does not change
         self.truth = f"{root}/truth"  # glimpses, so many a second at most; may be lost
+        self.status = f"{root}/status"  # queryable: how it goes, for whoever may look
+        self.control = f"{root}/control"  # queryable: what to do, for whoever may control

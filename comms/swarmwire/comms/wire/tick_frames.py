@@ -11,6 +11,7 @@ from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.bodies.leds import BRIGHTEST
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
+from swarmwire.comms.memory import Memory
 from swarmwire.comms.notes import MOST_STATES, Notes, checked_state
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
 from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
@@ -19,6 +20,7 @@ from swarmwire.comms.values import NO_VALUES, Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.checked import checked_array
 from swarmwire.comms.wire.frames import Frame
+from swarmwire.comms.wire.memory_frames import memory_arrays
 
 NOTHING_BESIDE: Mapping[str, AnyArray] = MappingProxyType({})
 
@@ -88,11 +90,15 @@ def _outcomes(frame: Frame) -> Outcomes:
 
 
 def encode_actions(
-    tick: int, actions: Actions, dropped: int = 0, beside: Mapping[str, AnyArray] = NOTHING_BESIDE
+    tick: int,
+    actions: Actions,
+    dropped: int = 0,
+    memory: Memory | None = None,
+    beside: Mapping[str, AnyArray] = NOTHING_BESIDE,
 ) -> bytes:
     """An `actions` frame: what a runner's robots do and send, and how many frames to it were none that it could use.
 
-    `beside` are arrays that a record of actions has more.
+    With `memory`, where the world keeps it, what their agents remember; `beside` are arrays that a record has more.
     """
     arrays: dict[str, AnyArray] = {
         **beside,
@@ -109,6 +115,8 @@ def encode_actions(
     if len(actions.values):
         arrays["values"] = actions.values.rows
         arrays["values/value"] = actions.values.value
+    if memory:
+        arrays |= memory_arrays(memory)
     values: dict[str, Any] = {"dropped": dropped} if dropped else {}
     if len(actions.notes):
         arrays["notes"] = np.array((actions.notes.rows, actions.notes.code))

@@ -1,6 +1,7 @@
 """`swarmwire router`."""
 
 import json
+from collections import Counter
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -106,7 +107,17 @@ def _route(of: "Member", listen: list[str], connect: list[str], access: dict[str
             raise BadInput("--listen", ", ".join(listen), f"expected endpoints that are free: {reason}") from error
         with closed_after(session):
             typer.echo(f"router: listens at {', '.join(listens_at(session))}, calls {', '.join(connect)}")
+            linked = Counter[str]()
             while not interrupt.asked:
+                linked = _told(linked, Counter(link.auth_identifier or link.dst for link in session.info.links()))
                 clock.sleep_until(clock.now_ns() + to_ns(LOOK_S))
     if not interrupt.hung_up:
         typer.echo("router: ended")
+
+
+def _told(before: "Counter[str]", now: "Counter[str]") -> "Counter[str]":
+    """The links that there are now, once people know what has changed."""
+    for word, changed in (("linked with", now - before), ("lost", before - now)):
+        for name in changed.elements():
+            typer.echo(f"router: {word} {name}")
+    return now

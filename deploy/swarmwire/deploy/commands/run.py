@@ -106,7 +106,7 @@ def run_command(
             raise BadInput("--revoked", name, "expected a robot of the scenario")
     member = network_of(network, ca, certificate, key, revoked or [], insecure=insecure)
     gateways = gateways_of_options(gateway or [], gateway_set or [], swarm, member)
-    chosen = choose_seeds(checked, seed, None if seeds is None else _seed_list(seeds))
+    chosen = choose_seeds(checked, seed, None if seeds is None else seed_list(seeds))
     folder = out or default_folder(scenario.stem, chosen)
     console = Console(quiet=quiet, highlight=False)
     with compiling_told(console):
@@ -121,19 +121,21 @@ def run_command(
             gateways=gateways,
             record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
         )
-        result = _shown(simulation, folder, view, console)
+        result = run_shown(simulation, folder, view, console)
     if result.ended == "interrupted":
         raise typer.Exit(INTERRUPTED)
 
 
-def _shown(simulation: "Simulation", folder: Path, view: bool, console: Console) -> "Result":
+def run_shown(simulation: "Simulation", folder: Path, view: bool, console: Console) -> "Result":
     """The result of the run, told and shown while it goes on and afterwards."""
+    from swarmwire.deploy.control.run_finder import Announced
     from swarmwire.deploy.live.live_view import LiveView
     from swarmwire.deploy.running import finished
     from swarmwire.deploy.terminal.report import print_result
     from swarmwire.deploy.terminal.robots_told import RobotsTold
     from swarmwire.deploy.terminal.shown import progress
 
+    simulation.watch(Announced(folder))
     simulation.watch(RobotsTold(simulation, console))
     simulation.watch(progress(simulation, console))
     with LiveView(folder) as live:
@@ -149,7 +151,8 @@ def _shown(simulation: "Simulation", folder: Path, view: bool, console: Console)
     return result
 
 
-def _seed_list(text: str) -> list[int]:
+def seed_list(text: str) -> list[int]:
+    """The seeds of a text such as "1:9" or "1,5,7"; BadInput if it is none."""
     first, colon, last = text.partition(":")
     try:
         found = range(int(first), int(last)) if colon else [int(item) for item in text.split(",")]

@@ -36,7 +36,7 @@ def read_live(folder: Path) -> Live | None:
         return None
     except (ValueError, KeyError, TypeError) as error:
         raise BadInput(str(path), "", "expected endpoint, run and pid, as a run writes them") from error
-    return live if _goes_on(live.pid) else None
+    return live if goes_on(live.pid) else None
 
 
 def forget_live(folder: Path) -> None:
@@ -45,7 +45,7 @@ def forget_live(folder: Path) -> None:
         (folder / LIVE).unlink()
 
 
-def _goes_on(pid: int) -> bool:
+def goes_on(pid: int) -> bool:
     """Whether there is such a process: a run that was killed leaves its file behind."""
     try:
         os.kill(pid, 0)

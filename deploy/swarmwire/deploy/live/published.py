@@ -6,6 +6,7 @@
 import os
 import queue
 import threading
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from math import isinf
 from pathlib import Path
@@ -29,6 +30,7 @@ from swarmwire.deploy.live.live_file import Live, forget_live
 from swarmwire.deploy.live.sampling import FRAMES_PER_S, Rate, Sampling, Since
 from swarmwire.metrics.viewer.plotted import Measured
 from swarmwire.metrics.viewer.selected import selected_robot
+from swarmwire.world.crews.door import Door
 
 LEAVE_S = 2.0  # how long the last frame may take
 
@@ -51,8 +53,16 @@ class Published:
         clock: Clock,
         arena: int = 0,
         selected: str | None = None,
+        declare: Callable[[zenoh.Session, ObserverKeys], object] = lambda *_: None,
+        door: Door | None = None,
     ) -> None:
-        """Publish the run whose folder this is; `selected` is the robot that is shown in detail."""
+        """Publish the run whose folder this is; `selected` is the robot that is shown in detail.
+
+        `declare` declares what else is answered on the session, for as long as what it returns is kept. `door` is where
+        observers from elsewhere meet it, too.
+        """
+        self._door = door or Door(())
+        self._declare_more = declare
         self._folder, self._run_id, self._metrics, self._clock = folder, run_id, metrics, clock
         self._arena, self._selected = arena, selected
         self._open = ExitStack()
@@ -71,7 +81,7 @@ class Published:
         self._frames: queue.Queue[Glimpse | None] = queue.Queue(maxsize=1)
         with ExitStack() as opening:
             endpoint = opening.enter_context(local_endpoint(None))
-            session = opening.enter_context(closed_after(open_observed(endpoint)))
+            session = opening.enter_context(closed_after(self._session(endpoint)))
             self._declare(session, encode_scene(self._scene(static)))
             opening.callback(forget_live, self._folder)
             Live(endpoint, self._run_id, os.getpid()).write(self._folder)
@@ -109,6 +119,15 @@ class Published:
         self._open.close()
         return {"published": {"frames": self.frames, "left_out": self.left_out}}
 
+    def _session(self, endpoint: str) -> zenoh.Session:
+        door = self._door
+        try:
+            return open_observed([endpoint, *door.endpoints], door.network, door.access)
+        except zenoh.ZError as error:
+            raise BadInput(
+                "--observe", ", ".join(door.endpoints), f"expected endpoints that are free: {error}"
+            ) from error
+
     def _put(self, now_ns: int) -> None:
         """Hand what has not been shown to the sender; at the end it may be busy for a while."""
         latest = self._metrics.latest
@@ -142,6 +161,7 @@ class Published:
 
         self._declared = (
             session.declare_queryable(keys.scene, zenoh.handlers.Callback(answer, indirect=False)),
+            self._declare_more(session, keys),
             session.liveliness().declare_token(keys.published),  # last: it says that all is there
         )
 

@@ -12,8 +12,10 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.in_time import TimedCrew
 from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.comms.protocols import Crew, Observer
+from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.record.inputs import InputsRecord, RecordedCrew
+from swarmwire.deploy.record.interventions import InterventionsLog, InterventionsRecord
 from swarmwire.deploy.record.new_folder import make_folder
 from swarmwire.deploy.record.origin import Origin, origin_of
 from swarmwire.deploy.record.recording import Recording
@@ -24,6 +26,8 @@ from swarmwire.metrics.record.names import RECORDING, SUMMARY
 from swarmwire.metrics.record.recorders import recorders
 from swarmwire.metrics.record.run_log import RunLog
 from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.world.crews.door import Door
+from swarmwire.world.interventions import Intervention
 from swarmwire.world.scenario.scenario import Scenario
 
 
@@ -40,11 +44,23 @@ class RunRecord:
         self._clock = clock
         self._log = RunLog(self.folder, clock) if self.folder else None
         self._recorded: RecordedCrew | None = None
+        self._interventions = InterventionsLog(self.folder) if self.folder else None
 
     def observers(
-        self, what: Recording, run_id: str, metrics: Metrics, hashes: Callable[[], list[str]], *, may_drop: bool
+        self,
+        what: Recording,
+        run_id: str,
+        metrics: Metrics,
+        hashes: Callable[[], list[str]],
+        control: ControlServer,
+        *,
+        may_drop: bool,
+        door: Door | None = None,
     ) -> Sequence[Observer]:
-        """Those that fill the folder, and let others look on; `metrics` must see each tick before them."""
+        """Those that fill the folder, and let others look on and control it; `metrics` must see each tick before.
+
+        `door` is where others meet it beyond this machine.
+        """
         folder, clock = self.folder, self._clock
         if folder is None:
             return ()
@@ -62,7 +78,8 @@ class RunRecord:
             )
         if what.rrd:
             found.append(RerunRecording(folder / RECORDING, metrics, clock, selected=what.select))
-        return (*found, Published(folder, run_id, metrics, clock, selected=what.select))
+        published = Published(folder, run_id, metrics, clock, selected=what.select, declare=control.declare, door=door)
+        return (*found, published)
 
     def begin(
         self,
@@ -115,6 +132,20 @@ class RunRecord:
     def inputs(self) -> InputsRecord | None:
         """What was recorded of the crew; None if nothing."""
         return self._recorded.record() if self._recorded else None
+
+    def keep(self, intervention: Intervention) -> None:
+        """Record what somebody does to the run, before it takes effect; OSError if it cannot be recorded."""
+        if self._interventions is None:
+            return
+        try:
+            self._interventions.keep(intervention)
+        except OSError as error:
+            self.say(f"event {intervention.number} does not happen, as it cannot be recorded: {error}")
+            raise
+
+    def interventions(self) -> InterventionsRecord | None:
+        """What was recorded of what people did to the run; None if nothing."""
+        return self._interventions.record() if self._interventions else None
 
     def say(self, text: str) -> None:
         """Keep it in the log, and tell people at once; a terminal that is gone must not end a run."""

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from swarmwire.comms.assignment import robots_text
+
 What = Literal["joined", "left", "lost", "returned"]
 
 
@@ -12,13 +14,14 @@ class Change:
 
     what: What
     runner: str
-    robots: str  # in a few words
+    robots: tuple[str, ...]  # names
     tick: int  # that was open; -1: before the first
     reason: str = ""  # why it was lost
 
     def __str__(self) -> str:
         when = "before the first tick" if self.tick < 0 else f"in tick {self.tick}"
-        return f"{self.runner} {_SAID[self.what]} {self.robots} {when}" + (f": {self.reason}" if self.reason else "")
+        told = f"{self.runner} {_SAID[self.what]} {robots_text(list(self.robots))} {when}"
+        return told + (f": {self.reason}" if self.reason else "")
 
 
 _SAID: dict[What, str] = {

@@ -30,7 +30,7 @@ from swarmwire.world.crews.terms import USUAL, Terms
 __all__ = ["Lockstep", "Refused", "standing"]
 
 
-@dataclass
+@dataclass(eq=False)
 class _Slot(Slot):
     actions: Actions | None = None  # in the open tick
     idle: bool = False  # whether its robots have no agent in the open tick

@@ -62,7 +62,7 @@ class _Asked(NamedTuple):
     at_ns: int  # wall time, pauses left out
 
 
-@dataclass
+@dataclass(eq=False)
 class _Slot(Slot):
     asked: deque[_Asked] = field(default_factory=deque[_Asked])  # without an answer so far, oldest first
 

@@ -13,6 +13,7 @@ from swarmwire.comms.in_time import AirTime, HearingCrew, Put
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.senses import Actions, Senses
+from swarmwire.world.crews.door import Door
 from swarmwire.world.crews.lateness import Delays
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.quanta import Quanta
@@ -103,7 +104,7 @@ class RealTimeCrew(RunnerCrew[RealTime]):
 
     def __init__(
         self,
-        endpoint: str,
+        door: Door | str,
         run_id: str,
         assignments: list[Assignment],
         timeout_s: float,
@@ -116,11 +117,11 @@ class RealTimeCrew(RunnerCrew[RealTime]):
         quanta: Quanta | None = None,
     ) -> None:
         roster = RealTime(assignments, watchdog_s, timeout_s, on_loss, terms, quantum=quanta is not None)
-        super().__init__(endpoint, run_id, roster, timeout_s, clock, around)
+        super().__init__(door, run_id, roster, timeout_s, clock, around)
         self._pace, self._assignments, self._quanta = pace, assignments, quanta
         self._rate_hz = assignments[0].rate_hz
         if quanta:
-            self._inbox = RunnerInbox(now_ns=clock.now_ns)
+            self._inbox = RunnerInbox(roster.limits, clock.now_ns)
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """A frame to every runner; what has come when the tick is over."""

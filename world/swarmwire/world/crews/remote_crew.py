@@ -5,6 +5,7 @@ from swarmwire.comms.clock import Clock
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
+from swarmwire.world.crews.door import Door
 from swarmwire.world.crews.lockstep import Lockstep
 from swarmwire.world.crews.roster import OnLoss
 from swarmwire.world.crews.runner_crew import START_S, RunnerCrew, Surroundings
@@ -18,7 +19,7 @@ class RemoteCrew(RunnerCrew[Lockstep]):
 
     def __init__(
         self,
-        endpoint: str,
+        door: Door | str,
         run_id: str,
         assignments: list[Assignment],
         timeout_s: float,
@@ -28,7 +29,7 @@ class RemoteCrew(RunnerCrew[Lockstep]):
         start_s: float = START_S,
         terms: Terms = USUAL,
     ) -> None:
-        super().__init__(endpoint, run_id, Lockstep(assignments, on_loss, terms), timeout_s, clock, around, start_s)
+        super().__init__(door, run_id, Lockstep(assignments, on_loss, terms), timeout_s, clock, around, start_s)
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """One frame to every runner, one answer from each."""

@@ -30,6 +30,7 @@ from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted, RunnerLos
 from swarmwire.comms.memory import GroupMemory
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.limits import Limits
 from swarmwire.comms.wire.memory_frames import decode_memory, encode_memory
 from swarmwire.comms.wire.offer import Offer
 from swarmwire.world.crews.change import Change, What
@@ -75,6 +76,7 @@ class Roster(ABC, Generic[S]):
         """`parts` of the robots are free: a runner that asks for nothing in particular gets the next one."""
         self._slots, self._on_loss, self._terms = [self._slot(part) for part in parts], on_loss, terms
         self._by_runner: dict[str, S] = {}
+        self._parts = len(parts)  # as many runners as the run itself started are welcome, whatever the limits say
         self._owner = self._owners()
         self._rows = {name: row for part in parts for name, row in _named(part)}
         self._gone: set[str] = set()  # runners that left or were lost
@@ -82,6 +84,16 @@ class Roster(ABC, Generic[S]):
         self._counts: Counter[str] = Counter()
         self.losses: list[Loss] = []
         self.changes: list[Change] = []
+
+    @property
+    def is_open(self) -> bool:
+        """Whether runners come from elsewhere, when they like."""
+        return self._terms.open
+
+    @property
+    def limits(self) -> Limits:
+        """What is taken from runners at most."""
+        return self._terms.limits
 
     @property
     def waiting(self) -> int:
@@ -99,6 +111,11 @@ class Roster(ABC, Generic[S]):
     def robots_free(self) -> int:
         """Robots that nobody plays, and whose agents are still to be built."""
         return sum(len(slot.all_rows) for slot in self._slots if slot.state in ("free", "joined"))
+
+    @property
+    def missing_robots(self) -> tuple[str, ...]:
+        """Names of the robots that nobody plays."""
+        return tuple(name for slot in self._slots if slot.may("joins") for name in slot.assignment.robot_names)
 
     @property
     def bears_losses(self) -> bool:
@@ -152,7 +169,7 @@ class Roster(ABC, Generic[S]):
             self._refuse("expected a name of letters, digits, '_', '-' and '.', 64 at most", "bad_join")
         if runner in self._by_runner:
             self._refuse(f"the name {runner} is in use: another runner of this name plays")
-        if self._terms.most_runners is not None and len(self._by_runner) >= self._terms.most_runners:
+        if len(self._by_runner) >= max(self._terms.limits.runners, self._parts):
             self._refuse(f"there are {len(self._by_runner)} runners already, the most that this run takes")
         self._check_scenario(asked)
         slot = self._granted(asked)
@@ -265,7 +282,7 @@ class Roster(ABC, Generic[S]):
             self._changed("returned" if back else "joined", runner, slot)
 
     def _changed(self, what: What, runner: str, slot: S, reason: str = "") -> None:
-        self.changes.append(Change(what, runner, slot.assignment.robots_text, self._tick, reason))
+        self.changes.append(Change(what, runner, slot.assignment.robot_names, self._tick, reason))
 
     def _failed(self, slot: S, frame: frames.Frame) -> None:
         match frame.values:
@@ -307,11 +324,12 @@ class Roster(ABC, Generic[S]):
             rows = np.sort(np.concatenate([slot.all_rows for slot in free]))[: asked.robots]
             if len(rows) < asked.robots:
                 self._refuse(f"expected at most {len(rows)} robots, which are free, got {asked.robots}")
-        most = self._terms.most_robots
-        if most is not None and len(rows) > most:
+        most = self._terms.limits.robots_per_runner
+        if self._terms.open and len(rows) > most:
             self._refuse(f"expected at most {most} robots for one runner, got {len(rows)}")
         from_slots = [slot for slot in free if np.isin(slot.all_rows, rows).any()]
-        self._check_agents(asked, [group.name for slot in from_slots for group in slot.assignment.groups])
+        groups = [group for slot in from_slots for group in slot.assignment.groups]
+        self._check_agents(asked, [group.name for group in groups if np.isin(group.rows, rows).any()])
         return self._cut(from_slots, rows)
 
     def _named(self, names: Sequence[str]) -> IntArray:

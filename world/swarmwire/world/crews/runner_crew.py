@@ -19,8 +19,9 @@ from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.keys import Keys, runner_of
-from swarmwire.comms.wire.sessions import open_world
+from swarmwire.comms.wire.sessions import listens_at, open_world
 from swarmwire.world.crews.change import Change
+from swarmwire.world.crews.door import Door
 from swarmwire.world.crews.roster import Loss, Refused, Roster
 from swarmwire.world.crews.runner_health import RunnerHealth
 from swarmwire.world.crews.runner_inbox import Item, RunnerInbox
@@ -38,14 +39,16 @@ class Surroundings:
 
     `trouble` says why there is no more point in waiting for runners (a process that exited), or None; it is asked while
     any loss ends the run. `stopped` says whether the run is to end; `lost` is told of a loss that the run survives,
-    `changed` of every runner that comes or goes, `refused` of one that may not join, and why.
+    `changed` of every runner that comes or goes and of the robots that nobody plays then, `refused` of one that may not
+    join, and why; `opened`, in an open run, of where the world listens.
     """
 
     trouble: Callable[[], str | None] = lambda: None
     stopped: Callable[[], bool] = lambda: False
     lost: Callable[[Loss], None] = lambda _: None
-    changed: Callable[[Change], None] = lambda _: None
+    changed: Callable[[Change, tuple[str, ...]], None] = lambda _change, _free: None
     refused: Callable[[str, str], None] = lambda _runner, _why: None
+    opened: Callable[[tuple[str, ...]], None] = lambda _: None
 
 
 class RunnerCrew(ABC, Generic[R]):
@@ -55,7 +58,7 @@ class RunnerCrew(ABC, Generic[R]):
 
     def __init__(
         self,
-        endpoint: str,
+        door: Door | str,
         run_id: str,
         roster: R,
         timeout_s: float,
@@ -63,9 +66,10 @@ class RunnerCrew(ABC, Generic[R]):
         around: Surroundings,
         start_s: float = START_S,
     ) -> None:
-        self._endpoint, self._keys = endpoint, Keys(run_id)
+        self._door = Door((door,)) if isinstance(door, str) else door
+        self._keys = Keys(run_id)
         self._roster, self._timeout_s, self._clock, self._around = roster, timeout_s, clock, around
-        self._inbox = RunnerInbox()
+        self._inbox = RunnerInbox(roster.limits)
         self._session: zenoh.Session | None = None
         self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to
         self._frames: dict[str, zenoh.Publisher] = {}
@@ -76,14 +80,16 @@ class RunnerCrew(ABC, Generic[R]):
         self._deadline_ns = 0
 
     def open(self) -> None:
-        """Listen at the endpoint, so that runners may join; BadInput if it is taken."""
+        """Listen at the endpoints, so that runners may join; BadInput if one is taken."""
+        door = self._door
         try:
-            session = self._session = open_world(self._endpoint, self._timeout_s)
+            session = open_world(door.endpoints, self._timeout_s, door.network, door.access, self._roster.limits)
         except zenoh.ZError as error:
             reason = str(error).split(" at ")[0]
             raise BadInput(
-                "", self._endpoint, f"expected an endpoint that is free and can be listened on: {reason}"
+                "", ", ".join(door.endpoints), f"expected an endpoint that is free and can be listened on: {reason}"
             ) from error
+        self._session = session
         arrived = (self._inbox.put, self._inbox)
         self._declared = (
             session.declare_queryable(self._keys.any_offer, arrived),
@@ -92,6 +98,8 @@ class RunnerCrew(ABC, Generic[R]):
             session.liveliness().declare_subscriber(self._keys.any_alive, arrived, history=True),
             session.liveliness().declare_token(self._keys.world),  # last: it says that runners may join
         )
+        if self._roster.is_open:
+            self._around.opened(listens_at(session))
 
     def start(self) -> None:
         """Wait until runners have taken all robots and built their agents."""
@@ -216,7 +224,7 @@ class RunnerCrew(ABC, Generic[R]):
             self._frames[runner] = self._session.declare_publisher(
                 self._keys.frame(runner), congestion_control=self.congestion, express=True
             )
-            self._building[runner] = self._clock.now_ns() + to_ns(START_S)
+            self._building[runner] = self._clock.now_ns() + to_ns(self._roster.limits.join_s)
             self._allow_time()
             query.reply(key, reply)
 
@@ -226,7 +234,7 @@ class RunnerCrew(ABC, Generic[R]):
             if not self._roster.is_building(runner):
                 del self._building[runner]
             elif self._clock.now_ns() > until_ns:
-                self._roster.gone(runner, f"its agents were not ready within {START_S:g} s")
+                self._roster.gone(runner, f"its agents were not ready within {self._roster.limits.join_s:g} s")
         for loss in self._roster.losses[self._losses_told :]:
             self._around.lost(loss)
         self._losses_told = len(self._roster.losses)
@@ -235,5 +243,5 @@ class RunnerCrew(ABC, Generic[R]):
                 why = {"why": change.reason} if change.reason else {}
                 self._frames.pop(change.runner).put(frames.encode("end", -1, {}, why))
                 self._present.discard(change.runner)
-            self._around.changed(change)
+            self._around.changed(change, self._roster.missing_robots)
         self._changes_told = len(self._roster.changes)

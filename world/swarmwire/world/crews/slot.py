@@ -25,7 +25,7 @@ MOVES: dict[State, dict[Move, State]] = {
 }
 
 
-@dataclass
+@dataclass(eq=False)
 class Slot:
     """Some robots, and the runner that plays them."""
 

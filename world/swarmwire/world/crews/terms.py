@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from swarmwire.comms.memory import Layout
+from swarmwire.comms.wire.limits import LIMITS, Limits
 from swarmwire.comms.wire.offer import Offer
 
 
@@ -16,16 +17,14 @@ class Terms:
         open: whether runners come from elsewhere and when they like: nobody is waited for in vain, and who leaves
             before the first tick only frees its robots.
         start_with: robots with an agent that are enough for the first tick; None: all.
-        most_runners: at a time; None: as many as there are robots.
-        most_robots: of one runner; None: all.
+        limits: how many runners, how many robots of each, and how long they may take.
         memory: by group, what is kept of its robots for whoever plays them next; None: nothing is.
     """
 
     offer: Offer | None = None
     open: bool = False
     start_with: int | None = None
-    most_runners: int | None = None
-    most_robots: int | None = None
+    limits: Limits = LIMITS
     memory: Mapping[str, Layout] | None = None
 
 

@@ -71,6 +71,10 @@ class Engine(Protocol):
         """
         ...
 
+    def push(self, by_mps: FloatArray) -> None:
+        """Add to the velocities of robots at once, (arenas, n, 2) in m/s; TypeError if the engine knows no forces."""
+        ...
+
     def leave(self, over: BoolArray) -> None:
         """Nothing in these arenas (arenas,) moves any more, or begins to touch: `state` and `travel_m` stay there."""
         ...

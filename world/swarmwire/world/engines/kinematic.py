@@ -58,6 +58,10 @@ class KinematicEngine:
         mark(self._touching, self.touched)
         return onsets
 
+    def push(self, by_mps: FloatArray) -> None:
+        """TypeError: bodies that go where they are told cannot be pushed, and scenarios that ask for it are refused."""
+        raise TypeError("the kinematic engine knows no forces")
+
     def leave(self, over: BoolArray) -> None:
         """Nothing in these arenas (arenas,) moves or touches any more."""
         self._running &= ~over

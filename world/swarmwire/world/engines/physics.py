@@ -77,6 +77,14 @@ class Physics:
         self._gather()
         return onsets
 
+    def push(self, by_mps: FloatArray) -> None:
+        """Add to the velocities of robots at once, (arenas, robots, 2) in m/s; TypeError where there are no forces."""
+        for engine, index in zip(self._engines, self._robots, strict=True):
+            if (part := by_mps[:, index]).any():
+                engine.push(part)
+        if len(self._engines) > 1:
+            self._gather()
+
     def leave(self, over: BoolArray) -> None:
         """Nothing in these arenas (arenas,) moves any more."""
         for engine in self._engines:

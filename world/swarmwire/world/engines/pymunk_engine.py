@@ -55,6 +55,12 @@ class PymunkEngine:
             self._spaces[arena].count_onsets(onsets[arena : arena + 1], self.touched[arena : arena + 1])
         return onsets
 
+    def push(self, by_mps: FloatArray) -> None:
+        """Add to the velocities of robots at once, (arenas, robots, 2) in m/s."""
+        for arena in self._moving:
+            self._spaces[arena].push(by_mps[arena])
+        self._read()
+
     def leave(self, over: BoolArray) -> None:
         """The spaces of these arenas (arenas,) are not stepped any more."""
         self._running &= ~over

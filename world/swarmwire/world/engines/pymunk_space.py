@@ -72,7 +72,7 @@ class ArenaSpace:
         # Only a buffer that is written from may lie in numpy's memory: pymunk reallocates one that it fills.
         self._forces.set_float_buf(force)
         self._check_order(ids)
-        self._robots = len(robots)
+        self._robots, self._pushed = len(robots), robots
         order = np.argsort(np.array(ids, np.uintp))
         self._ids = np.array(ids, np.uintp)[order]
         self._index = np.minimum(order, self._robots)  # all obstacles and walls count as one body
@@ -133,6 +133,12 @@ class ArenaSpace:
         state[:] = rows[: self._robots]
         if len(loads):
             loads[:] = rows[self._robots : -1]
+
+    def push(self, by_mps: FloatArray) -> None:
+        """Add to the velocities of robots, (robots, 2) in m/s."""
+        for row in np.flatnonzero(by_mps.any(axis=1)).tolist():
+            body, (x_mps, y_mps) = self._pushed[row], by_mps[row].tolist()
+            body.velocity = body.velocity.x + x_mps, body.velocity.y + y_mps
 
     def step(self, step_s: float) -> None:
         """Hand over the forces and move by one physics step."""

@@ -1,6 +1,7 @@
 """Checks that need more than one key of a scenario: bodies, physics steps, obstacles, the radio's offset, events."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from swarmwire.comms.air.radio_checks import check_radio, unfit_for_torus
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
+from swarmwire.comms.events.push import Push
 from swarmwire.world.actuation.noise import noise_of
 from swarmwire.world.engines.choice import check_engines, engines_of
 from swarmwire.world.placement.layout import read_layout
@@ -34,7 +36,7 @@ def check(scenario: Scenario, where: str) -> None:
         _check_torus(scenario, scenario.radio, where)
     _check_antennas(scenario, where)
     for i, event in enumerate(scenario.events):
-        _check_event(scenario, bodies, event, f"events.{i}", where)
+        check_event(scenario, bodies, event, f"events.{i}", where)
 
 
 def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> None:
@@ -79,13 +81,30 @@ def _check_antennas(scenario: Scenario, where: str) -> None:
             raise BadInput(where, f"robots.{group}.radio", f"expected a radio with signals: {why}")
 
 
-def _check_event(scenario: Scenario, bodies: dict[str, Body], event: Event, key: str, where: str) -> None:
-    """An event names robots that there are, and fits the radio, if it needs one."""
+def _check_push(scenario: Scenario, bodies: Mapping[str, Body], event: Push) -> None:
+    """Only engines with forces can push; and who is pushed must not get through what stands in the way in one step."""
+    engines = engines_of(scenario, bodies)
+    for group in event.robots.groups(scenario.groups()):
+        if engines[group] == "kinematic":
+            expected = (
+                f"expected robots whose bodies have contacts: those of {group} go where they are told (kinematic)"
+            )
+            raise BadInput("", "robots", expected)
+        most_mps = bodies[group].radius_m * scenario.time.rate_hz * scenario.physics.steps
+        if event.speed_mps > most_mps:
+            why = f"with which a robot of {group} moves by its radius in one of {scenario.physics.steps} physics.steps"
+            raise BadInput("", "speed_mps", f"expected at most {most_mps:g} m/s, {why}; got {event.speed_mps!r}")
+
+
+def check_event(scenario: Scenario, bodies: Mapping[str, Body], event: Event, key: str, where: str) -> None:
+    """Raise BadInput unless an event names robots that there are, and fits the radio and the engines that it needs."""
     if event.needs_radio and scenario.radio is None:
         raise BadInput(where, f"{key}.do", f"expected a scenario with a [radio] for {event.do!r}")
     try:
         event.check(scenario.groups())
         event.check_bodies(scenario.groups(), bodies)
+        if isinstance(event, Push):
+            _check_push(scenario, bodies, event)
         if event.needs_radio and scenario.radio is not None:
             event.check_radio(scenario.radio)
     except BadInput as error:

@@ -72,8 +72,10 @@ class RobotsTable(Table):
 class RunTable(Table):
     """[run]: what the loop does about runners."""
 
-    on_runner_loss: Literal["stop", "dead", "wait"] = "stop"
-    """A lost runner ends the run, its robots stand still, or they wait until another runner takes over."""
+    on_runner_loss: Literal["stop", "dead", "wait", "stand", "coast"] = "stop"
+    """A lost runner ends the run (stop), or its robots stand still to the end (dead), or the run waits until another
+    runner takes over (wait), or it goes on, and until one does they stand still (stand) or keep their last command
+    (coast)."""
     runner_timeout_s: float = Field(default=30.0, gt=0, le=86_400, json_schema_extra={"unit": "s"})
     """A runner is lost if it gives no answer for so long."""
     watchdog_s: float = Field(default=0.5, gt=0, le=86_400, json_schema_extra={"unit": "s"})

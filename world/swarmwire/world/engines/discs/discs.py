@@ -59,6 +59,10 @@ class DiscsEngine:
                 return onsets
             self._list_near(fastest_mps)
 
+    def push(self, by_mps: FloatArray) -> None:
+        """Add to the velocities of robots at once, (arenas, robots, 2) in m/s."""
+        self.state[:, :, 3:5] += by_mps
+
     def leave(self, over: BoolArray) -> None:
         """Nothing in these arenas (arenas,) moves or touches any more: nothing there is listed."""
         self._running &= ~over

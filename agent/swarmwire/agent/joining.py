@@ -1,0 +1,188 @@
+"""Joining a run from elsewhere: which run it is, what it offers, and with which agents of its own a runner comes."""
+
+# zenoh's stubs leave out the types of what a session answers.
+# pyright: reportUnknownMemberType=false
+
+import hashlib
+import os
+import queue
+import socket
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from secrets import token_hex
+
+import zenoh
+from zenoh.handlers import Callback
+
+from swarmwire.agent.loading import NoAgent, agent_sha256, load_agent
+from swarmwire.agent.runner import NO_ROBOTS, Asked, Ended, Inbox, play
+from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.errors import BadFrame, BadInput, RunnerLost
+from swarmwire.comms.loading import resolve
+from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.keys import EVERY_WORLD, Keys, run_of
+from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.network_names import fault_of_name
+from swarmwire.comms.wire.offer import Offer
+from swarmwire.comms.wire.sessions import open_runner
+
+LOOK_S = 5.0  # for worlds at an endpoint: a router may have to find its own first
+OTHERS_S = 0.3  # for further worlds after the first
+OFFER_S = 10.0
+BY_ALL = ""  # in place of a group's name
+
+
+@dataclass(frozen=True)
+class Joining:
+    """How somebody joins a run.
+
+    Attributes:
+        endpoint: where the world, or a router before it, listens.
+        robots: how many; None, and no names: all that are free, or the next part.
+        names: of the robots.
+        agents: "mine.py:Mine" for all groups, or "flock=mine.py:Mine"; else as the scenario writes them, beside it if
+            it was named, else here.
+        scenario: a file that must be that of the run; None: any.
+        name: of the runner; None: that of its certificate, or one made up.
+        run: its id; None: the only one at the endpoint.
+        network: the certificates.
+        connect_s: how long the endpoint is called.
+    """
+
+    endpoint: str
+    robots: int | None = None
+    names: tuple[str, ...] | None = None
+    agents: tuple[str, ...] = ()
+    scenario: Path | None = None
+    name: str | None = None
+    run: str | None = None
+    network: Network = field(default_factory=Network)
+    connect_s: float = 10.0
+
+    def check(self) -> None:
+        """BadInput for what cannot be asked for at all."""
+        self.network.check_endpoint(self.endpoint, "", "ENDPOINT")
+        if self.robots is not None and self.names is not None:
+            raise BadInput("--robots", "", "expected only one of --robots and --names")
+        if self.robots is not None and self.robots < 1:
+            raise BadInput("--robots", "", f"expected at least 1, got {self.robots}")
+        if self.name is not None and (fault := fault_of_name(self.name)) is not None:
+            raise BadInput("--name", "", fault)
+        if self.scenario is not None and not self.scenario.is_file():
+            raise BadInput("--scenario", str(self.scenario), "expected a file, it is none")
+
+    @property
+    def runner(self) -> str:
+        """The runner's name: with certificates it must be the one on its own."""
+        if self.name is not None:
+            return self.name
+        if self.network.certificate is not None:
+            return self.network.certificate.stem
+        host = "".join(letter for letter in socket.gethostname().partition(".")[0] if letter.isalnum() or letter == "-")
+        return f"{host or 'runner'}-{os.getpid()}-{token_hex(2)}"
+
+
+def join(joining: Joining, inbox: Inbox, say: Callable[[str], None]) -> Ended:
+    """Play robots of a run to its end, or until `inbox.leave()`; `say` is told what people should know.
+
+    BadInput for what cannot be asked for, RunnerLost if the world is not there, or says no.
+    """
+    joining.check()
+    runner = joining.runner
+    try:
+        session = open_runner(joining.endpoint, joining.connect_s, joining.network)
+    except zenoh.ZError as error:
+        reason = str(error).split(" at ")[0]
+        raise RunnerLost(
+            runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}{_or_else(joining)}: {reason}"
+        ) from error
+    with closed_after(session):
+        run_id = joining.run or _only_run(session, runner, joining.endpoint)
+        keys = Keys(run_id)
+
+        def asked() -> Asked:
+            offer = _offer(session, keys, runner)
+            agents, hashes = _own_agents(offer, joining, say)
+            return Asked(JoinRequest(joining.robots, joining.names, hashes, _sha256(joining.scenario)), agents)
+
+        def joined(assignment: Assignment) -> None:
+            say(f"{runner}: joined run {run_id} with {assignment.robots_text}")
+
+        return play(session, keys, runner, inbox, asked, joined)
+
+
+def _or_else(joining: Joining) -> str:
+    return ", or one certificate or the other is not accepted" if joining.network.proves else ""
+
+
+def _only_run(session: zenoh.Session, runner: str, endpoint: str) -> str:
+    """The id of the only run at the endpoint."""
+    replies = session.liveliness().get(EVERY_WORLD, timeout=LOOK_S)
+    found = {run_of(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None}
+    runs = sorted(found or _runs_to_come(session))
+    if len(runs) == 1:
+        return runs[0]
+    if runs:
+        raise BadInput("--run", "", f"expected one of the runs at {endpoint}: {', '.join(runs)}")
+    raise RunnerLost(runner, NO_ROBOTS, f"there is no run at {endpoint}, or it does not let {runner} in")
+
+
+def _runs_to_come(session: zenoh.Session) -> set[str]:
+    """The runs that appear soon. Beside a subscription to the same keys, zenoh answers a `get` only sometimes."""
+    arrived: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
+    looking = session.liveliness().declare_subscriber(EVERY_WORLD, Callback(arrived.put, indirect=False), history=True)
+    found, patience_s = set[str](), LOOK_S
+    with suppress(queue.Empty):
+        while True:
+            found.add(run_of(str(arrived.get(timeout=patience_s).key_expr)))
+            patience_s = OTHERS_S
+    looking.undeclare()
+    return found
+
+
+def _offer(session: zenoh.Session, keys: Keys, runner: str) -> Offer:
+    for reply in session.get(keys.offer(runner), timeout=OFFER_S):
+        if reply.ok is not None:
+            try:
+                return Offer.decode(reply.ok.payload.to_bytes())
+            except BadFrame as fault:
+                raise RunnerLost(runner, NO_ROBOTS, f"another version of swarmwire: {fault}") from fault
+    raise RunnerLost(runner, NO_ROBOTS, f"the world told nothing of its run: it may not let {runner} in")
+
+
+def _own_agents(
+    offer: Offer, joining: Joining, say: Callable[[str], None]
+) -> tuple[Mapping[str, str], Mapping[str, str]]:
+    """By group, the spec and the sha256 of this machine's own agent; what is not here is told, and left out."""
+    given = _given(joining.agents, [group.name for group in offer.groups])
+    specs: dict[str, str] = {}
+    hashes: dict[str, str] = {}
+    for group in offer.groups:
+        if joining.names is not None and not set(group.free) & set(joining.names):
+            continue
+        own = given.get(group.name, given.get(BY_ALL))
+        beside = Path.cwd() if own or joining.scenario is None else joining.scenario.parent
+        spec = resolve(own or group.agent, beside)
+        try:
+            hashes[group.name] = agent_sha256(load_agent(spec))
+            specs[group.name] = spec
+        except NoAgent as error:
+            say(f"no agent for {group.name}: {error}; --agent names another")
+    return specs, hashes
+
+
+def _given(texts: Sequence[str], groups: Sequence[str]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for text in texts:
+        group, equals, spec = text.partition("=")
+        if equals and group not in groups:
+            raise BadInput("--agent", text, f"expected a group of the run: {', '.join(groups)}")
+        found[group if equals else BY_ALL] = spec if equals else text
+    return found
+
+
+def _sha256(path: Path | None) -> str | None:
+    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()

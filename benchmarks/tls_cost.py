@@ -1,0 +1,157 @@
+"""What mutual TLS with access control costs of a lockstep tick: beside it, the tick over plain TCP and unix sockets.
+
+Three sets of runners play the same robots, a process each; in every tick all three are asked in turn, with the same
+senses and packets. So the machine's moods fall on all of them alike, and their answers are the same.
+"""
+
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks import scenes
+from benchmarks.lines import print_line
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.run_access import RunAccess, agents_access
+from swarmwire.comms.wire.sessions import unix_endpoint
+from swarmwire.deploy import Simulation
+from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
+from swarmwire.deploy.certificates.folder_access import network_in
+from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.new_air import new_air
+from swarmwire.world.crews import split_robots
+from swarmwire.world.crews.door import Door
+from swarmwire.world.crews.remote_crew import RemoteCrew
+from swarmwire.world.crews.runner_crew import Surroundings
+from swarmwire.world.crews.terms import Terms
+from swarmwire.world.loop import Loop
+from swarmwire.world.scenario.scenario_file import scenario_from
+
+KINDS = ("unix", "tcp", "tls")
+WARM_UP = 20
+START_S = 60.0
+
+
+class InTurn:
+    """A crew that asks several, each in turn first, and keeps what each took."""
+
+    def __init__(self, crews: dict[str, RemoteCrew]) -> None:
+        self._crews, self._clock = crews, WallClock()
+        self.took_ns: list[dict[str, int]] = []
+
+    def start(self) -> None:
+        """All of them have been started."""
+
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+        """What the last one says; the others say the same."""
+        first = tick % len(KINDS)
+        took, actions = dict[str, int](), None
+        for kind in (*KINDS[first:], *KINDS[:first]):
+            before_ns = self._clock.now_ns()
+            actions = self._crews[kind].act(tick, senses, heard, outcomes)
+            took[kind] = self._clock.now_ns() - before_ns
+        self.took_ns.append(took)
+        assert actions is not None
+        return actions
+
+    def close(self) -> None:
+        """They are closed by whoever opened them."""
+
+    def counts(self) -> dict[str, int]:
+        """Nothing of its own."""
+        return {}
+
+
+def tls_cost(name: str, repeats: int, *, robots: int, ticks: int) -> None:
+    """A tick over TLS in times one over plain TCP, whole ticks of world, radio and runners; the median of all pairs."""
+    ratios: list[float] = []
+    told: dict[str, object] = {}
+    for _ in range(repeats):
+        rest_ms, took_ms = _measured(robots, ticks)
+        tick_ms = {kind: rest_ms + took_ms[kind] for kind in KINDS}
+        ratios.append(float(np.median(tick_ms["tls"] / tick_ms["tcp"])))
+        told = {f"tick_ms_{kind}": round(statistics.median(tick_ms[kind].tolist()), 3) for kind in KINDS}
+        told["over_unix"] = round(float(np.median(tick_ms["tls"] / tick_ms["unix"])), 3)
+        told["runners_alone"] = round(float(np.median(took_ms["tls"] / took_ms["tcp"])), 3)
+    config = {
+        "robots": robots,
+        "runners": robots,
+        "ticks": ticks,
+        "repeats": repeats,
+        "lowest": round(min(ratios), 3),
+        "highest": round(max(ratios), 3),
+        "rate_hz": 10,
+        "body": "epuck",
+        "agent": "swarmwire.agent.behaviours:Flocking",
+        "physics_steps": 5,
+        "certificates": "EC P-256, mutual TLS 1.3 of zenoh, access control for each runner by its common name",
+        "beside": "plain TCP on loopback, the same ticks in turn",
+        **told,
+    }
+    print_line(name, statistics.median(ratios), "times the plain tick", config)
+
+
+def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Of each tick, in ms: what world and radio took, and what each set of runners did."""
+    scenario = scenario_from(scenes.flocking(robots, ticks / 10), "tls-cost")
+    simulation = Simulation(scenario)
+    parts = split_robots.split(split_robots.whole(scenario, simulation.static, dict(simulation.agents)), robots)
+    agent, clock = next(iter(simulation.agents.values())), WallClock()
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sw-", dir="/tmp")))
+        names = tuple(f"r{i}" for i in range(robots))
+        certs = _certificates(folder / "certs", names)
+        crews: dict[str, RemoteCrew] = {}
+        for kind in KINDS:
+            at: list[str] = []
+            around = Surroundings(opened=at.extend)
+            crew = RemoteCrew(
+                _door(kind, folder, certs, names), kind, parts, START_S, clock, around, terms=Terms(open=True)
+            )
+            stack.callback(crew.close)
+            crew.open()
+            words = [at[0], kind, agent, str(certs) if kind == "tls" else "", *names]
+            runners = subprocess.Popen(
+                [sys.executable, "-m", "benchmarks.tls_runners", *words],
+                env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+            )
+            crew.start()
+            stack.callback(runners.wait, 10.0)
+            stack.callback(crew.close)
+            crews[kind] = crew
+        in_turn = InTurn(crews)
+        simulation.metrics.begin(simulation.static)
+        loop = Loop(simulation.world, new_air(scenario, simulation.world, None), in_turn, [simulation.metrics])
+        steps_ns = list[int]()
+        for _ in range(ticks):
+            before_ns = clock.now_ns()
+            loop.step()
+            steps_ns.append(clock.now_ns() - before_ns)
+    took_ms = {kind: np.array([took[kind] for took in in_turn.took_ns])[WARM_UP:] / 1e6 for kind in KINDS}
+    rest_ms = np.array(steps_ns)[WARM_UP:] / 1e6 - sum(took_ms.values())
+    return rest_ms, took_ms
+
+
+def _certificates(folder: Path, names: tuple[str, ...]) -> Path:
+    begin_authority(folder, WallClock())
+    here = ("127.0.0.1",)
+    issue(folder, [wanted("world", here), *(wanted(name, here, "runner") for name in names)], 1, WallClock())
+    return folder
+
+
+def _door(kind: str, folder: Path, certs: Path, names: tuple[str, ...]) -> Door:
+    if kind == "unix":
+        return Door((unix_endpoint(f"{folder}/world"),))
+    if kind == "tcp":
+        return Door(("tcp/127.0.0.1:0",))
+    return Door(("tls/127.0.0.1:0",), network_in(certs, "world"), agents_access(Keys(kind), RunAccess(names)))

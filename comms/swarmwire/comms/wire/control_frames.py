@@ -1,0 +1,112 @@
+"""What people ask of a run on the observers' endpoint, and its answers: small msgpack maps, checked on arrival."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any, cast
+
+import msgpack
+from msgpack.exceptions import UnpackException
+
+from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.one_of import one_of
+
+CONTROL_VERSION = 1
+MOST_BYTES = 64 * 1024  # of a request
+MOST_REPLY_BYTES = 16 * 1024 * 1024
+MOST_STEPS = 1_000_000
+
+# What may be asked, and the key that comes with it.
+DOES: dict[str, str | None] = {
+    "pause": None,
+    "resume": None,
+    "step": "n",
+    "speed": "factor",
+    "stop": None,
+    "event": "event",
+    "end": "event",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One thing that is asked of a run."""
+
+    do: str
+    value: Any = None  # of its key: ticks, a factor (None: no limit), an event's table, an event's number
+
+
+def encode_request(request: Request) -> bytes:
+    """The bytes of a request."""
+    key = DOES[request.do]
+    return msgpack.packb({"v": CONTROL_VERSION, "do": request.do} | ({key: request.value} if key else {}))
+
+
+def decode_request(data: bytes) -> Request:
+    """The request of these bytes; BadInput says in one line what was expected instead."""
+    try:
+        asked = _map_of(data, MOST_BYTES)
+    except BadFrame as fault:
+        raise BadInput("", "", f"expected a request: {fault}") from None
+    if type(asked.get("v")) is not int or asked["v"] != CONTROL_VERSION:
+        raise BadInput("", "v", f"expected version {CONTROL_VERSION} of control, got {_shown(asked.get('v'))}")
+    do = asked.get("do")
+    if not isinstance(do, str) or do not in DOES:
+        raise BadInput("", "do", f"expected {one_of(DOES, do)}; got {_shown(do)}")
+    key = DOES[do]
+    for name in asked:
+        if name not in ("v", "do", key):
+            raise BadInput("", name, f"unknown key of {do!r}; expected {key or 'none'}")
+    value = _value(do, asked.get(key, 1 if do == "step" else None)) if key else None
+    return Request(do, value)
+
+
+def encode_reply(reply: Mapping[str, Any]) -> bytes:
+    """The bytes of an answer: of control `done`, `tick` and `event`, of status what there is to tell."""
+    return msgpack.packb({"v": CONTROL_VERSION, **reply})
+
+
+def decode_reply(data: bytes) -> dict[str, Any]:
+    """The answer in these bytes; BadFrame if they are none."""
+    reply = _map_of(data, MOST_REPLY_BYTES)
+    if type(reply.get("v")) is not int or reply["v"] != CONTROL_VERSION:
+        raise BadFrame("malformed", f"version {reply.get('v')!r} of control, expected {CONTROL_VERSION}")
+    return reply
+
+
+def _value(do: str, value: object) -> Any:
+    if do == "step":
+        if type(value) is int and 1 <= value <= MOST_STEPS:
+            return value
+        raise BadInput("", "n", f"expected a whole number of ticks from 1 to {MOST_STEPS}, got {_shown(value)}")
+    if do == "speed":
+        if value is None or (type(value) in (int, float) and isfinite(cast("float", value))):
+            return None if value is None else float(cast("float", value))
+        raise BadInput("", "factor", f"expected simulated seconds per second, or none, got {_shown(value)}")
+    if do == "end":
+        if type(value) is int:
+            return value
+        raise BadInput("", "event", f"expected the number of an event, got {_shown(value)}")
+    if isinstance(value, dict):
+        table = cast("dict[object, object]", value)
+        if all(type(name) is str for name in table):
+            return table
+    expected = 'expected a table as in a scenario, such as { do = "kill", robots = { count = 3 } }'
+    raise BadInput("", "event", f"{expected}; got {_shown(cast('object', value))}")
+
+
+def _map_of(data: bytes, most_bytes: int) -> dict[str, Any]:
+    if len(data) > most_bytes:
+        raise BadFrame("oversized", f"{len(data)} bytes, expected at most {most_bytes}")
+    try:
+        body: object = msgpack.unpackb(data)
+    except (ValueError, UnpackException) as error:
+        raise BadFrame("malformed", f"no msgpack: {error}") from error
+    if type(body) is not dict or not all(type(name) is str for name in cast("dict[object, object]", body)):
+        raise BadFrame("malformed", "expected a map with texts as keys")
+    return cast("dict[str, Any]", body)
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

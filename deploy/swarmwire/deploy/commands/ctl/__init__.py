@@ -1,0 +1,1 @@
+"""`swarmwire ctl`: runs that go on, watched and changed from another terminal."""

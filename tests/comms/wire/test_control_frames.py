@@ -1,0 +1,78 @@
+"""What is asked of a run arrives as it was sent, and what cannot be meant is refused in one line that names the key."""
+
+import msgpack
+import pytest
+
+from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.wire.control_frames import (
+    MOST_BYTES,
+    Request,
+    decode_reply,
+    decode_request,
+    encode_reply,
+    encode_request,
+)
+
+KILL = {"do": "kill", "robots": {"names": ["flock-1"]}}
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        Request("pause"),
+        Request("resume"),
+        Request("stop"),
+        Request("step", 3),
+        Request("speed", 0.5),
+        Request("speed", None),
+        Request("event", KILL),
+        Request("end", 4),
+    ],
+    ids=lambda request: f"{request.do} {request.value}",
+)
+def test_a_request_arrives_as_it_was_sent(request_):
+    assert decode_request(encode_request(request_)) == request_
+
+
+def test_a_step_is_one_tick_and_a_whole_speed_is_a_number():
+    assert decode_request(msgpack.packb({"v": 1, "do": "step"})) == Request("step", 1)
+    assert decode_request(msgpack.packb({"v": 1, "do": "speed", "factor": 2})) == Request("speed", 2.0)
+
+
+@pytest.mark.parametrize(
+    ("asked", "line"),
+    [
+        ({}, "v: expected version 1 of control, got None"),
+        ({"v": True}, "v: expected version 1"),
+        ({"v": 2, "do": "pause"}, "v: expected version 1"),
+        ({"v": 1}, "do: expected one of pause, resume"),
+        ({"v": 1, "do": "paus"}, "did you mean pause?"),
+        ({"v": 1, "do": ["pause"]}, "do: expected one of"),
+        ({"v": 1, "do": "pause", "n": 1}, "n: unknown key of 'pause'; expected none"),
+        ({"v": 1, "do": "step", "n": 0}, "n: expected a whole number of ticks from 1 to"),
+        ({"v": 1, "do": "step", "n": 2.0}, "n: expected a whole number"),
+        ({"v": 1, "do": "speed", "factor": "fast"}, "factor: expected simulated seconds per second"),
+        ({"v": 1, "do": "speed", "factor": float("nan")}, "factor: expected simulated seconds per second"),
+        ({"v": 1, "do": "end", "event": True}, "event: expected the number of an event, got True"),
+        ({"v": 1, "do": "event", "event": "kill"}, "event: expected a table as in a scenario"),
+        ({"v": 1, "do": "event", "event": {"do": "kill", 1: 2}}, "expected"),
+        ([1], "expected a map"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_in_one_line(asked, line):
+    with pytest.raises(BadInput, match="^[^\n]*$") as caught:
+        decode_request(msgpack.packb(asked))
+    assert line in str(caught.value)
+
+
+@pytest.mark.parametrize("data", [b"", b"\xc1", b"\x93" * 5000, bytes(MOST_BYTES + 1)])
+def test_bytes_that_are_no_request_are_refused(data):
+    with pytest.raises(BadInput, match="expected a request"):
+        decode_request(data)
+
+
+def test_an_answer_of_another_version_or_none_is_a_bad_frame():
+    assert decode_reply(encode_reply({"done": "paused", "tick": 3})) == {"v": 1, "done": "paused", "tick": 3}
+    for data in (b"", msgpack.packb({"v": 2}), msgpack.packb([1])):
+        with pytest.raises(BadFrame):
+            decode_reply(data)
