@@ -1,11 +1,12 @@
 """From a text to an agent class, and every way in which it can lead nowhere."""
 
+import hashlib
 from pathlib import Path
 
 import pytest
 
 from swarmwire.agent.behaviours import Flocking
-from swarmwire.agent.loading import NoAgent, load_agent
+from swarmwire.agent.loading import NoAgent, agent_sha256, load_agent
 from swarmwire.comms.loading import resolve
 from tests.agent.hosts import PLAYERS, spec
 
@@ -26,6 +27,17 @@ def written(directory: Path, code: str) -> str:
 
 def test_a_class_of_a_module_is_found() -> None:
     assert load_agent("swarmwire.agent.behaviours:Flocking") is Flocking
+
+
+def test_two_machines_tell_by_the_file_whether_they_have_the_same_agent(tmp_path) -> None:
+    own = agent_sha256(load_agent(spec("Counter")))
+    assert own == hashlib.sha256(PLAYERS.read_bytes()).hexdigest() == agent_sha256(load_agent(spec("Chatter")))
+    copy = tmp_path / "mine.py"
+    copy.write_bytes(PLAYERS.read_bytes() + b"\n")
+    assert agent_sha256(load_agent(f"{copy}:Counter")) != own
+    copy.unlink()
+    with pytest.raises(NoAgent, match="comes from no file that can be read"):
+        agent_sha256(type("Typed", (Flocking,), {"__module__": "__main__x"}))
 
 
 def test_a_class_of_a_file_is_found_and_loaded_once() -> None:

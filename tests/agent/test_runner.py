@@ -92,3 +92,31 @@ def test_frames_with_packets_that_never_came_are_counted() -> None:
     inbox = inbox_of(True, packets(2), packets(3), packets(7), frames.encode("packets", 0, {}))
     assert next(inbox.ticks(ASSIGNMENT)) == (0, 7_000)
     assert (inbox.missed, inbox.dropped) == (2 + 3, 1)
+
+
+def test_what_came_before_the_robots_were_given_is_forgotten_but_not_that_the_world_is_gone() -> None:
+    inbox = inbox_of(True, END, tick(0))
+    inbox.forget_frames()
+    inbox.put_frame(Sample(Bytes(tick(1))))
+    assert next(inbox.ticks(ASSIGNMENT))[0] == 1
+    assert inbox.dropped == 2
+    gone = inbox_of(True, END, False)
+    gone.forget_frames()
+    assert list(gone.ticks(ASSIGNMENT)) == []
+    assert gone.ended.how == "gone"
+
+
+def test_why_a_runner_ended_is_told() -> None:
+    let_go = frames.encode("end", -1, {}, {"why": "no answer for 3 s"})
+    for arrived, ended in ((END, ("over", "")), (let_go, ("let go", "no answer for 3 s"))):
+        inbox = inbox_of(arrived)
+        assert list(inbox.ticks(ASSIGNMENT)) == []
+        assert inbox.ended == ended
+    inbox = inbox_of(tick(0))
+    ticks = inbox.ticks(ASSIGNMENT)
+    assert next(ticks)[0] == 0
+    inbox.leave()
+    assert list(ticks) == []
+    assert inbox.ended.how == "left"
+    inbox.put_frame(Sample(Bytes(END)))
+    inbox.wait_for_farewell()

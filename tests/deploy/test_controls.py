@@ -6,6 +6,7 @@ from itertools import pairwise
 import pytest
 
 from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.controls import LOOK_NS, Controls
@@ -238,3 +239,58 @@ class Asker:
 
     def end(self, last: Tally | None) -> dict[str, object]:
         return {}
+
+
+def test_so_many_ticks_are_let_go_whether_the_run_is_paused_or_not() -> None:
+    clock, controls, asking, _ = controlled()
+    controls.step_by(2)
+    asking.at_ms(500, lambda: controls.step_by(3))
+    asking.at_ms(900, controls.resume)
+    began_ms = []
+    for tick in range(6):
+        controls.hold(tick, never)
+        began_ms.append((clock.time_ns - 77) // MS)
+    assert began_ms == [0, 0, 520, 520, 520, 920]
+    assert not controls.paused
+
+
+def test_a_pause_ends_steps_that_have_not_begun_and_stands_still_once_the_loop_is_held() -> None:
+    _, controls, asking, _ = controlled()
+    controls.step_by(5)
+    assert not controls.stands_still
+    controls.hold(0, never)
+    controls.pause()
+    assert not controls.stands_still  # the tick is under way
+    stood: list[bool] = []
+    asking.at_ms(100, lambda: stood.append(controls.stands_still))
+    asking.at_ms(200, controls.step)
+    asking.at_ms(200, lambda: stood.append(controls.stands_still))
+    controls.hold(1, never)
+    assert stood == [True, False]
+    controls.resume()
+    controls.hold(2, never)
+    assert not controls.stands_still
+
+
+def test_a_speed_that_is_asked_for_is_kept_or_refused() -> None:
+    clock, controls, _, _ = controlled()
+    controls.set_speed(4.0)
+    began_ns = []
+    for tick in range(5):
+        controls.hold(tick, never)
+        began_ns.append(clock.time_ns)
+    assert [after - before for before, after in pairwise(began_ns)] == [TICK_NS // 4] * 4
+    controls.set_speed(None)
+    sleeps = len(clock.slept_until)
+    controls.hold(5, never)
+    assert len(clock.slept_until) == sleeps
+    for wrong in (0.0, -1.0, 1e9):
+        with pytest.raises(BadInput, match="factor: expected 0.001 to 1e"):
+            controls.set_speed(wrong)
+    assert controls.speed is None
+    _, paced, _, _ = controlled(1.0)
+    with pytest.raises(BadInput, match="keeps to the wall clock"):
+        paced.set_speed(None)
+    fixed = Controls(clock, RATE_HZ, speed_fixed=True)
+    with pytest.raises(BadInput, match="programs elsewhere keep to that of the run"):
+        fixed.set_speed(2.0)

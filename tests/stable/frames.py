@@ -11,6 +11,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.glimpse import Glimpse, Scene
 from swarmwire.comms.led_changes import LedChanges
+from swarmwire.comms.memory import GroupMemory, Memory
 from swarmwire.comms.messages import Message, f4, f8, i1, u2
 from swarmwire.comms.notes import Notes
 from swarmwire.comms.outcomes import Outcomes
@@ -72,9 +73,9 @@ def text() -> str:
         "every frame": lines_of(paths_of({"v": 1, "kind": "", "tick": 1, "arrays": {}, "values": {}})),
         "join, asked": _map(JoinRequest(1, None, {"*": "a"}, "a").encode(), JoinRequest(None, ("a",)).encode()),
         "join, answered": lines_of(paths_of({**_assignment().as_mapping(), "v": frames.VERSION, "memory": b""})),
-        "offer, answered": _map(_offer().encode()),
+        "offer, answered": _map(_offer(1.0).encode(), _offer(None).encode()),
         "tick": _frame(encode_tick(1, _senses(), _heard(), Outcomes(*_ints(3, OUTCOMES)))),
-        "actions": _frame(encode_actions(1, _actions(), dropped=1)),
+        "actions": _frame(encode_actions(1, _actions(), dropped=1, memory=_memory())),
         "packets": _frame(encode_packets(1, 1, 1, _heard(), Outcomes(*_ints(3, OUTCOMES)))),
         "sent": _frame(encode_sent(1, _actions().sent, missed=1)),
         f"scene, version {OBSERVED_VERSION}": _frame(*(encode_scene(sample(Scene, left)) for left in LEFT_OUT)),
@@ -141,8 +142,12 @@ def _assignment() -> Assignment:
     return Assignment((group,), 1, ("range_m",))
 
 
-def _offer() -> Offer:
-    return Offer("RUN", "s", "a", "1", 1, 1.0, (OfferedGroup("g", "a", "a", 1, ("g-0",)),))
+def _memory() -> Memory:
+    return {"GROUP": GroupMemory(_ints(TOLD_OF), {"COLUMN": _floats(TOLD_OF, WIDE)})}
+
+
+def _offer(real_time: float | None) -> Offer:
+    return Offer("RUN", "s", "a", "1", 1, real_time, (OfferedGroup("g", "a", "a", 1, ("g-0",)),))
 
 
 def _glimpse() -> Glimpse:

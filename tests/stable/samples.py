@@ -10,7 +10,7 @@ from swarmwire.comms.bodies.body import Body, load_body
 SHEET = load_body("epuck")  # a body's own keys are the scenario's affair
 PLAIN: dict[Any, Any] = {bool: True, int: 1, float: 0.5, str: "", Any: {}, Body: SHEET}
 LEFT_OUT = ("nothing", "values", "all")
-WORDS = {bytes: "bytes", bool: "true or false", int: "whole number", float: "number", str: "text", NoneType: "null"}
+WORDS = {bool: "true or false", int: "whole number", float: "number", str: "text", bytes: "bytes", NoneType: "null"}
 
 
 def sample(hint: Any, left_out: str = "nothing") -> Any:

@@ -51,7 +51,8 @@ def test_events_are_numbered_after_the_scenarios_and_happen_at_the_start_of_the_
         ({**SET, "to": 2.0}, "to: expected at most 1"),
         ({"do": "jammer", "at": [0, 0], "power_dbm": 20.0}, "do: expected a radio with signals"),
         ({"do": "push", "robots": {"group": "flock"}, "speed_mps": 9.0}, "speed_mps: expected at most 1.75 m/s"),
-        ({"do": "kill", "robots": {"share": float("nan")}}, "robots.share: expected"),
+        ({"do": "kill", "robots": {"share": float("nan")}}, "expected texts, numbers, lists and tables alone"),
+        ({"do": "kill", "robots": {"group": b"flock"}}, "expected texts, numbers, lists and tables alone"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_one_line_and_nothing_waits(table, line):
@@ -94,6 +95,7 @@ def test_an_event_that_is_ended_before_a_tick_never_happens():
         "do": "kill",
         "text": 'kill robots = { names = ["flock-1"] }',
         "over": True,
+        "given": True,
     }
 
 
@@ -118,9 +120,12 @@ def test_what_contradicts_a_number_that_was_changed_is_refused():
     given = Interventions(scenario, bodies_of(scenario, "s.toml"))
     assert scenario.radio
     assert scenario.radio.bursts
-    given.give({"do": "ramp", "what": "radio.bursts.loss_good", "to": 0.8})
-    with pytest.raises(BadInput, match="loss_good"):
-        given.give({"do": "ramp", "what": "radio.bursts.loss_bad", "to": 0.05})
+    worse = given.give({"do": "ramp", "what": "radio.bursts.loss_good", "to": 0.8})
+    better = {"do": "ramp", "what": "radio.bursts.loss_bad", "to": 0.5}
+    with pytest.raises(BadInput, match="^to: radio.bursts.loss_bad: expected at least loss_good, 0.8; got 0.5"):
+        given.give(better)
+    given.end(worse)
+    given.give(better)
 
 
 def test_what_cannot_be_recorded_does_not_happen():
@@ -154,5 +159,7 @@ def test_a_repetition_takes_what_was_done_and_nothing_new():
     for refused in (lambda: given.give(KILL), lambda: given.end(2)):
         with pytest.raises(BadInput, match="the repetition"):
             refused()
-    with pytest.raises(BadInput, match="robots: is missing"):
+    with pytest.raises(BadInput, match="^event 2 that was given: robots: is missing"):
         door(replayed=[Intervention(0, 2, {"do": "kill"})])
+    with pytest.raises(BadInput, match="^event 1 that was given: expected a number that no other event has"):
+        door(replayed=[Intervention(0, 1, KILL)])

@@ -88,6 +88,7 @@ def play(
     if not inbox.wait_for_world():
         raise RunnerLost(runner, NO_ROBOTS, "there is no world")
     assignment, memory = _join(session, keys, runner, asked())
+    inbox.forget_frames()
     joined(assignment)
     answer = session.declare_publisher(
         keys.answer(runner), congestion_control=zenoh.CongestionControl.BLOCK, express=True
@@ -135,6 +136,15 @@ class Inbox:
         except queue.Empty:
             return False
         return arrived
+
+    def forget_frames(self) -> None:
+        """Drop what the world sent before it gave robots: to another runner of this name, which it lost."""
+        for _ in range(self._arrived.qsize()):
+            arrived = self._arrived.get()
+            if arrived is None or isinstance(arrived, bool):
+                self._arrived.put(arrived)
+            else:
+                self.dropped += 1
 
     def ticks(
         self, assignment: Assignment, receive: Callable[[Heard, Outcomes], None] = lambda _heard, _outcomes: None
@@ -187,9 +197,9 @@ class Inbox:
 
     def wait_for_farewell(self) -> None:
         """Until the world says that it has read that the runner left, or is gone; not for long."""
-        with suppress(queue.Empty):
+        with suppress(queue.Empty, BadFrame):
             while arrived := self._arrived.get(timeout=FAREWELL_S):
-                if not isinstance(arrived, bool) and b"end" in arrived.payload.to_bytes():
+                if not isinstance(arrived, bool) and frames.decode(arrived.payload.to_bytes()).kind == "end":
                     return
 
 

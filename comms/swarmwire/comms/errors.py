@@ -6,6 +6,7 @@ SwarmwireError
 ├── OwnCodeFailed       the user's sensor, actuator or metric raised (exit code 1)
 ├── RunnerLost          a runner's process or link is gone (exit code 1)
 ├── RunGone             the run that a view is to follow does not answer (exit code 1); in deploy
+├── Refused             what a run that is controlled from elsewhere does not do (exit code 1); in deploy
 ├── WorkersFailed       workers of a campaign cannot start here; in deploy, as the next five (exit code 1)
 ├── ClusterFailed       the cluster that was to run a campaign is gone
 ├── CannotStart         a worker of a cluster cannot start a process that works

@@ -31,6 +31,7 @@ from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
 from swarmwire.deploy.commands.sweep import sweep_command
 from swarmwire.deploy.commands.tune import tune_command
+from swarmwire.deploy.commands.ui import ui_command
 from swarmwire.deploy.commands.verify import verify_command
 from swarmwire.deploy.commands.view import view_command
 from swarmwire.deploy.commands.world import world_command
@@ -70,6 +71,7 @@ app.command("check")(check_command)
 app.command("draw")(draw_command)
 app.command("export", cls=ExportCommand)(export_command)
 app.command("view")(view_command)
+app.command("ui")(ui_command)
 app.command("screenshot")(screenshot_command)
 app.command("schema")(schema_command)
 app.command("list")(list_command)

@@ -22,6 +22,7 @@ class Controls:
         help_asked: people want to know what the keys do.
         paused_ns: wall time spent in pauses so far.
         on_wait: called while the loop is held, many times a second.
+        on_pause: the same, while it is held by a pause; it must not raise.
     """
 
     def __init__(self, clock: Clock, rate_hz: int, pace: Pace | None = None, *, speed_fixed: bool = False) -> None:
@@ -33,6 +34,8 @@ class Controls:
         self.speed = pace.factor if pace else None
         self.paused_ns = 0
         self.on_wait: Callable[[], None] = lambda: None
+        self.on_pause: Callable[[], None] = lambda: None
+        self._held = False  # whether the loop waits for the end of a pause
         self._asked = False  # whether `hold` has anything to do
         self._steps = 0
         self._next_ns = 0  # under a limit no tick begins before
@@ -44,6 +47,12 @@ class Controls:
     def real_time(self) -> bool:
         """Whether the wall clock paces the run."""
         return self._pace is not None
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether the run is paused, the tick that was under way is over, and none is to come."""
+        with self._lock:
+            return self.paused and self._held and not self._steps
 
     @property
     def missed_ticks(self) -> int:
@@ -131,6 +140,8 @@ class Controls:
             if wait_ns <= 0:
                 break
             self.on_wait()
+            if paused:
+                self.on_pause()
             self._clock.sleep_until(now_ns + min(wait_ns, LOOK_NS))
             paused_ns += (self._clock.now_ns() - now_ns) if paused else 0
         self._begin(tick, paused_ns)
@@ -139,9 +150,10 @@ class Controls:
         """Whether the run is paused, and how long the next tick is to wait, in ns."""
         with self._lock:
             if self.paused:
-                held = not self._steps
-                self._steps -= not held
-                return held, LOOK_NS * held
+                self._held = not self._steps
+                self._steps -= not self._held
+                return self._held, LOOK_NS * self._held
+            self._held = False
             return False, 0 if self._pace or self.speed is None else self._next_ns - now_ns
 
     def _begin(self, tick: int, paused_ns: int) -> None:

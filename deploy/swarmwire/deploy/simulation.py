@@ -34,6 +34,7 @@ from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.kept_memory import keep_memory
 from swarmwire.deploy.listening import Listening
+from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.deploy.new_air import new_air
 from swarmwire.deploy.outcome import outcome
@@ -315,9 +316,13 @@ class Simulation:
         given = self.interventions
         door = listening.observers_door(self.run_id) if listening else None
         control = ControlServer(self._status, self.controls, given.give, given.end, self._record.note)
-        return self._record.observers(
+        found = self._record.observers(
             what, self.run_id, self.metrics, self.hashes, control, may_drop=may_drop, door=door
         )
+        for published in found:
+            if isinstance(published, Published):
+                self.controls.on_pause = published.catch_up
+        return found
 
     def _new_status(self) -> Status:
         """What tells how the run is doing."""

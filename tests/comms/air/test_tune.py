@@ -9,6 +9,7 @@ from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.parameters.gives import Gives, RangeGiven
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.burst_states import BurstStates
+from swarmwire.comms.air.tuning import check_number, number_of, numbers_of
 from swarmwire.comms.clock import tick_start_ns
 from tests.comms.air.runs import RATE_HZ, Run, at, everybody, make_air, packets, scattered
 
@@ -115,3 +116,14 @@ def test_a_loss_may_come_and_go(loss: float):
     on_air_s = told.on_air("on_air_at_ns") / 1e9
     lost = told.on_air("fate") == 3
     assert (lost == ((on_air_s < 1.0) == (loss == 1.0))).all()
+
+
+def test_the_numbers_of_a_radio_are_those_that_a_ramp_may_move():
+    radio = Radio(range_m=2.0, loss=0.3, bursts=Bursts(good_s=1.0, bad_s=0.5), send_offset=0.02)
+    numbers = numbers_of(radio)
+    assert (numbers["range_m"], numbers["loss"], numbers["bursts.bad_s"]) == (2.0, 0.3, 0.5)
+    assert "send_offset" not in numbers
+    assert "bodies_block" not in numbers
+    for key, value in numbers.items():
+        check_number(radio, f"radio.{key}", value)
+        assert number_of(radio, f"radio.{key}") == value

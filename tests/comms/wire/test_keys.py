@@ -1,11 +1,17 @@
 """Keys name the run and the runner, and lead back to the runner."""
 
-from swarmwire.comms.wire.keys import Keys, ObserverKeys, runner_of
+from swarmwire.comms.wire.keys import EVERY_WORLD, Keys, ObserverKeys, run_of, runner_of
 
 
 def test_a_key_of_a_runner_leads_back_to_it():
     keys = Keys("run-1")
-    assert {runner_of(keys.answer("flock-3")), runner_of(keys.alive("flock-3"))} == {"flock-3"}
+    of_runner = (keys.offer, keys.join, keys.alive, keys.frame, keys.answer)
+    assert {runner_of(key("flock-3")) for key in of_runner} == {"flock-3"}
+
+
+def test_a_world_s_token_leads_back_to_its_run():
+    assert run_of(Keys("run-1").world) == "run-1"
+    assert Keys("*").world == EVERY_WORLD
 
 
 def test_no_key_is_of_two_runs_or_of_runners_and_observers():

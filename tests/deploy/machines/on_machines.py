@@ -38,12 +38,25 @@ class Started:
             self._arrived.put(line.rstrip("\n"))
         self._arrived.put(None)
 
-    def said(self, text: str) -> str:
-        """The next line that holds the text, waited for."""
+    @classmethod
+    @contextmanager
+    def running(cls, command: Sequence[str], cwd: Path | None = None) -> Generator["Started"]:
+        """The command; killed with the context if it still runs."""
+        started = cls(command, cwd)
+        try:
+            yield started
+        finally:
+            started.process.kill()
+            started.process.wait()
+            assert started.process.stdout is not None
+            started.process.stdout.close()
+
+    def said(self, *texts: str) -> str:
+        """The next line that holds all these texts, waited for."""
         while (line := self._next()) is not None:
-            if text in line:
+            if all(text in line for text in texts):
                 return line
-        raise AssertionError(f"it ended without {text!r}: {self.lines}")
+        raise AssertionError(f"it ended without {texts}: {self.lines}")
 
     def ended(self) -> int:
         """Its exit code, waited for."""
@@ -71,11 +84,5 @@ class Started:
 def on(machine: Machine | None, *words: object, cwd: Path | None = None) -> Generator[Started]:
     """`swarmwire` with these words on a machine, or on this one; killed with the context if it still runs."""
     command = [sys.executable, "-m", "swarmwire.deploy", *map(str, words)]
-    started = Started(machine.command(*command) if machine else command, cwd)
-    try:
+    with Started.running(machine.command(*command) if machine else command, cwd) as started:
         yield started
-    finally:
-        started.process.kill()
-        started.process.wait()
-        assert started.process.stdout is not None
-        started.process.stdout.close()

@@ -31,15 +31,15 @@ def partition(*between: list[str]) -> dict[str, Any]:
 FAULTS: list[tuple[Any, str]] = [
     (
         3,
-        "events.0: expected a table with do = one of blackout, fail, gain, jammer, kill, partition, ramp, revive",
+        "events.0: expected a table with do = one of blackout, fail, gain, jammer, kill, partition, push, ramp, revive",
     ),
     (
         {"at_s": 1.0},
-        "events.0.do: is missing; expected one of blackout, fail, gain, jammer, kill, partition, ramp, revive",
+        "events.0.do: is missing; expected one of blackout, fail, gain, jammer, kill, partition, push, ramp, revive",
     ),
     (
         event("burn"),
-        "events.0.do: expected one of blackout, fail, gain, jammer, kill, partition, ramp, revive; got 'burn'",
+        "events.0.do: expected one of blackout, fail, gain, jammer, kill, partition, push, ramp, revive; got 'burn'",
     ),
     ({"do": "revive", "robots": FLOCK}, "events.0.at_s: is missing; expected a number of at least 0 and at most 10"),
     (event(at_s=-1.0, robots=FLOCK), "events.0.at_s: expected a number of at least 0 and at most 1000000000 (s), got"),

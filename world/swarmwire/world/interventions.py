@@ -4,11 +4,14 @@ A scenario's events have their places in it as numbers; those that are given go 
 is kept before it takes effect: with that record a run is repeated bit for bit.
 """
 
+import json
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.tuning import with_number
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.errors import BadInput
@@ -50,6 +53,7 @@ class Interventions:
         self._lock = threading.Lock()
         self._next_number = len(scenario.events)
         self._events: dict[int, Event] = dict(enumerate(scenario.events))
+        self._texts: dict[int, str] = {}  # of events that were told
         self._waiting: list[tuple[int, Mapping[str, Any] | None]] = []
         self._dropped: set[int] = set()  # events that ended before a tick began, or could not be recorded
         self._replayed: dict[int, list[Intervention]] | None = None if replayed is None else {}
@@ -64,10 +68,12 @@ class Interventions:
         BadInput says what is wrong with it.
         """
         self._check_open()
+        table = _plain(table)
         event = event_of(table, self._scenario, self._bodies)
-        if event.needs_radio and self.course.radio is not None:
-            event.check_radio(self.course.radio)  # whose other numbers may have been changed
         with self._lock:
+            if event.needs_radio:
+                for radio in self._radios():
+                    event.check_radio(radio)
             if len(self._waiting) >= MOST_WAITING:
                 raise BadInput(
                     "", "", f"expected at most {MOST_WAITING} events that wait for a tick; let the run go on"
@@ -78,7 +84,7 @@ class Interventions:
             number = self._next_number
             self._next_number += 1
             self._events[number] = event
-            self._waiting.append((number, dict(table)))
+            self._waiting.append((number, table))
         return number
 
     def end(self, number: int) -> None:
@@ -122,7 +128,10 @@ class Interventions:
             return taken
 
     def told(self) -> list[dict[str, Any]]:
-        """The newest events by number: the tick in which each began, if it has, what it does, whether it is over."""
+        """The newest events by number: the tick in which each began, if it has, what it does, whether it is over.
+
+        `given` says that people gave it; the others are the scenario's.
+        """
         with self._lock:
             newest = sorted(self._events)[-MOST_TOLD:]
             return [
@@ -130,11 +139,28 @@ class Interventions:
                     "number": number,
                     "tick": self.course.begun.get(number),
                     "do": self._events[number].do,
-                    "text": self._events[number].words,
+                    "text": self._text(number),
                     "over": self._is_over(number),
+                    "given": number >= len(self._scenario.events),
                 }
                 for number in newest
             ]
+
+    def _text(self, number: int) -> str:
+        if number not in self._texts:
+            self._texts[number] = self._events[number].words
+        return self._texts[number]
+
+    def _radios(self) -> list[Radio]:
+        """The radio as events have made it by now, and as those that go on or wait will have made it."""
+        now = to_come = self.course.radio
+        if now is None or to_come is None:
+            return []
+        for number, event in self._events.items():
+            known = number in self.course.begun or number >= len(self._scenario.events)
+            if isinstance(event, Ramp) and known and not self._is_over(number):
+                to_come = with_number(to_come, event.what, event.to)
+        return [now, to_come]
 
     def _set_before(self, what: str) -> list[int]:
         """Numbers of events that were given and hold this number of the radio at a value."""
@@ -163,9 +189,23 @@ class Interventions:
     def _replay(self, given: Intervention) -> None:
         assert self._replayed is not None
         if given.table is not None:
-            self._events[given.number] = event_of(given.table, self._scenario, self._bodies)
+            where = f"event {given.number} that was given"
+            if given.number in self._events or given.number < 0:
+                raise BadInput(where, "", "expected a number that no other event has")
+            try:
+                self._events[given.number] = event_of(given.table, self._scenario, self._bodies)
+            except BadInput as error:
+                raise BadInput(where, error.key, error.expected) from None
         self._replayed.setdefault(given.tick, []).append(given)
 
     def _check_open(self) -> None:
         if self._replayed is not None:
             raise BadInput("", "", "expected a run, not the repetition of one: nothing new can happen in it")
+
+
+def _plain(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of a table, as its record will have it."""
+    try:
+        return json.loads(json.dumps(dict(table), allow_nan=False))
+    except (TypeError, ValueError):
+        raise BadInput("", "", "expected texts, numbers, lists and tables alone") from None

@@ -1,6 +1,6 @@
 """Tuning: a radio some of whose numbers change while a run goes on."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import Field, dataclass, fields, is_dataclass, replace
 from typing import Any, cast
 
@@ -40,6 +40,11 @@ def number_of(radio: Radio, key: str) -> float:
     """The number at a key such as "radio.bursts.bad_s"."""
     holder, of = _place(radio, key)
     return float(getattr(holder, of.name))
+
+
+def numbers_of(radio: Radio) -> dict[str, float]:
+    """The numbers of a radio that may change while a run goes on, by their keys within [radio]: "bursts.bad_s"."""
+    return dict(_numbers(radio, TABLE))
 
 
 def with_number(radio: Radio, key: str, value: float) -> Radio:
@@ -85,6 +90,15 @@ def _place(radio: Radio, key: str) -> tuple[object, "Field[Any]"]:
             return holder, found[name]
         holder = getattr(holder, name)
     raise AssertionError("there is at least one name")
+
+
+def _numbers(holder: Any, path: str) -> Iterator[tuple[str, float]]:
+    for of in fields(holder):
+        value, key = getattr(holder, of.name), f"{path}.{of.name}"
+        if is_dataclass(value):
+            yield from _numbers(value, key)
+        elif isinstance(value, int | float) and not isinstance(value, bool) and key not in FIXED:
+            yield key.removeprefix(f"{TABLE}."), value
 
 
 def _with(holder: Any, names: list[str], value: float) -> object:

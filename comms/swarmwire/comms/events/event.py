@@ -42,10 +42,9 @@ class Event(ABC):
     @property
     def words(self) -> str:
         """What it does, as a scenario would say it: the action, and what is not left out."""
-        given = [(of.name, getattr(self, of.name), of.default) for of in fields(self) if of.name not in ("at_s", "do")]
-        return " ".join(
-            [self.do, *(f"{name} = {as_toml(value)}" for name, value, default in given if value != default)]
-        )
+        of_it = [of for of in fields(self) if of.name not in ("at_s", "do") and getattr(self, of.name) != of.default]
+        of_it.sort(key=lambda of: of.name == "for_s")  # said last
+        return f"{self.do} {', '.join(f'{of.name} = {as_toml(getattr(self, of.name))}' for of in of_it)}"
 
     @property
     def failing_part(self) -> str:

@@ -39,7 +39,7 @@ class JoinRequest:
     def decode(cls, data: bytes) -> "JoinRequest":
         """The request of these bytes; BadFrame if they are none, "version" if they are of another version."""
         asked = versioned(data)
-        robots, names, agents = asked.get("robots"), asked.get("names"), asked.get("agents")
+        robots, names, agents = asked.get("robots"), asked.get("names"), cast("object", asked.get("agents"))
         scenario: object = asked.get("scenario_sha256")
         if robots is not None and (type(robots) is not int or robots < 1):
             raise BadFrame("malformed", "robots: expected a number of at least 1")
@@ -51,7 +51,8 @@ class JoinRequest:
             raise BadFrame("malformed", "agents: expected the sha256 of an agent by group")
         if scenario is not None and not (isinstance(scenario, str) and SHA256.fullmatch(scenario)):
             raise BadFrame("malformed", "scenario_sha256: expected 64 hexadecimal digits")
-        return cls(robots, None if names is None else tuple(cast("list[str]", names)), agents, scenario)
+        given = None if names is None else tuple(cast("list[str]", names))
+        return cls(robots, given, cast("dict[str, str] | None", agents), scenario)
 
 
 def versioned(data: bytes) -> dict[str, Any]:

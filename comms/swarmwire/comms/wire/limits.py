@@ -35,4 +35,4 @@ class Limits:
     join_s: float = 60.0
 
 
-LIMITS = Limits()
+LIMITS = Limits()  # of every world that is not told others

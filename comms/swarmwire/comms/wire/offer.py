@@ -49,14 +49,11 @@ class Offer:
         """The offer of these bytes; BadFrame if they are none, "version" if they are of another version."""
         told = versioned(data)
         try:
-            groups = [_group(group) for group in told.pop("groups")]
-            factor = told.pop("real_time")
-            offer = cls(
-                **{**_typed(told, _OFFER), "real_time": None if factor is None else float(factor)}, groups=tuple(groups)
-            )
+            groups = tuple(_group(group) for group in told["groups"])
+            factor = None if told["real_time"] is None else float(told["real_time"])
+            return cls(**_typed(told, _OFFER), real_time=factor, groups=groups)
         except (KeyError, TypeError, ValueError) as error:
             raise BadFrame("malformed", f"expected an offer: {error}") from error
-        return offer
 
 
 _OFFER: Mapping[str, type] = {"run": str, "scenario": str, "scenario_sha256": str, "swarmwire": str, "rate_hz": int}

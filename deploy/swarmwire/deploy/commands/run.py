@@ -56,6 +56,11 @@ Select = Annotated[
 ]
 View = Annotated[bool, typer.Option("--view", help="Look at it while it goes on, as `swarmwire view` does.")]
 
+Ui = Annotated[
+    bool,
+    typer.Option("--ui", help="Control it in a browser while it goes on, as `swarmwire ui` does; it begins paused."),
+]
+
 
 def run_command(
     scenario: ScenarioFile,
@@ -72,6 +77,7 @@ def run_command(
     rrd: Rrd = True,
     select: Select = None,
     view: View = False,
+    ui: Ui = False,
     gateway: Gateway = None,
     gateway_set: GatewaySet = None,
     network: NetworkEndpoint = None,
@@ -95,11 +101,14 @@ def run_command(
     from swarmwire.deploy.arguments import choose_seeds
     from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.gateways.gateways import gateways_of_options, network_of
+    from swarmwire.deploy.page.extra import need_ui_extra
     from swarmwire.deploy.record.new_folder import default_folder
     from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.simulation import Simulation
     from swarmwire.world.scenario.scenario_file import load_scenario
 
+    if ui:
+        need_ui_extra("--ui")
     checked = load_scenario(scenario, overrides or [])
     for name in revoked or []:
         if name not in checked.robot_names():
@@ -121,15 +130,18 @@ def run_command(
             gateways=gateways,
             record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
         )
-        result = run_shown(simulation, folder, view, console)
+        result = run_shown(simulation, folder, console, view=view, ui=ui)
     if result.ended == "interrupted":
         raise typer.Exit(INTERRUPTED)
 
 
-def run_shown(simulation: "Simulation", folder: Path, view: bool, console: Console) -> "Result":
+def run_shown(
+    simulation: "Simulation", folder: Path, console: Console, *, view: bool = False, ui: bool = False
+) -> "Result":
     """The result of the run, told and shown while it goes on and afterwards."""
     from swarmwire.deploy.control.run_finder import Announced
     from swarmwire.deploy.live.live_view import LiveView
+    from swarmwire.deploy.page.beside import PageBeside
     from swarmwire.deploy.running import finished
     from swarmwire.deploy.terminal.report import print_result
     from swarmwire.deploy.terminal.robots_told import RobotsTold
@@ -138,16 +150,19 @@ def run_shown(simulation: "Simulation", folder: Path, view: bool, console: Conso
     simulation.watch(Announced(folder))
     simulation.watch(RobotsTold(simulation, console))
     simulation.watch(progress(simulation, console))
-    with LiveView(folder) as live:
-        if view:
-            simulation.watch(live)
+    with LiveView(folder) as live, PageBeside(simulation, folder, console) as page:
+        for wanted, beside in ((view, live), (ui, page)):
+            if wanted:
+                simulation.watch(beside)
         with leaving_when_hung_up(simulation.interrupt):
             result = finished(simulation)
         print_result(result, simulation.metrics.metrics, console)
         _say_where(result, folder, console)
-        if live.pid is not None:
-            console.print("the view stays open: close it, or press Ctrl-C, to end it")
+        for beside, name in ((live, "view"), (page, "page")):
+            if beside.pid is not None:
+                console.print(f"the {name} stays open: close it, or press Ctrl-C, to end it")
         live.wait()
+        page.wait()
     return result
 
 

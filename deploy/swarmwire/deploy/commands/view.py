@@ -1,8 +1,6 @@
 """`swarmwire view`."""
 
 import os
-import select
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +8,7 @@ import typer
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.commands.with_parent import WithParent, standard_input_closed
 from swarmwire.metrics.record.names import RECORDING
 
 if TYPE_CHECKING:
@@ -22,9 +21,7 @@ def view_command(
     port: Annotated[
         int | None, typer.Option(help="Port of the pages for a browser. Default: a free one.", min=1, max=65535)
     ] = None,
-    with_parent: Annotated[
-        bool, typer.Option("--with-parent", hidden=True, help="End when standard input is closed.")
-    ] = False,
+    with_parent: WithParent = False,
 ) -> None:
     """Look at a run: live while it goes on, its recording afterwards. Ctrl-C, or closing the window, ends the view.
 
@@ -42,7 +39,7 @@ def view_command(
         way = Way(
             clock=WallClock(),
             say=lambda text: typer.echo(text, err=True),
-            stopped=lambda: interrupt.asked or (with_parent and _closed()),
+            stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),
             web=web or port is not None or not has_screen(),
             port=port,
         )
@@ -68,8 +65,3 @@ def _show(run: Path, way: "Way") -> None:
     if not recording.is_file():
         raise BadInput(str(run), "", f"expected a run folder with {RECORDING} or a run that goes on, or a recording")
     show_recording(recording, way)
-
-
-def _closed() -> bool:
-    """Whether standard input is at its end; nobody writes to it."""
-    return bool(select.select([sys.stdin], [], [], 0)[0])

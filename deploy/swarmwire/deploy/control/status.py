@@ -1,12 +1,12 @@
 """How a run is doing at this moment, as a mapping of plain values, for whoever asks from another thread."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import asdict
 from math import isfinite
-from typing import Any, cast
+from typing import Any
 
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.tuning import FIXED, TABLE
+from swarmwire.comms.air.tuning import numbers_of
 from swarmwire.comms.clock import Clock, tick_start_ns, to_s
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy.controls import Controls
@@ -84,7 +84,7 @@ class Status:
             "tick": tick,
             "ticks": self._ticks,
             "time_s": to_s(tick_start_ns(tick, static.rate_hz)),
-            "state": "over" if self._over else "paused" if self._controls.paused else "running",
+            "state": "over" if self._over else "paused" if self._controls.stands_still else "running",
             "speed": self._controls.speed,
             "real_time": self._controls.real_time,
             "alive": int(truth.alive[rows].sum()) if truth else static.robots,
@@ -104,15 +104,3 @@ class Status:
             return {}
         latest = {name: float(values[self._arena]) for name, values in self._metrics.latest.items()}
         return {name: value if isfinite(value) else None for name, value in latest.items()}
-
-
-def numbers_of(table: object, path: str = "") -> dict[str, float]:
-    """The numbers of a radio that may change while a run goes on, by their keys without "radio."."""
-    found: dict[str, float] = {}
-    for of in fields(cast("Any", table)):
-        value, key = getattr(table, of.name), f"{path}{of.name}"
-        if is_dataclass(value):
-            found |= numbers_of(value, f"{key}.")
-        elif isinstance(value, int | float) and not isinstance(value, bool) and f"{TABLE}.{key}" not in FIXED:
-            found[key] = value
-    return found

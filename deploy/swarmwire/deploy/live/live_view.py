@@ -1,9 +1,11 @@
-"""The live view of a run that this process executes: a viewing process beside it, which cannot disturb it."""
+"""The live view or page of a run that this process executes: a viewing process beside it, which cannot disturb it."""
 
 import os
 import signal
 import subprocess
 import sys
+import threading
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -21,10 +23,25 @@ class LiveView:
     that does not open says so on the terminal.
     """
 
-    def __init__(self, folder: Path, web: bool = False, port: int | None = None) -> None:
-        """View the run in a window if there is a screen, else, or with `web`, in a browser at this port."""
+    def __init__(
+        self,
+        folder: Path,
+        web: bool = False,
+        port: int | None = None,
+        *,
+        page: bool = False,
+        say: Callable[[str], None] | None = None,
+        closed: Callable[[], None] | None = None,
+    ) -> None:
+        """View the run in a window if there is a screen, else, or with `web`, in a browser at this port.
+
+        With `page` it is the page, for a browser. What the view says goes to `say`, line by line, or to the terminal;
+        `closed` is called when its process has ended, whatever ended it. Both are called in a thread of their own.
+        """
         options = [*(["--web"] if web else []), *([] if port is None else ["--port", str(port)])]
-        self._command = [sys.executable, "-m", "swarmwire.deploy", "view", str(folder), "--with-parent", *options]
+        name = "ui" if page else "view"
+        self._command = [sys.executable, "-m", "swarmwire.deploy", name, str(folder), "--with-parent", *options]
+        self._say, self._closed = say, closed
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> "LiveView":
@@ -44,10 +61,28 @@ class LiveView:
         try:
             # A session of its own: Ctrl-C is for the run. Its standard input tells it when this process is gone.
             self._process = subprocess.Popen(
-                self._command, stdin=subprocess.PIPE, env=environment, start_new_session=True
+                self._command,
+                stdin=subprocess.PIPE,
+                stderr=subprocess.PIPE if self._say else None,
+                env=environment,
+                start_new_session=True,
             )
         except OSError as error:
             print(f"no live view: {error}", file=sys.stderr, flush=True)
+            if self._closed:
+                self._closed()
+            return
+        if self._say or self._closed:
+            threading.Thread(target=self._attend, args=(self._process,), name="live view", daemon=True).start()
+
+    def _attend(self, process: subprocess.Popen[bytes]) -> None:
+        if self._say and process.stderr:
+            with process.stderr as lines:
+                for line in lines:
+                    self._say(line.decode(errors="replace").rstrip())
+        process.wait()
+        if self._closed:
+            self._closed()
 
     def see(self, truth: Truth) -> None:
         """Nothing: what is seen is published."""

@@ -53,7 +53,7 @@ class Published:
         clock: Clock,
         arena: int = 0,
         selected: str | None = None,
-        declare: Callable[[zenoh.Session, ObserverKeys], object] = lambda *_: None,
+        declare: Callable[[zenoh.Session, ObserverKeys], object] | None = None,
         door: Door | None = None,
     ) -> None:
         """Publish the run whose folder this is; `selected` is the robot that is shown in detail.
@@ -77,6 +77,7 @@ class Published:
         self._sampling = Sampling(static, self._arena, self._selected)
         self._since, self._rate = Since(), Rate(FRAMES_PER_S)
         self._watched = False
+        self._newest: Truth | None = None
         self._fault: Exception | None = None
         self._frames: queue.Queue[Glimpse | None] = queue.Queue(maxsize=1)
         with ExitStack() as opening:
@@ -94,6 +95,7 @@ class Published:
         """Publish a tick if it is time to and somebody looks on; none once the arena has left."""
         if not truth.running[self._arena]:
             return
+        self._newest = truth
         if self._watched:
             self._since.add(truth)
         now_ns = self._clock.now_ns()
@@ -111,6 +113,23 @@ class Published:
             self.left_out += 1
             return
         self._put(now_ns)
+
+    def catch_up(self) -> None:
+        """Publish the newest tick, if it is not yet: the run is paused, and no other will follow.
+
+        Nothing here raises: what fails does so in the next `see`.
+        """
+        if self._newest is None or self._fault is not None or self._frames.full():
+            return
+        watched_before, self._watched = self._watched, self._is_watched()
+        if self._watched and not watched_before:
+            self._since = Since()
+            self._since.add(self._newest)
+        if self._watched and self._since.ticks:
+            try:
+                self._put(self._clock.now_ns())
+            except Exception as error:  # noqa: BLE001 - the pause goes on
+                self._fault = error
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """Show how it ended and close the endpoint; whoever looks on learns that the run is over."""
@@ -161,7 +180,7 @@ class Published:
 
         self._declared = (
             session.declare_queryable(keys.scene, zenoh.handlers.Callback(answer, indirect=False)),
-            self._declare_more(session, keys),
+            self._declare_more(session, keys) if self._declare_more else None,
             session.liveliness().declare_token(keys.published),  # last: it says that all is there
         )
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from swarmwire.comms.clock import NS_PER_S, Clock
+from swarmwire.comms.glimpse import Glimpse
 from swarmwire.deploy.live.evened import Evened
 from swarmwire.deploy.live.following import Following, following
 from swarmwire.deploy.live.live_file import Live
@@ -69,10 +70,11 @@ class Drawer(threading.Thread):
     In a thread that nobody waits for: drawing stands still while the viewer does, and ends with it.
     """
 
-    def __init__(self, run: Following, url: str, way: Way) -> None:
+    def __init__(self, run: Following, url: str, way: Way, page: Callable[[Glimpse], None] | None = None) -> None:
+        """Draw in the viewer that listens at `url`; if it is that of a page, the page gets each glimpse before."""
         super().__init__(name="drawer", daemon=True)
-        self._run, self._way, self._evened = run, way, Evened()
-        self._drawing = RerunLive(url, run, way.clock, selected=run.scene.selected)
+        self._run, self._way, self._page, self._evened = run, way, page, Evened()
+        self._drawing = RerunLive(url, run, way.clock, selected=run.scene.selected, page=page is not None)
         self.fault: Exception | None = None
 
     def run(self) -> None:
@@ -90,6 +92,8 @@ class Drawer(threading.Thread):
         glimpse = self._run.next()
         if glimpse is None:
             return False
+        if self._page is not None:
+            self._page(glimpse)
         truth = glimpse.truth
         tally = None if truth.tally is None else self._evened.per_tick(truth.tally, glimpse.ticks)
         self._drawing.see(replace(truth, tally=tally))

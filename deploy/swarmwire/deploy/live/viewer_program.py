@@ -32,9 +32,12 @@ class Viewer:
     @property
     def page(self) -> str | None:
         """The address for a browser; None: it has a window."""
-        if self._web_port is None:
-            return None
-        return f"http://127.0.0.1:{self._web_port}/?url={quote(self.url, safe='')}"
+        return None if self.web is None else f"{self.web}/?url={quote(self.url, safe='')}"
+
+    @property
+    def web(self) -> str | None:
+        """The origin of its pages; None: it has a window."""
+        return None if self._web_port is None else f"http://127.0.0.1:{self._web_port}"
 
     @property
     def alive(self) -> bool:

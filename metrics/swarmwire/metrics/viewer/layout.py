@@ -14,6 +14,7 @@ _GROUND = [16, 18, 24]
 _ARENA_SHARE = 0.44  # of the window's width, for an arena as wide as it is high; a narrow one leaves more to the plots
 _LEAST_ARENA_SHARE, _SIDE_SHARE = 0.24, 0.19
 _NARROW = 0.6  # width over height below which an arena gets the window's whole height
+_PAGE_ARENA_SHARE = 0.68
 _ROWS = [4.2, 1.0]  # of what is looked at, and of the events below it
 
 
@@ -33,8 +34,23 @@ def layout(static: Static, selected: str, play_state: Literal["playing", "follow
     else:
         middle, right = rrb.Vertical(_arena(static), _events(), row_shares=_ROWS), plots
     shares = [_SIDE_SHARE, arena_share, 1.0 - _SIDE_SHARE - arena_share]
+    return _whole(rrb.Horizontal(side, middle, right, column_shares=shares), play_state)
+
+
+def page_layout(static: Static, selected: str) -> Any:
+    """The blueprint for the page, which tells numbers and events itself: the arena, as large as there is room."""
+    import rerun.blueprint as rrb
+
+    plots = _plots(static)[:2]
+    beside = rrb.Vertical(_close_up(static, selected), *plots, row_shares=[1.15, *[1.0 for _ in plots]])
+    return _whole(rrb.Horizontal(_arena(static), beside, column_shares=[_PAGE_ARENA_SHARE, 1.0 - _PAGE_ARENA_SHARE]))
+
+
+def _whole(views: Any, play_state: Literal["playing", "following", "paused"] = "following") -> Any:
+    import rerun.blueprint as rrb
+
     return rrb.Blueprint(
-        rrb.Horizontal(side, middle, right, column_shares=shares),
+        views,
         rrb.TopPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=_TIME, play_state=play_state),
         rrb.BlueprintPanel(state="collapsed"),

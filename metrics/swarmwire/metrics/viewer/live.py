@@ -3,6 +3,8 @@
 from typing import Any
 
 from swarmwire.comms.clock import Clock
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.viewer.layout import layout, page_layout
 from swarmwire.metrics.viewer.plotted import Measured
 from swarmwire.metrics.viewer.recording import RerunRecording
 
@@ -15,12 +17,26 @@ class RerunLive(RerunRecording):
 
     _send_bytes = 0  # people wait for it
 
-    def __init__(self, url: str, metrics: Measured, clock: Clock, arena: int = 0, selected: str | None = None) -> None:
-        """Draw in the viewer at "rerun+http://…/proxy"; BadInput without the extra [view]."""
+    def __init__(
+        self,
+        url: str,
+        metrics: Measured,
+        clock: Clock,
+        arena: int = 0,
+        selected: str | None = None,
+        *,
+        page: bool = False,
+    ) -> None:
+        """Draw in the viewer at "rerun+http://…/proxy", laid out for the `page` if that is it.
+
+        BadInput without the extra [view].
+        """
         super().__init__(None, metrics, clock, arena, selected)
-        self._url = url
+        self._url, self._page = url, page
+
+    def _layout(self, static: Static, selected: str) -> Any:
+        return page_layout(static, selected) if self._page else layout(static, selected, "following")
 
     def _connect(self, layout: Any) -> None:
-        layout.time_panel.play_state = "following"
         self._arena_view.links_every_ticks = 1  # whoever publishes the ticks has thinned the links already
         self._rec.connect_grpc(self._url, default_blueprint=layout)

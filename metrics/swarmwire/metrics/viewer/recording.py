@@ -60,7 +60,7 @@ class RerunRecording:
         self._ticks = 0
         self._rec.set_log_time_enabled(False)
         self._rec.set_log_tick_enabled(False)
-        self._connect(layout(static, selected))
+        self._connect(self._layout(static, selected))
         self._rec.send_recording_name(f"{static.name}, seed {seed}")
         links_every = self._arena_view.links_every_ticks
         run = rr.AnyValues(scenario=static.name, seed=seed, robots=static.robots, links_every_ticks=links_every)
@@ -93,6 +93,10 @@ class RerunRecording:
         if self._limit.reached(rows.kept_bytes):
             rows.send()
             self._limit.restart()
+
+    def _layout(self, static: Static, selected: str) -> Any:
+        """How it looks when it is opened."""
+        return layout(static, selected)
 
     def _connect(self, layout: Any) -> None:
         """Lead the stream to where it goes; OSError if there is no room: rerun would wait for ever for its writer."""

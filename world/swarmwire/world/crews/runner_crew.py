@@ -28,6 +28,7 @@ from swarmwire.world.crews.runner_inbox import Item, RunnerInbox
 
 POLL_S = 0.2  # how often a wait looks up whether to go on waiting
 START_S = 60.0  # how long runners may take to join and build their agents
+MOST_TOLD = 200  # refusals: whoever asks for ever shall not fill the log
 FAREWELL_S = 3.0  # how long runners may take to leave after the end
 
 R = TypeVar("R", bound=Roster[Any])
@@ -75,7 +76,7 @@ class RunnerCrew(ABC, Generic[R]):
         self._frames: dict[str, zenoh.Publisher] = {}
         self._present: set[str] = set()
         self._building: dict[str, int] = {}  # until when runners may take, wall time
-        self._losses_told = self._changes_told = 0
+        self._losses_told = self._changes_told = self._refusals = 0
         self._patience_s = start_s  # how long a wait may last; in ticks the time-out
         self._deadline_ns = 0
 
@@ -205,6 +206,7 @@ class RunnerCrew(ABC, Generic[R]):
         """A runner asks what there is to play, or for robots."""
         if self._session is None:
             return
+        self._tell_changes()  # before another runner of the same name hears what the one before it was told
         key = str(query.key_expr)
         runner = runner_of(key)
         with query:  # a query that is kept alive holds the asker until its time-out
@@ -218,7 +220,9 @@ class RunnerCrew(ABC, Generic[R]):
                 speaker = runner if key == self._keys.join(runner) else key
                 reply = self._roster.join(speaker, query.payload.to_bytes() if query.payload else b"")
             except Refused as refusal:
-                self._around.refused(runner, str(refusal))
+                self._refusals += 1
+                if self._refusals <= MOST_TOLD:
+                    self._around.refused(runner, str(refusal))
                 query.reply_err(str(refusal))
                 return
             self._frames[runner] = self._session.declare_publisher(

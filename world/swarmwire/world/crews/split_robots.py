@@ -79,7 +79,7 @@ def _one(parts: list[GroupAssignment]) -> GroupAssignment:
         parts[0],
         params=params_of(params, order),
         rows=rows[order],
-        robot_names=tuple(names[at] for at in order.tolist()),
+        robot_names=tuple(names[int(at)] for at in order),
         keys=np.concatenate([part.keys for part in parts])[order],
     )
 

@@ -22,30 +22,24 @@ class Chosen:
 
     run: str | None = None  # its id, or its folder; None: the only one
     endpoint: str | None = None  # on another machine; None: a run of this one
-    ca: Path | None = None
-    certificate: Path | None = None
-    key: Path | None = None
+    certs: Path | None = None
+    name: str | None = None
+    files: tuple[Path | None, Path | None, Path | None] = (None, None, None)  # ca, certificate, key
     insecure: bool = False
 
     def network(self) -> "Network | None":
         """The settings for an endpoint beyond this machine; None for a run of this one. BadInput if they won't do."""
         if self.endpoint is None:
-            if self.ca or self.certificate or self.key or self.insecure:
+            if self.certs or self.name or any(self.files) or self.insecure:
                 raise BadInput("--endpoint", "", "is missing: certificates are for a run on another machine")
             return None
-        from swarmwire.comms.wire.network import Network
+        from swarmwire.comms.wire.access import OPERATOR
+        from swarmwire.deploy.certificates.member import member
 
-        network = Network(
-            connect=(self.endpoint,),
-            ca=self.ca,
-            certificate=self.certificate,
-            key=self.key,
-            insecure=self.insecure,
-        )
-        network.check("", "--endpoint")
-        if network.warning is not None:
-            typer.echo(f"warning: {self.endpoint} without certificates: whoever is there can control the run", err=True)
-        return network
+        of = member(OPERATOR, certs=self.certs, name=self.name, files=self.files, insecure=self.insecure)
+        if (warning := of.warning([self.endpoint])) is not None:
+            typer.echo(f"warning: {warning}", err=True)
+        return of.network
 
 
 @contextmanager

@@ -1,13 +1,12 @@
 """The group of commands `swarmwire ctl`."""
 
-from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-import click
 import typer
 from typer.core import TyperGroup
 
 from swarmwire.comms.one_of import one_of
+from swarmwire.deploy.commands.access_options import PANEL, Ca, Certificate, Certs, Insecure, Key, Name
 from swarmwire.deploy.commands.ctl.chosen_run import Chosen
 from swarmwire.deploy.commands.ctl.given import end_command, event_command, events_command
 from swarmwire.deploy.commands.ctl.pace import (
@@ -41,14 +40,14 @@ For example:
 
   swarmwire ctl runs/flocking-s1-20261121T030405Z speed max
 
-  swarmwire ctl --endpoint tls/10.0.0.5:7448 --ca ca.pem --certificate me.pem --key me.key status
+  swarmwire ctl --endpoint tls/10.0.0.5:7448 --certs lab-certs status
 """)
 
 
 class CtlGroup(TyperGroup):
     """A group whose commands may follow the name of a run."""
 
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Take the run from the first argument that is neither an option nor a command."""
         place, chosen = _first_word(self, args), Chosen()
         if place is not None and args[place] not in self.commands:
@@ -70,19 +69,23 @@ def _ctl(
     context: typer.Context,
     endpoint: Annotated[
         str | None,
-        typer.Option(help="Where a run on another machine takes observers.", metavar="ENDPOINT"),
+        typer.Option(
+            help="Of a run on another machine: where it takes observers.", metavar="ENDPOINT", rich_help_panel=PANEL
+        ),
     ] = None,
-    ca: Annotated[Path | None, typer.Option(help="Who signed the members' certificates.")] = None,
-    certificate: Annotated[Path | None, typer.Option(help="The operator's own certificate.")] = None,
-    key: Annotated[Path | None, typer.Option(help="Its key, which its owner alone may read.")] = None,
-    insecure: Annotated[bool, typer.Option("--insecure", help="Go to another machine without certificates.")] = False,
+    certs: Certs = None,
+    name: Name = None,
+    ca: Ca = None,
+    certificate: Certificate = None,
+    key: Key = None,
+    insecure: Insecure = False,
 ) -> None:
-    chosen = context.obj
-    chosen.endpoint, chosen.ca, chosen.certificate, chosen.key = endpoint, ca, certificate, key
-    chosen.insecure = insecure
+    chosen: Chosen = context.obj
+    chosen.endpoint, chosen.certs, chosen.name = endpoint, certs, name
+    chosen.files, chosen.insecure = (ca, certificate, key), insecure
 
 
-def _first_word(group: click.Group, args: list[str]) -> int | None:
+def _first_word(group: TyperGroup, args: list[str]) -> int | None:
     """The place of the first argument that is neither an option nor the value of one."""
     with_value = {name for of in group.params if not getattr(of, "is_flag", False) for name in of.opts}
     place = 0

@@ -1,0 +1,53 @@
+// Who did what at which tick, newest first; what lasts can be ended.
+import { end } from "./ask.js";
+
+const LASTING = ["kill", "partition", "jammer", "blackout", "gain", "fail", "ramp"];
+
+const CHANGED = { ramp: /^ramp (?:what = "(.*?)") (?:to = (\S+))(.*)$/ };
+
+export function happenings() {
+  let shown = "";
+  return {
+    see(status) {
+      const told = [status.events, status.who, status.state === "over"];
+      const text = JSON.stringify(told);
+      if (text === shown) return; // a list that is drawn anew takes the button from under the pointer
+      shown = text;
+      const place = document.getElementById("events");
+      const items = ordered(status.events ?? []).map((event) => item(event, status.who?.[event.number], status.state === "over"));
+      if (!items.length) items.push(Object.assign(document.createElement("li"), { className: "none", textContent: "nothing has happened yet" }));
+      place.replaceChildren(...items);
+    },
+  };
+}
+
+// What waits for the next tick, what happened, newest first, and at last what the scenario has in store.
+function ordered(events) {
+  const rank = (event) => (event.tick ?? (event.given ? Infinity : -1));
+  return [...events].sort((one, other) => rank(other) - rank(one) || (rank(one) < 0 ? one.number - other.number : other.number - one.number));
+}
+
+function item(event, who, ended) {
+  const line = document.createElement("li");
+  const begun = event.tick !== null;
+  const when = begun ? `tick ${event.tick}` : !event.given ? "to come" : event.over ? "taken back" : "next tick";
+  line.className = event.over || !begun ? "over" : "";
+  line.title = event.text;
+  line.append(Object.assign(document.createElement("span"), { className: "quiet", textContent: when }));
+  const what = line.appendChild(document.createElement("span"));
+  what.textContent = words(event, begun ? who : undefined);
+  if (event.given) what.append(" ", Object.assign(document.createElement("span"), { className: "hand", textContent: "by hand" }));
+  if (event.over && begun) what.append(" ", Object.assign(document.createElement("span"), { className: "quiet", textContent: "over" }));
+  if (LASTING.includes(event.do) && begun && !event.over && !ended) {
+    const button = line.appendChild(Object.assign(document.createElement("button"), { textContent: "end", title: "undo it" }));
+    button.onclick = () => end(event.number);
+  }
+  return line;
+}
+
+function words(event, who) {
+  const ramp = event.do === "ramp" && CHANGED.ramp.exec(event.text);
+  if (ramp) return `${ramp[1]} = ${ramp[2]}${ramp[3]}`;
+  if (who === undefined) return event.text;
+  return `${event.do}: ${who}`;
+}

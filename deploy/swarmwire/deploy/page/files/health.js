@@ -1,0 +1,31 @@
+// How the runners are doing, and every count that is not 0.
+const by = (id) => document.getElementById(id);
+
+export function health() {
+  return {
+    see(status) {
+      const runners = status.runners;
+      by("runners").replaceChildren();
+      if (runners === null || runners === undefined) {
+        by("runners").textContent = "no runners: all agents are in the world's process";
+      } else {
+        const told = Object.entries(runners).map(([name, count]) => ({ name: name.replaceAll("_", " "), count }));
+        told.forEach(({ name, count }, at) => {
+          const item = document.createElement("span");
+          const number = item.appendChild(document.createElement("b"));
+          number.textContent = count;
+          number.className = count && name !== "ready" ? "bad" : "";
+          item.append(` ${name}${at < told.length - 1 ? " · " : ""}`);
+          by("runners").append(item);
+        });
+      }
+      const counts = Object.entries(status.counts ?? {}).filter(([, count]) => count);
+      by("faults").replaceChildren(...counts.map(([name, count]) => {
+        const item = document.createElement("li");
+        item.append(`${name.replaceAll("_", " ")} `);
+        item.appendChild(document.createElement("b")).textContent = count;
+        return item;
+      }));
+    },
+  };
+}

@@ -1,0 +1,49 @@
+// The arena from above, small: where the robots are, and the place that was clicked.
+const NS = "http://www.w3.org/2000/svg";
+
+export function map(svg, chosen) {
+  const add = (name, attributes, to = svg) => {
+    const element = to.appendChild(document.createElementNS(NS, name));
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+    return element;
+  };
+  let robots, mark, radius;
+  let place = null; // null: the swarm's centre
+
+  svg.addEventListener("click", (event) => {
+    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+    place = [Number(at.x.toFixed(2)), Number((-at.y).toFixed(2))];
+    chosen(place);
+  });
+
+  return {
+    begin(facts) {
+      const [width, height] = facts.arena_m, side = Math.max(width, height) * 1.04;
+      radius = side / 55;
+      svg.replaceChildren();
+      svg.setAttribute("viewBox", `${-side / 2} ${-side / 2} ${side} ${side}`);
+      add("rect", { class: "wall", x: -width / 2, y: -height / 2, width, height });
+      for (const one of facts.obstacles) {
+        if (one.corners.length) add("polygon", { class: "block", points: one.corners.map(([x, y]) => `${x},${-y}`).join(" ") });
+        else add("circle", { class: "block", cx: one.x, cy: -one.y, r: one.radius });
+      }
+      robots = add("g", {});
+      mark = add("path", { class: "place" });
+    },
+    see(places, centre) {
+      while (robots.children.length > places.length) robots.lastChild.remove();
+      while (robots.children.length < places.length) add("circle", { r: radius }, robots);
+      places.forEach(([x, y, alive], at) => {
+        const dot = robots.children[at];
+        dot.setAttribute("cx", x);
+        dot.setAttribute("cy", -y);
+        dot.setAttribute("class", alive ? "robot" : "dead");
+      });
+      const at = place ?? centre, arm = radius * 3;
+      mark.setAttribute("d", at ? `M${at[0] - arm} ${-at[1]}h${2 * arm}M${at[0]} ${-at[1] - arm}v${2 * arm}` : "");
+      return at;
+    },
+    get place() { return place; },
+    forget() { place = null; },
+  };
+}

@@ -1,0 +1,41 @@
+// The page: news of the run come in, orders go out; each part of the page is a module of its own.
+import { breaking } from "./breaking.js";
+import { happenings } from "./happenings.js";
+import { health } from "./health.js";
+import { numbers } from "./numbers.js";
+import { radio } from "./radio.js";
+import { say } from "./said.js";
+import { transport } from "./transport.js";
+import { viewer } from "./viewer.js";
+
+const parts = [transport(), numbers(), radio(), breaking(), health(), happenings(), viewer()];
+const by = (id) => document.getElementById(id);
+const news = new EventSource("news");
+
+news.addEventListener("facts", (event) => {
+  const facts = JSON.parse(event.data);
+  by("name").textContent = facts.name;
+  document.title = `${facts.name}: swarmwire`;
+  by("about").textContent = `seed ${facts.seed}, ${facts.robots.length} robots, ${facts.rate_hz} Hz`;
+  for (const part of parts) part.begin?.(facts);
+});
+
+news.addEventListener("status", (event) => {
+  const status = JSON.parse(event.data);
+  show(status.state);
+  for (const part of parts) part.see?.(status);
+  if (status.state === "over") {
+    news.close(); // no more will come, and a browser would ask for it again and again
+    say("the run is over; what there was to see can still be looked at", true);
+  }
+});
+
+news.addEventListener("error", () => show("lost"));
+
+function show(state) {
+  by("state").textContent = state === "lost" ? "no connection" : state;
+  by("state").className = `state ${state}`;
+  for (const control of document.querySelectorAll("#transport button, #transport input, aside button"))
+    control.dataset.over = state === "over" || state === "lost";
+  document.body.classList.toggle("ended", state === "over" || state === "lost");
+}

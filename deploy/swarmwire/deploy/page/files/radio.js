@@ -1,0 +1,58 @@
+// Sliders for the radio's numbers: what is let go of holds from the next tick on.
+import { happen } from "./ask.js";
+
+const KEYS = [
+  { key: "loss", name: "loss", unit: "", least: 0, most: () => 1, step: 0.01, show: (value) => `${Math.round(100 * value)} %` },
+  { key: "latency_s", name: "latency", unit: "s", least: 0, most: (now) => Math.max(2, now), step: 0.01, show: (value) => `${value.toFixed(2)} s` },
+  { key: "range_m", name: "range", unit: "m", least: 0.1, most: (now, facts) => Math.max(now, Math.ceil(Math.hypot(...facts.arena_m))), step: 0.1, show: (value) => `${value.toFixed(1)} m` },
+  { key: "antenna.power_dbm", name: "power", unit: "dBm", least: -60, most: (now) => Math.max(30, now), step: 1, show: (value) => `${value.toFixed(0)} dBm`, signals: true },
+];
+const WHY = { range_m: "follows from how strong signals are" };
+
+export function radio() {
+  const place = document.getElementById("radio");
+  const rows = new Map();
+  let facts = null;
+
+  for (const of of KEYS) {
+    const row = place.appendChild(document.createElement("label"));
+    row.className = "slide";
+    row.append(Object.assign(document.createElement("span"), { textContent: of.name }));
+    const input = row.appendChild(Object.assign(document.createElement("input"), { type: "range", id: `radio-${of.name}`, step: of.step }));
+    const output = row.appendChild(document.createElement("output"));
+    const state = { row, input, output, held: false, awaited: null };
+    input.oninput = () => { state.held = true; output.textContent = of.show(Number(input.value)); };
+    input.onchange = async () => {
+      const to = Number(input.value);
+      state.awaited = (await happen({ do: "ramp", what: `radio.${of.key}`, to })) === null ? null : to;
+      state.held = false;
+    };
+    rows.set(of, state);
+  }
+
+  return {
+    begin(told) { facts = told; },
+    see(status) {
+      const known = status.radio;
+      document.getElementById("radio-why").textContent = known ? "" : "(this scenario has no radio)";
+      for (const [of, state] of rows) {
+        const now = known?.[of.key];
+        const there = typeof now === "number" && status.state !== "over";
+        state.row.hidden = Boolean(of.signals) && typeof now !== "number";
+        state.input.disabled = !there;
+        state.row.classList.toggle("off", !there);
+        state.row.title = there ? `radio.${of.key}` : known ? WHY[of.key] ?? "this radio has no such number" : "this scenario has no radio";
+        if (typeof now !== "number") {
+          state.output.textContent = known ? "by signal" : "–";
+          continue;
+        }
+        if (state.awaited !== null && Math.abs(state.awaited - now) > of.step / 2 && status.state === "paused") continue; // the next tick brings it
+        state.awaited = null;
+        if (state.held) continue;
+        Object.assign(state.input, { min: Math.min(of.least, now), max: of.most(now, facts) });
+        state.input.value = now;
+        state.output.textContent = of.show(now);
+      }
+    },
+  };
+}

@@ -1,0 +1,110 @@
+"""News of a run for the pages that are open: its status, asked for many times a second in a thread of its own."""
+
+import asyncio
+import threading
+from collections import deque
+from collections.abc import AsyncGenerator, Callable, Mapping
+from math import nan
+from typing import Any
+
+from swarmwire.comms.clock import NS_PER_S, Clock
+from swarmwire.comms.errors import SwarmwireError
+from swarmwire.deploy.control.remote_control import RemoteControl
+
+EVERY_S = 0.2  # between two looks
+KEPT = 240  # values of each number that a page that is opened later still gets
+SPEED_NS = NS_PER_S  # of wall time over which the speed is measured
+
+News = dict[str, Any]
+
+
+class NewsThread(threading.Thread):
+    """Asks for the status of a run until the run is over or `close` is called, and hands it to all that read.
+
+    Attributes:
+        latest: what was told last.
+        history: what the numbers were, by tick, as far as it is kept.
+    """
+
+    def __init__(self, control: RemoteControl, seen: Callable[[], Mapping[str, Any]], clock: Clock) -> None:
+        """`seen` tells what else there is to tell at each look."""
+        super().__init__(name="news", daemon=True)
+        self._control, self._seen, self._clock = control, seen, clock
+        self.latest: News = {}
+        self.history: deque[News] = deque(maxlen=KEPT)
+        self._marks: deque[tuple[int, float]] = deque(maxlen=50)  # wall time in ns, simulated time in s
+        self._readers: dict[asyncio.Queue[News | None], asyncio.AbstractEventLoop] = {}
+        self._lock = threading.Lock()
+        self._look = threading.Event()
+        self._closed = False
+
+    def run(self) -> None:
+        """Look, tell, wait."""
+        while not self._closed:
+            try:
+                status = dict(self._control.status())
+            except SwarmwireError as error:  # it has ended, or its process is gone: what is known of it stays
+                status = {**self.latest, "state": "over", "gone": str(error)}
+            self._tell(status)
+            if status["state"] == "over":
+                return
+            self._look.wait(EVERY_S)
+            self._look.clear()
+
+    def look(self) -> None:
+        """Look at once: something was asked of the run."""
+        self._look.set()
+
+    def close(self) -> None:
+        """No more news; safe to call more than once."""
+        self._closed = True
+        self._look.set()
+        if self.is_alive():
+            self.join()
+        with self._lock:
+            for queue, loop in self._readers.items():
+                loop.call_soon_threadsafe(_put, queue, None)
+
+    async def read(self) -> AsyncGenerator[News]:
+        """The news as it comes, beginning with the newest; what a slow reader missed is left out."""
+        queue: asyncio.Queue[News | None] = asyncio.Queue(maxsize=1)
+        with self._lock:
+            self._readers[queue] = asyncio.get_running_loop()
+            if self.latest:
+                _put(queue, self.latest)
+        try:
+            while (news := await queue.get()) is not None:
+                yield news
+        finally:
+            with self._lock:
+                del self._readers[queue]
+
+    def _tell(self, status: News) -> None:
+        news = {**status, **self._seen(), "speed_now": self._speed(status)}
+        with self._lock:
+            if news.get("tick") != self.latest.get("tick"):
+                self.history.append(_numbers(news))
+            self.latest = news
+            for queue, loop in self._readers.items():
+                loop.call_soon_threadsafe(_put, queue, news)
+
+    def _speed(self, status: News) -> float | None:
+        """Simulated s per s of wall time over the last second; None while nothing is known."""
+        now_ns, time_s = self._clock.now_ns(), float(status.get("time_s", nan))
+        self._marks.append((now_ns, time_s))
+        while len(self._marks) > 2 and self._marks[1][0] <= now_ns - SPEED_NS:
+            self._marks.popleft()
+        since_ns, since_s = self._marks[0]
+        return (time_s - since_s) * NS_PER_S / (now_ns - since_ns) if now_ns > since_ns else None
+
+
+def _numbers(news: News) -> News:
+    """What is drawn as a curve."""
+    tick_ms = news.get("measures_ms")
+    return {"pdr": news.get("pdr"), "alive": news.get("alive"), "tick_ms": tick_ms, **news.get("metrics", {})}
+
+
+def _put(queue: asyncio.Queue[News | None], news: News | None) -> None:
+    if queue.full():
+        queue.get_nowait()
+    queue.put_nowait(news)

@@ -1,0 +1,71 @@
+"""What the page tells of the swarm as its observer sees it: where the robots are, and how many packets get through."""
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.glimpse import Glimpse
+from swarmwire.comms.truth import Happened, Static
+from swarmwire.metrics.event_log import names
+
+NAMED = 5  # robots of an event, at most
+MOST_PLACES = 500  # robots: of more, the small map shows only some
+
+
+class Seen:
+    """The newest glimpse, in numbers. Written by the thread that draws, read by any other."""
+
+    def __init__(self, static: Static) -> None:
+        self._rate_hz = static.rate_hz
+        self._second: deque[tuple[int, int, int]] = deque()  # tick, heard, in range
+        self._every = -(-static.robots // MOST_PLACES)
+        self._static = static
+        self._who: dict[str, str] = {}
+        self.numbers: dict[str, Any] = {"centre": None, "places": [], "pdr": None, "who": {}}
+
+    def see(self, glimpse: Glimpse) -> None:
+        """Take one more."""
+        truth = glimpse.truth
+        places, alive = np.asarray(truth.pose)[:, :2], np.asarray(truth.alive)
+        living = places[alive]
+        shown = slice(None, None, self._every)
+        self.numbers = {
+            "centre": living.mean(axis=0).round(3).tolist() if len(living) else None,
+            "places": [
+                [*place, bool(lives)]
+                for place, lives in zip(places[shown].round(2).tolist(), alive[shown], strict=True)
+            ],
+            "pdr": self._pdr(glimpse),
+            "who": self._whom(truth.events),
+        }
+
+    def _whom(self, events: Sequence[Happened]) -> dict[str, str]:
+        """Whom each event changed when it began, by its number."""
+        begun = {str(event.serial): whom(event, self._static) for event in events if not event.ended}
+        self._who = {**self._who, **begun}
+        return self._who
+
+    def _pdr(self, glimpse: Glimpse) -> float | None:
+        """Heard over in range in the last simulated second; None if none was in range."""
+        truth = glimpse.truth
+        if truth.tally is not None:
+            heard, in_range = int(truth.tally.fates[:, Fate.HEARD].sum()), int(truth.tally.in_range.sum())
+            self._second.append((truth.tick, heard, in_range))
+        while self._second and self._second[0][0] <= truth.tick - self._rate_hz:
+            self._second.popleft()
+        reached = sum(in_range for _, _, in_range in self._second)
+        return sum(heard for _, heard, _ in self._second) / reached if reached else None
+
+
+def whom(event: Happened, static: Static) -> str:
+    """The robots that an event changed, in words."""
+    changed = names(event, static)[0]
+    if not changed:
+        return "nobody"
+    if len(changed) == static.robots:
+        return "all"
+    more = len(changed) - NAMED
+    return ", ".join(changed[:NAMED]) + (f" and {more} more" if more > 0 else "")

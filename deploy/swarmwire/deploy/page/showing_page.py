@@ -1,0 +1,73 @@
+"""Showing a run on the page: what it publishes in rerun's viewer, and beside it what controls, breaks and mends it."""
+
+import webbrowser
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import replace
+from typing import Any
+
+from swarmwire.comms.glimpse import Scene
+from swarmwire.deploy.control.remote_control import RemoteControl, controlling
+from swarmwire.deploy.live.following import following
+from swarmwire.deploy.live.live_file import Live
+from swarmwire.deploy.live.showing import Drawer, Way
+from swarmwire.deploy.live.viewer_program import has_screen
+from swarmwire.deploy.page.app import Shown, page_app
+from swarmwire.deploy.page.news import NewsThread
+from swarmwire.deploy.page.seen import Seen
+from swarmwire.deploy.page.serving import serving
+
+
+def show_page(live: Live, way: Way) -> None:
+    """Show the run until `way.stopped()` or its viewer is gone; afterwards it can still be looked at. RunGone if it is.
+
+    The first tick of a run that waits for the page is asked for from here: without it there would be nothing to see.
+    """
+    clock = way.clock
+    viewing = replace(way, web=True, port=None).viewer(None)
+    with following(live) as run, viewing as shown, controlling(live.endpoint, live.run) as control:
+        assert shown.web is not None, "a viewer with pages was asked for"
+        seen = Seen(run.scene.static)
+        drawer = Drawer(run, shown.url, way, seen.see)
+        drawer.start()
+        told = Shown(shown.web, shown.url, facts(run.scene))
+        news = NewsThread(control, lambda: seen.numbers, clock)
+        with (
+            serving(lambda token, port: page_app(control, news, told, token, port), clock, way.port) as address,
+            closing(news),  # first, so that no page waits for more
+        ):
+            news.start()
+            way.say(f"open {address} in a browser; Ctrl-C ends the page")
+            if has_screen():
+                webbrowser.open(address)
+            _first_tick(control)
+            while shown.alive and not way.stopped() and drawer.fault is None:
+                way.pause()
+    if drawer.fault is not None:
+        raise drawer.fault
+
+
+def _first_tick(control: RemoteControl) -> None:
+    status = control.status()
+    if status["state"] == "paused" and status["tick"] == 0:
+        control.step()
+
+
+def facts(scene: Scene) -> Mapping[str, Any]:
+    """What does not change during the run, as the page is told of it."""
+    static = scene.static
+    return {
+        "name": static.name,
+        "seed": static.seeds[0],
+        "rate_hz": static.rate_hz,
+        "arena_m": list(static.arena_size_m),
+        "robots": list(static.robot_names),
+        "groups": [group.name for group in static.groups],
+        "series": [
+            {"name": series.name, "unit": series.unit, "bounds": list(series.bounds)} for series in scene.series
+        ],
+        "obstacles": [
+            {"x": one.x_m, "y": one.y_m, "radius": one.radius_m, "corners": one.corners_m.tolist()}
+            for one in static.fixed(0)
+        ],
+    }

@@ -1,0 +1,103 @@
+"""What the page about several machines shows is typed on three of them, as it stands, and prints what is shown."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from swarmwire.deploy import run
+from tests.deploy.commands import LOSSY
+from tests.deploy.machines.namespaces import Machine, machines
+from tests.deploy.machines.on_machines import Started
+from tests.docs.pages import ROOT, commands_of
+from tests.docs.test_pages import UV
+
+PAGE = "docs/machines.md"
+NAMES = ("lab", "gate", "laptop")
+
+
+@dataclass
+class Typed:
+    """A line that is typed on a machine, and what it prints before the next one is typed."""
+
+    machine: str
+    line: str
+    shown: list[str] = field(default_factory=list)
+
+
+def typed_in(text: str) -> list[Typed]:
+    found: list[Typed] = []
+    for line in text.splitlines():
+        prompt, dollar, rest = line.partition("$ ")
+        if dollar and prompt in NAMES:
+            found.append(Typed(prompt, rest))
+        else:
+            found[-1].shown.append(line)
+    return found
+
+
+def shell(line: str, folder: Path) -> list[str]:
+    """The command of a line, in a machine's folder, whose `uv run` is the tests' own environment."""
+    path = os.pathsep.join([str(folder / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]])
+    return ["env", f"PATH={path}", "sh", "-c", f"cd {folder} && exec {line}"]
+
+
+def new_folder(folder: Path) -> Path:
+    """What a machine has: the project's scenarios and programs."""
+    shutil.copytree(ROOT / "scenarios", folder / "scenarios")
+    (folder / "bin").mkdir()
+    (folder / "bin" / "uv").write_text(UV)
+    (folder / "bin" / "uv").chmod(0o755)
+    return folder
+
+
+@pytest.fixture
+def page() -> str:
+    return (ROOT / PAGE).read_text(encoding="utf-8")
+
+
+def test_the_machines_do_what_the_page_shows(page, tmp_path):
+    with machines(3) as line, ExitStack() as opened:
+        on: dict[str, Machine] = dict(zip(NAMES, line, strict=True))
+        certs = certificates(new_folder(tmp_path / "ca"))
+        folders = {name: new_folder(tmp_path / name) for name in NAMES}
+        for name, files in table_of(page).items():
+            (folders[name] / "certs").mkdir()
+            for file in files:
+                shutil.copy(certs / file, folders[name] / "certs")
+        started: list[Started] = []
+        block = re.search(r"<!-- machines -->\n```text\n(.*?)```", page, re.DOTALL)
+        assert block is not None
+        commands = typed_in(block[1])
+        for typed in commands:
+            command = on[typed.machine].command(*shell(typed.line, folders[typed.machine]))
+            started.append(opened.enter_context(Started.running(command)))
+            for shown in typed.shown:
+                started[-1].said(*shown.split("…"))
+        by_machine = {typed.machine: of for typed, of in zip(commands, started, strict=True)}
+        assert [of.ended() for of in started if of is not by_machine["gate"]] == [0, 0, 0]
+        assert by_machine["laptop"].lines[-1] == "the run is over"
+        assert by_machine["gate"].stop() == 0
+    told = json.loads((folders["lab"] / "runs" / "across" / "summary.json").read_text())
+    assert told["trajectory_sha256"] == list(run(LOSSY, overrides=["duration_s=20"]).trajectory_sha256)
+
+
+def certificates(folder: Path) -> Path:
+    """The CA that the page's own commands make."""
+    for command in commands_of(PAGE):
+        done = subprocess.run(shell(command.line, folder), capture_output=True, text=True, check=False, timeout=60)
+        assert done.returncode == 0, done.stderr
+    return folder / "lab-ca"
+
+
+def table_of(page: str) -> dict[str, list[str]]:
+    """Which files the page has on which machine."""
+    rows = [line.split("|")[1:3] for line in page.splitlines() if line.startswith("| ")]
+    return {row[0].strip(): re.findall("`([^`]+)`", row[1]) for row in rows if row[0].strip() in NAMES}
