@@ -6,7 +6,7 @@ Nothing is allocated from a number that the frame claims: the bytes are there, a
 # What arrives is of unknown types until it is checked, item by item; a `cast` is a call, here in the busiest of loops.
 # pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false, reportUnknownMemberType=false
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -40,7 +40,7 @@ def encode(kind: str, tick: int, arrays: Mapping[str, AnyArray], values: Mapping
     return msgpack.packb({"v": VERSION, "kind": kind, "tick": tick, "arrays": packed, "values": dict(values or {})})
 
 
-def decode(data: bytes, most_bytes: int = MOST_BYTES) -> Frame:
+def decode(data: bytes, most_bytes: int = MOST_BYTES, versions: Container[int] = (VERSION,)) -> Frame:
     """The frame of these bytes; BadFrame ("oversized" or "malformed") if they are none. Arrays are read-only views."""
     if len(data) > most_bytes:
         raise BadFrame("oversized", f"{len(data)} bytes, expected at most {most_bytes}")
@@ -53,7 +53,7 @@ def decode(data: bytes, most_bytes: int = MOST_BYTES) -> Frame:
     if type(body) is not dict or body.keys() != KEYS:
         raise BadFrame("malformed", f"expected a map of {', '.join(sorted(KEYS))}")
     version, kind, tick, arrays, values = body["v"], body["kind"], body["tick"], body["arrays"], body["values"]
-    if type(version) is not int or version != VERSION:
+    if type(version) is not int or version not in versions:
         raise BadFrame("malformed", f"version {version!r}, expected {VERSION}")
     if type(kind) is not str or type(tick) is not int or type(arrays) is not dict or type(values) is not dict:
         raise BadFrame("malformed", "expected kind to be a text, tick a number, arrays and values maps")
