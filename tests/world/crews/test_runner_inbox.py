@@ -67,7 +67,9 @@ def test_requests_of_one_runner_are_counted_over_the_whole_run(session):
         for runner in ("a", "a", "b"):
             replies = session.get(f"join/{runner}", timeout=10.0)
             if inbox.qsize():
-                with inbox.get(timeout=10.0) as query:
+                query = inbox.get(timeout=10.0)
+                assert isinstance(query, zenoh.Query)
+                with query:
                     query.reply(query.key_expr, b"yes")
             list(replies)
     asked.undeclare()
