@@ -22,7 +22,6 @@ OPTIONS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--n
 PATIENCE_MS = 120_000
 LOAD_MS = 12_000  # until rerun's viewer has loaded and draws, without a graphics card
 DRAW_MS = 15_000  # until it has drawn the newest tick
-COLORS = 256
 
 
 def main(picture: Path, width_px: int, height_px: int, theme: Literal["dark", "light"]) -> None:
@@ -44,7 +43,7 @@ def main(picture: Path, width_px: int, height_px: int, theme: Literal["dark", "l
             finally:
                 browser.close()
                 run.kill()  # the page ends with it; a run that is told to end waits for whoever looks at its page
-        Image.open(shot).convert("RGB").quantize(COLORS).save(picture, optimize=True)
+        Image.open(shot).convert("RGB").save(picture, optimize=True)
 
 
 def _break_and_mend(page: Page) -> None:

@@ -270,3 +270,21 @@ def test_ticks_are_taken_once():
     assert (together.tick, ticks) == (1, 2)
     with pytest.raises(ValueError, match="expected a tick"):
         since.take()
+
+
+def test_a_run_that_is_paused_has_told_its_newest_tick_and_tells_it_to_who_begins_to_look_on(tmp_path):
+    metrics, found = Metrics(), []
+    shown = Published(tmp_path, "r", metrics, WallClock())
+
+    def looked(run):
+        shown.catch_up()  # as the loop does for as long as it is held
+        return run.next()
+
+    def pause():
+        for _ in range(2):  # the second begins to look on in the middle, after the first has gone
+            with following(read_live(tmp_path)) as run:
+                found.append(until(lambda run=run: looked(run)).truth.tick)
+            until(lambda: shown.catch_up() or not shown._watched)
+
+    run(LOSSY, overrides=["duration_s=1"], observers=[metrics, shown, At(5, pause)])
+    assert found == [5, 5]

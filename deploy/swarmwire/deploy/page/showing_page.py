@@ -39,7 +39,7 @@ def show_page(live: Live, way: Way, network: Network | None = None, *, begin: bo
             closing(news),  # first, so that no page waits for more
         ):
             news.start()
-            way.say(f"open {address} in a browser; Ctrl-C ends the page")
+            way.say(f"open {address} in a browser{'' if begin else '; Ctrl-C ends the page'}")
             if has_screen():
                 webbrowser.open(address)
             if begin:
