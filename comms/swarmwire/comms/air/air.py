@@ -21,9 +21,11 @@ from swarmwire.comms.air.way import Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import Obstacles
-from swarmwire.comms.outcomes import Outcomes
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import BROADCAST, NOWHERE, Heard, Sent
 from swarmwire.comms.truth import Boundary, Tally
+
+PARTS = 8  # of what is told within a tick that are kept before they are put together
 
 
 class Air:
@@ -90,6 +92,8 @@ class Air:
         self._within: list[news.Final] = []  # told in the tick under way
         self._on_air = Transmissions.none()  # packets of `_links`
         self._links = self._no_links = Links.none(len(radio.gives.columns))
+        nothing = Heard.none(radio.gives.columns), *news.nothing_final(self._links, self._on_air, radio.is_signal)
+        self._nothing = news.Final(*nothing, NO_OUTCOMES)
 
     def hold(self, pose: FloatArray, alive: BoolArray) -> None:
         """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive.
@@ -165,6 +169,8 @@ class Air:
         told = self._final(until_ns)
         if told.anything:
             self._within.append(told)
+            if len(self._within) == PARTS:  # now, and not in the one moment in which the next tick waits for them
+                self._within = [news.joined(self._within)]
         return told.heard, told.outcomes
 
     def end(self) -> Tally:
@@ -209,6 +215,8 @@ class Air:
         self._lives.forget(self._way.queued.epoch)
         links, packets, robots = self._links, self._on_air, self._robots
         rows = news.parted(links.fate, links.receiver, links.final_at_ns, until_ns)
+        if len(rows.open) == len(links.fate):
+            return self._nothing._replace(outcomes=self._way.outcomes(self._coming.alive & ~self._gone))
         self._accounts.settle(links, until_ns)
         told = news.Final(
             news.heard(rows.heard, links, packets, self.radio.gives.columns, robots, len(self._others_alive)),

@@ -131,6 +131,12 @@ def _finished(index, of_link, of_packet, robots):
     return told
 
 
+def nothing_final(links: Links, packets: Transmissions, has_strength: bool) -> tuple[Finished, Departed]:
+    """The tables of none, for an air with these kinds of links and packets."""
+    none = np.empty(0, np.int64)
+    return finished(none, links, packets, 1, has_strength), departed(none, links, packets, 1)
+
+
 def in_arena(row: IntArray, robots: int) -> IntArray:
     """Indices within their arena of robot rows; numpy divides several at a time, but finds remainders one by one."""
     return row - row // robots * robots
