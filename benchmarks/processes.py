@@ -17,29 +17,50 @@ PLAIN = "benchmarks.plain_nursery"
 FLOCKING, BOID = "swarmwire.agent.behaviours:Flocking", "benchmarks.agents:Boid"
 
 
-class OwnMemory:
-    """Observer that reads, once, the memory of the run: what belongs to each runner alone, and of all their share."""
+class Consumption:
+    """Observer that reads what the processes of a run take, at two of its ticks.
 
-    def __init__(self, at_tick: int) -> None:
-        self.at_tick, self.uss_mb, self.all_gb = at_tick, list[float](), 0.0
+    Attributes:
+        uss_mb: memory that belongs to each runner alone.
+        all_gb: memory of world, nursery and runners together, as the sum of their PSS.
+        runner_us: processor time of a runner in a tick.
+        world_ms: processor time of the world in a tick.
+    """
+
+    def __init__(self, first: int, last: int) -> None:
+        self.first, self.last = first, last
+        self.uss_mb, self.all_gb, self.runner_us, self.world_ms = list[float](), 0.0, 0.0, 0.0
+        self._begun_s = (0.0, 0.0)
 
     def begin(self, static: Static) -> None:
         """Nothing to do."""
 
     def see(self, truth: Truth) -> None:
-        """Read at one tick."""
-        if truth.tick == self.at_tick:
-            world = psutil.Process()
-            nursery = [child for child in world.children() if RunnerProcesses.program in child.cmdline()]
-            runners = [runner for process in nursery for runner in process.children()]
+        """Read at two ticks; the memory at the first."""
+        if truth.tick not in (self.first, self.last):
+            return
+        world = psutil.Process()
+        nursery = [child for child in world.children() if RunnerProcesses.program in child.cmdline()]
+        runners = [runner for process in nursery for runner in process.children()]
+        if truth.tick == self.first:
             memory = [runner.memory_full_info() for runner in runners]
             self.uss_mb = [of.uss / 1e6 for of in memory]
             # PSS: what some processes share counts for each by its part, so that the sum is what they take together.
             self.all_gb = sum(of.pss for of in [*memory, *(one.memory_full_info() for one in [world, *nursery])]) / 1e9
+        its_s, theirs_s = _processor_s(world), sum(map(_processor_s, runners))
+        ticks = self.last - self.first
+        self.world_ms = (its_s - self._begun_s[0]) / ticks * 1e3
+        self.runner_us = (theirs_s - self._begun_s[1]) / ticks / len(runners) * 1e6
+        self._begun_s = its_s, theirs_s
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """No part of the summary."""
         return {}
+
+
+def _processor_s(process: psutil.Process) -> float:
+    times = process.cpu_times()
+    return times.user + times.system
 
 
 def plain_processes(name: str, repeats: int, *, robots: int, ticks: int) -> None:
@@ -52,8 +73,8 @@ def processes(name: str, repeats: int, *, robots: int, ticks: int, agent: str) -
     """Real-time factor of a flock with a process per robot; its start, and what each process costs."""
     scenario = scenario_from(scenes.flocking(robots, ticks / 10, BOID if agent.endswith(".py") else agent), name)
     run(scenario.model_copy(update={"duration_s": 1.0}))
-    memory = OwnMemory(ticks // 2)
-    results = [run(scenario, runners="per-robot", observers=[memory]) for _ in range(repeats)]
+    taken = Consumption(ticks // 3, ticks - 1)
+    results = [run(scenario, runners="per-robot", observers=[taken]) for _ in range(repeats)]
     factors = [result.realtime_factor for result in results]
     config = {
         "agent": agent,
@@ -63,9 +84,11 @@ def processes(name: str, repeats: int, *, robots: int, ticks: int, agent: str) -
         "speed_mps": 0.1,
         "rays": 8,
         "radio": "disk, 2 m, loss 0.3, latency 0.1 s",
+        "runner_us_per_tick": round(taken.runner_us),
+        "world_ms_per_tick": round(taken.world_ms, 1),
     }
     report(name, statistics.median(factors), "x real time", results[0], {**config, **spread(factors)})
     starts = [result.start_time_s for result in results]
     report(f"{name}-start", statistics.median(starts), "s", results[0], {**config, **spread(starts)})
-    report(f"{name}-uss", statistics.median(memory.uss_mb), "MB", results[0], {**config, **spread(memory.uss_mb)})
-    report(f"{name}-memory", memory.all_gb, "GB", results[0], config)
+    report(f"{name}-uss", statistics.median(taken.uss_mb), "MB", results[0], {**config, **spread(taken.uss_mb)})
+    report(f"{name}-memory", taken.all_gb, "GB", results[0], config)
