@@ -35,4 +35,4 @@ class Limits:
     join_s: float = 60.0
 
 
-LIMITS = Limits()
+LIMITS = Limits()  # of every run that says nothing else
