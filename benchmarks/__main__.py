@@ -18,6 +18,7 @@ from benchmarks.first_compile import first_compile
 from benchmarks.metrics_share import metrics_share
 from benchmarks.processes import processes
 from benchmarks.push_fleet import push_fleet
+from benchmarks.realtime import realtime
 from benchmarks.record_cost import record_cost
 from benchmarks.report_cost import report_cost
 from benchmarks.robot_step import robot_step
@@ -41,6 +42,7 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     "air-scaling": air_scaling,
     "campaign-1000x10": campaign,
     "processes-100": partial(processes, robots=100, ticks=300),
+    "realtime-50": partial(realtime, robots=50, runners=2, quantum_s=0.001, duration_s=30.0),
     "tls-cost": partial(tls_cost, robots=40, ticks=400),
     **dict.fromkeys(COMPILES, first_compile),
     "report-10000": partial(report_cost, seeds=200),

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.agent import Agent, Message, Robot, Robots, State, VectorAgent, f8
+from swarmwire.agent import Agent, Message, Robot, Robots, State, VectorAgent, f8, u1
 from swarmwire.agent.behaviours import Diffusion
 
 
@@ -43,6 +43,32 @@ class ScanDiffusion(VectorAgent):
         blocked = np.minimum(left_m, right_m) < self.clear_m
         turn_radps = np.where(left_m < right_m, -self.turn_radps, self.turn_radps)
         robots.drive(np.where(blocked, 0.0, self.speed_mps), np.where(blocked, turn_radps, 0.0))
+
+
+class Word(Message):
+    """News that is passed on `hops` times more."""
+
+    hops: u1
+
+
+class Relay(VectorAgent):
+    """Drives in circles, and tells news in one step of ten; whoever hears some passes it on at once, if it may."""
+
+    turn_radps: float = 0.5
+    hops: int = 1
+
+    def step(self, robots: Robots, state: State) -> None:
+        """Drive, pass on what waited, and now and then tell something."""
+        self.hear(robots, state)
+        robots.drive(0.05, self.turn_radps)
+        robots.radio.send(Word, rows=robots.draw.uniform("news") < 0.1, hops=self.hops)
+
+    def hear(self, robots: Robots, state: State) -> None:
+        """Pass on the newest of what each robot heard, if it has hops left."""
+        heard = robots.radio.heard(Word)
+        hops = np.zeros(robots.n, np.int64)
+        hops[heard.row] = heard.message.hops
+        robots.radio.send(Word, rows=hops > 0, hops=hops - 1)
 
 
 class Listener(Agent):

@@ -38,6 +38,39 @@ class Chatter(Agent):
         robot.radio.send(Other(number=7), to=1)
 
 
+class Echo(Agent):
+    """Sends a word in each step, and one for each that it hears between steps; both tell how many it knows of."""
+
+    def __init__(self) -> None:
+        self.known = 0
+
+    def step(self, robot: Robot) -> None:
+        self.known += 100 * len(robot.radio.heard(Word))
+        robot.radio.send(Word(number=float(self.known)))
+
+    def hear(self, robot: Robot) -> None:
+        for _ in robot.radio.heard(Word):
+            self.known += 1
+            robot.radio.send(Word(number=float(self.known)))
+
+
+class Known(State):
+    known: IntColumn = column(0)
+
+
+class VectorEcho(VectorAgent[Known]):
+    """The same for n robots, one word for all that are heard at a time."""
+
+    def step(self, robots: Robots, state: Known) -> None:
+        state.known += 100 * robots.radio.heard(Word).count()
+        robots.radio.send(Word, number=state.known)
+
+    def hear(self, robots: Robots, state: Known) -> None:
+        heard = robots.radio.heard(Word).count()
+        state.known += heard
+        robots.radio.send(Word, rows=heard > 0, number=state.known)
+
+
 class Insisting(Agent):
     """Sends a number to its neighbour until it is acknowledged, then the next one; its speed tells what it was told."""
 

@@ -3,12 +3,15 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from swarmwire.agent.runner import Inbox
-from swarmwire.comms.outcomes import NO_OUTCOMES
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
+from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.in_time_frames import encode_packets
 from swarmwire.comms.wire.tick_frames import encode_tick
-from tests.agent.hosts import GIVES, assignment, group, senses
+from tests.agent.hosts import GIVES, assignment, group, heard_from, senses
 
 
 @dataclass
@@ -57,6 +60,38 @@ def test_of_frames_that_wait_the_newest_is_acted_on_and_the_others_are_counted()
 def test_nothing_is_acted_on_once_the_run_is_over() -> None:
     assert list(inbox_of(tick(0), END).ticks(ASSIGNMENT)) == []
     assert list(inbox_of(tick(0), tick(1), False).ticks(ASSIGNMENT)) == []
+
+
+def packets(number: int, tick_number: int = 0) -> bytes:
+    sent = Sent(np.array([1]), np.array([BROADCAST]), Payloads.of([bytes([0, 0, number])]))
+    return encode_packets(tick_number, 1_000 * number, number, heard_from(sent, [0]), NO_OUTCOMES)
+
+
+def test_packets_between_ticks_are_kept_at_once_and_told_of_when_nothing_newer_waits() -> None:
+    inbox, kept = inbox_of(True, tick(0)), list[int]()
+
+    def receive(heard: Heard, _: Outcomes) -> None:
+        kept.append(heard.payloads.row(0)[2])
+
+    told = inbox.ticks(ASSIGNMENT, receive)
+    assert next(told)[0] == 0
+    for data in (packets(0), packets(1)):
+        inbox.put_frame(Sample(Bytes(data)))
+    assert next(told) == (0, 1_000)
+    assert kept == [0, 1]
+    for data in (packets(2), tick(1), packets(3, 1)):
+        inbox.put_frame(Sample(Bytes(data)))
+    assert next(told)[0] == 1  # with the packets that are there: the step reads all of them
+    assert kept == [0, 1, 2, 3]
+    inbox.put_frame(Sample(Bytes(END)))
+    assert list(told) == []
+    assert (inbox.dropped, inbox.missed) == (0, 0)
+
+
+def test_frames_with_packets_that_never_came_are_counted() -> None:
+    inbox = inbox_of(True, packets(2), packets(3), packets(7), frames.encode("packets", 0, {}))
+    assert next(inbox.ticks(ASSIGNMENT)) == (0, 7_000)
+    assert (inbox.missed, inbox.dropped) == (2 + 3, 1)
 
 
 def test_what_came_before_the_robots_were_given_is_forgotten_but_not_that_the_world_is_gone() -> None:

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.clock import NS_PER_S, ScaledClock, WallClock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.clock import NS_PER_S, PreciseClock, ScaledClock, WallClock, tick_start_ns, to_ns, to_s
 from tests.clocks import FakeClock
 
 TICKS = st.integers(0, 10**9)
@@ -43,6 +43,47 @@ def test_the_wall_clock_returns_once_the_time_has_come_and_at_once_when_it_is_pa
     clock.sleep_until(before_ns - NS_PER_S)
     clock.sleep_until(before_ns + 1_000_000)
     assert clock.now_ns() >= before_ns + 1_000_000
+
+
+class LateClock(FakeClock):
+    """A clock whose sleeps end late, and on which looking takes time."""
+
+    def __init__(self, late_ns: int) -> None:
+        super().__init__()
+        self.late_ns = late_ns
+
+    def now_ns(self) -> int:
+        self.time_ns += 100
+        return self.time_ns
+
+    def sleep_until(self, at_ns: int) -> None:
+        super().sleep_until(at_ns)
+        self.time_ns += self.late_ns
+
+
+def test_a_precise_clock_learns_how_late_its_sleeps_end_and_ends_them_on_time() -> None:
+    inner = LateClock(250_000)
+    clock, late_ns = PreciseClock(inner), list[int]()
+    for _ in range(4):
+        at_ns = inner.time_ns + 10_000_000
+        clock.sleep_until(at_ns)
+        late_ns.append(inner.time_ns - at_ns)
+    assert late_ns[0] > 100_000  # not known yet
+    assert all(0 <= late < 1_000 for late in late_ns[1:])
+    inner.late_ns = 0
+    for _ in range(100):
+        clock.sleep_until(inner.time_ns + 10_000_000)
+    assert clock._wakes_late_ns < 10_000  # it does not wait awake for long where sleeps end on time
+
+
+def test_a_precise_clock_does_not_sleep_for_what_is_near_or_past_nor_wait_awake_for_a_machine_that_is_busy() -> None:
+    inner = LateClock(50_000_000)
+    clock = PreciseClock(inner)
+    clock.sleep_until(inner.time_ns - 5)
+    clock.sleep_until(inner.time_ns + 20_000)
+    assert not inner.slept_until
+    clock.sleep_until(inner.time_ns + 10_000_000)
+    assert clock._wakes_late_ns <= 500_000
 
 
 class DatedClock(FakeClock):

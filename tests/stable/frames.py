@@ -20,6 +20,7 @@ from swarmwire.comms.senses import Actions, GroupSenses
 from swarmwire.comms.truth import Finished, Happened, Tally, Truth
 from swarmwire.comms.values import Values
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.in_time_frames import encode_packets, encode_sent
 from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.offer import Offer, OfferedGroup
@@ -75,6 +76,8 @@ def text() -> str:
         "offer, answered": _map(_offer(1.0).encode(), _offer(None).encode()),
         "tick": _frame(encode_tick(1, _senses(), _heard(), Outcomes(*_ints(3, OUTCOMES)))),
         "actions": _frame(encode_actions(1, _actions(), dropped=1, memory=_memory())),
+        "packets": _frame(encode_packets(1, 1, 1, _heard(), Outcomes(*_ints(3, OUTCOMES)))),
+        "sent": _frame(encode_sent(1, _actions().sent, missed=1)),
         f"scene, version {OBSERVED_VERSION}": _frame(*(encode_scene(sample(Scene, left)) for left in LEFT_OUT)),
         "message, on air": f"{Told(x_m=1.5, count=3, place=-2.25, turns=-1).encode().hex(' ')}\n",
         f"truth, version {OBSERVED_VERSION}": _frame(encode_truth(_glimpse())),

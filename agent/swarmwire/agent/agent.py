@@ -23,3 +23,11 @@ class Agent(ABC):
     @abstractmethod
     def step(self, robot: Robot) -> None:
         """Called once a tick in which the robot acts: read `robot`, then drive and send."""
+
+    def hear(self, robot: Robot) -> None:  # noqa: B027 - it may be left out
+        """If it is defined: called between steps when packets have come, in real time with a quantum; read and send.
+
+        What it is given, the next step is not. The senses are those of the last step, the time is now. Driving, lights,
+        actuators and notes are for `step`. Elsewhere (lockstep, real time without a quantum, a real robot) it is never
+        called, and all packets wait for the step: an agent must do without.
+        """

@@ -7,8 +7,9 @@ from swarmwire.comms.arrays import FloatArray, KeyArray
 class Draws:
     """Draws of n robots in one tick; a second call for a purpose gives new values."""
 
-    def __init__(self, keys: KeyArray, tick: int) -> None:
-        self._keys, self._tick = keys, tick
+    def __init__(self, keys: KeyArray, tick: int, first: int = 0) -> None:
+        """`first` numbers the first call for each purpose: what was drawn before it in this tick is not drawn again."""
+        self._keys, self._tick, self._first = keys, tick, first
         self._calls: dict[str, int] = {}
 
     def uniform(self, purpose: str, low: float = 0.0, high: float = 1.0) -> FloatArray:
@@ -22,7 +23,7 @@ class Draws:
         return mean + deviation * unit
 
     def _count(self, purpose: str) -> int:
-        call = self._calls.get(purpose, 0)
+        call = self._calls.get(purpose, self._first)
         self._calls[purpose] = call + 1
         return call
 
@@ -30,8 +31,8 @@ class Draws:
 class Draw:
     """Draws of one robot in one tick; a second call for a purpose gives a new value."""
 
-    def __init__(self, keys: KeyArray, tick: int) -> None:
-        self._rows = Draws(keys, tick)
+    def __init__(self, keys: KeyArray, tick: int, first: int = 0) -> None:
+        self._rows = Draws(keys, tick, first)
 
     def uniform(self, purpose: str, low: float = 0.0, high: float = 1.0) -> float:
         """Uniform in [low, high)."""

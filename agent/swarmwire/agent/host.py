@@ -2,7 +2,7 @@
 
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, cast
 
 import numpy as np
@@ -12,6 +12,7 @@ from swarmwire.agent.declared import make, parameters_of
 from swarmwire.agent.loading import AgentClass, load_agent
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
+from swarmwire.agent.told import Told
 from swarmwire.agent.turn import Turn
 from swarmwire.agent.vector_agent import State, VectorAgent, freeze, state_of
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
@@ -20,10 +21,12 @@ from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.memory import GroupMemory, Layout, Memory
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 
 NOT_OWN = -1
+NOBODY = np.empty(0, np.int64)
+DRAWS_APART = 1 << 20  # calls for a purpose that a step, or a hearing, does not reach
 # Columns of memory that are the host's own, for robots of either kind of agent.
 SENT, FIRST_OWN, ACTED = "host.sent", "host.first_own", "host.acted"
 
@@ -35,11 +38,34 @@ class Host:
         """`memory` is what earlier agents of some of these robots remembered; others start afresh."""
         self._rate_hz = assignment.rate_hz
         self._groups = {group.name: hosted(group, load_agent(group.agent)) for group in assignment.groups}
+        self._waiting: Told | None = None  # that came between ticks; None: nothing
         for name, kept in (memory or {}).items():
             self._groups[name].recall(kept)
 
+    def receive(self, heard: Heard, outcomes: Outcomes) -> None:
+        """Keep what came between ticks until the robots that it is for step, or hear; what is for others is lost."""
+        rows = np.concatenate([agents.group.rows for agents in self._groups.values()])
+        came = Told(heard, outcomes).of(np.sort(rows))
+        if came:
+            self._waiting = self._waiting.followed_by(came) if self._waiting else came
+
+    def hear(self, tick: int, at_ns: int) -> Sent:
+        """Let agents that read between ticks read, at a time in this tick: what they sent. AgentFailed as for `act`."""
+        sent: list[Sent] = []
+        for agents in self._groups.values():
+            if self._waiting and agents.hears:
+                its, self._waiting = self._waiting.parted(agents.rows if agents.has_stepped else NOBODY)
+                if its:
+                    sent.append(agents.hear((tick, at_ns, self._time(tick, agents.group)[2]), its))
+        return Sent.joined(sent)
+
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What the robots do in this tick; AgentFailed with the robot and the agent's traceback if one raises."""
+        if self._waiting:
+            acting_rows = [self._groups[name].group.rows for name in senses]
+            # Also what waits for the dead of these groups: it is lost with them.
+            its, self._waiting = self._waiting.parted(np.sort(np.concatenate(acting_rows)))
+            heard, outcomes = Told(heard, outcomes).followed_by(its) if its else (heard, outcomes)
         acting = ((self._groups[name], group) for name, group in senses.items())
         return Actions.joined(
             [agents.act(self._time(tick, agents.group), group, heard, outcomes) for agents, group in acting]
@@ -57,11 +83,14 @@ class Host:
 class Hosted(ABC):
     """The agents of one group: what both kinds share."""
 
-    def __init__(self, group: GroupAssignment, needs: tuple[str, ...]) -> None:
+    def __init__(self, group: GroupAssignment, needs: tuple[str, ...], *, hears: bool) -> None:
         self.group, self.needs = group, needs
+        self.hears = hears  # between steps, too
         self.rows: IntArray = group.rows  # that acted last: state is kept for these
         self._sent_before = np.zeros(len(group.rows), np.int64)
         self._first_own = np.zeros(len(group.rows), np.int64)  # id of the first packet that the agent itself sent
+        self._senses: GroupSenses | None = None  # of the last step, for agents that read between steps
+        self._hearings = 0  # since it
 
     def act(
         self, time: tuple[int, int, int], senses: GroupSenses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES
@@ -89,7 +118,40 @@ class Hosted(ABC):
         if turn.n:  # no step for nobody: an agent must not tell whether others share its process
             self.step(turn)
         self._sent_before[place] = sent_before
+        if self.hears:
+            self._senses, self._hearings = senses, 0
         return turn.end()
+
+    def hear(self, time: tuple[int, int, int], told: Told) -> Sent:
+        """What robots send that read, between steps, what they were `told`; `time` is as for `act`, but now."""
+        senses = self._senses
+        if senses is None:
+            raise RuntimeError("whoever has not stepped does not hear between steps")
+        place = np.searchsorted(self.group.rows, self.rows)
+        sent_before = self._sent_before[place]
+        self._hearings += 1
+        turn = Turn(
+            self.group,
+            self.needs,
+            time,
+            senses,
+            _own(told.heard, self.rows),
+            self._own_outcomes(told.outcomes, self.rows, place),
+            self.group.keys[place],
+            sent_before,
+            self._hearings * DRAWS_APART,
+        )
+        self.listen(turn)
+        self._sent_before[place] = sent_before
+        try:
+            return turn.end_hearing()
+        except RuntimeError as error:
+            raise _failed([self.group.robot_names[at] for at in place], error) from error
+
+    @property
+    def has_stepped(self) -> bool:
+        """Whether any robot has: who has not does not hear."""
+        return self._senses is not None
 
     def memory(self) -> GroupMemory:
         """What is remembered of every robot of the group."""
@@ -135,6 +197,10 @@ class Hosted(ABC):
         """Let the agents act."""
 
     @abstractmethod
+    def listen(self, turn: Turn) -> None:
+        """Let the agents read between steps."""
+
+    @abstractmethod
     def keep(self, rows: IntArray) -> None:
         """Keep the memory of robots that act again, drop that of others, give new ones a fresh one."""
 
@@ -143,7 +209,7 @@ class _Vector(Hosted):
     """One VectorAgent for all robots of the group, and the State that it works on."""
 
     def __init__(self, group: GroupAssignment, kind: type[VectorAgent[Any]]) -> None:
-        super().__init__(group, kind.needs)
+        super().__init__(group, kind.needs, hears=kind.hear is not VectorAgent.hear)
         self._agent = make(kind, group.params, len(group.rows))
         per_robot = [name for name, parameter in parameters_of(kind).items() if parameter.per_robot]
         self._per_robot: dict[str, FloatArray | IntArray] = {name: getattr(self._agent, name) for name in per_robot}
@@ -151,11 +217,17 @@ class _Vector(Hosted):
         self._state: State = state_of(kind).fresh(len(group.rows))
 
     def step(self, turn: Turn) -> None:
+        self._call(self._agent.step, turn)
+
+    def listen(self, turn: Turn) -> None:
+        self._call(self._agent.hear, turn)
+
+    def _call(self, method: Callable[[Robots, State], None], turn: Turn) -> None:
         if self._per_robot:
             place = np.searchsorted(self.group.rows, turn.senses.rows)
             freeze(self._agent, {name: values[place] for name, values in self._per_robot.items()})
         try:
-            self._agent.step(Robots(turn), self._state)
+            method(Robots(turn), self._state)
         except (Exception, SystemExit) as error:
             place = np.searchsorted(self.group.rows, turn.senses.rows)
             raise _failed([self.group.robot_names[at] for at in place], error, turn) from error
@@ -178,17 +250,26 @@ class _Single(Hosted):
     """An Agent for each robot of the group."""
 
     def __init__(self, group: GroupAssignment, kind: type[Agent]) -> None:
-        super().__init__(group, kind.needs)
+        super().__init__(group, kind.needs, hears=kind.hear is not Agent.hear)
         self._kind = kind
         self._agents = {int(row): make(kind, group.params) for row in group.rows}
 
     def step(self, turn: Turn) -> None:
         for at, row in enumerate(cast("list[int]", turn.senses.rows.tolist())):
-            try:
-                self._agents[row].step(Robot(turn, at))
-            except (Exception, SystemExit) as error:
-                name = self.group.robot_names[int(np.searchsorted(self.group.rows, row))]
-                raise _failed([name], error, turn) from error
+            self._call(self._agents[row].step, turn, at, row)
+
+    def listen(self, turn: Turn) -> None:
+        told = np.union1d(turn.heard.receiver, turn.outcome_rows)
+        for at in cast("list[int]", told.tolist()):
+            row = int(turn.senses.rows[at])
+            self._call(self._agents[row].hear, turn, at, row)
+
+    def _call(self, method: Callable[[Robot], None], turn: Turn, at: int, row: int) -> None:
+        try:
+            method(Robot(turn, at))
+        except (Exception, SystemExit) as error:
+            name = self.group.robot_names[int(np.searchsorted(self.group.rows, row))]
+            raise _failed([name], error, turn) from error
 
     def keep(self, rows: IntArray) -> None:
         known = self._agents

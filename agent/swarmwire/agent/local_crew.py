@@ -4,7 +4,7 @@ from swarmwire.agent.host import Host
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard, Payloads
+from swarmwire.comms.packets import Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 
 
@@ -21,9 +21,15 @@ class LocalCrew:
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick."""
-        if self._host is None:
-            raise RuntimeError("the crew has not been started")
-        return self._host.act(tick, _read_only(senses), _heard_read_only(heard), outcomes)
+        return self._started().act(tick, _read_only(senses), _heard_read_only(heard), outcomes)
+
+    def receive(self, heard: Heard, outcomes: Outcomes) -> None:
+        """Keep this until the robots that it is for step, or hear."""
+        self._started().receive(_heard_read_only(heard), outcomes)
+
+    def hear(self, tick: int, at_ns: int) -> Sent:
+        """Let agents that read between ticks read, at a time in this tick; what they sent."""
+        return self._started().hear(tick, at_ns)
 
     def counts(self) -> dict[str, int]:
         """Nothing is lost within a process."""
@@ -32,6 +38,11 @@ class LocalCrew:
     def close(self) -> None:
         """Forget the agents."""
         self._host = None
+
+    def _started(self) -> Host:
+        if self._host is None:
+            raise RuntimeError("the crew has not been started")
+        return self._host
 
 
 # What comes over the wire cannot be written to; what is handed over here must not be either, since it is the world's.

@@ -36,7 +36,7 @@ class Robot(Sensing[float]):
     def draw(self) -> Draw:
         """Random draws of the robot's own."""
         if self._draw is None:
-            self._draw = Draw(self._turn.keys[self._row : self._row + 1], self._turn.tick)
+            self._draw = Draw(self._turn.keys[self._row : self._row + 1], self._turn.tick, self._turn.first_draw)
         return self._draw
 
     @property

@@ -27,7 +27,7 @@ class Robots(Sensing[FloatArray]):
     def __init__(self, turn: Turn) -> None:
         super().__init__(turn)
         self.radio = RadioRows(turn)
-        self.draw = Draws(turn.keys, turn.tick)
+        self.draw = Draws(turn.keys, turn.tick, turn.first_draw)
 
     @property
     def n(self) -> int:

@@ -1,9 +1,10 @@
 """A runner: a process that plays some robots of a world behind zenoh, in lockstep or in real time.
 
 It joins (gets robots), declares its token, builds the agents, says "ready", then answers `tick` frames with one
-`actions` frame each until the world says "end" or is gone, or until it is asked to leave, which it says. All that
-arrives lands in one queue, put there by the network thread itself: no Python thread per subscription, so a runner stays
-small. Where the world keeps memory, each answer carries what the agents remember.
+`actions` frame each until the world says "end" or is gone, or until it is asked to leave, which it says. In real time
+`packets` frames may come between ticks: agents that read between their steps answer with a `sent` frame, for all others
+they wait for the tick. All that arrives lands in one queue, put there by the network thread itself: no Python thread
+per subscription, so a runner stays small. Where the world keeps memory, each answer carries what the agents remember.
 """
 
 # zenoh's stubs leave out the return types of put, reply and close.
@@ -31,6 +32,7 @@ from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.wire.in_time_frames import decode_packets, encode_sent
 from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.memory_frames import decode_memory
@@ -105,13 +107,15 @@ class Inbox:
 
     Attributes:
         dropped: frames that were no tick to come, or not acted on since a newer one was there.
+        missed: frames with packets that never came.
         ended: how it ended; meaningless before.
     """
 
     def __init__(self) -> None:
         self._arrived: queue.SimpleQueue[zenoh.Sample | bool | None] = queue.SimpleQueue()
         self.put_frame = self._arrived.put
-        self.dropped = 0
+        self.dropped = self.missed = 0
+        self._next_packets = 0  # the number of the next frame with packets
         self.ended = Ended("gone")
 
     def leave(self) -> None:
@@ -142,16 +146,25 @@ class Inbox:
             else:
                 self.dropped += 1
 
-    def ticks(self, assignment: Assignment) -> Iterator[tuple[int, Senses, Heard, Outcomes]]:
-        """What the newest tick brings, each time, until the world says "end" or is gone; lockstep has but one."""
+    def ticks(
+        self, assignment: Assignment, receive: Callable[[Heard, Outcomes], None] = lambda _heard, _outcomes: None
+    ) -> Iterator[tuple[int, Senses, Heard, Outcomes] | tuple[int, int]]:
+        """What the newest tick brings, each time, until the world says "end" or is gone; lockstep has but one.
+
+        What comes between ticks goes to `receive`; where no newer tick is there, its tick and time are given out.
+        """
         gives, groups = assignment.gives or (), {group.name for group in assignment.groups}
         every = math.gcd(*(group.act_every_ticks for group in assignment.groups))
         newest: tuple[int, Senses, Heard, Outcomes] | None = None
+        between: tuple[int, int] | None = None
         tick = -1
         while True:
             if newest is not None and self._arrived.empty():
                 yield newest
-                newest = None
+                newest = between = None
+            if between is not None and self._arrived.empty():
+                yield between
+                between = None
             arrived = self._arrived.get()
             if arrived is None:
                 self.ended = Ended("left")
@@ -166,6 +179,13 @@ class Inbox:
                 if frame.kind == "end":
                     self.ended = _end(frame)
                     return
+                if frame.kind == "packets":
+                    at_ns, number, heard, outcomes = decode_packets(frame, gives)
+                    self.missed += max(0, number - self._next_packets)
+                    self._next_packets = number + 1
+                    receive(heard, outcomes)
+                    between = frame.tick, at_ns
+                    continue
                 if frame.kind != "tick" or frame.tick <= tick or frame.tick % every:
                     raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
                 told = decode_tick(frame, gives, groups)
@@ -214,7 +234,13 @@ def _answers(assignment: Assignment, memory: Memory | None, inbox: Inbox) -> Ite
     try:
         host = Host(assignment, memory)
         yield frames.encode("ready", -1, {})
-        for tick, senses, heard, outcomes in inbox.ticks(assignment):
+        for told in inbox.ticks(assignment, host.receive):
+            if len(told) == 2:
+                if len(sent := host.hear(*told)):
+                    missed, inbox.missed = inbox.missed, 0
+                    yield encode_sent(told[0], sent, missed)
+                continue
+            tick, senses, heard, outcomes = told
             actions = host.act(tick, senses, heard, outcomes)
             dropped, inbox.dropped = inbox.dropped, 0
             yield encode_actions(tick, actions, dropped, None if memory is None else host.memory(senses))

@@ -36,11 +36,14 @@ class Turn:
         outcomes: Outcomes,
         keys: KeyArray,
         sent_before: IntArray,
+        first_draw: int = 0,
     ) -> None:
+        self.first_draw = first_draw  # of the tick that it does not share with those before it
         self.group, self.needs = group, needs
         self.tick, self.time_ns, self.period_ns = time
         self.senses, self.heard = senses, heard
         self._outcomes, self._asks = outcomes, OUTCOMES in needs
+        self.outcome_rows = outcomes.row  # (k,) places of robots that there is an outcome for
         self.keys = keys  # (n,) of the robots' draws
         self.n = len(senses.rows)
         self.drive = np.zeros(self.n, np.bool_)
@@ -186,6 +189,14 @@ class Turn:
 
         def __getattr__(self, name):
             raise RuntimeError("robot and radio hold for one step: use those that this step is given, keep none")
+
+    def end_hearing(self) -> Sent:
+        """What the robots sent between their steps; RuntimeError if they did anything else."""
+        actions = self.end()
+        others = actions.notes, actions.leds, actions.own, actions.values
+        if actions.drive.any() or any(map(len, others)):
+            raise RuntimeError("hear(…) reads packets and sends; to drive, light, actuate or note is for step(…)")
+        return actions.sent
 
     def _actions(self) -> Actions:
         sent = Sent.joined(self._outbox)

@@ -125,6 +125,9 @@ class VectorAgent(ABC, Generic[S]):
     def step(self, robots: Robots, state: S) -> None:
         """Called once a tick with the robots that act in it: read `robots`, then drive and send."""
 
+    def hear(self, robots: Robots, state: S) -> None:
+        """If it is defined: called between steps when packets have come, as for Agent, with the last step's robots."""
+
 
 def freeze(agent: VectorAgent[Any], per_robot: dict[str, FloatArray | IntArray]) -> None:
     """Let nothing be set on an agent any more, but, by calling this again, parameters per robot."""

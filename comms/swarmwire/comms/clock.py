@@ -5,6 +5,9 @@ from datetime import UTC, datetime
 from typing import Protocol
 
 NS_PER_S = 1_000_000_000  # all times are integers, in ns
+LATE_WAKE_NS = 100_000  # by how much a sleep ends late, before it is known
+MOST_AWAKE_NS = 500_000  # the longest that is waited awake: a machine that wakes later is busy, and others need it
+FADES_IN = 16  # sleeps, about
 SCALED_FROM_NS = 1_767_225_600 * NS_PER_S  # the first of January 2026: when all scaled clocks show the same date
 SCALED_SPAN_NS = 10 * 365 * 86_400 * NS_PER_S  # after which they show it again: dates of ROS 2 end in 2038
 
@@ -68,6 +71,29 @@ class WallClock:
     def utc_ns(self) -> int:
         """Wall time in ns since 1970, UTC."""
         return time.time_ns()
+
+
+class PreciseClock:
+    """A clock whose sleeps end on time: it sleeps for less by what the machine takes to wake, and waits out the rest.
+
+    What a wake takes is measured at each: the longest of late, which fades, so that one hiccup does not make every
+    later sleep a busy wait.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock, self._wakes_late_ns = clock, LATE_WAKE_NS
+        self.now_ns = clock.now_ns
+
+    def sleep_until(self, at_ns: int) -> None:
+        """Return once the clock shows `at_ns`, and hardly later."""
+        early_ns = at_ns - self._wakes_late_ns
+        if self.now_ns() < early_ns:
+            self._clock.sleep_until(early_ns)
+            late_ns = self.now_ns() - early_ns
+            faded_ns = self._wakes_late_ns - self._wakes_late_ns // FADES_IN
+            self._wakes_late_ns = min(max(faded_ns, late_ns), MOST_AWAKE_NS)
+        while self.now_ns() < at_ns:
+            continue
 
 
 class ScaledClock:

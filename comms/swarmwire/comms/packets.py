@@ -167,13 +167,21 @@ class Heard:
 
     def merged(self, other: "Heard") -> "Heard":
         """Both, in the order that `Heard` promises; `other` was heard over the same medium."""
-        mine = (self.receiver, self.sender, self.sequence, self.heard_at_ns)
-        its = (other.receiver, other.sender, other.sequence, other.heard_at_ns)
-        receiver, sender, sequence, heard_at_ns = (np.concatenate(pair) for pair in zip(mine, its, strict=True))
-        given = {name: np.concatenate([column, other.given[name]]) for name, column in self.given.items()}
-        payload = np.concatenate([self.payload, other.payload + len(self.payloads)])
-        payloads = Payloads.joined([self.payloads, other.payloads])
-        both = Heard(receiver, sender, sequence, heard_at_ns, given, payload, payloads)
+        return Heard.joined([self, other])
+
+    @classmethod
+    def joined(cls, parts: "list[Heard]") -> "Heard":
+        """All parts, one or more, heard over the same medium, in the order that `Heard` promises."""
+        some = [part for part in parts if len(part)]
+        if len(some) < 2:
+            return some[0] if some else parts[0]
+        columns = zip(*((part.receiver, part.sender, part.sequence, part.heard_at_ns) for part in some), strict=True)
+        receiver, sender, sequence, heard_at_ns = (np.concatenate(column) for column in columns)
+        given = {name: np.concatenate([part.given[name] for part in some]) for name in some[0].given}
+        first = offsets(np.array([len(part.payloads) for part in some]))
+        payload = np.concatenate([part.payload + at for part, at in zip(some, first.tolist(), strict=False)])
+        payloads = Payloads.joined([part.payloads for part in some])
+        both = cls(receiver, sender, sequence, heard_at_ns, given, payload, payloads)
         return both.select(np.lexsort((sequence, sender, heard_at_ns, receiver)))
 
     def compacted(self) -> "Heard":

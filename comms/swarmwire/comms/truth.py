@@ -1,15 +1,16 @@
 """Ground truth for observers: `Static` once, `Truth` per tick. It never crosses to a runner."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from math import inf
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.geometry.floor import Floor
-from swarmwire.comms.packets import Payloads
+from swarmwire.comms.packets import Payloads, offsets
 from swarmwire.comms.senses import Senses
 
 NOBODY = -1  # in place of a robot; of a receiver: all that the packet was meant for
@@ -150,6 +151,37 @@ class Finished:
     payload: IntArray | None = None  # (k,) the row of `payloads`; None: not known
     payloads: Payloads | None = None
 
+    def of(self, arenas: BoolArray) -> "Finished":
+        """The links of these arenas (arenas,)."""
+        index = np.flatnonzero(arenas[self.arena])
+        columns = {name: column[index] for name, column in _columns(self).items()}
+        return replace(self, **columns)
+
+    @classmethod
+    def joined(cls, parts: "list[Finished]") -> "Finished":
+        """The links of all parts, one or more, which are alike in what they know."""
+        some = [part for part in parts if len(part.arena)]
+        if len(some) < 2:
+            return some[0] if some else parts[0]
+        columns = _joined_columns(some)
+        if all(part.payload is not None and part.payloads is not None for part in some):
+            tables = [part.payloads for part in some if part.payloads is not None]
+            first = offsets(np.array([len(table) for table in tables]))
+            columns["payload"] += np.repeat(first[:-1], [len(part.arena) for part in some])
+            return replace(some[0], **columns, payloads=Payloads.joined(tables))
+        return replace(some[0], **columns)
+
+
+def _columns(table: "Finished | Departed") -> dict[str, Any]:
+    """The arrays that a table has, by name; the payloads are none."""
+    named = ((field.name, getattr(table, field.name)) for field in fields(table) if field.name != "payloads")
+    return {name: column for name, column in named if column is not None}
+
+
+def _joined_columns(tables: "Sequence[Finished] | Sequence[Departed]") -> dict[str, Any]:
+    """The arrays of tables that have the same ones, by name, one after the other."""
+    return {name: np.concatenate([getattr(table, name) for table in tables]) for name in _columns(tables[0])}
+
 
 @dataclass(frozen=True, slots=True)
 class Departed:
@@ -167,6 +199,16 @@ class Departed:
     fate: IntArray  # (k,) a Fate; HEARD: it was on air, else why not
     on_air_at_ns: IntArray  # (k,)
     off_air_at_ns: IntArray  # (k,) the same if it never was on air
+
+    def of(self, arenas: BoolArray) -> "Departed":
+        """The packets of these arenas (arenas,)."""
+        index = np.flatnonzero(arenas[self.arena])
+        return Departed(**{name: column[index] for name, column in _columns(self).items()})
+
+    @classmethod
+    def joined(cls, parts: "list[Departed]") -> "Departed":
+        """The packets of all parts, one or more."""
+        return cls(**_joined_columns([part for part in parts if len(part.arena)] or parts[:1]))
 
 
 @dataclass(frozen=True, slots=True)

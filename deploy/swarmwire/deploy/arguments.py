@@ -9,6 +9,7 @@ from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.scenario_file import load_scenario
 
 FASTEST = 1e6  # factor in real time
+SHORTEST_QUANTUM_S = 0.001
 Runners = int | str | None  # how many, "per-robot", or None for a local crew
 
 
@@ -46,6 +47,21 @@ def real_time_factor(realtime: float | str | None) -> float | None:
     if not 0 < factor <= FASTEST:
         raise BadInput("--realtime", "", f"expected a factor above 0 and at most {FASTEST:g}, got {realtime!r}")
     return factor
+
+
+def quantum_of(quantum: float | None, factor: float | None, scenario: Scenario) -> float | None:
+    """The quantum of a run in real time at so many times the wall clock's pace, in s; BadInput if it cannot be."""
+    if quantum is None:
+        return None
+    if factor is None:
+        raise BadInput("--quantum", "", "expected --realtime with it, or gateways: without them no clock paces the run")
+    if scenario.radio is None:
+        raise BadInput("--quantum", "", "expected a scenario with a radio: without one nothing happens between ticks")
+    tick_s = 1 / scenario.time.rate_hz / factor
+    if not SHORTEST_QUANTUM_S <= quantum <= tick_s:
+        expected = f"expected {SHORTEST_QUANTUM_S:g} s to a tick's {tick_s:g} s of wall time, got {quantum!r}"
+        raise BadInput("--quantum", "", expected)
+    return quantum
 
 
 def scenario_of(given: Scenario | Path | str, overrides: Sequence[str]) -> Scenario:

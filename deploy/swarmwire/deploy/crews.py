@@ -19,6 +19,7 @@ from swarmwire.world.crews import split_robots as assignments
 from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.door import Door
 from swarmwire.world.crews.pace import Pace
+from swarmwire.world.crews.quanta import Quanta
 from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.crews.remote_crew import RemoteCrew
 from swarmwire.world.crews.roster import Loss
@@ -44,6 +45,7 @@ class Crews:
     lost: Callable[[Loss], None]  # is told of a runner that was lost while the run went on
     changed: Callable[[Change], None]  # is told of every runner that came or went
     say: Callable[[str], None]  # what people should know at once
+    quanta: Quanta | None = None  # of real time, in which packets cross also between ticks
 
     @contextmanager
     def crew(self, served: Served | None = None) -> Generator[Crew]:
@@ -61,6 +63,7 @@ class Crews:
                     self.static.rate_hz,
                     served.show,
                     served.show_counts,
+                    self.quanta,
                 )
             return
         if self.listening is not None:
@@ -71,7 +74,7 @@ class Crews:
             return
         if not self.runners:
             with closing(LocalCrew(whole)) as local:
-                yield PacedCrew(local, self.pace) if self.pace else local
+                yield PacedCrew(local, self.pace, self.quanta) if self.pace else local
             return
         processes: list[RunnerProcesses] = []
 
@@ -143,6 +146,7 @@ class Crews:
                 self.pace,
                 table.watchdog_s,
                 terms,
+                self.quanta,
             )
         return RemoteCrew(door, self.run_id, parts, timeout_s, self.clock, around, on_loss, terms=terms)
 

@@ -4,16 +4,18 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, cast
 
-from swarmwire.comms.clock import WallClock, to_s
+from swarmwire.comms.clock import PreciseClock, WallClock, to_s
 from swarmwire.comms.errors import Interrupted
+from swarmwire.comms.in_time import TimedCrew
 from swarmwire.comms.protocols import Crew, Judge, Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.arguments import (
     Runners,
     choose_seeds,
+    quantum_of,
     real_time_factor,
     runner_count,
     scenario_of,
@@ -50,6 +52,7 @@ from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.pace import Pace
+from swarmwire.world.crews.quanta import Quanta
 from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
 from swarmwire.world.crews.remote_crew import RemoteCrew
 from swarmwire.world.crews.roster import Loss
@@ -103,6 +106,7 @@ class Simulation:
         observers: Sequence[Observer] = (),
         socket: Path | None = None,
         realtime: float | str | None = None,
+        quantum: float | None = None,
         record: Recording | None = None,
         gateways: GatewaysGiven = None,
         replay: Replay | None = None,
@@ -113,6 +117,7 @@ class Simulation:
         self.scenario = scenario_of(scenario, overrides)
         self._behind = Behind(as_gateways(gateways), self.scenario)
         factor = self._behind.factor(real_time_factor(realtime))
+        self._quantum_s = quantum_of(quantum, factor, self.scenario)
         self.agents = agent_specs(self.scenario)
         self.world = self._new_world(seed, seeds)
         measures = measuring(self.scenario)
@@ -137,7 +142,9 @@ class Simulation:
         # Only now a folder: what is refused leaves none.
         self._record = RunRecord(None if out is None else Path(out), self._clock)
         rate_hz = self.scenario.time.rate_hz
-        self._pace = None if factor is None else Pace(self._clock, rate_hz, factor, self._record.say)
+        clock = PreciseClock(self._clock) if self._quantum_s else self._clock
+        self._pace = None if factor is None else Pace(clock, rate_hz, factor, self._record.say)
+        self._recorded_quantum_s = replay.quantum_s if replay else self._quantum_s
         self.controls = Controls(self._clock, rate_hz, self._pace, speed_fixed=bool(self._behind.kinds))
         self.run_id, self.interrupt = new_run_id(), Interrupt()
         self.interventions = Interventions(
@@ -202,6 +209,7 @@ class Simulation:
             ticks=self.ticks,
             runners=self.runners,
             realtime=realtime,
+            quantum_s=self._recorded_quantum_s,
             gateways=self._behind.kinds,
             metrics=self.metrics,
         )
@@ -219,7 +227,7 @@ class Simulation:
             self._watching: list[Observer] = [*looking, *self._observers]
             if self.served:
                 self._watching.append(Undriven(self.served, pace, self._record.say))
-            acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows)
+            acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows, self.static.rate_hz)
             acting = self._record.recorded(acting, self._from_outside)
             self._loop = Loop(
                 self.world,
@@ -229,6 +237,7 @@ class Simulation:
                 self.scenario.events,
                 self.judge,
                 self.interventions,
+                cast("TimedCrew", acting) if self._recorded_quantum_s is not None else None,
             )
             crew.start()
             self._incomplete = bool((health := self.health()) and health.robots_free)
@@ -351,6 +360,9 @@ class Simulation:
             lost=self._losses.append,
             changed=self._changes.append,
             say=self._record.say,
+            quanta=Quanta(self._clock, self._pace, self.static.rate_hz, self._quantum_s)
+            if self._pace and self._quantum_s
+            else None,
         )
 
     def _from_outside(self, tick: int) -> bool:
@@ -359,7 +371,8 @@ class Simulation:
             return tick >= self.inputs.first_tick
         if self._incomplete or any(change.tick >= 0 for change in self._changes):
             return True
-        return bool(self._losses or self._behind.kinds) or (self._pace is not None and self.runners > 0)
+        in_real_time = self._pace is not None and (self.runners > 0 or self._quantum_s is not None)
+        return bool(self._losses or self._behind.kinds) or in_real_time
 
     def _stopped(self) -> bool:
         return self.interrupt.asked or self.controls.quit_asked

@@ -14,7 +14,7 @@ import zenoh
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join_request import JoinRequest
-from swarmwire.comms.wire.keys import ObserverKeys
+from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.limits import LIMITS
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import open_runner
@@ -22,12 +22,11 @@ from swarmwire.deploy import run
 from swarmwire.deploy.certificates.certificate_folder import revoke
 from tests.deploy.certificates.peers import at_once, wait_for_listeners
 from tests.deploy.commands import LOSSY
-from tests.deploy.machines.guarded_world import KEYS, SHORT, GuardedWorld, authority, guarded_world
+from tests.deploy.machines.guarded_world import AT_TICK, SHORT, GuardedWorld, authority
 
 BLOCK = zenoh.CongestionControl.BLOCK
-AT_TICK = 3
 FLOOD = 5000
-SEEN = ObserverKeys("run1")
+OWN = b"own"  # attached to what the hostile one says itself
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +48,9 @@ def standing(first: int, stop: int, tick: int) -> bytes:
 
 
 def forged(tick: int) -> list[bytes]:
-    """Answers that would stop robots of one or the other runner, or the run, if they were taken for theirs."""
+    """Answers that would stop the robots of r0, or the run, or have r0 leave, if they were taken for r0's."""
     failed = frames.encode("failed", tick, {}, {"robots": "all", "traceback": "lies"})
-    return [standing(0, 10, tick), standing(10, 20, tick), failed]
+    return [standing(0, 10, tick), failed, frames.encode("leave", -1, {})]
 
 
 def faults(counts: dict[str, int]) -> dict[str, int]:
@@ -60,25 +59,26 @@ def faults(counts: dict[str, int]) -> dict[str, int]:
 
 
 class Hostile:
-    """A session that tries everything at one tick; `heard` is what it got hold of."""
+    """A session that tries everything at once; `heard` is what it got hold of, then and later."""
 
-    def __init__(self, world: GuardedWorld, name: str, opened: ExitStack) -> None:
-        self.name, self._world, self._opened = name, world, opened
+    def __init__(self, name: str, opened: ExitStack) -> None:
+        self.name, self._opened = name, opened
         self.heard: list[str] = []
         self._kept: list[object] = []
 
-    def __call__(self, tick: int) -> None:
-        if tick != AT_TICK:
-            return
-        session = self._opened.enter_context(self._world.session_of(self.name))
-        self._spy(session)
-        self._speak_for_others(session, tick)
-        self._ask(session)
-        self._flood(session)
+    def __call__(self, world: GuardedWorld) -> None:
+        session = self._opened.enter_context(world.session_of(self.name))
+        self._spy(session, world)
+        self._speak_for_others(session, world.keys)
+        self._ask(session, world)
+        self._flood(session, world.keys)
+        observing = self._opened.enter_context(world.session_of(self.name, observing=True))
+        self._spy(observing, world)
+        self._ask(observing, world)
 
-    def _spy(self, session: zenoh.Session) -> None:
+    def _spy(self, session: zenoh.Session, world: GuardedWorld) -> None:
         """On frames to others, their answers, the truth."""
-        for key in ("**", KEYS.frame("r0"), KEYS.any_answer, SEEN.truth):
+        for key in ("**", world.keys.frame("r0"), world.keys.any_answer, world.seen.truth):
             self._kept.append(session.declare_subscriber(key, at_once(self._hear)))
 
     def _be_asked(self, query: zenoh.Query) -> None:
@@ -88,88 +88,85 @@ class Hostile:
         if sample.attachment is None:  # what it puts itself, it hears, too
             self.heard.append(str(sample.key_expr))
 
-    def _speak_for_others(self, session: zenoh.Session, tick: int) -> None:
-        own = b"own"
-        for payload in forged(tick):
-            for key in (KEYS.answer("r0"), KEYS.answer("r1"), "swarmwire/*/answer/r0", KEYS.any_answer, "**"):
-                session.put(key, payload, congestion_control=BLOCK, attachment=own)
+    def _speak_for_others(self, session: zenoh.Session, keys: Keys) -> None:
+        for payload in forged(AT_TICK):
+            for key in (keys.answer("r0"), keys.answer("r1"), "swarmwire/*/answer/r0", keys.any_answer, "**"):
+                session.put(key, payload, congestion_control=BLOCK, attachment=OWN)
         for name in ("r0", "r1"):
             end = frames.encode("end", -1, {})
-            session.put(KEYS.frame(name), end, congestion_control=BLOCK, attachment=own)
-            token = session.liveliness().declare_token(KEYS.alive(name))
+            session.put(keys.frame(name), end, congestion_control=BLOCK, attachment=OWN)
+            token = session.liveliness().declare_token(keys.alive(name))
             token.undeclare()
-        self._kept.append(session.liveliness().declare_token(KEYS.world))
+        self._kept.append(session.liveliness().declare_token(keys.world))
 
-    def _ask(self, session: zenoh.Session) -> None:
+    def _ask(self, session: zenoh.Session, world: GuardedWorld) -> None:
         """In others' names, for others' robots, for control and truth: nobody answers; nor is it asked itself."""
-        request = JoinRequest(names=("flock-0",)).encode()
-        for key in (KEYS.join("r0"), KEYS.any_join, SEEN.control, SEEN.scene, SEEN.status):
-            assert [reply for reply in session.get(key, payload=request, timeout=20.0) if reply.ok] == []
-        for key in (KEYS.any_join, KEYS.any_offer, SEEN.control):  # only now: it would be asked by itself
+        request, keys, seen = JoinRequest(names=("flock-0",)).encode(), world.keys, world.seen
+        for key in (keys.join("r0"), keys.any_join, seen.control, seen.scene, seen.status):
+            replies = [reply for reply in session.get(key, payload=request, timeout=20.0) if reply.ok]
+            assert replies == [], key
+        for key in (keys.any_join, keys.any_offer, seen.control):  # only now: it would be asked by itself
             self._kept.append(session.declare_queryable(key, at_once(self._be_asked)))
 
-    def _flood(self, session: zenoh.Session) -> None:
+    def _flood(self, session: zenoh.Session, keys: Keys) -> None:
         payload = standing(0, 10, AT_TICK)
         for _ in range(FLOOD):
-            session.put(KEYS.answer(self.name), payload, congestion_control=BLOCK, attachment=b"own")
+            session.put(keys.answer(self.name), payload, congestion_control=BLOCK, attachment=OWN)
         for size in (frames.MOST_BYTES + 1, LIMITS.link_bytes + 1):
-            session.put(KEYS.answer(self.name), bytes(size), congestion_control=BLOCK, attachment=b"own")
+            session.put(keys.answer(self.name), bytes(size), congestion_control=BLOCK, attachment=OWN)
 
 
 @pytest.mark.parametrize("name", ["mallory", "robot-1", "gone"])
-def test_another_members_certificate_gets_nowhere(certs, undisturbed, name):
+def test_another_members_certificate_gets_nowhere(certs, undisturbed, tmp_path, name):
     """An admitted runner without robots, a member of another network, and one that is revoked."""
-    with ExitStack() as opened, guarded_world(certs) as world:
-        hostile = Hostile(world, name, opened)
-        world.finish(hostile)
-        assert world.hashes == undisturbed
+    with ExitStack() as opened:
+        hostile = Hostile(name, opened)
+        result = GuardedWorld(certs, hostile).run(tmp_path / "run")
+        assert list(result.trajectory_sha256) == undisturbed
         assert hostile.heard == []
-        arrived = faults(world.counts)
-        if name != "mallory":
-            assert arrived == {}
-            return
-        assert arrived.keys() == {"unknown_runner_frames", "flooded_frames"}
-        assert sum(arrived.values()) == FLOOD + 1  # the one that no link takes is not seen here
+    arrived = faults(result.counts)
+    if name != "mallory":
+        assert arrived == {}
+        return
+    assert arrived.keys() == {"unknown_runner_frames", "flooded_frames"}
+    assert sum(arrived.values()) == FLOOD + 1  # the one that no link takes is not seen here
 
 
-def test_a_runner_that_plays_cannot_join_twice_nor_answer_for_others(certs, undisturbed):
+def test_a_runner_that_plays_cannot_join_twice_nor_answer_for_others(certs, undisturbed, tmp_path):
     """The session has the name and the certificate of r1, which plays ten robots beside it."""
 
-    def disturb(tick: int) -> None:
-        if tick != AT_TICK:
-            return
-        session = opened.enter_context(world.session_of("r1"))
-        wait_for_listeners(session, KEYS.answer("r1"))
-        replies.append(session.get(KEYS.join("r1"), payload=JoinRequest().encode(), timeout=20.0))
-        odd = standing(0, 20, tick), b"\xc1", standing(0, 10, tick + 9), frames.encode("dance", tick, {})
-        for payload in odd:
-            session.put(KEYS.answer("r1"), payload, congestion_control=BLOCK)
+    def disturb(world: GuardedWorld) -> None:
+        session, own = opened.enter_context(world.session_of("r1")), world.keys.answer("r1")
+        wait_for_listeners(session, own)
+        replies.append(session.get(world.keys.join("r1"), payload=JoinRequest().encode(), timeout=20.0))
+        dance = frames.encode("dance", AT_TICK, {})
+        for payload in (standing(0, 20, AT_TICK), b"\xc1", standing(0, 10, AT_TICK + 9), dance):
+            session.put(own, payload, congestion_control=BLOCK)
 
     replies: list[Iterable[zenoh.Reply]] = []
-    with ExitStack() as opened, guarded_world(certs) as world:
-        world.finish(disturb)
+    with ExitStack() as opened:
+        result = GuardedWorld(certs, disturb).run(tmp_path / "run")
         refused = [reply.err.payload.to_string() for reply in replies[0] if reply.err]
-        assert world.hashes == undisturbed
-        assert len(refused) == 1
-        assert "in use" in refused[0]
-        counts = faults(world.counts)
-        # An answer about too many robots is of the wrong tick once the runner's own has come.
-        assert counts.pop("malformed_frames") + counts.pop("wrong_tick_frames") == 3
-        assert counts == {"refused_join": 1, "unexpected_kind_frames": 1}
+    assert list(result.trajectory_sha256) == undisturbed
+    assert len(refused) == 1
+    assert "in use" in refused[0]
+    counts = faults(result.counts)
+    # An answer about too many robots is of the wrong tick once the runner's own has come.
+    assert counts.pop("malformed_frames") + counts.pop("wrong_tick_frames") == 3
+    assert counts == {"refused_join": 1, "unexpected_kind_frames": 1}
 
 
 def test_no_certificate_of_this_ca_is_no_link(certs, undisturbed, tmp_path):
     others = authority(tmp_path / "other")
     foreign = Network(ca=certs / "ca.pem", certificate=others / "r0.pem", key=others / "r0.key")
 
-    def disturb(tick: int) -> None:
-        if tick == AT_TICK:
+    def disturb(world: GuardedWorld) -> None:
+        for endpoint in (world.endpoint, world.observed):
             with pytest.raises(zenoh.ZError):
-                open_runner(world.endpoint, 0.3, foreign)
+                open_runner(endpoint, 0.3, foreign)
             with pytest.raises(zenoh.ZError):
-                open_runner(world.endpoint.replace("tls/", "tcp/"), 0.3)
+                open_runner(endpoint.replace("tls/", "tcp/"), 0.3)
 
-    with guarded_world(certs) as world:
-        world.finish(disturb)
-        assert world.hashes == undisturbed
-        assert not faults(world.counts)
+    result = GuardedWorld(certs, disturb).run(tmp_path / "run")
+    assert list(result.trajectory_sha256) == undisturbed
+    assert not faults(result.counts)

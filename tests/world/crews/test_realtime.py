@@ -8,11 +8,12 @@ import pytest
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import RunnerLost
 from swarmwire.comms.led_changes import LedChanges
-from swarmwire.comms.outcomes import Outcomes
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions
 from swarmwire.comms.values import Values
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.in_time_frames import decode_packets, encode_sent
 from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.tick_frames import encode_actions
 from swarmwire.world.crews.pace import Pace
@@ -312,3 +313,74 @@ def test_a_pause_loses_no_runner_and_stops_no_robot_and_an_answer_from_before_it
     clock.time_ns += 2 * NS_PER_S  # not a pause: a loop that lags
     runners.open_tick(2, pace.begin(), one_group(2, ROWS), Heard.none(GIVES))
     assert [loss.reason for loss in runners.losses] == ["no answer for 1 s"] * 2
+
+
+def in_quanta() -> RealTime:
+    parts = [assignment(group("unused:A", own)) for own in OWN.values()]
+    runners = RealTime(parts, 0.5, 30.0, "dead", quantum=True)
+    for name in OWN:
+        join(runners, name)
+    return runners
+
+
+def word(*senders: int) -> Sent:
+    return Sent(np.array(senders), np.full(len(senders), BROADCAST), Payloads.of([bytes(3)] * len(senders)))
+
+
+def test_in_quanta_each_ready_runner_gets_what_its_robots_heard_and_numbers_tell_what_it_missed() -> None:
+    runners = in_quanta()
+    opened(runners, 0)
+    told = Outcomes(np.array([3]), np.array([0]), np.array([1]))
+    for number in range(2):
+        out = dict(runners.hand_over(0, 5_000_000, heard_from(word(1), [0, 2]), told))
+        assert list(out) == ["a", "b"]
+        at_ns, got, heard, outcomes = decode_packets(frames.decode(out["a"]), GIVES)
+        assert (at_ns, got, heard.receiver.tolist(), len(outcomes)) == (5_000_000, number, [0, 2], 0)
+        _, _, nothing, outcomes = decode_packets(frames.decode(out["b"]), GIVES)
+        assert (len(nothing), outcomes.row.tolist()) == (0, [3])
+    assert runners.hand_over(0, 6_000_000, Heard.none(GIVES), Outcomes(*np.empty((3, 0), np.int64))) == []
+
+
+def test_in_quanta_packets_of_robots_without_a_runner_are_counted_as_dropped() -> None:
+    runners = RealTime([assignment(group("unused:A", own)) for own in OWN.values()], 0.5, 30.0, "wait", quantum=True)
+    join(runners, "a")
+    assert [name for name, _ in runners.hand_over(0, 0, heard_from(word(0), [1, 2, 3]), NO_OUTCOMES)] == ["a"]
+    assert runners.packets_dropped == 2
+
+
+def test_in_quanta_what_comes_is_given_with_its_time_and_whether_it_is_of_a_step() -> None:
+    runners = in_quanta()
+    opened(runners, 0)
+    runners.now_ns = 5
+    runners.answer("b", said("b", 0, 1.0))
+    runners.now_ns = 7
+    runners.answer("a", encode_sent(0, word(2), missed=3))
+    puts = runners.puts()
+    assert [(put.at_ns, put.tick, put.sent.sender.tolist()) for put in puts] == [(5, 0, [1, 3]), (7, None, [2])]
+    assert runners.puts() == []
+    commands, sent = taken(runners)
+    assert (commands, sent) == ({1: 1.0, 3: 1.0}, [])
+    assert runners.counts() == {"packets_frames_missed_by_runners": 3}
+
+
+def test_a_sent_frame_is_taken_of_ones_own_robots_alone_and_without_quanta_not_at_all() -> None:
+    for runners, data, fault in (
+        (in_quanta(), encode_sent(0, word(1)), "malformed"),
+        (in_quanta(), frames.encode("sent", 0, {}), "malformed"),
+        (playing(), encode_sent(0, word(2)), "unexpected_kind"),
+    ):
+        opened(runners, 0)
+        before = state(runners)
+        runners.answer("a", data)
+        assert state(runners) == before
+        assert runners.counts() == {f"{fault}_frames": 1}
+
+
+def test_numbers_of_frames_begin_anew_with_a_new_runner() -> None:
+    runners = RealTime([assignment(group("unused:A", ROWS))], 0.5, 30.0, "wait", quantum=True)
+    for _ in range(2):
+        join(runners, "a")
+        opened(runners, 0)
+        (_, data), *_ = runners.hand_over(0, 0, heard_from(word(1), [0]), NO_OUTCOMES)
+        assert decode_packets(frames.decode(data), GIVES)[1] == 0
+        runners.gone("a", "its link is gone")

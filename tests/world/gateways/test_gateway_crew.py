@@ -13,6 +13,7 @@ from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
 from swarmwire.comms.truth import Group
 from swarmwire.world.crews.pace import Pace
+from swarmwire.world.crews.quanta import Quanta
 from swarmwire.world.gateways.gateway_crew import GatewayCrew
 from swarmwire.world.gateways.gateway_group import GatewayGroup
 from tests.agent.hosts import GIVES, heard_from
@@ -36,6 +37,12 @@ class Inner:
         rows = np.array([0, 1])
         sent = Sent(rows[:1], np.array([BROADCAST]), Payloads.of([b"inner"]))
         return Actions(rows, np.ones(2, np.bool_), np.full(2, 0.5), np.zeros(2), np.zeros(2), sent)
+
+    def receive(self, heard, outcomes) -> None:
+        self.given.append(("received", heard, outcomes))
+
+    def hear(self, tick, at_ns) -> Sent:
+        return Sent(np.array([1]), np.array([BROADCAST]), Payloads.of([b"echo"]))
 
     def counts(self) -> dict[str, int]:
         return {"inner": 1}
@@ -63,7 +70,7 @@ class Air:
 class Around:
     """A crew of two robots of its own and three behind a gateway, rows 2 to 4."""
 
-    def __init__(self, *, air: bool = True) -> None:
+    def __init__(self, *, air: bool = True, quantum_s: float | None = None) -> None:
         self.clock, self.inner, self.said = FakeClock(), Inner(), []
         self.air = Air() if air else None
         body = load_body("epuck2")
@@ -71,7 +78,8 @@ class Around:
         group = GatewayGroup(Group("b", body, 2, 5), "scripted", self.gateway)
         pace = Pace(self.clock, 10, 1.0, self.said.append)
         self.shown = 0
-        self.crew = GatewayCrew(self.inner, [group], self.air, pace, 10, self.show, lambda: {"unseen": 4})
+        quanta = Quanta(self.clock, pace, 10, quantum_s) if quantum_s else None
+        self.crew = GatewayCrew(self.inner, [group], self.air, pace, 10, self.show, lambda: {"unseen": 4}, quanta)
 
     def show(self) -> None:
         self.shown += 1
@@ -199,3 +207,39 @@ def test_the_agents_of_others_start_and_end_with_it() -> None:
     around.crew.start()
     around.crew.close()
     assert around.inner.given == ["started", "closed"]
+
+
+class QuietAir:
+    """The loop's air, in which robots 0 and 3 hear one packet in the middle of the tick."""
+
+    def __init__(self) -> None:
+        self.sent: list[tuple[int | None, bytes]] = []
+        self.told = False
+
+    def send(self, put) -> None:
+        if len(put.sent):
+            self.sent.append((put.tick, put.sent.payloads.row(0)))
+
+    def advance(self, until_ns) -> tuple[Heard, Outcomes]:
+        due, self.told = not self.told and until_ns >= TICK_NS // 2, self.told or until_ns >= TICK_NS // 2
+        sent = Sent(np.array([1]), np.array([BROADCAST]), Payloads.of([b"beacon"]))
+        return heard_from(sent, [0, 3] if due else []), NO_OUTCOMES
+
+
+def test_in_quanta_robots_behind_gateways_are_told_when_it_is_due_and_what_they_send_goes_out_at_once() -> None:
+    around, air = Around(quantum_s=0.010), QuietAir()
+    rows = np.array([2, 3, 4])
+    fields = {"proximity.value": np.zeros((3, 8)), "odometry.left_m": np.zeros(3)}
+    senses = {"a": GroupSenses(np.array([0, 1]), {}), "b": GroupSenses(rows, fields)}
+    around.gateway.drive = {1: (0.05, -0.7)}
+    actions = around.crew.act_in_time(0, senses, Heard.none(GIVES), NO_OUTCOMES, air)
+    assert around.air is not None
+    heard = [told.receiver.tolist() for _, told, _ in around.air.published if len(told)]
+    assert heard == [[3]]
+    assert [given[1].receiver.tolist() for given in around.inner.given if given[0] == "received"] == [[], [0, 3]]
+    assert air.sent[:2] == [(0, b"inner"), (None, b"outer")]
+    assert (None, b"echo") in air.sent
+    assert set(air.sent[2:]) == {(None, b"outer"), (None, b"echo")}
+    assert not len(actions.sent)
+    assert commands(actions)[3] == (0.05, -0.7)
+    assert around.crew.report().quantum_s == 0.010

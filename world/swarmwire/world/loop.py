@@ -6,13 +6,17 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.air.air import Air
+from swarmwire.comms.air.news import News
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.events.event import Event
-from swarmwire.comms.outcomes import NO_OUTCOMES
+from swarmwire.comms.in_time import TimedCrew
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import NOWHERE, Heard, Sent
 from swarmwire.comms.protocols import Crew, Judge, Observer
+from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.truth import Tally, Truth
+from swarmwire.world.air_in_time import AirInTime
 from swarmwire.world.events import Events
 from swarmwire.world.interventions import Interventions
 from swarmwire.world.mailbox import Mailbox
@@ -40,10 +44,12 @@ class Loop:
         events: Sequence[Event] = (),
         judge: Judge | None = None,
         interventions: Interventions | None = None,
+        timed: TimedCrew | None = None,
     ) -> None:
         """`judge` is asked after each tick, once observers saw it; without one no arena is over before the run is.
 
-        `interventions` are asked at the start of each tick for events that people want.
+        `interventions` are asked at the start of each tick for events that people want. `timed` is the crew, if it is
+        to put packets on the air and hand them over while a tick goes on.
         """
         self.world, self.air, self.crew, self.observers = world, air, crew, observers
         self.ticks_done = 0
@@ -53,6 +59,8 @@ class Loop:
         course = interventions.course if interventions else None
         self._events = Events(events, world.static, world.keys, air.radio if air else None, course)
         self._mailbox = Mailbox(world.static)
+        self._timed = timed
+        self._in_time = AirInTime(air, world.static, self._addressable) if air and timed else None
         self._to_nobody, self._without_radio = np.zeros_like(self._left_after), np.zeros_like(self._left_after)
         self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
         self._stranded: Tally | None = None  # in arenas that left: no observer has seen that they did
@@ -77,20 +85,11 @@ class Loop:
         start_ns = tick_start_ns(tick, world.static.rate_hz)
         self._intervene(tick, start_ns)
         events = self._events.apply(start_ns, world, self.air)
-        news = self.air.advance(start_ns) if self.air else None
-        heard = news.heard if news else Heard.none()
-        self._open = news.tally if news else None
+        news, packets, outcomes = self._receive(start_ns)
         senses = world.sense(tick)
-        packets = self._mailbox.hand_over(tick, heard, world.alive)
-        outcomes = self._mailbox.hand_over_outcomes(tick, news.outcomes if news else NO_OUTCOMES, world.alive)
-        actions = self.crew.act(tick, senses, packets, outcomes)
-
+        actions = self._act(start_ns, senses, packets, outcomes)
+        heard = news.heard if news else Heard.none()
         pose, velocity, movable, alive = world.pose, world.velocity, world.movable, world.alive.copy()
-        if self.air:
-            self.air.hold(pose, alive)
-            self.air.send(start_ns, tick, self._addressable(actions.sent))
-        elif len(actions.sent):
-            np.add.at(self._without_radio, actions.sent.sender // world.static.robots, 1)
         onsets = world.move(actions)
         command = world.command
         self._hash.add(pose, velocity, command, heard)
@@ -130,6 +129,8 @@ class Loop:
         """End the air: what was in flight, and what no observer has seen of a tick that was broken off."""
         if self.air is None:
             return None
+        if self._in_time:
+            self._in_time.end()
         last = self.air.end()
         for more in (self._stranded, self._open):
             last = last if more is None else last + more
@@ -160,6 +161,32 @@ class Loop:
         packets = {"packets_to_nobody": self._to_nobody, "packets_without_radio": self._without_radio}
         return {**self.world.counts(), **packets}
 
+    def _receive(self, start_ns: int) -> tuple[News | None, Heard, Outcomes]:
+        """What came of the radio up to a tick's start; of that, what the crew is to be told."""
+        if self._in_time:
+            news, packets, outcomes = self._in_time.begin(start_ns)
+            self._open = news.tally
+            return news, packets, outcomes
+        alive, tick = self.world.alive, self.ticks_done
+        news = self.air.advance(start_ns) if self.air else None
+        self._open = news.tally if news else None
+        packets = self._mailbox.hand_over(tick, news.heard if news else Heard.none(), alive)
+        return news, packets, self._mailbox.hand_over_outcomes(tick, news.outcomes if news else NO_OUTCOMES, alive)
+
+    def _act(self, start_ns: int, senses: Senses, packets: Heard, outcomes: Outcomes) -> Actions:
+        """What the robots do in a tick; what they send is the air's."""
+        world, tick = self.world, self.ticks_done
+        if self.air:
+            self.air.hold(world.pose, world.alive.copy())
+        if self._timed and self._in_time:
+            return self._timed.act_in_time(tick, senses, packets, outcomes, self._in_time)
+        actions = self.crew.act(tick, senses, packets, outcomes)
+        if self.air:
+            self.air.send(start_ns, tick, self._addressable(actions.sent))
+        elif len(actions.sent):
+            np.add.at(self._without_radio, actions.sent.sender // world.static.robots, 1)
+        return actions
+
     def _intervene(self, tick: int, start_ns: int) -> None:
         """Have begin and end what people want of this tick."""
         if self._interventions is None:
@@ -179,6 +206,8 @@ class Loop:
         self._hash.close(over)
         self.world.leave(over)
         if self.air:
+            if self._in_time:
+                self._in_time.leave(over)
             stranded = self.air.leave(over)
             self._stranded = stranded if self._stranded is None else self._stranded + stranded
 

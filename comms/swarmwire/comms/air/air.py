@@ -21,7 +21,8 @@ from swarmwire.comms.air.way import Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import Obstacles
-from swarmwire.comms.packets import BROADCAST, NOWHERE, Sent
+from swarmwire.comms.outcomes import Outcomes
+from swarmwire.comms.packets import BROADCAST, NOWHERE, Heard, Sent
 from swarmwire.comms.truth import Boundary, Tally
 
 
@@ -79,13 +80,14 @@ class Air:
         fixed = keys, robots, obstacles, size_m, radii_m
         medium = Medium(radio, *fixed, self._held, own, self._running, traces, boundary == "torus")
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
-        send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
-        self._way: Way = SignalWay(medium, send_times) if radio.is_signal else DiskWay(medium, send_times)
+        self._send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
+        self._way: Way = SignalWay(medium) if radio.is_signal else DiskWay(medium)
         self._accounts = Accounts(len(keys), robots)
         self._lives = Lives(rows)
         self._gone: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that left
         self._others_alive = np.zeros(rows, np.int64)
         self._now_ns = 0
+        self._within: list[news.Final] = []  # told in the tick under way
         self._on_air = Transmissions.none()  # packets of `_links`
         self._links = self._no_links = Links.none(len(radio.gives.columns))
 
@@ -125,36 +127,45 @@ class Air:
         itself, or for a time that has passed.
         """
         self._refuse(at_ns, sent)
-        if not len(sent):
-            return
-        packets = self._way.accept(at_ns, tick, sent, self._others_alive, self._lives.epoch)
-        self._accounts.take_up(packets)
+        if len(sent):
+            self._accept(self._send_times.at(at_ns, tick), sent)
+
+    def turns(self, start_ns: int, tick: int) -> IntArray:
+        """When each robot hands over what it sends in a tick that starts at `start_ns`, in ns, (rows,)."""
+        return self._send_times.at(start_ns, tick)
+
+    def send_at(self, sent_at_ns: IntArray, sent: Sent) -> None:
+        """Queue packets within a tick; `sent_at_ns` (rows,) is when each robot hands its own over.
+
+        The rest is as for `send`.
+        """
+        if len(sent):
+            self._refuse(int(sent_at_ns[sent.sender].min()), sent)
+            self._accept(sent_at_ns, sent)
 
     def advance(self, until_ns: int) -> news.News:
         """Let time pass to `until_ns`, with the poses held: what goes on air before it, what is final by it.
 
         What happens at a sender's radio at `until_ns` itself belongs to the poses held next, and so to the next call.
         """
-        if until_ns < self._now_ns:
-            raise ValueError(f"until_ns: expected at least {self._now_ns}, got {until_ns}")
-        self._now_ns = until_ns
-        self._take(*self._way.pass_time(until_ns, self._lives))
+        self._pass(until_ns)
         if self._coming.anyone_out or self._held.anyone_out:
             self._take(*self._way.disrupt(until_ns, self._coming, self._lives))
             self._cut_off(until_ns)
-        self._lives.forget(self._way.queued.epoch)
-        links, packets, robots = self._links, self._on_air, self._robots
-        rows = news.parted(links.fate, links.receiver, links.final_at_ns, until_ns)
-        self._accounts.settle(links, until_ns)
-        told = news.News(
-            news.heard(rows.heard, links, packets, self.radio.gives.columns, robots, len(self._others_alive)),
-            news.finished(rows.finished, links, packets, robots, self.radio.is_signal),
-            news.departed(rows.departed, links, packets, robots),
-            self._accounts.close(),
-            self._way.outcomes(self._coming.alive & ~self._gone),
-        )
-        self._keep(rows.open)
-        return told
+        told = news.joined([*self._within, self._final(until_ns)])
+        self._within = []
+        return news.News(told.heard, told.finished, told.departed, self._accounts.close(), told.outcomes)
+
+    def advance_within(self, until_ns: int) -> tuple[Heard, Outcomes]:
+        """The same in the middle of a tick, where no event begins: in how many parts time passes changes nothing.
+
+        What became final is told again with all of the tick by the next `advance`.
+        """
+        self._pass(until_ns)
+        told = self._final(until_ns)
+        if told.anything:
+            self._within.append(told)
+        return told.heard, told.outcomes
 
     def end(self) -> Tally:
         """The run is over: what is queued or on its way ends as IN_FLIGHT."""
@@ -171,6 +182,7 @@ class Air:
         lost = going[self._links.sender]
         self._accounts.strand(self._links.select(np.flatnonzero(lost)), queued.parted(going[queued.sender])[0])
         self._keep(np.flatnonzero(~lost))
+        self._within = [news.joined(self._within).of(~over, self._robots)] if self._within else []
         self._gone |= going
         self._running &= ~over
         return self._accounts.close(over)
@@ -181,6 +193,31 @@ class Air:
         Two robots alive are joined where a lone packet gets through with at least `min_delivery`.
         """
         return self._way.edges(pose, alive)
+
+    def _accept(self, sent_at_ns: IntArray, sent: Sent) -> None:
+        packets = self._way.accept(sent_at_ns, sent, self._others_alive, self._lives.epoch)
+        self._accounts.take_up(packets)
+
+    def _pass(self, until_ns: int) -> None:
+        if until_ns < self._now_ns:
+            raise ValueError(f"until_ns: expected at least {self._now_ns}, got {until_ns}")
+        self._now_ns = until_ns
+        self._take(*self._way.pass_time(until_ns, self._lives))
+
+    def _final(self, until_ns: int) -> news.Final:
+        """What is final by `until_ns`; links that are not are kept."""
+        self._lives.forget(self._way.queued.epoch)
+        links, packets, robots = self._links, self._on_air, self._robots
+        rows = news.parted(links.fate, links.receiver, links.final_at_ns, until_ns)
+        self._accounts.settle(links, until_ns)
+        told = news.Final(
+            news.heard(rows.heard, links, packets, self.radio.gives.columns, robots, len(self._others_alive)),
+            news.finished(rows.finished, links, packets, robots, self.radio.is_signal),
+            news.departed(rows.departed, links, packets, robots),
+            self._way.outcomes(self._coming.alive & ~self._gone),
+        )
+        self._keep(rows.open)
+        return told
 
     def _refuse(self, at_ns: int, sent: Sent) -> None:
         if at_ns < self._now_ns:

@@ -11,7 +11,7 @@ from numba import njit
 from swarmwire.comms.air.hearing_order import by_receiver
 from swarmwire.comms.air.links import HEARD, OUT_OF_RANGE, THE_REST, Links
 from swarmwire.comms.air.transmissions import Transmissions
-from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.truth import Departed, Finished, Tally
@@ -26,6 +26,34 @@ class News:
     departed: Departed
     tally: Tally
     outcomes: Outcomes  # of packets whose senders ask and are alive
+
+
+class Final(NamedTuple):
+    """What became final in a part of a tick."""
+
+    heard: Heard
+    finished: Finished
+    departed: Departed
+    outcomes: Outcomes
+
+    @property
+    def anything(self) -> bool:
+        """Whether anything did."""
+        return bool(len(self.finished.arena) or len(self.departed.arena) or len(self.outcomes))
+
+    def of(self, arenas: BoolArray, robots: int) -> "Final":
+        """What concerns these arenas (arenas,) of so many robots each."""
+        heard = self.heard.select(np.flatnonzero(arenas[self.heard.receiver // robots])).compacted()
+        outcomes = self.outcomes.select(np.flatnonzero(arenas[self.outcomes.row // robots]))
+        return Final(heard, self.finished.of(arenas), self.departed.of(arenas), outcomes)
+
+
+def joined(parts: list[Final]) -> Final:
+    """What became final in all parts, one or more."""
+    if len(parts) == 1:
+        return parts[0]
+    heard, finished, departed, outcomes = (list(of) for of in zip(*parts, strict=True))
+    return Final(Heard.joined(heard), Finished.joined(finished), Departed.joined(departed), Outcomes.joined(outcomes))
 
 
 class Parted(NamedTuple):

@@ -35,8 +35,11 @@ class Way(ABC):
         """The radio has other numbers from `at_ns` on; what waits or is on air stays so."""
 
     @abstractmethod
-    def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
-        """Queue packets; they as the radios take them up. `others_alive` (rows,) are whom a broadcast intends."""
+    def accept(self, sent_at_ns: IntArray, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
+        """Queue packets that robots hand over at `sent_at_ns` (rows,); they as the radios take them up.
+
+        `others_alive` (rows,) are whom a broadcast intends.
+        """
 
     @abstractmethod
     def pass_time(self, until_ns: int, lives: Lives) -> Decided:

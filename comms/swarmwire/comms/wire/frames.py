@@ -3,7 +3,7 @@
 Nothing is allocated from a number that the frame claims: the bytes are there, and every array must fit its own bytes.
 """
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -36,7 +36,7 @@ def encode(kind: str, tick: int, arrays: Mapping[str, AnyArray], values: Mapping
     return msgpack.packb({"v": VERSION, "kind": kind, "tick": tick, "arrays": packed, "values": dict(values or {})})
 
 
-def decode(data: bytes, most_bytes: int = MOST_BYTES) -> Frame:
+def decode(data: bytes, most_bytes: int = MOST_BYTES, versions: Container[int] = (VERSION,)) -> Frame:
     """The frame of these bytes; BadFrame ("oversized" or "malformed") if they are none. Arrays are read-only views."""
     if len(data) > most_bytes:
         raise BadFrame("oversized", f"{len(data)} bytes, expected at most {most_bytes}")
@@ -50,7 +50,7 @@ def decode(data: bytes, most_bytes: int = MOST_BYTES) -> Frame:
         raise BadFrame("malformed", f"expected a map of {', '.join(sorted(KEYS))}")
     whole = cast("dict[str, Any]", body)
     version, kind, tick, arrays, values = whole["v"], whole["kind"], whole["tick"], whole["arrays"], whole["values"]
-    if type(version) is not int or version != VERSION:
+    if type(version) is not int or version not in versions:
         raise BadFrame("malformed", f"version {version!r}, expected {VERSION}")
     if type(kind) is not str or type(tick) is not int or type(arrays) is not dict or type(values) is not dict:
         raise BadFrame("malformed", "expected kind to be a text, tick a number, arrays and values maps")

@@ -35,4 +35,4 @@ class Limits:
     join_s: float = 60.0
 
 
-LIMITS = Limits()  # of every run that says nothing else
+LIMITS = Limits()  # of every world that is not told others

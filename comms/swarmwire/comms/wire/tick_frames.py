@@ -1,6 +1,7 @@
 """What a tick carries across the wire: senses and heard packets to a runner, actions back; checked on arrival."""
 
 from collections.abc import Mapping, Set
+from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
@@ -21,6 +22,8 @@ from swarmwire.comms.wire.checked import checked_array
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.memory_frames import memory_arrays
 
+NOTHING_BESIDE: Mapping[str, AnyArray] = MappingProxyType({})
+
 
 def encode_tick(tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> bytes:
     """A `tick` frame: what a runner's robots sense and heard, and what became of packets that they sent."""
@@ -29,6 +32,12 @@ def encode_tick(tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> 
         arrays[f"sense/{name}/rows"] = group.rows
         for sense, column in group.fields.items():
             arrays[f"sense/{name}/{sense}"] = column
+    return frames.encode("tick", tick, arrays | told_arrays(heard, outcomes))
+
+
+def told_arrays(heard: Heard, outcomes: Outcomes) -> dict[str, AnyArray]:
+    """What was heard, and what became of packets, as the arrays of a frame."""
+    arrays: dict[str, AnyArray] = {}
     if len(heard):
         # A row per column, so that each is contiguous again on the other side.
         numbers = (heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, heard.payload)
@@ -38,7 +47,7 @@ def encode_tick(tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> 
         arrays["heard/offset"] = heard.payloads.offset
     if len(outcomes):
         arrays["outcomes"] = np.array((outcomes.row, outcomes.id, outcomes.result))
-    return frames.encode("tick", tick, arrays)
+    return arrays
 
 
 def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[Senses, Heard, Outcomes]:
@@ -52,9 +61,14 @@ def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[
         senses = {name: GroupSenses(fields.pop("rows"), fields) for name, fields in groups.items()}
         if not senses or not senses.keys() <= known:
             raise BadFrame("malformed", "sense: expected groups of this runner")
-        return senses, _heard(frame.arrays, gives), _outcomes(frame)
+        return senses, *told_of(frame, gives)
     except (KeyError, ValueError) as error:
         raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error
+
+
+def told_of(frame: Frame, gives: tuple[str, ...]) -> tuple[Heard, Outcomes]:
+    """What `told_arrays` was given; KeyError, ValueError or BadFrame if the frame does not hold it."""
+    return _heard(frame.arrays, gives), _outcomes(frame)
 
 
 def _heard(arrays: Mapping[str, AnyArray], gives: tuple[str, ...]) -> Heard:
@@ -75,21 +89,24 @@ def _outcomes(frame: Frame) -> Outcomes:
     return Outcomes(row, id_, result)
 
 
-def encode_actions(tick: int, actions: Actions, dropped: int = 0, memory: Memory | None = None) -> bytes:
+def encode_actions(
+    tick: int,
+    actions: Actions,
+    dropped: int = 0,
+    memory: Memory | None = None,
+    beside: Mapping[str, AnyArray] = NOTHING_BESIDE,
+) -> bytes:
     """An `actions` frame: what a runner's robots do and send, and how many frames to it were none that it could use.
 
-    With `memory`, where the world keeps it, what their agents remember.
+    With `memory`, where the world keeps it, what their agents remember; `beside` are arrays that a record has more.
     """
     arrays: dict[str, AnyArray] = {
+        **beside,
         "rows": actions.rows,
         "command": np.array((actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps)),
     }
     if len(actions.sent):
-        arrays["sent"] = np.array((actions.sent.sender, actions.sent.to))
-        arrays["sent/data"] = actions.sent.payloads.data
-        arrays["sent/offset"] = actions.sent.payloads.offset
-        if actions.sent.outcome_id is not None:
-            arrays["sent/outcome_id"] = actions.sent.outcome_id
+        arrays |= sent_arrays(actions.sent)
     if len(actions.leds):
         arrays["leds"] = np.array((actions.leds.rows, actions.leds.which, actions.leds.rgb))
     if len(actions.own):
@@ -107,13 +124,23 @@ def encode_actions(tick: int, actions: Actions, dropped: int = 0, memory: Memory
     return frames.encode("actions", tick, arrays, values)
 
 
+def sent_arrays(sent: Sent) -> dict[str, AnyArray]:
+    """Packets as the arrays of a frame."""
+    arrays: dict[str, AnyArray] = {
+        "sent": np.array((sent.sender, sent.to)),
+        "sent/data": sent.payloads.data,
+        "sent/offset": sent.payloads.offset,
+    }
+    return arrays if sent.outcome_id is None else arrays | {"sent/outcome_id": sent.outcome_id}
+
+
 def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     """The actions of the robots `rows` (n,); BadFrame if the frame is not for exactly these or contradicts itself."""
     n = len(rows)
     if (checked_array(frame, "rows", "<i8", (n,)) != rows).any():
         raise BadFrame("malformed", "rows: expected the runner's own robots")
     drive, linear_mps, angular_radps, lateral_mps = checked_array(frame, "command", "<f8", (4, n))
-    sent = _sent(frame, rows) if "sent" in frame.arrays else Sent.none()
+    sent = sent_of(frame, rows) if "sent" in frame.arrays else Sent.none()
     notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
     leds = _leds(frame, rows) if "leds" in frame.arrays else NO_LED_CHANGES
     own = _actuations(frame, rows) if "own" in frame.arrays else NO_ACTUATIONS
@@ -121,7 +148,8 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own, told)
 
 
-def _sent(frame: Frame, rows: IntArray) -> Sent:
+def sent_of(frame: Frame, rows: IntArray) -> Sent:
+    """What `sent_arrays` was given; BadFrame unless it is of robots `rows` and does not contradict itself."""
     sender, to = checked_array(frame, "sent", "<i8", (2, None))
     offset = checked_array(frame, "sent/offset", "<i8", (len(sender) + 1,))
     data = checked_array(frame, "sent/data", "|u1", (None,))

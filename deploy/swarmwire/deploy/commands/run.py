@@ -42,6 +42,13 @@ RealTime = Annotated[
         metavar="[FACTOR]",
     ),
 ]
+Quantum = Annotated[
+    float | None,
+    typer.Option(
+        help="In real time, wake every so many seconds between ticks, 0.001 or more, and let packets cross then.",
+        metavar="SECONDS",
+    ),
+]
 Rrd = Annotated[bool, typer.Option(help="Record run.rrd, for rerun's viewer.")]
 Select = Annotated[
     str | None,
@@ -64,6 +71,7 @@ def run_command(
     overrides: Overrides = None,
     socket: Socket = None,
     realtime: RealTime = None,
+    quantum: Quantum = None,
     packets: Packets = "off",
     links: Links = False,
     rrd: Rrd = True,
@@ -118,6 +126,7 @@ def run_command(
             out=folder,
             socket=socket,
             realtime=realtime,
+            quantum=quantum,
             gateways=gateways,
             record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
         )

@@ -2,25 +2,37 @@
 
 In lockstep all actions follow from scenario and seed until a runner is lost. With runners in real time none do: it
 matters when an answer comes. From the first such tick on, each tick's actions are appended to `inputs/actions.frames`:
-a length of 4 bytes, little-endian, and an `actions` frame of the wire. Each goes to the system in one write, so that a
-run that is killed keeps all its ticks; a frame that is cut off at the end of the file is passed over.
+a length of 4 bytes, little-endian, and an `actions` frame of the wire. In real time with a quantum, where packets come
+in the middle of a tick, its frame also holds when each came and whether it waits for its robot's turn (`within`). Each
+goes to the system in one write, so that a run that is killed keeps all its ticks; a frame that is cut off at the end of
+the file is passed over.
 """
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray, IntArray
+from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.in_time import AirTime, Put, TimedCrew
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.protocols import Crew
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions
+from swarmwire.comms.wire.checked import checked_array
+from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions, sent_arrays, sent_of
 from swarmwire.metrics.record.names import INPUTS
 
 LENGTH_BYTES = 4
+VERSIONS = (1, frames.VERSION)  # of frames in records: those of 1 hold actions as those of today do
+WITHIN = "within/"  # name of the array of what came within the tick, and of its packets' arrays before their names
+AT_ONCE = -1  # in place of a tick: packets that waited for nobody's turn
 
 
 @dataclass(frozen=True)
@@ -37,7 +49,7 @@ class InputsRecord:
 class RecordedCrew:
     """A crew whose actions are recorded from the first tick on at which `outside(tick)` holds."""
 
-    def __init__(self, crew: Crew, folder: Path, outside: Callable[[int], bool]) -> None:
+    def __init__(self, crew: Crew | TimedCrew, folder: Path, outside: Callable[[int], bool]) -> None:
         self._crew, self._path, self._outside = crew, folder / INPUTS, outside
         self._sha256 = hashlib.sha256()
         self._first_tick: int | None = None
@@ -48,7 +60,15 @@ class RecordedCrew:
         """What every robot does in this tick."""
         actions = self._crew.act(tick, senses, heard, outcomes)
         if self._first_tick is not None or self._outside(tick):
-            self._record(tick, actions)
+            self._record(tick, actions, {})
+        return actions
+
+    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+        """The same of a crew that puts packets on the air itself."""
+        noted = _Noted(air)
+        actions = cast("TimedCrew", self._crew).act_in_time(tick, senses, heard, outcomes, noted)
+        if self._first_tick is not None or self._outside(tick):
+            self._record(tick, actions, _puts_arrays(noted.puts))
         return actions
 
     def record(self) -> InputsRecord | None:
@@ -57,13 +77,13 @@ class RecordedCrew:
             return None
         return InputsRecord(INPUTS, self._sha256.hexdigest(), self._first_tick, self._ticks, self._missed)
 
-    def _record(self, tick: int, actions: Actions) -> None:
+    def _record(self, tick: int, actions: Actions, within: dict[str, AnyArray]) -> None:
         if self._first_tick is None:
             self._first_tick = tick
         if self._missed:  # after a gap nothing can be replayed
             self._missed += 1
             return
-        frame = encode_actions(tick, actions)
+        frame = encode_actions(tick, actions, beside=within)
         data = len(frame).to_bytes(LENGTH_BYTES, "little") + frame
         try:
             self._path.parent.mkdir(exist_ok=True)
@@ -124,10 +144,34 @@ class RecordedInputs:
         except BadFrame as fault:
             raise self._damaged(tick, fault) from None
 
+    def puts(self, tick: int, robots: int) -> list[Put]:
+        """Packets that came in the middle of a recorded tick, in order; BadInput if the file does not say."""
+        frame = self._frame(tick - self.first_tick)
+        if WITHIN not in frame.arrays:
+            return []
+        try:
+            named = ((name, array) for name, array in frame.arrays.items() if name.startswith(WITHIN))
+            arrays = {name.removeprefix(WITHIN): array for name, array in named}
+            sent = sent_of(frames.Frame("sent", tick, arrays), np.arange(robots))
+            at_ns, of_tick, count = checked_array(frame, WITHIN, "<i8", (3, None))
+            end: IntArray = np.cumsum(count)
+            if (count < 1).any() or (end[-1:] != len(sent)).any() or (at_ns[1:] < at_ns[:-1]).any():
+                raise BadFrame("malformed", "within: expected packets in the order in which they came")
+        except BadFrame as fault:
+            raise self._damaged(tick, fault) from None
+        return [
+            Put(
+                int(at_ns[i]),
+                None if of_tick[i] == AT_ONCE else int(of_tick[i]),
+                sent.select(np.arange(int(end[i] - count[i]), int(end[i]))),
+            )
+            for i in range(len(count))
+        ]
+
     def _frame(self, place: int) -> frames.Frame:
         try:
             data = self._data[self._spans[place]]
-            return frames.decode(data, len(data))
+            return frames.decode(data, len(data), VERSIONS)
         except BadFrame as fault:
             raise self._damaged(place, fault) from None
 
@@ -138,9 +182,9 @@ class RecordedInputs:
 class ReplayedCrew:
     """A crew whose agents act until the first recorded tick; from there on the record does."""
 
-    def __init__(self, agents: Crew, inputs: RecordedInputs, robots: int) -> None:
+    def __init__(self, agents: Crew, inputs: RecordedInputs, robots: int, rate_hz: int) -> None:
         """`robots` in all arenas."""
-        self._agents, self._inputs, self._robots = agents, inputs, robots
+        self._agents, self._inputs, self._robots, self._rate_hz = agents, inputs, robots, rate_hz
         self.start, self.counts, self.close = agents.start, agents.counts, agents.close
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
@@ -148,6 +192,37 @@ class ReplayedCrew:
         if tick < self._inputs.first_tick:
             return self._agents.act(tick, senses, heard, outcomes)
         return self._inputs.actions(tick, self._robots)
+
+    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+        """What every robot did; packets go on the air when they did. Nobody hears: who would is in the record."""
+        for put in self._inputs.puts(tick, self._robots):
+            air.send(put)
+        air.advance(tick_start_ns(tick + 1, self._rate_hz))  # as far as in the run, if this is its last tick
+        return self._inputs.actions(tick, self._robots)
+
+
+class _Noted:
+    """An air, and what is put on it."""
+
+    def __init__(self, air: AirTime) -> None:
+        self._air = air
+        self.puts: list[Put] = []
+        self.advance = air.advance
+
+    def send(self, put: Put) -> None:
+        """Take packets."""
+        self._air.send(put)
+        if len(put.sent):
+            self.puts.append(put)
+
+
+def _puts_arrays(puts: Sequence[Put]) -> dict[str, AnyArray]:
+    """What was put on the air within a tick, as arrays of its frame."""
+    if not puts:
+        return {}
+    rows = [(put.at_ns, AT_ONCE if put.tick is None else put.tick, len(put.sent)) for put in puts]
+    packets = sent_arrays(Sent.joined([put.sent for put in puts]))
+    return {WITHIN: np.array(rows).T.copy(), **{f"{WITHIN}{name}": array for name, array in packets.items()}}
 
 
 def recorded_inputs(folder: Path) -> RecordedInputs | None:

@@ -35,6 +35,7 @@ class Origin:
     versions: Mapping[str, str]
     gateways: Mapping[str, str] = field(default_factory=dict[str, str])  # by group: of which kind it has one
     metrics: tuple[MetricFacts, ...] = ()  # that were measured; none: by a swarmwire that did not keep them
+    quantum_s: float | None = None  # wall time after which real time woke within ticks; None: packets wait for ticks
 
     def changes(self, folder: Path, code: Sequence[str]) -> list[str]:
         """What is not as it was when the run of this folder began, a line each; `code`: specs of users' classes."""
@@ -56,6 +57,7 @@ def origin_of(
     ticks: int,
     runners: int,
     realtime: float | None,
+    quantum_s: float | None,
     metrics: Sequence[Metric],
     gateways: Mapping[str, str],
     folder: Path | None,
@@ -75,6 +77,7 @@ def origin_of(
         versions=machine.versions(),
         gateways=gateways,
         metrics=tuple(facts_of(metric) for metric in metrics),
+        quantum_s=quantum_s,
     )
     if folder:
         write_whole(folder / RUN_JSON, json.dumps({"format": RUN_FORMAT, **asdict(origin)}, indent=2) + "\n")
@@ -111,4 +114,5 @@ def _origin(found: dict[str, Any]) -> Origin:
         cpu=str(found["cpu"]),
         versions=dict(found["versions"]),
         gateways=dict(found.get("gateways", {})),
+        quantum_s=None if found.get("quantum_s") is None else float(found["quantum_s"]),
     )

@@ -9,6 +9,7 @@ from types import TracebackType
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.in_time import TimedCrew
 from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.deploy.control.control_server import ControlServer
@@ -89,6 +90,7 @@ class RunRecord:
         ticks: int,
         runners: int,
         realtime: float | None,
+        quantum_s: float | None,
         gateways: Mapping[str, str],
         metrics: Metrics,
     ) -> Origin:
@@ -100,6 +102,7 @@ class RunRecord:
             ticks=ticks,
             runners=runners,
             realtime=realtime,
+            quantum_s=quantum_s,
             metrics=metrics.metrics,
             gateways=gateways,
             folder=self.folder,
@@ -119,7 +122,7 @@ class RunRecord:
             rmtree(self.folder, ignore_errors=True)  # it was new or empty, so all that is in it is of this run
             self.folder = self._log = None
 
-    def recorded(self, crew: Crew, outside: Callable[[int], bool]) -> Crew:
+    def recorded(self, crew: Crew | TimedCrew, outside: Callable[[int], bool]) -> Crew | TimedCrew:
         """The crew, with its actions kept in the folder from the first tick on at which `outside(tick)` holds."""
         if self.folder is None:
             return crew

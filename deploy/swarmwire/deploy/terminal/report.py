@@ -12,6 +12,7 @@ from swarmwire.deploy.result import ArenaResult, Percentiles, Result, Statistics
 
 if TYPE_CHECKING:
     from swarmwire.metrics.metric import Metric
+    from swarmwire.world.crews.lateness import Delays
 
 BLOCKED = Fate.BLOCKED.name.lower()
 SHOWN = 6  # arenas that are named, at most
@@ -90,10 +91,20 @@ def _add_real_time(table: Table, result: Result) -> None:
     missed = f"{real.missed_ticks} of {result.ticks} ticks missed"
     lag = f", worst lag {_lag(real.worst_lag_s)}" if real.missed_ticks else ""
     table.add_row("real time", f"asked for x {real.factor:g}{_longer(result, real.factor)}; {missed}{lag}")
+    if real.tick_jitter:
+        table.add_row("ticks began late", _delays(real.tick_jitter))
+    if real.delivery:
+        quanta = f", in quanta of {_lag(real.quantum_s)}" if real.quantum_s else ""
+        table.add_row("delivered late", f"{_delays(real.delivery)} of {real.delivery.count} packets{quanta}")
     if result.runners:
         late, stops = sum(real.late_answers.values()), sum(real.watchdog_stops.values())
         drops = f"{real.frames_dropped} frames with {real.packets_dropped} packets dropped"
         table.add_row("runners", f"{late} late answers (per robot), {stops} watchdog stops, {drops}")
+
+
+def _delays(of: "Delays") -> str:
+    """How late things came."""
+    return f"{_lag(of.p50_s)} (99 %: {_lag(of.p99_s)}, worst {_lag(of.worst_s)})"
 
 
 def _lag(lag_s: float) -> str:

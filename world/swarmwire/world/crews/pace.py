@@ -2,7 +2,11 @@
 
 from collections.abc import Callable
 
+import numpy as np
+
+from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
+from swarmwire.world.crews.lateness import Lateness
 
 REPEAT_S = 5.0  # wall time: not to be told more often that the machine does not keep up
 
@@ -15,6 +19,8 @@ class Pace:
         missed_ticks: ticks that were over before the loop came to wait for it, so the next one started late.
         worst_lag_ns: by how much at most, wall time.
         lag_ns: how far behind the last tick was when it was over, wall time; 0: it was waited for.
+        jitter: by how much ticks began after the end of those before.
+        delivery: by how much packets were handed over after the modelled radio had them.
     """
 
     def __init__(self, clock: Clock, rate_hz: int, factor: float, say: Callable[[str], None]) -> None:
@@ -23,24 +29,49 @@ class Pace:
         self._first_tick = self._paused_ns = 0
         self._first_ns: int | None = None  # when the first tick of this schedule began, wall time
         self._quiet_until_ns: int | None = None
+        self._next_ns: int | None = None  # when the next tick is to begin, where there was one before
         self.missed_ticks = self.worst_lag_ns = self.lag_ns = 0
+        self.jitter, self.delivery = Lateness(), Lateness()
 
     def begin(self) -> int:
         """A tick begins; the first sets the schedule. Returns the wall time in ns, pauses left out."""
         now_ns = self._clock.now_ns()
         if self._first_ns is None:
             self._first_ns = now_ns
+        if self._next_ns is not None:
+            self.jitter.add(np.array([now_ns - self._next_ns]))
         return now_ns - self._paused_ns
+
+    def now_ns(self) -> int:
+        """Wall time."""
+        return self._clock.now_ns()
+
+    def handed_over(self, heard_at_ns: IntArray) -> None:
+        """Packets were handed over just now that the modelled radio had at these simulated times, (k,)."""
+        if len(heard_at_ns) and self._first_ns is not None:
+            after_ns = (heard_at_ns - self._first_tick_ns) / self.factor
+            self.delivery.add(self._clock.now_ns() - self._first_ns - after_ns.astype(np.int64))
+
+    def simulated_ns(self, wall_ns: int) -> int:
+        """Simulated time at a time of the wall clock, by the present schedule; before there is one, its start."""
+        if self._first_ns is None:
+            return self._first_tick_ns
+        return self._first_tick_ns + round((wall_ns - self._first_ns) * self.factor)
+
+    def over_ns(self, tick: int) -> int:
+        """When a tick is over, wall time."""
+        first_ns = self.begin() + self._paused_ns if self._first_ns is None else self._first_ns
+        return first_ns + round(self._span_ns(tick) / self.factor)
 
     def begin_anew(self, tick: int, factor: float, paused_ns: int = 0) -> None:
         """A new schedule, in which this tick begins now, after a pause of so long; what lagged before is forgotten."""
         self.factor, self._first_tick, self._first_ns = factor, tick, self._clock.now_ns()
+        self._next_ns = None
         self._paused_ns += paused_ns
 
     def hold(self, tick: int) -> None:
         """Return once the tick is over by the wall clock."""
-        first_ns = self.begin() if self._first_ns is None else self._first_ns
-        over_ns = first_ns + round(self._span_ns(tick) / self.factor)
+        self._next_ns = over_ns = self.over_ns(tick)
         lag_ns = self._clock.now_ns() - over_ns
         self.lag_ns = max(0, lag_ns)
         if lag_ns <= 0:
@@ -57,4 +88,8 @@ class Pace:
 
     def _span_ns(self, tick: int) -> int:
         """Simulated time from the start of the schedule to the end of a tick."""
-        return tick_start_ns(tick + 1, self._rate_hz) - tick_start_ns(self._first_tick, self._rate_hz)
+        return tick_start_ns(tick + 1, self._rate_hz) - self._first_tick_ns
+
+    @property
+    def _first_tick_ns(self) -> int:
+        return tick_start_ns(self._first_tick, self._rate_hz)

@@ -10,10 +10,17 @@
 An answer that came after its own tick is late. "At once" is the tick that is open then: its packets are handed to the
 air with those of that tick, so they are sent at that tick's start plus their robot's phase and jitter.
 
+With a quantum packets cross also between these: `packets` frames go out, and "sent" frames come, whenever there are
+any. Then `puts` gives, many times in a tick, what came to be sent, and when; `take` has none left.
+
+    quantum   hand_over     a frame "packets" to each ready runner some of whose robots heard something
+              "sent"        its packets go to the air at once
+              "actions"     as above, but its packets wait for their robots' turn only
+
 How runners join and are lost stands in `roster`, and so does what becomes of frames that do not fit.
 """
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -25,6 +32,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.in_time import Put
 from swarmwire.comms.led_changes import LedChanges
 from swarmwire.comms.notes import Notes
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
@@ -32,6 +40,7 @@ from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.values import Values
 from swarmwire.comms.wire.frames import Frame
+from swarmwire.comms.wire.in_time_frames import decode_sent, encode_packets
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
 from swarmwire.world.crews.change import What
 from swarmwire.world.crews.roster import GOES_ON, OnLoss, Roster
@@ -68,19 +77,31 @@ class RealTime(Roster[_Slot]):
             their runner was lost: dropped by the network, or passed over by a runner that had a newer one.
         packets_dropped: packets in them, or for robots without a runner: heard by a radio, never by an agent.
         outcomes_dropped: outcomes in them, or for such robots: known to a radio, never to its agent.
+        now_ns: wall time at which what is answered arrived; set by whoever hands it in.
     """
 
     def __init__(
-        self, parts: list[Assignment], watchdog_s: float, timeout_s: float, on_loss: OnLoss, terms: Terms = USUAL
+        self,
+        parts: list[Assignment],
+        watchdog_s: float,
+        timeout_s: float,
+        on_loss: OnLoss,
+        terms: Terms = USUAL,
+        *,
+        quantum: bool = False,
     ) -> None:
+        """`quantum`: packets cross also between ticks."""
         super().__init__(parts, on_loss, terms)
+        self.quantum = quantum
         rows = len(self._owner)
         self._rate_hz = parts[0].rate_hz
         self._watchdog_ns, self._timeout_ns = to_ns(watchdog_s), to_ns(timeout_s)
         self._asked_ns = np.full(rows, ANSWERED, np.int64)  # simulated time of the first question without an answer
         self._stopped = np.zeros(rows, np.bool_)
         self._drive, self._command = np.zeros(rows, np.bool_), np.zeros((3, rows))
-        self._sent: list[Sent] = []
+        self._sent: list[Put] = []
+        self._numbers = Counter[str]()  # of "packets" frames to each runner
+        self.now_ns = 0
         self._notes: list[Notes] = []
         self._leds: list[LedChanges] = []
         self._own: list[Actuations] = []
@@ -123,6 +144,26 @@ class RealTime(Roster[_Slot]):
                 self.outcomes_dropped += len(its)
         return out
 
+    def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> list[tuple[str, bytes]]:
+        """Frames to runners that are ready, at `at_ns` of simulated time, with what robots were told since the last."""
+        packets = split_heard(heard, self._owner, len(self._slots))
+        told = split_outcomes(outcomes, self._owner, len(self._slots))
+        out: list[tuple[str, bytes]] = []
+        for slot, own, its in zip(self._slots, packets, told, strict=True):
+            if slot.state == "ready" and (len(own) or len(its)):
+                runner = slot.runner or ""
+                out.append((runner, encode_packets(tick, at_ns, self._numbers[runner], own, its)))
+                self._numbers[runner] += 1
+            elif slot.state != "dead":
+                self.packets_dropped += len(own)
+                self.outcomes_dropped += len(its)
+        return out
+
+    def puts(self) -> list[Put]:
+        """Packets that came since the last call, `at_ns` in the time of `now_ns`."""
+        puts, self._sent = self._sent, []
+        return puts
+
     def take(self) -> Actions:
         """Commands and packets that came since the last take, and command 0 for robots whose watchdog ran out."""
         waited_ns = tick_start_ns(self._tick, self._rate_hz) - self._asked_ns
@@ -131,11 +172,11 @@ class RealTime(Roster[_Slot]):
         self._stop(np.flatnonzero(overdue))
         rows = np.arange(len(self._drive))
         linear_mps, angular_radps, lateral_mps = self._command
-        sent, notes = Sent.joined(self._sent), self._latest_notes()
+        sent, notes = Sent.joined([put.sent for put in self.puts()]), self._latest_notes()
         leds, own, told = LedChanges.joined(self._leds), Actuations.joined(self._own), Values.joined(self._values)
         actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own, told)
         self._drive, self._command = np.zeros_like(self._drive), np.zeros_like(self._command)
-        self._sent, self._notes, self._leds, self._own, self._values = [], [], [], [], []
+        self._notes, self._leds, self._own, self._values = [], [], [], []
         return actions
 
     def _acted(self, slot: _Slot, frame: Frame) -> None:
@@ -152,11 +193,19 @@ class RealTime(Roster[_Slot]):
         self._drive[given] = True
         command: FloatArray = np.array((actions.linear_mps, actions.angular_radps, actions.lateral_mps))
         self._command[:, given] = command[:, actions.drive]
-        self._sent.append(actions.sent)
+        self._sent.append(Put(self.now_ns, frame.tick, actions.sent))
         self._notes.append(actions.notes)
         self._leds.append(actions.leds)
         self._own.append(actions.own)
         self._values.append(actions.values)
+
+    def _sent_between(self, slot: _Slot, frame: Frame) -> None:
+        if not self.quantum:
+            super()._sent_between(slot, frame)
+        sent, missed = decode_sent(frame, slot.all_rows), frame.values.get("missed", 0)
+        self._sent.append(Put(self.now_ns, None, sent))
+        if type(missed) is int and missed > 0:
+            self._counts["packets_frames_missed_by_runners"] += missed
 
     def _slot(self, assignment: Assignment) -> _Slot:
         return _Slot(assignment, rows_of(assignment))
@@ -166,6 +215,7 @@ class RealTime(Roster[_Slot]):
 
     def _free(self, slot: _Slot, runner: str, what: What, reason: str) -> None:
         super()._free(slot, runner, what, reason)
+        del self._numbers[runner]
         while slot.asked:
             self._drop(slot.asked.popleft())
         if self._on_loss in GOES_ON:

@@ -2,22 +2,25 @@
 
 # pyright: reportUnknownMemberType=false
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import zenoh
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.clock import Clock, to_s
+from swarmwire.comms.clock import Clock, tick_start_ns, to_s
+from swarmwire.comms.in_time import AirTime, HearingCrew, Put
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.protocols import Crew
+from swarmwire.comms.packets import Heard, Sent
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.world.crews.door import Door
+from swarmwire.world.crews.lateness import Delays
 from swarmwire.world.crews.pace import Pace
+from swarmwire.world.crews.quanta import Quanta
 from swarmwire.world.crews.realtime import RealTime
 from swarmwire.world.crews.roster import OnLoss
 from swarmwire.world.crews.runner_crew import RunnerCrew, Surroundings
+from swarmwire.world.crews.runner_inbox import Item, RunnerInbox
 from swarmwire.world.crews.terms import USUAL, Terms
 
 
@@ -33,25 +36,65 @@ class RealTimeReport:
     frames_dropped: int = 0  # to runners, never acted on: middleware loss
     packets_dropped: int = 0  # in these frames: heard by the radio, never by the agent
     outcomes_dropped: int = 0  # in these frames: what radios knew of packets sent, and agents never learned
+    quantum_s: float | None = None  # wall time after which the loop woke within ticks; None: it did not
+    delivery: Delays | None = None  # packets: when they were handed over against when the modelled radio had them
+    tick_jitter: Delays | None = None  # ticks: when they began against when the ones before were to end
+
+
+def report_of(pace: Pace, quanta: Quanta | None) -> RealTimeReport:
+    """How far a loop kept up."""
+    return RealTimeReport(
+        factor=pace.factor,
+        missed_ticks=pace.missed_ticks,
+        worst_lag_s=to_s(pace.worst_lag_ns),
+        quantum_s=quanta.quantum_s if quanta else None,
+        delivery=pace.delivery.delays(),
+        tick_jitter=pace.jitter.delays(),
+    )
 
 
 class PacedCrew:
     """A crew in this process, paced by the wall clock: an agent that takes too long makes the loop lag."""
 
-    def __init__(self, crew: Crew, pace: Pace) -> None:
-        self._crew, self._pace = crew, pace
+    def __init__(self, crew: HearingCrew, pace: Pace, quanta: Quanta | None = None) -> None:
+        self._crew, self._pace, self._quanta = crew, pace, quanta
+        self._puts: list[Put] = []
         self.start, self.counts, self.close = crew.start, crew.counts, crew.close
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick."""
         self._pace.begin()
+        self._pace.handed_over(heard.heard_at_ns)
         actions = self._crew.act(tick, senses, heard, outcomes)
         self._pace.hold(tick)
         return actions
 
+    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+        """The same, with packets handed over when they are due."""
+        assert self._quanta
+        self._pace.begin()
+        self._pace.handed_over(heard.heard_at_ns)
+        self._crew.receive(heard, outcomes)
+        actions = self._crew.act(tick, senses, Heard.none(tuple(heard.given)), NO_OUTCOMES)
+        self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
+        self._quanta.pass_tick(tick, air, self)
+        return replace(actions, sent=Sent.none())
+
+    def take_in(self) -> list[Put]:
+        """What agents sent since the last call."""
+        puts, self._puts = self._puts, []
+        return puts
+
+    def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> None:
+        """Let agents that read between ticks read."""
+        self._crew.receive(heard, outcomes)
+        sent = self._crew.hear(tick, at_ns)
+        if len(sent):
+            self._puts.append(Put(self._pace.now_ns(), None, sent))
+
     def report(self) -> RealTimeReport:
         """How far the loop kept up."""
-        return RealTimeReport(self._pace.factor, self._pace.missed_ticks, to_s(self._pace.worst_lag_ns))
+        return report_of(self._pace, self._quanta)
 
 
 class RealTimeCrew(RunnerCrew[RealTime]):
@@ -71,31 +114,57 @@ class RealTimeCrew(RunnerCrew[RealTime]):
         pace: Pace,
         watchdog_s: float,
         terms: Terms = USUAL,
+        quanta: Quanta | None = None,
     ) -> None:
-        roster = RealTime(assignments, watchdog_s, timeout_s, on_loss, terms)
+        roster = RealTime(assignments, watchdog_s, timeout_s, on_loss, terms, quantum=quanta is not None)
         super().__init__(door, run_id, roster, timeout_s, clock, around)
-        self._pace, self._assignments = pace, assignments
+        self._pace, self._assignments, self._quanta = pace, assignments, quanta
+        self._rate_hz = assignments[0].rate_hz
+        if quanta:
+            self._inbox = RunnerInbox(roster.limits, clock.now_ns)
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """A frame to every runner; what has come when the tick is over."""
         self._send(self._roster.open_tick(tick, self._pace.begin(), senses, heard, outcomes))
+        self._pace.handed_over(heard.heard_at_ns)
         self._pace.hold(tick)
         self._take_in()
         return self._roster.take()
 
+    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+        """The same, with frames also between ticks, as packets come and are due."""
+        assert self._quanta
+        now_ns = self._pace.begin()
+        self.hand_over(tick, tick_start_ns(tick, self._rate_hz), heard, outcomes)
+        self._pace.handed_over(heard.heard_at_ns)
+        self._send(self._roster.open_tick(tick, now_ns, senses, Heard.none(), NO_OUTCOMES))
+        self._quanta.pass_tick(tick, air, self)
+        return self._roster.take()
+
+    def take_in(self) -> list[Put]:
+        """Packets that arrived from runners since the last call."""
+        self._take_in()
+        return self._roster.puts()
+
+    def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> None:
+        """A frame to every runner that this concerns."""
+        self._send(self._roster.hand_over(tick, at_ns, heard, outcomes))
+
     def report(self) -> RealTimeReport:
         """How far loop and runners kept up."""
-        roster, pace = self._roster, self._pace
-        return RealTimeReport(
-            factor=pace.factor,
-            missed_ticks=pace.missed_ticks,
-            worst_lag_s=to_s(pace.worst_lag_ns),
+        roster = self._roster
+        return replace(
+            report_of(self._pace, self._quanta),
             late_answers=self._by_robot(roster.late),
             watchdog_stops=self._by_robot(roster.watchdog_stops),
             frames_dropped=roster.frames_dropped,
             packets_dropped=roster.packets_dropped,
             outcomes_dropped=roster.outcomes_dropped,
         )
+
+    def _handle(self, item: Item) -> None:
+        self._roster.now_ns = self._inbox.arrived_ns
+        super()._handle(item)
 
     def _by_robot(self, counts: IntArray) -> dict[str, int]:
         """The counts that are not 0, by robot."""

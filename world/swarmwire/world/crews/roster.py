@@ -205,6 +205,8 @@ class Roster(ABC, Generic[S]):
                 dropped = frame.values.get("dropped", 0)
                 if type(dropped) is int and dropped > 0:
                     self._counts["frames_dropped_by_runners"] += dropped
+            elif frame.kind == "sent":
+                self._sent_between(slot, frame)
             elif frame.kind == "failed":
                 self._failed(slot, frame)
             elif frame.kind == "leave":
@@ -230,6 +232,10 @@ class Roster(ABC, Generic[S]):
     @abstractmethod
     def _acted(self, slot: S, frame: frames.Frame) -> None:
         """Take an "actions" frame; BadFrame, and nothing changed, if it does not fit."""
+
+    def _sent_between(self, slot: S, frame: frames.Frame) -> None:
+        """Take a "sent" frame, which only real time with a quantum knows; BadFrame, and nothing changed, elsewhere."""
+        raise BadFrame("unexpected_kind", frame.kind)
 
     def _memory(self, slot: S, frame: frames.Frame) -> dict[str, list[GroupMemory]]:
         """What is remembered of a slot's robots once this answer counts; BadFrame if it is not as it should be."""

@@ -7,6 +7,7 @@ counted by name; a token that is dropped shows in the time-out of its runner.
 import queue
 import threading
 from collections import Counter
+from collections.abc import Callable
 
 import zenoh
 
@@ -17,11 +18,16 @@ Item = zenoh.Sample | zenoh.Query
 
 
 class RunnerInbox:
-    """The runners' answers, tokens and requests, in the order in which they arrived."""
+    """The runners' answers, tokens and requests, in the order in which they arrived.
 
-    def __init__(self, limits: Limits = LIMITS) -> None:
-        self._limits = limits
-        self._arrived: queue.SimpleQueue[tuple[str, int, Item]] = queue.SimpleQueue()
+    Attributes:
+        arrived_ns: when the item that was got last arrived.
+    """
+
+    def __init__(self, limits: Limits = LIMITS, now_ns: Callable[[], int] = lambda: 0) -> None:
+        """`now_ns` tells the time, where it matters when something arrives."""
+        self._limits, self._now_ns, self.arrived_ns = limits, now_ns, 0
+        self._arrived: queue.SimpleQueue[tuple[str, int, int, Item]] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._waiting: dict[str, tuple[int, int]] = {}  # of each runner: items, and their bytes
         self._asked: Counter[str] = Counter()
@@ -43,11 +49,11 @@ class RunnerInbox:
                 self._dropped["flooded_frames"] += 1
                 return
             self._waiting[runner] = items + 1, waiting_bytes + size
-        self._arrived.put((runner, size, item))
+        self._arrived.put((runner, size, self._now_ns(), item))
 
     def get(self, timeout: float | None = None) -> Item:
         """The next item; queue.Empty if there is none in time."""
-        runner, size, item = self._arrived.get(timeout=timeout)
+        runner, size, self.arrived_ns, item = self._arrived.get(timeout=timeout)
         with self._lock:
             items, waiting_bytes = self._waiting.pop(runner)
             if items > 1:

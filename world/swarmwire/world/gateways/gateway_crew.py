@@ -17,13 +17,14 @@ from typing import Protocol
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.clock import tick_start_ns, to_s
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.in_time import AirTime, HearingCrew, Put
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard, Sent
-from swarmwire.comms.protocols import Crew
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.world.crews.pace import Pace
-from swarmwire.world.crews.realtime_crew import RealTimeReport
+from swarmwire.world.crews.quanta import Quanta
+from swarmwire.world.crews.realtime_crew import RealTimeReport, report_of
 from swarmwire.world.gateways.gateway_group import GatewayGroup
 
 CARRIED = ("packets_to_robots", "packets_from_robots")  # which is no fault
@@ -50,13 +51,14 @@ class GatewayCrew:
 
     def __init__(
         self,
-        inner: Crew,
+        inner: HearingCrew,
         groups: Sequence[GatewayGroup],
         air: RobotsAir | None,
         pace: Pace,
         rate_hz: int,
         show: Callable[[], None] = lambda: None,
         show_counts: Callable[[], dict[str, int]] = dict,
+        quanta: Quanta | None = None,
     ) -> None:
         """`inner` plays all other groups; `show` is called at the start of each tick, before anything goes out.
 
@@ -64,24 +66,45 @@ class GatewayCrew:
         whoever opened them.
         """
         self._inner, self._groups, self._air, self._pace, self._show = inner, groups, air, pace, show
-        self._rate_hz, self._show_counts = rate_hz, show_counts
+        self._rate_hz, self._show_counts, self._quanta = rate_hz, show_counts, quanta
+        self._puts: list[Put] = []
         self._names = frozenset(group.name for group in groups)
         self._rows = np.sort(np.concatenate([group.rows for group in groups]))
         self.start, self.close = inner.start, inner.close
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What agents here decided, and what foreign programs told the other robots in this tick."""
-        self._pace.begin()
-        self._show()
-        for group in self._groups:
-            group.publish(tick_start_ns(tick, self._rate_hz), senses)
-        if self._air:
-            self._air.publish(tick, heard.select(self._own(heard.receiver)), outcomes.select(self._own(outcomes.row)))
-        others = {name: of for name, of in senses.items() if name not in self._names}
+        others = self._begin(tick, senses, heard, outcomes)
         actions = self._inner.act(tick, others, heard, outcomes)
-        self._hold(tick)
+        self._pace.hold(tick)
+        self._catch_up(tick)
         told = Actions.joined([actions, *(group.take() for group in self._groups)])
         return replace(told, sent=Sent.joined([told.sent, self._air.take()])) if self._air else told
+
+    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+        """The same, with packets taken when they come and handed over when they are due."""
+        assert self._quanta
+        others = self._begin(tick, senses, heard, outcomes)
+        self._inner.receive(heard, outcomes)
+        actions = self._inner.act(tick, others, Heard.none(tuple(heard.given)), NO_OUTCOMES)
+        self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
+        self._quanta.pass_tick(tick, air, self)
+        self._catch_up(tick)
+        still = replace(actions, sent=Sent.none())
+        return Actions.joined([still, *(group.take() for group in self._groups)])
+
+    def take_in(self) -> list[Put]:
+        """What agents here sent since the last call, and what came from foreign ones."""
+        puts, self._puts = self._puts, []
+        return [*puts, Put(self._pace.now_ns(), None, self._air.take())] if self._air else puts
+
+    def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> None:
+        """Tell robots behind gateways, and let agents here that read between ticks read."""
+        self._publish(tick, heard, outcomes)
+        self._inner.receive(heard, outcomes)
+        sent = self._inner.hear(tick, at_ns)
+        if len(sent):
+            self._puts.append(Put(self._pace.now_ns(), None, sent))
 
     def counts(self) -> dict[str, int]:
         """Faults of the inner crew, of gateways by their kind, of what is shown, and of the air between."""
@@ -95,12 +118,25 @@ class GatewayCrew:
 
     def report(self) -> RealTimeReport:
         """How far the loop kept up."""
-        return RealTimeReport(self._pace.factor, self._pace.missed_ticks, to_s(self._pace.worst_lag_ns))
+        return report_of(self._pace, self._quanta)
 
-    def _hold(self, tick: int) -> None:
-        """Return once the tick is over by the wall clock."""
+    def _begin(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> Senses:
+        """A tick begins: all goes out; what the others sense."""
+        self._pace.begin()
+        self._show()
+        for group in self._groups:
+            group.publish(tick_start_ns(tick, self._rate_hz), senses)
+        self._publish(tick, heard, outcomes)
+        self._pace.handed_over(heard.heard_at_ns)
+        return {name: of for name, of in senses.items() if name not in self._names}
+
+    def _publish(self, tick: int, heard: Heard, outcomes: Outcomes) -> None:
+        if self._air:
+            self._air.publish(tick, heard.select(self._own(heard.receiver)), outcomes.select(self._own(outcomes.row)))
+
+    def _catch_up(self, tick: int) -> None:
+        """Where the loop lags by more than a tick, the schedule begins anew."""
         pace = self._pace
-        pace.hold(tick)
         if pace.lag_ns > tick_start_ns(1, self._rate_hz) / pace.factor:
             pace.begin_anew(tick + 1, pace.factor)
 

@@ -11,7 +11,6 @@ from swarmwire.comms.air.links import Links
 from swarmwire.comms.air.lives import Lives
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.stages.stage import Medium
-from swarmwire.comms.air.timing.send_times import SendTimes
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Decided, Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
@@ -23,9 +22,9 @@ NEVER_NS = 2**63 - 1
 class DiskWay(Way):
     """Senders with a queue each, then the chain of stages."""
 
-    def __init__(self, medium: Medium, send_times: SendTimes) -> None:
+    def __init__(self, medium: Medium) -> None:
         self._medium = medium
-        self._senders = Senders(medium.radio, send_times, len(medium.keys) * medium.robots)
+        self._senders = Senders(medium.radio, len(medium.keys) * medium.robots)
         self._channel = Channel(medium)
         self._pose = np.zeros((len(medium.keys) * medium.robots, 3))
         self._held, self._columns = medium.disruption, len(medium.radio.gives.columns)
@@ -45,9 +44,9 @@ class DiskWay(Way):
         self._senders.tune(radio)
         self._channel.tune(at_ns, replace(self._medium, radio=radio))
 
-    def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
+    def accept(self, sent_at_ns: IntArray, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets: when they will go on air, or be refused, is known at once."""
-        return self._senders.accept(at_ns, tick, sent, others_alive, epoch)
+        return self._senders.accept(sent_at_ns, sent, others_alive, epoch)
 
     def pass_time(self, until_ns: int, lives: Lives) -> Decided:
         """What goes on air, or is refused, before `until_ns`."""

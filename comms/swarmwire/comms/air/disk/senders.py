@@ -8,7 +8,6 @@ from swarmwire.comms.air.disruption import DROP, NEWEST, Disruption
 from swarmwire.comms.air.intake import Intake
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.timing.frames import airtime_ns
-from swarmwire.comms.air.timing.send_times import SendTimes
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.fates import Fate
@@ -20,8 +19,8 @@ NO_LIMIT = 2**31  # where all but the newest packet end anyway
 class Senders:
     """Each robot's radio: a queue, first in, first out, and a count of the packets that it was handed."""
 
-    def __init__(self, radio: Radio, send_times: SendTimes, rows: int) -> None:
-        self._radio, self._send_times = radio, send_times
+    def __init__(self, radio: Radio, rows: int) -> None:
+        self._radio = radio
         self._intake = Intake(rows)
         self._free_at_ns = np.zeros(rows, np.int64)
         self._backlog = np.full(rows, DROP)
@@ -31,12 +30,12 @@ class Senders:
         """The radio has other numbers for packets to come."""
         self._radio = radio
 
-    def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
+    def accept(self, sent_at_ns: IntArray, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """The packets as the radios take them up, sorted by sender; also kept in `queued`.
 
-        `others_alive` (rows,) are the receivers that a robot's broadcast intends, those of the epoch.
+        `sent_at_ns` (rows,) is when each robot hands its packets over, `others_alive` (rows,) are the receivers that a
+        robot's broadcast intends, those of the epoch.
         """
-        sent_at_ns = self._send_times.at(at_ns, tick)
         packets = self._intake.take(sent_at_ns, sent, others_alive, epoch)
         on_air_at_ns, off_air_at_ns, fate = self._access(sent_at_ns, packets.sender, packets.payloads.sizes)
         packets = packets._replace(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns, fate=fate)

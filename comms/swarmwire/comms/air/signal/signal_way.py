@@ -34,7 +34,6 @@ from swarmwire.comms.air.signal.tables import (
 )
 from swarmwire.comms.air.signal.told import Told, room_for, taken_out
 from swarmwire.comms.air.stages.stage import Medium
-from swarmwire.comms.air.timing.send_times import SendTimes
 from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.air.way import Decided, Way
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
@@ -48,8 +47,8 @@ LEAST_ROOM = 4096
 class SignalWay(Way):
     """Packets queue, go on air by the access method, and are received or not by signal, noise and interference."""
 
-    def __init__(self, medium: Medium, send_times: SendTimes) -> None:
-        self._medium, self._radio, self._send_times = medium, medium.radio, send_times
+    def __init__(self, medium: Medium) -> None:
+        self._medium, self._radio = medium, medium.radio
         rows = len(medium.keys) * medium.robots
         self._rules = rules_of(medium.radio, medium.robots)
         self._measured = MeasuredLinks.of(medium)
@@ -101,11 +100,11 @@ class SignalWay(Way):
         self._links.tune(self._around(), levels_of(radio, self._rules))
         self._refresh()
 
-    def accept(self, at_ns: int, tick: int, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
+    def accept(self, sent_at_ns: IntArray, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets; when they go on air will turn out."""
         if self._rules.acknowledged:
             self._outcomes.append(sent_in_vain(sent, self._radio.max_payload_bytes))
-        taken = self._intake.take(self._send_times.at(at_ns, tick), sent, others_alive, epoch)
+        taken = self._intake.take(sent_at_ns, sent, others_alive, epoch)
         self._packets.add(taken, self._radio, self._medium.robots)
         return taken
 
