@@ -136,18 +136,16 @@ def test_where_the_run_waits_the_tick_is_asked_again_with_the_memory_from_before
     roster = Lockstep(parts(dict.fromkeys(range(8), 0)), "wait", OPEN)
     comes(roster, "a", "flock-0", "flock-1")
     comes(roster, "b", "flock-4", "flock-5", "scouts-2", "scouts-6", "lone-3", "lone-7")
-
-    def rest(tick: int) -> bytes:
-        return remembering(tick, flock={4: tick, 5: tick}, scouts={2: tick, 6: tick}, lone={3: tick, 7: tick})
-
+    rest: dict[str, dict[int, int]] = {}
     for tick in range(2):
         opened(roster, tick)
+        rest = {"flock": {4: tick, 5: tick}, "scouts": {2: tick, 6: tick}, "lone": {3: tick, 7: tick}}
         roster.answer("a", remembering(tick, flock={0: tick, 1: 10 + tick}))
         if tick == 0:
-            roster.answer("b", rest(tick))
+            roster.answer("b", remembering(tick, **rest))
             roster.take()
     roster.gone("a", "its link is gone")
-    roster.answer("b", rest(1))
+    roster.answer("b", remembering(1, **rest))
     assert roster.waiting == 1
     given = msgpack.unpackb(roster.join("c", request(names=["flock-1"])))
     assert decode_memory(frames.decode(given["memory"]), KEPT)["flock"].columns["x"].tolist() == [10]
