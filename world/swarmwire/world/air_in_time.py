@@ -29,7 +29,10 @@ class AirInTime:
     def __init__(self, air: Air, static: Static, addressable: Callable[[Sent], Sent]) -> None:
         """`addressable` makes packets fit for the air, and counts what was wrong with them."""
         self._air, self._static, self._addressable = air, static, addressable
-        self._waiting, self._turn_ns = Sent.none(), np.empty(0, np.int64)  # (k,) until their robots' turn comes
+        self._rows = static.arenas * static.robots
+        self._waiting = Sent.none()  # (k,) that were put on the air, each until its robot's turn comes
+        self._turn_ns = np.empty(0, np.int64)  # (k,) NEVER_NS: it came
+        self._next_ns = NEVER_NS  # the first turn to come
         self._now_ns = 0
 
     def begin(self, start_ns: int) -> tuple[News, Heard, Outcomes]:
@@ -45,13 +48,17 @@ class AirInTime:
         if not len(put.sent):
             return
         at_ns = max(put.at_ns, self._now_ns)
+        self._release(at_ns)
         sent = self._addressable(put.sent)
-        turn_ns = np.full(len(sent), at_ns)
-        if put.tick is not None:
-            start_ns = tick_start_ns(put.tick, self._static.rate_hz)
-            turn_ns = np.maximum(turn_ns, self._air.turns(start_ns, put.tick)[sent.sender])
-        self._waiting = Sent.joined([self._waiting, sent]) if len(self._waiting) else sent
-        self._turn_ns = np.concatenate((self._turn_ns, turn_ns))
+        if put.tick is None:
+            self._air.send_at(np.full(self._rows, at_ns), sent)
+            return
+        start_ns = tick_start_ns(put.tick, self._static.rate_hz)
+        turn_ns = np.maximum(at_ns, self._air.turns(start_ns, put.tick)[sent.sender])
+        waits = np.flatnonzero(self._turn_ns < NEVER_NS)
+        self._waiting = Sent.joined([self._waiting.select(waits), sent]) if len(waits) else sent
+        self._turn_ns = np.concatenate((self._turn_ns[waits], turn_ns))
+        self._next_ns = int(self._turn_ns.min())
         self._release(at_ns)
 
     def advance(self, until_ns: int) -> tuple[Heard, Outcomes]:
@@ -70,15 +77,18 @@ class AirInTime:
 
     def _release(self, until_ns: int, arenas: BoolArray | None = None) -> None:
         """Hand to the radios what robots, of these arenas (arenas,), send until then, in the order of their turns."""
-        while (due := np.flatnonzero(self._turn_ns <= until_ns)).size:
+        while self._next_ns <= until_ns and self._next_ns < NEVER_NS:
+            due = self._turn_ns <= min(until_ns, NEVER_NS - 1)
             if arenas is not None:
-                due = due[arenas[self._waiting.sender[due] // self._static.robots]]
-                if not due.size:
-                    return
-            sender, turn_ns = self._waiting.sender[due], self._turn_ns[due]
-            first_ns = np.full(self._static.arenas * self._static.robots, NEVER_NS)
-            np.minimum.at(first_ns, sender, turn_ns)
-            going = due[turn_ns == first_ns[sender]]
+                due &= arenas[self._waiting.sender // self._static.robots]
+            place = np.flatnonzero(due)
+            if not len(place):
+                return
+            sender, turn_ns = self._waiting.sender[place], self._turn_ns[place]
+            # A robot's packets stand in the order in which it sent them, which is that of their turns.
+            first_ns = np.full(self._rows, NEVER_NS)
+            first_ns[sender[::-1]] = turn_ns[::-1]
+            going = place[turn_ns == first_ns[sender]]
             self._air.send_at(first_ns, self._waiting.select(going))
-            staying = np.setdiff1d(np.arange(len(self._turn_ns)), going, assume_unique=True)
-            self._waiting, self._turn_ns = self._waiting.select(staying), self._turn_ns[staying]
+            self._turn_ns[going] = NEVER_NS
+            self._next_ns = int(self._turn_ns.min())

@@ -44,13 +44,14 @@ class Quanta:
         wake_ns = self._clock.now_ns()
         while wake_ns <= last_ns:
             self._clock.sleep_until(wake_ns)
-            self._exchange(tick, air, exchange)
+            self.exchange(tick, air, exchange)
             # Whoever woke late goes on from there: quanta that were missed are not made up for.
             wake_ns = max(wake_ns + self._quantum_ns, self._clock.now_ns())
         self._pace.hold(tick)
-        self._exchange(tick, air, exchange)
+        self.exchange(tick, air, exchange)
 
-    def _exchange(self, tick: int, air: AirTime, exchange: Exchange) -> None:
+    def exchange(self, tick: int, air: AirTime, exchange: Exchange) -> None:
+        """Take in what came, and hand over what is due."""
         pace, came = self._pace, exchange.take_in()
         start_ns, end_ns = (tick_start_ns(of, self._rate_hz) for of in (tick, tick + 1))
         now_ns = min(max(start_ns, pace.simulated_ns(self._clock.now_ns()), self._last_ns), end_ns)

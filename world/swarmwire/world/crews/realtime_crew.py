@@ -137,6 +137,7 @@ class RealTimeCrew(RunnerCrew[RealTime]):
         now_ns = self._pace.begin()
         self.hand_over(tick, tick_start_ns(tick, self._rate_hz), heard, outcomes)
         self._pace.handed_over(heard.heard_at_ns)
+        self._quanta.exchange(tick, air, self)  # first what became due since the last tick's end
         self._send(self._roster.open_tick(tick, now_ns, senses, Heard.none(), NO_OUTCOMES))
         self._quanta.pass_tick(tick, air, self)
         return self._roster.take()

@@ -13,6 +13,7 @@ from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import Sent
 
+NOTHING = Transmissions.none()
 NO_LIMIT = 2**31  # where all but the newest packet end anyway
 
 
@@ -76,6 +77,8 @@ class Senders:
         return packets._replace(fate=fate, on_air_at_ns=at, off_air_at_ns=at)
 
     def _taken(self, due: BoolArray) -> Transmissions:
+        if not due.any():
+            return NOTHING
         packets, self.queued = self.queued.parted(due)
         return packets
 
