@@ -3,7 +3,7 @@
 import ast
 import inspect
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from swarmwire.world.loop import Loop
@@ -22,16 +22,46 @@ class Step:
 
 def tick_steps() -> list[Step]:
     """The calls of a tick to those who take part in it, in their order."""
-    body = ast.parse(textwrap.dedent(inspect.getsource(Loop.step)))
+    return list(_steps(Loop.step, {}))
+
+
+def _steps(method: Callable[..., object], givers: dict[str, str]) -> Iterator[Step]:
+    """The calls of a method of the loop; `givers` has, of each local name so far, the lane that it came from.
+
+    The loop's own methods whose result it keeps stand for what is in them, and their names for the same things.
+    """
+    body = ast.parse(textwrap.dedent(inspect.getsource(method)))
     statements = [node for node in ast.walk(body) if isinstance(node, ast.Assign | ast.Expr)]
-    givers: dict[str, str] = {}  # of each local name: the lane that it came from
-    steps: list[Step] = []
     for statement in sorted(statements, key=lambda node: node.lineno):
-        steps += [_step(call, givers) for call in _calls(statement.value)]
+        own = _own_method(statement.value) if isinstance(statement, ast.Assign) else None
+        if own is not None:
+            yield from _steps(own, givers)
+            continue
+        yield from (_step(call, givers) for call in _calls(statement.value))
         if isinstance(statement, ast.Assign):
-            targets = [node.id for node in ast.walk(statement.targets[0]) if isinstance(node, ast.Name)]
-            givers |= dict.fromkeys(targets, _giver(statement.value, givers))
-    return steps
+            givers |= _given(statement.targets[0], statement.value, givers)
+
+
+def _given(target: ast.expr, value: ast.expr, givers: dict[str, str]) -> dict[str, str]:
+    """Of each name that is assigned to, the lane that it came from."""
+    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+        pairs = zip(target.elts, value.elts, strict=True)
+        return {name: lane for each in pairs for name, lane in _given(*each, givers).items()}
+    names = [node.id for node in ast.walk(target) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
+    return dict.fromkeys(names, _giver(value, givers))
+
+
+def _own_method(value: ast.expr) -> Callable[..., object] | None:
+    """The method of the loop that a value is a call of; None if it is none."""
+    if isinstance(value, ast.Call) and isinstance(value.func, ast.Attribute):
+        whose = value.func.value
+        if (
+            isinstance(whose, ast.Name)
+            and whose.id == "self"
+            and inspect.isfunction(getattr(Loop, value.func.attr, None))
+        ):
+            return getattr(Loop, value.func.attr)
+    return None
 
 
 def _calls(value: ast.expr) -> Iterator[ast.Call]:
@@ -48,7 +78,7 @@ def _step(call: ast.Call, givers: dict[str, str]) -> Step:
 def _giver(value: ast.expr, givers: dict[str, str]) -> str:
     """The lane whose call, attribute or earlier gift a value is; empty where it is of the loop's own making."""
     if isinstance(value, ast.Call) and not _lane(value.func):
-        return ""
+        return _lane(value.func.value) if isinstance(value.func, ast.Attribute) else ""  # a copy of an array, or none's
     for node in ast.walk(value):
         if isinstance(node, ast.Attribute) and _lane(node):
             return _lane(node)

@@ -167,11 +167,12 @@ class Loop:
             news, packets, outcomes = self._in_time.begin(start_ns)
             self._open = news.tally
             return news, packets, outcomes
-        alive, tick = self.world.alive, self.ticks_done
+        tick, alive = self.ticks_done, self.world.alive
         news = self.air.advance(start_ns) if self.air else None
         self._open = news.tally if news else None
         packets = self._mailbox.hand_over(tick, news.heard if news else Heard.none(), alive)
-        return news, packets, self._mailbox.hand_over_outcomes(tick, news.outcomes if news else NO_OUTCOMES, alive)
+        outcomes = self._mailbox.hand_over_outcomes(tick, news.outcomes if news else NO_OUTCOMES, alive)
+        return news, packets, outcomes
 
     def _act(self, start_ns: int, senses: Senses, packets: Heard, outcomes: Outcomes) -> Actions:
         """What the robots do in a tick; what they send is the air's."""
