@@ -19,6 +19,7 @@ from swarmwire.agent.fields import (
     repulsion,
     repulsion_of_ranges,
     repulsion_of_rays,
+    spacing,
     steered,
 )
 from swarmwire.agent.packet import Packets
@@ -41,6 +42,12 @@ def test_who_is_far_attracts_and_who_is_near_repels(range_m: float, pull: float,
     far, bearing = np.array([range_m]), np.array([0.7])
     assert parts(attraction(far, bearing, 0.5))[0] == pytest.approx((pull * np.cos(0.7), pull * np.sin(0.7)))
     assert parts(repulsion(far, bearing, 0.5))[0] == pytest.approx((-push * np.cos(0.7), -push * np.sin(0.7)))
+
+
+@given(st.floats(0.0, 10.0), angles)
+def test_spacing_is_attraction_and_repulsion_in_one(range_m: float, bearing_rad: float) -> None:
+    place = np.array([range_m]), np.array([bearing_rad]), 0.4
+    assert parts(spacing(*place)) == parts(attraction(*place) + repulsion(*place))
 
 
 @given(angles, angles)
