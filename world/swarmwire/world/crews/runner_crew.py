@@ -214,17 +214,17 @@ class RunnerCrew(ABC, Generic[R]):
         key = str(query.key_expr)
         runner = runner_of(key)
         with query:  # a query that is kept alive holds the asker until its time-out
-            if key == self._keys.offer(runner):
-                offer = self._roster.offer()
-                if offer is not None:
-                    query.reply(key, offer.encode())
-                return
+            request = query.payload.to_bytes() if query.payload else b""
             try:
+                if key == self._keys.offer(runner):
+                    offer = self._roster.offer(request)
+                    if offer is not None:
+                        query.reply(key, offer.encode())
+                    return
                 if runner in self._shut_out:
                     raise Refused(FLOODED)
                 # Only the exact key speaks for a runner, as below.
-                speaker = runner if key == self._keys.join(runner) else key
-                reply = self._roster.join(speaker, query.payload.to_bytes() if query.payload else b"")
+                reply = self._roster.join(runner if key == self._keys.join(runner) else key, request)
             except Refused as refusal:
                 self._refusals += 1
                 if self._refusals <= MOST_TOLD:
