@@ -1,12 +1,15 @@
 """Agents from elsewhere join, leave, are killed, frozen, thawed, in lockstep: what robots do, and what is counted."""
 
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 
 import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Truth
+from swarmwire.comms.wire.frames import VERSION
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.simulation import Simulation
@@ -185,6 +188,27 @@ def test_who_may_not_join_is_told_why_at_both_ends_and_the_run_goes_on(joiners, 
         assert any(runner == name and text.startswith(why) for runner, text in joiners.refusals)
     assert result.counts["refused_join"] == len(refused)
     assert result.trajectory_sha256 == alone(joiners, SHORT)
+
+
+def test_another_version_is_told_at_both_ends(joiners):
+    ends: list[str] = []
+
+    def strange(_: Change) -> None:
+        if not ends:
+            ends.append("")
+            later = "from swarmwire.comms.wire import frames; frames.VERSION += 1; "
+            program = later + "from swarmwire.agent.cli import main; raise SystemExit(main())"
+            command = [sys.executable, "-c", program, "join", joiners.endpoint, "--name", "b"]
+            joiners.processes["b"] = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+
+    joiners.first = [("a", "--robots", "5")]
+    joiners.on_change = strange
+    joiners.refused = lambda runner, why: (joiners.refusals.append((runner, why)), joiners.start("c"))
+    result = joiners.run(SHORT)
+    why = f"version: expected version {VERSION} of the frames, got {VERSION + 1}"
+    assert joiners.refusals == [("b", why)]
+    assert joiners.said("b") == (1, f"runner b got no robots: {why}\n")
+    assert result.counts["bad_join"] == 1
 
 
 def test_a_name_in_use_is_refused(joiners):

@@ -21,7 +21,8 @@ def joiners(tmp_path) -> Iterator[Joiners]:
     found.close()
 
 
-def test_a_late_joiner_s_robots_stand_until_it_plays_them_and_stand_again_once_it_left(joiners, tmp_path):
+@pytest.mark.parametrize("quantum", [None, 0.005])
+def test_a_late_joiner_s_robots_stand_until_it_plays_them_and_stand_again_once_it_left(joiners, tmp_path, quantum):
     joiners.first = [("a", "--robots", "5")]
     watcher = Watcher(
         (lambda truth: len(moving(truth)) == 5, lambda: joiners.start("b", "--robots", "4")),
@@ -35,6 +36,7 @@ def test_a_late_joiner_s_robots_stand_until_it_plays_them_and_stand_again_once_i
         watcher=watcher,
         start_with=5,
         realtime=FACTOR,
+        quantum=quantum,
         out=tmp_path / "run",
     )
     assert not watcher.steps

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from secrets import token_hex
 
+import msgpack
 import zenoh
 from zenoh.handlers import Callback
 
@@ -22,6 +23,7 @@ from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame, BadInput, RunnerLost
 from swarmwire.comms.loading import resolve
 from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.wire.frames import VERSION
 from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.keys import EVERY_WORLD, Keys, run_of
 from swarmwire.comms.wire.network import Network
@@ -144,7 +146,9 @@ def _runs_to_come(session: zenoh.Session) -> set[str]:
 
 
 def _offer(session: zenoh.Session, keys: Keys, runner: str) -> Offer:
-    for reply in session.get(keys.offer(runner), timeout=OFFER_S):
+    for reply in session.get(keys.offer(runner), payload=msgpack.packb({"v": VERSION}), timeout=OFFER_S):
+        if reply.err is not None:
+            raise RunnerLost(runner, NO_ROBOTS, reply.err.payload.to_string())
         if reply.ok is not None:
             try:
                 return Offer.decode(reply.ok.payload.to_bytes())

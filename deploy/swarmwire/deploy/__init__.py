@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from swarmwire.deploy.campaign.sweeping import Sweep, resume, sweep
     from swarmwire.deploy.gateways.gateways import Gateways
+    from swarmwire.deploy.listening import Listening
     from swarmwire.deploy.record.recording import Recording
     from swarmwire.deploy.repetition import Repetition, repeat
     from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ArenaResult",
     "Gateways",
+    "Listening",
     "Percentiles",
     "RadioResult",
     "Recording",
@@ -36,6 +38,7 @@ __all__ = [
 
 _PLACES = {
     "Gateways": "swarmwire.deploy.gateways.gateways",
+    "Listening": "swarmwire.deploy.listening",
     "Recording": "swarmwire.deploy.record.recording",
     "Repetition": "swarmwire.deploy.repetition",
     "RunFolder": "swarmwire.metrics.run_folder",

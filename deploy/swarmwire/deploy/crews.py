@@ -88,7 +88,7 @@ class Crews:
                 trouble,
                 self.stopped,
                 lambda loss: self._survive(loss, endpoint),
-                lambda change, _: self.changed(change),
+                lambda change, _: self._changed(change),
                 self._refused,
             )
             crew = self._remote(endpoint, parts, around)
@@ -121,6 +121,11 @@ class Crews:
                 told.opened(endpoints, self.run_id)
 
         return Surroundings(lambda: None, self.stopped, self.lost, changed, refused, opened)
+
+    def _changed(self, change: Change) -> None:
+        self.changed(change)
+        if change.what != "lost":  # which is told with what people can do
+            self.say(str(change))
 
     def _refused(self, runner: str, why: str) -> None:
         self.say(f"refused {runner!r}: {why}")

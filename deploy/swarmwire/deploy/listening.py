@@ -32,25 +32,15 @@ class Onlooker(Protocol):
 
 @dataclass(frozen=True)
 class Listening:
-    """Where a world listens for runners that others start.
+    """Where a world listens for runners that others start."""
 
-    Attributes:
-        endpoints: such as "tls/0.0.0.0:7447".
-        observed: where observers and operators from elsewhere meet it.
-        network: the world's certificates.
-        access: who may do what; None: whoever reaches an endpoint may play.
-        start_with: robots with an agent that are enough for the first tick; None: all.
-        limits: what is taken from runners at most.
-        told: of runners that come and go.
-    """
-
-    endpoints: tuple[str, ...]
-    observed: tuple[str, ...] = ()
-    network: Network = field(default_factory=Network)
-    access: RunAccess | None = None
-    start_with: int | None = None
-    limits: Limits = LIMITS
-    told: Onlooker | None = None
+    endpoints: tuple[str, ...]  # such as "tls/0.0.0.0:7447"
+    observed: tuple[str, ...] = ()  # where observers and operators from elsewhere meet it
+    network: Network = field(default_factory=Network)  # the world's certificates
+    access: RunAccess | None = None  # who may do what; None: whoever reaches an endpoint may play
+    start_with: int | None = None  # robots with an agent that are enough for the first tick; None: all
+    limits: Limits = LIMITS  # what is taken from runners at most
+    told: Onlooker | None = None  # of runners that come and go
 
     def check(self, scenario: Scenario, robots: int) -> None:
         """BadInput for endpoints that will not do, or a start that the scenario does not allow; `robots` in all."""

@@ -12,6 +12,7 @@ import pytest
 import zenoh
 
 from swarmwire.comms.clock import WallClock
+from swarmwire.comms.errors import RunnerLost
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.keys import Keys
@@ -130,6 +131,29 @@ def test_another_members_certificate_gets_nowhere(certs, undisturbed, tmp_path, 
         return
     assert arrived.keys() == {"unknown_runner_frames", "flooded_frames"}
     assert sum(arrived.values()) == FLOOD + 1  # the one that no link takes is not seen here
+
+
+def flood(world: GuardedWorld, name: str, opened: ExitStack) -> None:
+    """More of a name's messages than are dropped one by one."""
+    session, own = opened.enter_context(world.session_of(name)), world.keys.answer(name)
+    wait_for_listeners(session, own)
+    for _ in range(4 * LIMITS.flood):
+        session.put(own, b"x", congestion_control=BLOCK)
+
+
+def test_who_floods_is_heard_no_more_and_the_others_are(certs, undisturbed, tmp_path):
+    with ExitStack() as opened:
+        result = GuardedWorld(certs, lambda world: flood(world, "mallory", opened)).run(tmp_path / "run")
+    assert list(result.trajectory_sha256) == undisturbed
+    counts = faults(result.counts)
+    assert counts.pop("flooded_frames") > LIMITS.flood
+    # Those that were let through before, and answers of the others that were heard twice meanwhile.
+    assert counts.keys() <= {"unknown_runner_frames", "wrong_tick_frames"}
+
+
+def test_a_runner_that_plays_and_floods_is_lost(certs, tmp_path):
+    with ExitStack() as opened, pytest.raises(RunnerLost, match="far more than it was asked for"):
+        GuardedWorld(certs, lambda world: flood(world, "r1", opened)).run(tmp_path / "run")
 
 
 def test_a_runner_that_plays_cannot_join_twice_nor_answer_for_others(certs, undisturbed, tmp_path):

@@ -46,6 +46,11 @@ def test_a_flood_of_one_runner_keeps_no_other_out(session):
     assert inbox.counts() == {"flooded_frames": FLOOD - 3}
 
 
+def test_who_floods_is_known_by_name(session):
+    inbox = filled(session, Limits(waiting=1, flood=2), *[("a", b"x")] * 4, *[("b", b"x")] * 3)
+    assert inbox.flooding() == {"a"}
+
+
 def test_what_was_taken_makes_room(session):
     inbox = filled(session, Limits(waiting=2), *[("a", b"x")] * 2)
     item = inbox.get()

@@ -136,6 +136,7 @@ def test_where_the_run_waits_the_tick_is_asked_again_with_the_memory_from_before
     roster = Lockstep(parts(dict.fromkeys(range(8), 0)), "wait", OPEN)
     comes(roster, "a", "flock-0", "flock-1")
     comes(roster, "b", "flock-4", "flock-5", "scouts-2", "scouts-6", "lone-3", "lone-7")
+    rest: dict[str, dict[int, int]] = {}
     for tick in range(2):
         opened(roster, tick)
         rest = {"flock": {4: tick, 5: tick}, "scouts": {2: tick, 6: tick}, "lone": {3: tick, 7: tick}}

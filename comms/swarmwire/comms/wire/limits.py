@@ -21,6 +21,8 @@ class Limits:
         waiting: answers and requests of one runner that wait for the world. In lockstep one is there at a time, in
             real time a few; a runner that sends more is ahead of anything that it was asked.
         waiting_bytes: of these together; one is taken, however large.
+        flood: that may be dropped of one runner; then it is lost, and heard no more in this run. Even to drop a message
+            costs the world some 5 us, so that one that never stops would take a core.
         requests: to be told of the run, or to join it, that one runner may make in one run. A runner that comes back
             each minute for a day stays below.
         join_s: from the assignment of robots to the word that their agents are built.
@@ -31,6 +33,7 @@ class Limits:
     robots_per_runner: int = 20_000
     waiting: int = 64
     waiting_bytes: int = 2 * MOST_BYTES
+    flood: int = 5000
     requests: int = 2000
     join_s: float = 60.0
 

@@ -20,7 +20,7 @@ from swarmwire.deploy.commands.access_options import (
 )
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
 from swarmwire.deploy.commands.options import Links, Overrides, Packets, Quiet, ScenarioFile, Seed
-from swarmwire.deploy.commands.run import Out, Quantum, RealTime, Rrd, Seeds, Select, View, run_shown, seed_list
+from swarmwire.deploy.commands.run import Out, Quantum, RealTime, Rrd, Seeds, Select, Ui, View, run_shown, seed_list
 
 if TYPE_CHECKING:
     from swarmwire.deploy.certificates.member import Member
@@ -55,6 +55,7 @@ def world_command(
     rrd: Rrd = True,
     select: Select = None,
     view: View = False,
+    ui: Ui = False,
     certs: Certs = None,
     name: Name = None,
     ca: Ca = None,
@@ -82,12 +83,15 @@ def world_command(
     from swarmwire.deploy.certificates.member import member
     from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.listening import Listening
+    from swarmwire.deploy.page.extra import need_ui_extra
     from swarmwire.deploy.record.new_folder import default_folder
     from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.simulation import Simulation
     from swarmwire.deploy.terminal.gathering import Gathering
     from swarmwire.world.scenario.scenario_file import load_scenario
 
+    if ui:
+        need_ui_extra("--ui")
     checked = load_scenario(scenario, overrides or [])
     of = member(
         WORLD,
@@ -119,7 +123,7 @@ def world_command(
             listening=Listening(tuple(listen), tuple(observe or ()), of.network, of.access, start_with, told=gathering),
         )
         simulation.watch(gathering)
-        result = run_shown(simulation, folder, console, view=view)
+        result = run_shown(simulation, folder, console, view=view, ui=ui)
     if result.ended == "interrupted":
         raise typer.Exit(INTERRUPTED)
 

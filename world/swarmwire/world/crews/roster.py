@@ -29,7 +29,7 @@ from swarmwire.comms.assignment import Assignment, robots_text
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted, RunnerLost
 from swarmwire.comms.memory import GroupMemory
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.join_request import JoinRequest, versioned
 from swarmwire.comms.wire.limits import Limits
 from swarmwire.comms.wire.memory_frames import decode_memory, encode_memory
 from swarmwire.comms.wire.offer import Offer
@@ -148,8 +148,13 @@ class Roster(ABC, Generic[S]):
         slot = self._by_runner.get(runner)
         return slot is not None and slot.state == "joined"
 
-    def offer(self) -> Offer | None:
-        """What there is to play at present; None: nothing is told."""
+    def offer(self, request: bytes = b"") -> Offer | None:
+        """What there is to play at present; None: nothing is told. Refused if it is asked for in another version."""
+        try:
+            if request:
+                versioned(request)
+        except BadFrame as fault:
+            self._refuse(str(fault), "bad_join")
         if self._terms.offer is None:
             return None
         free: dict[str, list[str]] = {}

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import zenoh
+from zenoh.handlers import Callback
 
 from swarmwire.comms.clock import Clock, to_ns
 from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
@@ -29,6 +30,7 @@ from swarmwire.world.crews.runner_inbox import Item, RunnerInbox
 POLL_S = 0.2  # how often a wait looks up whether to go on waiting
 START_S = 60.0  # how long runners may take to join and build their agents
 MOST_TOLD = 200  # refusals: whoever asks for ever shall not fill the log
+FLOODED = "it sent far more than it was asked for"
 FAREWELL_S = 3.0  # how long runners may take to leave after the end
 
 R = TypeVar("R", bound=Roster[Any])
@@ -73,6 +75,8 @@ class RunnerCrew(ABC, Generic[R]):
         self._inbox = RunnerInbox(roster.limits)
         self._session: zenoh.Session | None = None
         self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to
+        self._answers: dict[str, zenoh.Subscriber[Any]] = {}  # by key: one for all; one for each once one is shut out
+        self._shut_out: set[str] = set()
         self._frames: dict[str, zenoh.Publisher] = {}
         self._present: set[str] = set()
         self._building: dict[str, int] = {}  # until when runners may take, wall time
@@ -92,10 +96,10 @@ class RunnerCrew(ABC, Generic[R]):
             ) from error
         self._session = session
         arrived = (self._inbox.put, self._inbox)
+        self._answers = {self._keys.any_answer: session.declare_subscriber(self._keys.any_answer, arrived)}
         self._declared = (
             session.declare_queryable(self._keys.any_offer, arrived),
             session.declare_queryable(self._keys.any_join, arrived),
-            session.declare_subscriber(self._keys.any_answer, arrived),
             session.liveliness().declare_subscriber(self._keys.any_alive, arrived, history=True),
             session.liveliness().declare_token(self._keys.world),  # last: it says that runners may join
         )
@@ -210,15 +214,17 @@ class RunnerCrew(ABC, Generic[R]):
         key = str(query.key_expr)
         runner = runner_of(key)
         with query:  # a query that is kept alive holds the asker until its time-out
-            if key == self._keys.offer(runner):
-                offer = self._roster.offer()
-                if offer is not None:
-                    query.reply(key, offer.encode())
-                return
+            request = query.payload.to_bytes() if query.payload else b""
             try:
+                if key == self._keys.offer(runner):
+                    offer = self._roster.offer(request)
+                    if offer is not None:
+                        query.reply(key, offer.encode())
+                    return
+                if runner in self._shut_out:
+                    raise Refused(FLOODED)
                 # Only the exact key speaks for a runner, as below.
-                speaker = runner if key == self._keys.join(runner) else key
-                reply = self._roster.join(speaker, query.payload.to_bytes() if query.payload else b"")
+                reply = self._roster.join(runner if key == self._keys.join(runner) else key, request)
             except Refused as refusal:
                 self._refusals += 1
                 if self._refusals <= MOST_TOLD:
@@ -228,12 +234,17 @@ class RunnerCrew(ABC, Generic[R]):
             self._frames[runner] = self._session.declare_publisher(
                 self._keys.frame(runner), congestion_control=self.congestion, express=True
             )
+            if self._shut_out:
+                self._hear(self._session, runner)
             self._building[runner] = self._clock.now_ns() + to_ns(self._roster.limits.join_s)
             self._allow_time()
             query.reply(key, reply)
 
     def _tell_changes(self) -> None:
         """A runner that was lost may be but slow: it is told to leave, since it has no robots any more."""
+        flooding = self._inbox.flooding() - self._shut_out
+        if flooding:
+            self._shut(flooding)
         for runner, until_ns in list(self._building.items()):
             if not self._roster.is_building(runner):
                 del self._building[runner]
@@ -249,3 +260,24 @@ class RunnerCrew(ABC, Generic[R]):
                 self._present.discard(change.runner)
             self._around.changed(change, self._roster.missing_robots)
         self._changes_told = len(self._roster.changes)
+
+    def _shut(self, flooding: set[str]) -> None:
+        """Hear each runner on its own, but for these: what they send is dropped where no Python sees it.
+
+        An answer that comes while this is under way may be heard twice, which is counted; none is missed.
+        """
+        if self._session is None:
+            return
+        self._shut_out |= flooding
+        for runner in self._frames.keys() - self._shut_out:
+            self._hear(self._session, runner)
+        for key in (self._keys.any_answer, *map(self._keys.answer, flooding)):
+            if key in self._answers:
+                self._answers.pop(key).undeclare()
+        for runner in flooding:
+            self._roster.gone(runner, FLOODED)
+
+    def _hear(self, session: zenoh.Session, runner: str) -> None:
+        key, put = self._keys.answer(runner), Callback(self._inbox.put, indirect=False)  # or each would have a thread
+        if key not in self._answers:
+            self._answers[key] = session.declare_subscriber(key, put)

@@ -32,6 +32,7 @@ class RunnerInbox:
         self._waiting: dict[str, tuple[int, int]] = {}  # of each runner: items, and their bytes
         self._asked: Counter[str] = Counter()
         self._dropped: Counter[str] = Counter()
+        self._beyond: Counter[str] = Counter()  # what was dropped of each runner
 
     def put(self, item: Item) -> None:
         """Called from the network's threads; it returns at once."""
@@ -42,11 +43,11 @@ class RunnerInbox:
             if isinstance(item, zenoh.Query):
                 self._asked[runner] += 1
                 if self._asked[runner] > limits.requests:
-                    self._dropped["flooded_requests"] += 1
+                    self._drop("flooded_requests", runner)
                     return  # the asker gets no answer as soon as nobody holds the query
             items, waiting_bytes = self._waiting.get(runner, (0, 0))
             if items >= limits.waiting or (items and waiting_bytes + size > limits.waiting_bytes):
-                self._dropped["flooded_frames"] += 1
+                self._drop("flooded_frames", runner)
                 return
             self._waiting[runner] = items + 1, waiting_bytes + size
         self._arrived.put((runner, size, self._now_ns(), item))
@@ -64,7 +65,16 @@ class RunnerInbox:
         """How many wait, about."""
         return self._arrived.qsize()
 
+    def flooding(self) -> set[str]:
+        """Runners of which so much was dropped that no mistake explains it."""
+        with self._lock:
+            return {runner for runner, dropped in self._beyond.items() if dropped > self._limits.flood}
+
     def counts(self) -> dict[str, int]:
         """What was dropped, by name."""
         with self._lock:
             return dict(self._dropped)
+
+    def _drop(self, what: str, runner: str) -> None:
+        self._dropped[what] += 1
+        self._beyond[runner] += 1

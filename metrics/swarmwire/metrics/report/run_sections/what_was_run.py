@@ -146,6 +146,10 @@ def _not_as_it_should_be(run: RunData) -> list[str]:
     lost: list[Any] = summary.get("lost_runners") or []
     if lost:
         said.append(f"Lost runners: {'; '.join(map(str, lost))}.")
+    changes: list[dict[str, Any]] = summary.get("runner_changes") or []
+    moved = [f"{of['runner']} {of['what']} in tick {of['tick']}" for of in changes if of["tick"] >= 0]
+    if moved:
+        said.append(f"Runners that came and went: {'; '.join(moved)}.")
     dropped = {name: part["dropped"] for name, part in summary["record"].items() if part.get("dropped")}
     if dropped:
         rows = ", ".join(f"{value:,} of `{name}`" for name, value in dropped.items())
