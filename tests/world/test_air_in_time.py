@@ -184,3 +184,39 @@ def test_the_loop_shows_observers_what_was_heard_within_a_tick_and_counts_what_w
     assert total.fates.sum() == total.intended.sum()
     assert loop.counts()["packets_to_nobody"] == 5
     assert [sender for sender, _ in crew.told] == [0] * len(crew.told)
+
+
+class OverAfter:
+    """A judge that finds the second arena over after so many ticks."""
+
+    def __init__(self, ticks: int) -> None:
+        self.ticks = ticks
+
+    def over(self) -> np.ndarray[Any, np.dtype[np.bool_]] | None:
+        self.ticks -= 1
+        return np.array([False, True]) if self.ticks == 0 else None
+
+
+class FromBoth(Sender):
+    """Robot 0 of each arena sends late in each tick, also where the arena is over."""
+
+    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+        start_ns = tick_start_ns(tick, 10)
+        for sender in (0, 15) if tick < 3 else (0,):
+            air.send(Put(start_ns + 5 * MS, None, packet(sender)))
+            air.send(Put(start_ns + 5 * MS, tick, packet(sender + 1)))
+        air.advance(start_ns + 99 * MS)
+        return Actions.joined([])
+
+
+def test_of_an_arena_that_leaves_what_was_heard_within_its_last_tick_counts_and_the_rest_is_in_flight():
+    scenario = scenario_from(SAMPLE, "sample")
+    world, crew, seen = World(scenario, [1, 2], {}), FromBoth(), Tallies()
+    loop = Loop(world, new_air(scenario, world, None), crew, [seen], judge=OverAfter(3), timed=crew)
+    loop.run(6)
+    last = loop.end()
+    assert last is not None
+    total = sum(seen.tallies, last)
+    assert total.sent.tolist() == [12, 6]
+    assert total.fates.sum(axis=1).tolist() == total.intended.tolist()
+    assert loop.arena_ticks.tolist() == [6, 3]
