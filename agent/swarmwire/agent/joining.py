@@ -1,7 +1,7 @@
 """Joining a run from elsewhere: which run it is, what it offers, and with which agents of its own a runner comes."""
 
 # zenoh's stubs leave out the types of what a session answers.
-# pyright: reportUnknownMemberType=false
+# pyright: reportUnknownMemberType=false, reportMissingModuleSource=false
 
 import hashlib
 import os

@@ -1,7 +1,7 @@
 """Runners behind zenoh: a thin adapter that carries bytes between them and a roster, which decides."""
 
 # zenoh's stubs leave out the return types of put, reply and close.
-# pyright: reportUnknownMemberType=false
+# pyright: reportUnknownMemberType=false, reportMissingModuleSource=false
 
 import queue
 from abc import ABC, abstractmethod
