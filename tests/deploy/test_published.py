@@ -283,7 +283,9 @@ def test_a_run_that_is_paused_has_told_its_newest_tick_and_tells_it_to_who_begin
     def pause():
         for _ in range(2):  # the second begins to look on in the middle, after the first has gone
             with following(read_live(tmp_path)) as run:
-                found.append(until(lambda run=run: looked(run)).truth.tick)
+                seen = until(lambda run=run: looked(run))
+                assert seen is not None
+                found.append(seen.truth.tick)
             until(lambda: shown.catch_up() or not shown._watched)
 
     run(LOSSY, overrides=["duration_s=1"], observers=[metrics, shown, At(5, pause)])
