@@ -110,11 +110,11 @@ WIDER = [
     ("events=3", "events: expected a list, got 3"),
     (
         "events=[{at_s=1}]",
-        "events.0.do: is missing; expected one of blackout, fail, gain, jammer, kill, partition, ramp, revive",
+        "events.0.do: is missing; expected one of blackout, fail, gain, jammer, kill, partition, push, ramp, revive",
     ),
     (
         "events=[{at_s=1, do='burn'}]",
-        "events.0.do: expected one of blackout, fail, gain, jammer, kill, partition, ramp, revive; got 'burn'",
+        "events.0.do: expected one of blackout, fail, gain, jammer, kill, partition, push, ramp, revive; got 'burn'",
     ),
     (
         "events=[{at_s=nan, do='kill', robots={count=1}}]",

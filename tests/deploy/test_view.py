@@ -162,9 +162,14 @@ def live_run(folder, *observers, duration_s=3):
 
 
 def test_a_live_view_listens_on_loopback_and_the_run_does_not_notice_its_death(tmp_path, capfd):
-    view, addresses, family = LiveView(tmp_path, web=True), [], []
+    view, addresses, family, told = LiveView(tmp_path, web=True), [], [], []
+
+    def told_where():
+        told.append(capfd.readouterr().err)
+        return "open http://127.0.0.1:" in "".join(told)
 
     def look():
+        until(told_where)
         until(lambda: len(listening(view.pid)) >= 2)
         addresses.extend(listening(view.pid))
         family.extend(psutil.Process(view.pid).children(recursive=True))
@@ -181,7 +186,6 @@ def test_a_live_view_listens_on_loopback_and_the_run_does_not_notice_its_death(t
     assert family
     assert beside.trajectory_sha256 == run(LOSSY, overrides=["duration_s=3"]).trajectory_sha256
     assert not [name for name in beside.counts if name.startswith("observer_failed")]
-    assert "open http://127.0.0.1:" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("frozen", [False, True])
