@@ -32,6 +32,7 @@ class Slot:
     assignment: Assignment
     rows: IntArray  # (n,) that act in the tick that is open, in the order of the answer: group after group
     runner: str | None = None
+    foreign: bool = False  # whether the runner plays code of its own, of which it told nothing
     state: State = "free"
     memory: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])  # of all rows, by group
 
