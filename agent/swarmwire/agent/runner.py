@@ -86,7 +86,7 @@ def play(
         session.liveliness().declare_token(keys.alive(runner)),
     )
     if not inbox.wait_for_world():
-        raise RunnerLost(runner, NO_ROBOTS, "there is no world")
+        raise RunnerLost(runner, NO_ROBOTS, f"there is no run {keys.run}, or it does not let {runner} in")
     assignment, memory = _join(session, keys, runner, asked())
     inbox.forget_frames()
     joined(assignment)
