@@ -32,9 +32,9 @@ class Slot:
     assignment: Assignment
     rows: IntArray  # (n,) that act in the tick that is open, in the order of the answer: group after group
     runner: str | None = None
-    foreign: bool = False  # whether the runner plays code of its own, of which it told nothing
     state: State = "free"
     memory: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])  # of all rows, by group
+    foreign: bool = False  # whether the runner plays code of its own, of which it told nothing
 
     def __post_init__(self) -> None:
         self._all_rows = rows_of(self.assignment)
