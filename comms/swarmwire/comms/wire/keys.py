@@ -10,7 +10,6 @@ class Keys:
     """
 
     def __init__(self, run: str) -> None:
-        self.run = run
         self.root = f"swarmwire/{run}"
         self.world = f"{self.root}/world"  # liveliness token of the world
         self.any_offer = f"{self.root}/offer/*"
