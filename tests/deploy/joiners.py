@@ -44,6 +44,7 @@ class Joiners:
         self.agent = folder / "wanderer.py"
         self.agent.write_text(AGENT)
         self.endpoint = ""
+        self.before: tuple[str, ...] = ()  # of each command: what starts it
         self.processes: dict[str, subprocess.Popen[str]] = {}
         self.changes: list[Change] = []
         self.refusals: list[tuple[str, str]] = []
@@ -57,7 +58,8 @@ class Joiners:
     def start(self, name: str, *arguments: str | Path) -> None:
         """A runner that joins."""
         command = [sys.executable, "-m", "swarmwire.agent.cli", "join", self.endpoint, "--name", name]
-        self.processes[name] = subprocess.Popen([*command, *map(str, arguments)], stderr=subprocess.PIPE, text=True)
+        command = [*self.before, *command, *map(str, arguments)]
+        self.processes[name] = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
 
     def send(self, name: str, number: signal.Signals) -> None:
         self.processes[name].send_signal(number)

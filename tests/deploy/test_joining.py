@@ -153,6 +153,17 @@ def test_a_runner_that_leaves_a_run_that_cannot_do_without_ends_it_in_order(join
     assert joiners.said("a")[0] == 130
 
 
+def test_a_runner_in_the_background_of_a_script_leaves_in_order_too(joiners):
+    """There a shell has Ctrl-C ignored, so a signal to end finds nothing that Ctrl-C did before."""
+    joiners.before = ("sh", "-c", "trap '' INT; exec \"$@\"", "sh")
+    joiners.first = [("a",)]
+    watcher = Watcher((lambda truth: truth.tick == 4, lambda: joiners.send("a", signal.SIGTERM)))
+    result = joiners.run(LONG, watcher=watcher)
+    assert (result.ended, result.error) == ("left", None)
+    code, said = joiners.said("a")
+    assert (code, said.splitlines()[-1]) == (130, "left the run")
+
+
 def test_who_may_not_join_is_told_why_at_both_ends_and_the_run_goes_on(joiners, tmp_path):
     other = tmp_path / "other.py"
     other.write_text(joiners.agent.read_text() + "\n")

@@ -51,8 +51,8 @@ def test_events_are_numbered_after_the_scenarios_and_happen_at_the_start_of_the_
         ({**SET, "to": 2.0}, "to: expected at most 1"),
         ({"do": "jammer", "at": [0, 0], "power_dbm": 20.0}, "do: expected a radio with signals"),
         ({"do": "push", "robots": {"group": "flock"}, "speed_mps": 9.0}, "speed_mps: expected at most 1.75 m/s"),
-        ({"do": "kill", "robots": {"share": float("nan")}}, "expected texts, numbers, lists and tables alone"),
-        ({"do": "kill", "robots": {"group": b"flock"}}, "expected texts, numbers, lists and tables alone"),
+        ({"do": "kill", "robots": {"share": float("nan")}}, "expected texts, finite numbers, lists and tables alone"),
+        ({"do": "kill", "robots": {"group": b"flock"}}, "expected texts, finite numbers, lists and tables alone"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_one_line_and_nothing_waits(table, line):

@@ -34,7 +34,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.closing import closed_after
 from swarmwire.comms.wire.in_time_frames import decode_packets, encode_sent
 from swarmwire.comms.wire.join_request import JoinRequest
-from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.keys import Keys, run_of
 from swarmwire.comms.wire.memory_frames import decode_memory
 from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
@@ -86,7 +86,7 @@ def play(
         session.liveliness().declare_token(keys.alive(runner)),
     )
     if not inbox.wait_for_world():
-        raise RunnerLost(runner, NO_ROBOTS, "there is no world")
+        raise RunnerLost(runner, NO_ROBOTS, f"there is no run {run_of(keys.world)}, or it does not let {runner} in")
     assignment, memory = _join(session, keys, runner, asked())
     inbox.forget_frames()
     joined(assignment)

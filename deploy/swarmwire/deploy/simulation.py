@@ -159,7 +159,7 @@ class Simulation:
             self.watch(observer)
         self._losses: list[Loss] = []
         self._changes: list[Change] = []
-        self._incomplete = False  # whether it began before all robots had an agent
+        self._not_its_own = False  # whether it began with robots that had no agent, or code of a foreign runner
         self.served: Served | None = None
         self._crews = self._new_crews(socket, listening)
         self._crew: Crew | None = None
@@ -240,7 +240,7 @@ class Simulation:
                 cast("TimedCrew", acting) if self._recorded_quantum_s is not None else None,
             )
             crew.start()
-            self._incomplete = bool((health := self.health()) and health.robots_free)
+            self._not_its_own = bool((health := self.health()) and (health.robots_free or health.foreign))
             for observer in self._watching:
                 observer.begin(self.static)
             self._exit = stack.pop_all()
@@ -369,7 +369,7 @@ class Simulation:
         """Whether the actions of this tick need not follow from scenario and seed."""
         if self.inputs is not None:
             return tick >= self.inputs.first_tick
-        if self._incomplete or any(change.tick >= 0 for change in self._changes):
+        if self._not_its_own or any(change.tick >= 0 for change in self._changes):
             return True
         in_real_time = self._pace is not None and (self.runners > 0 or self._quantum_s is not None)
         return bool(self._losses or self._behind.kinds) or in_real_time

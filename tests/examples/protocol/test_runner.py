@@ -4,6 +4,8 @@ import ast
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,10 +14,12 @@ from examples.protocol.runner import BROADCAST, TAG, VERSION
 from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.comms import packets
 from swarmwire.comms.wire import frames
-from swarmwire.deploy import crews, run
+from swarmwire.deploy import crews, repeat, run
+from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.scenario_file import load_scenario
+from tests.deploy.joiners import HERE, Joiners
 from tests.examples.test_examples import EXAMPLES
 
 PROGRAM = EXAMPLES / "protocol" / "runner.py"
@@ -97,3 +101,29 @@ def test_it_needs_nothing_but_zenoh_and_msgpack_and_is_short() -> None:
     assert {name for name in modules if name.split(".")[0] not in sys.stdlib_module_names} == {"msgpack", "zenoh"}
     assert len(text.splitlines()) < 150
     assert (VERSION, BROADCAST) == (frames.VERSION, packets.BROADCAST)
+
+
+class Both(Joiners):
+    """The example, and a runner of swarmwire for the robots that it leaves."""
+
+    def start(self, name: str, *arguments: str | Path) -> None:
+        if name != "foreign":
+            super().start(name, *arguments)
+            return
+        command = [sys.executable, str(PROGRAM), self.endpoint, "--name", name, *map(str, arguments)]
+        self.processes[name] = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+
+
+def test_what_it_does_is_recorded_so_that_repeat_gives_the_same_run(tmp_path: Path) -> None:
+    """Its code is not in the run folder, and the scenario's agent does something else."""
+    joiners = Both(tmp_path)
+    joiners.first = [("foreign", "--robots", str(OWN)), ("own",)]
+    flock = EXAMPLES / "protocol" / "flock.toml"
+    with closing(joiners):
+        listening = Listening(HERE, told=joiners)
+        result = run(flock, overrides=["duration_s=3"], listening=listening, out=tmp_path / "run")
+    assert result.runner_changes[0].runner == "foreign"
+    assert result.inputs is not None
+    assert result.inputs.first_tick == 0
+    assert result.trajectory_sha256 != run(flock, overrides=["duration_s=3"]).trajectory_sha256
+    assert repeat(tmp_path / "run").same

@@ -160,6 +160,28 @@ def test_before_the_first_tick_who_leaves_or_is_lost_only_frees_its_robots(kind:
     assert roster.counts() == {"runners_left": 1, "runners_lost": 1, "runners_returned": 1}
 
 
+def test_who_tells_nothing_of_its_agents_is_counted_as_foreign_while_it_plays(kind: str) -> None:
+    roster = made(kind, terms=Terms(OFFER, open=True))
+    asked(roster, "own", robots=2, agents=AGENTS)
+    asked(roster, "foreign", robots=2)
+    assert roster.health().foreign == 0
+    ready(roster, "own", "foreign")
+    assert roster.health().foreign == 1
+    roster.answer("foreign", LEAVE)
+    assert roster.health().foreign == 0
+    closed = made(kind, terms=Terms(OFFER))
+    asked(closed, "r0")
+    ready(closed, "r0")
+    assert closed.health().foreign == 0
+
+
+def test_robots_that_nobody_plays_are_told_in_their_order_whoever_came_and_went(roster: Made) -> None:
+    every = roster.missing_robots
+    asked(roster, "a", robots=3)
+    roster.gone("a", "its link is gone")
+    assert roster.missing_robots == every
+
+
 def test_a_run_may_begin_with_some_robots(kind: str) -> None:
     roster = made(kind, terms=Terms(OFFER, open=True, start_with=3))
     assert roster.waiting

@@ -208,4 +208,4 @@ def _plain(table: Mapping[str, Any]) -> dict[str, Any]:
     try:
         return json.loads(json.dumps(dict(table), allow_nan=False))
     except (TypeError, ValueError):
-        raise BadInput("", "", "expected texts, numbers, lists and tables alone") from None
+        raise BadInput("", "", "expected texts, finite numbers, lists and tables alone") from None

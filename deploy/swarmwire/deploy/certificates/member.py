@@ -29,7 +29,7 @@ class Member:
     def warning(self, endpoints: Sequence[str]) -> str | None:
         """What to tell the user each time, if these endpoints reach beyond this machine and prove nothing."""
         told = replace(self.network, listen=tuple(endpoints)).warning
-        return WARNING if told else None
+        return WARNING if told and self.network.insecure else None  # without --insecure they are refused
 
 
 def member(

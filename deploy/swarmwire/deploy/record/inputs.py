@@ -1,11 +1,11 @@
 """What came into a run from outside: its robots' actions, tick by tick, where scenario and seed do not give them.
 
-In lockstep all actions follow from scenario and seed until a runner is lost. With runners in real time none do: it
-matters when an answer comes. From the first such tick on, each tick's actions are appended to `inputs/actions.frames`:
-a length of 4 bytes, little-endian, and an `actions` frame of the wire. In real time with a quantum, where packets come
-in the middle of a tick, its frame also holds when each came and whether it waits for its robot's turn (`within`). Each
-goes to the system in one write, so that a run that is killed keeps all its ticks; a frame that is cut off at the end of
-the file is passed over.
+In lockstep all actions follow from scenario and seed until a runner is lost, or one comes with code of its own. With
+runners in real time none do: it matters when an answer comes. From the first such tick on, each tick's actions are
+appended to `inputs/actions.frames`: a length of 4 bytes, little-endian, and an `actions` frame of the wire. In real
+time with a quantum, where packets come in the middle of a tick, its frame also holds when each came and whether it
+waits for its robot's turn (`within`). Each goes to the system in one write, so that a run that is killed keeps all its
+ticks; a frame that is cut off at the end of the file is passed over.
 """
 
 import hashlib

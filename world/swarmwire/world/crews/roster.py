@@ -114,8 +114,9 @@ class Roster(ABC, Generic[S]):
 
     @property
     def missing_robots(self) -> tuple[str, ...]:
-        """Names of the robots that nobody plays."""
-        return tuple(name for slot in self._slots if slot.may("joins") for name in slot.assignment.robot_names)
+        """Names of the robots that nobody plays, in the order of the robots."""
+        free = [name for slot in self._slots if slot.may("joins") for name in slot.assignment.robot_names]
+        return tuple(sorted(free, key=self._rows.__getitem__))
 
     @property
     def bears_losses(self) -> bool:
@@ -134,13 +135,14 @@ class Roster(ABC, Generic[S]):
 
     def health(self) -> RunnerHealth:
         """How the runners are doing."""
-        playing = sum(slot.state in ("ready", "waiting") for slot in self._slots)
+        playing = [slot for slot in self._slots if slot.state in ("ready", "waiting")]
         return RunnerHealth(
-            playing,
+            len(playing),
             len(self.losses),
             frames_dropped=self._counts["frames_dropped_by_runners"],
             left=self._counts["runners_left"],
             robots_free=self.robots_free,
+            foreign=sum(slot.foreign for slot in playing),
         )
 
     def is_building(self, runner: str) -> bool:
@@ -180,6 +182,7 @@ class Roster(ABC, Generic[S]):
         slot = self._granted(asked)
         slot.move("joins")
         slot.runner = runner
+        slot.foreign = self._terms.open and asked.agents is None  # a run's own runners tell nothing, either
         self._by_runner[runner] = slot
         memory = None
         if self._terms.memory is not None:

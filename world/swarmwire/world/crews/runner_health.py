@@ -14,3 +14,4 @@ class RunnerHealth:
     watchdog_stops: int = 0  # of robots; in real time
     left: int = 0  # runners that said so
     robots_free: int = 0  # that no agent plays now
+    foreign: int = 0  # of those that are ready: with code of their own, of which they told nothing

@@ -34,6 +34,7 @@ class Slot:
     runner: str | None = None
     state: State = "free"
     memory: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])  # of all rows, by group
+    foreign: bool = False  # whether the runner plays code of its own, of which it told nothing
 
     def __post_init__(self) -> None:
         self._all_rows = rows_of(self.assignment)

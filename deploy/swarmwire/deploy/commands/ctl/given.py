@@ -15,7 +15,7 @@ COLUMNS = ("number", "tick", "event", "")
 def event_command(
     context: typer.Context,
     table: Annotated[
-        str, typer.Argument(help="A table as in a scenario's [[events]], without at_s.", metavar="'{ do = …, … }'")
+        str, typer.Argument(help="A table as that of an event in a scenario, without at_s.", metavar="'{ do = …, … }'")
     ],
 ) -> None:
     """Have any event happen at the start of the next tick; `swarmwire list events` names them.
