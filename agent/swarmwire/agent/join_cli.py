@@ -105,7 +105,8 @@ def _leaving_by_signals(inbox: "Inbox") -> Generator[None]:
 
     def leave(_number: int, _frame: FrameType | None) -> None:
         inbox.leave()
-        signal.signal(signal.SIGINT, before[signal.SIGINT])
+        if signal.SIGINT in before:  # a shell's script has what it starts in the background ignore it
+            signal.signal(signal.SIGINT, before[signal.SIGINT])
 
     for number in before:
         signal.signal(number, leave)
