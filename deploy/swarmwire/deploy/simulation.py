@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Any, Self, cast
 
 from swarmwire.comms.clock import PreciseClock, WallClock, to_s
-from swarmwire.comms.errors import Interrupted
+from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.in_time import TimedCrew
 from swarmwire.comms.protocols import Crew, Judge, Observer
 from swarmwire.comms.truth import Static, Truth
@@ -318,6 +318,8 @@ class Simulation:
         """Those that fill the run folder, which may drop something only where the run keeps to the wall clock."""
         may_drop = self._pace is not None
         given = self.interventions
+        if self._observed and self.folder is None:
+            raise BadInput("--observe", "", "expected a run folder with it: a run that leaves none is not published")
         door = listening.observers_door(self.run_id) if listening else None
         control = ControlServer(self._status, self.controls, given.give, given.end, self._record.note)
         found = self._record.observers(
