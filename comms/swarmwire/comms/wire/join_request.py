@@ -55,9 +55,9 @@ class JoinRequest:
         return cls(robots, given, cast("dict[str, str] | None", agents), scenario)
 
 
-def versioned(data: bytes) -> dict[str, Any]:
+def versioned(data: bytes, most_bytes: int = MOST_BYTES) -> dict[str, Any]:
     """The map of these bytes, of this version; BadFrame otherwise."""
-    found: object = unpacked(data, MOST_BYTES)
+    found: object = unpacked(data, most_bytes)
     if type(found) is not dict or not _texts([*cast("dict[object, object]", found)]):
         raise BadFrame("malformed", "expected a map")
     version = cast("dict[str, object]", found).get("v")
