@@ -246,6 +246,7 @@ def test_a_name_in_use_is_refused(joiners):
         (Listening(("tcp/0.0.0.0:0",)), [], "reaches beyond this machine"),
         (Listening(("nonsense",)), [], "expected endpoints such as"),
         (Listening(HERE, observed=("tcp/10.0.0.5:1",)), [], "--observe"),
+        (Listening(HERE, observed=HERE), [], "--observe: expected a run folder with it"),
         (Listening(HERE, start_with=21), [], "expected 0 to 20"),
         (Listening(HERE, start_with=5), [], "expected stand or coast with --start-with"),
         (Listening(HERE, start_with=5), ["run.on_runner_loss=wait"], "expected stand or coast with --start-with"),

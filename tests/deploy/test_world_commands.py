@@ -3,6 +3,7 @@
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Generator
@@ -77,6 +78,20 @@ def test_two_terminals_make_the_same_run_as_one(tmp_path):
     assert summary["trajectory_sha256"] == run(LOSSY, overrides=["duration_s=2"]).trajectory_sha256
     assert [change["what"] for change in summary["runner_changes"]] == ["joined", "joined"]
     assert swarmwire("repeat", folder).returncode == 0
+
+
+def test_a_run_that_cannot_be_observed_as_wanted_is_refused_before_anybody_joins(tmp_path):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        at = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        listening = ("--listen", "tcp/127.0.0.1:0", "--observe", at)
+        with world(tmp_path / "run", *listening) as process:
+            _, told = process.communicate()
+    assert process.returncode == 2
+    assert f"--observe: {at}: expected endpoints that are free" in told
+    assert "Traceback" not in told
+    assert not (tmp_path / "run").exists()
 
 
 def test_certificates_are_asked_for_beyond_this_machine(tmp_path, monkeypatch, capsys):

@@ -16,7 +16,7 @@ from swarmwire.comms.outcomes import Outcomes, SendResult
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses
 from swarmwire.comms.values import Values
-from swarmwire.comms.wire import frames, join_request, tick_frames
+from swarmwire.comms.wire import frames, join_request, tick_frames, unpacking
 from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.limits import LIMITS
@@ -108,12 +108,14 @@ def test_the_tag_of_a_message() -> None:
 def test_limits() -> None:
     told = {name: float(value.split()[0]) for name, (value, _) in table("limits").items()}
     ours = {field.name: float(getattr(LIMITS, field.name)) for field in fields(LIMITS)}
-    assert told == {"frame": frames.MOST_BYTES, "request to join": join_request.MOST_BYTES, **ours}
+    ours |= {"frame": frames.MOST_BYTES, "items": unpacking.MOST_ITEMS, "request to join": join_request.MOST_BYTES}
+    assert told == ours
 
 
 def test_what_is_counted() -> None:
     sources = "".join(
-        inspect.getsource(module) for module in (frames, tick_frames, roster, lockstep, realtime, runner_inbox)
+        inspect.getsource(module)
+        for module in (unpacking, frames, tick_frames, roster, lockstep, realtime, runner_inbox)
     )
     faults = {f"{fault}_frames" for fault in re.findall(r'BadFrame\("(\w+)"', sources)}
     named = set(re.findall(r'"((?:bad|refused)_join|flooded_frames)"', sources))

@@ -140,6 +140,21 @@ def test_what_cannot_be_recorded_does_not_happen():
         given.end(number)
 
 
+def test_an_event_whose_end_cannot_be_recorded_goes_on():
+    def ends_do_not_fit(given: Intervention) -> None:
+        if given.table is None:
+            raise OSError("no room")
+
+    given = door(keep=ends_do_not_fit)
+    number = given.give({**KILL, "for_s": 9.0})
+    given.take(0, RATE_HZ)
+    given.course.begun[number] = 0
+    given.end(number)
+    assert given.take(1, RATE_HZ) == []
+    assert not given.told()[-1]["over"]
+    given.end(number)  # may be asked for again
+
+
 def test_a_run_that_is_paused_lets_only_so_many_wait():
     given = door()
     for _ in range(MOST_WAITING):

@@ -75,7 +75,7 @@ def play_told(joining: "Joining") -> int:
     from swarmwire.agent.joining import join
     from swarmwire.agent.runner import Inbox
 
-    if joining.network.insecure and replace(joining.network, connect=(joining.endpoint,)).warning is not None:
+    if replace(joining.network, connect=(joining.endpoint,)).warning is not None:
         _say("warning: insecure: whoever is in the network can take the robots over, and overhear them")
     inbox = Inbox()
     with _leaving_by_signals(inbox):
@@ -105,7 +105,7 @@ def _leaving_by_signals(inbox: "Inbox") -> Generator[None]:
 
     def leave(_number: int, _frame: FrameType | None) -> None:
         inbox.leave()
-        if signal.SIGINT in before:  # in the background of a script it is ignored
+        if signal.SIGINT in before:  # a shell's script has what it starts in the background ignore it
             signal.signal(signal.SIGINT, before[signal.SIGINT])
 
     for number in before:

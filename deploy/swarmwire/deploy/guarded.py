@@ -4,6 +4,7 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
+from swarmwire.comms.errors import BadInput
 from swarmwire.comms.protocols import Observer
 from swarmwire.comms.truth import Static, Tally, Truth
 
@@ -37,8 +38,9 @@ class Guarded:
     def _try(self, call: Callable[[], Any]) -> Any:
         try:
             return call()
-        except (Exception, SystemExit):  # noqa: BLE001 - the run goes on; rich exits where nobody reads its output
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - the run goes on; rich exits where nobody reads its output
             if not self.failed:
-                self._say(f"observer {self.name} failed:\n{traceback.format_exc()}")
+                why = f" {error}" if isinstance(error, BadInput) else f"\n{traceback.format_exc()}"
+                self._say(f"observer {self.name} failed:{why}")
             self.failed = True
             return None

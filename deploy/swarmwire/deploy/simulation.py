@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Any, Self, cast
 
 from swarmwire.comms.clock import PreciseClock, WallClock, to_s
-from swarmwire.comms.errors import Interrupted
+from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.in_time import TimedCrew
 from swarmwire.comms.protocols import Crew, Judge, Observer
 from swarmwire.comms.truth import Static, Truth
@@ -155,6 +155,7 @@ class Simulation:
         )
         self._status = self._new_status()
         self._observers: list[Guarded] = []
+        self._observed = bool(listening and listening.observed)
         for observer in (TooLarge(self._record.say), *self._recorders(what, listening), *observers):
             self.watch(observer)
         self._losses: list[Loss] = []
@@ -221,6 +222,9 @@ class Simulation:
             pace = self._pace.factor if self._pace else 1.0
             served = self._behind.served(self.world, self.agents, self._clock, pace, self.folder, self._record.say)
             self.served = stack.enter_context(served)
+            if self._published and self._observed:  # what cannot be had is refused before anybody joins
+                stack.callback(self._published.close)
+                self._published.open()
             crew = self._crew = stack.enter_context(self._crews.crew(self.served))
             judging = [self._stop] if self._stop else []
             looking = [self.metrics, *judging, self._status, RadioTally(), EventLog()]
@@ -314,14 +318,16 @@ class Simulation:
         """Those that fill the run folder, which may drop something only where the run keeps to the wall clock."""
         may_drop = self._pace is not None
         given = self.interventions
+        if self._observed and self.folder is None:
+            raise BadInput("--observe", "", "expected a run folder with it: a run that leaves none is not published")
         door = listening.observers_door(self.run_id) if listening else None
         control = ControlServer(self._status, self.controls, given.give, given.end, self._record.note)
         found = self._record.observers(
             what, self.run_id, self.metrics, self.hashes, control, may_drop=may_drop, door=door
         )
-        for published in found:
-            if isinstance(published, Published):
-                self.controls.on_pause = published.catch_up
+        self._published = next((of for of in found if isinstance(of, Published)), None)
+        if self._published:
+            self.controls.on_pause = self._published.catch_up
         return found
 
     def _new_status(self) -> Status:

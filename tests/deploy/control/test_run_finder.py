@@ -6,6 +6,7 @@ import os
 import pytest
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.control import run_finder
 from swarmwire.deploy.control.run_finder import Announced, FoundRun, find_run, found_runs, runs_folder
 from swarmwire.deploy.live.live_file import Live
 from tests.metrics.truths import static
@@ -84,3 +85,11 @@ def test_without_a_runtime_folder_it_is_one_among_the_temporary_files(tmp_path, 
     monkeypatch.delenv("XDG_RUNTIME_DIR")
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     assert runs_folder() == tmp_path / f"swarmwire-{os.getuid()}"
+
+
+def test_a_runtime_folder_of_another_user_is_passed_over(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid + 1)
+    assert run_finder._is_own(tmp_path) is False
+    with pytest.raises(BadInput, match=f"swarmwire-{os.getuid()}"):  # which is of another user here, too
+        runs_folder()

@@ -1,9 +1,11 @@
 """The page lets in whoever has its token, asks the run for what people ask it for, and tells what the run tells."""
 
 import contextlib
+import http.client
 import json
 import urllib.error
 import urllib.request
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -55,6 +57,14 @@ def test_without_the_token_everything_is_refused(client, path):
     answer = client.get(path)
     assert answer.status_code == 403
     assert "token" in answer.text
+
+
+def test_what_names_no_path_is_refused_too(control, news):
+    with serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address:
+        asked = http.client.HTTPConnection(urlsplit(address).netloc, timeout=10)
+        with contextlib.closing(asked):
+            asked.request("OPTIONS", "*")
+            assert asked.getresponse().status == 403
 
 
 def test_the_folder_of_the_page_is_found_without_its_last_stroke(client):

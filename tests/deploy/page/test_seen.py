@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.glimpse import Glimpse
 from swarmwire.comms.truth import Happened
-from swarmwire.deploy.page.seen import MOST_PLACES, Seen
+from swarmwire.deploy.page.seen import MOST_PLACES, MOST_WHO, Seen
 from tests.metrics.truths import static, tally, truth
 
 OF = static(robots=4)
@@ -60,6 +60,13 @@ def test_events_say_whom_they_changed_when_they_began(robots, told):
     seen.see(glimpse(0, events=(happened(robots),)))
     seen.see(glimpse(1, events=(happened([0], ended=True),)))
     assert seen.numbers["who"] == {"2": told}
+
+
+def test_of_events_without_end_the_newest_are_kept():
+    seen = Seen(OF)
+    for tick in range(MOST_WHO + 10):
+        seen.see(glimpse(tick, events=(replace(happened([0]), serial=tick),)))
+    assert list(seen.numbers["who"]) == [str(tick) for tick in range(10, MOST_WHO + 10)]
 
 
 def test_of_many_robots_some_are_named():

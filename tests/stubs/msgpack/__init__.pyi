@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from typing import Any
 
 def packb(o: object, *, use_bin_type: bool = ..., strict_types: bool = ...) -> bytes: ...
@@ -6,6 +7,8 @@ def unpackb(
     *,
     raw: bool = ...,
     use_list: bool = ...,
+    object_hook: Callable[[dict[Any, Any]], Any] = ...,
+    list_hook: Callable[[list[Any]], Any] = ...,
     strict_map_key: bool = ...,
     max_str_len: int = ...,
     max_bin_len: int = ...,

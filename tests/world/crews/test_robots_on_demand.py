@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.errors import Interrupted, RunnerLost
+from swarmwire.comms.errors import AgentFailed, Interrupted, RunnerLost
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.limits import Limits
 from swarmwire.comms.wire.offer import Offer, OfferedGroup
@@ -240,3 +240,22 @@ def test_the_owner_of_each_robot_follows_the_cuts(roster: Made) -> None:
     asked(roster, "b", robots=2)
     owners = np.array([roster._slots[place].runner or "" for place in roster._owner])
     assert owners.tolist() == ["b", "b", "", "a", "a", "", "", ""]
+
+
+@pytest.mark.parametrize("asked", [{"names": ["\x1b[2J\n"]}, {"names": ["x" * 10**5]}, {"version": "\x1b" * 10**5}])
+def test_what_a_runner_asks_for_reaches_terminals_short_and_harmless(asked: Any) -> None:
+    with pytest.raises(Refused) as refused:
+        made("lockstep").join("a", request(**asked))
+    assert str(refused.value).isprintable()
+    assert len(str(refused.value)) <= 500
+
+
+def test_so_does_what_it_says_of_its_failure() -> None:
+    roster = made("lockstep")
+    roster.join("a", request())
+    said = {"robots": "\x1b[2J" + "x" * 1000, "traceback": "at line 1:\n\tboom\x1b[2J" + "x" * 10**6}
+    with pytest.raises(AgentFailed) as failed:
+        roster.answer("a", frames.encode("failed", -1, {}, said))
+    assert failed.value.robots.isprintable()
+    assert failed.value.traceback.startswith("at line 1:\n\tboom\\x1b[2Jx")
+    assert len(str(failed.value)) < 200_000

@@ -11,13 +11,13 @@ from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.memory_frames import decode_memory
-from swarmwire.comms.wire.tick_frames import encode_actions
+from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.crews.lockstep import Lockstep
 from swarmwire.world.crews.realtime import RealTime
 from swarmwire.world.crews.roster import OnLoss
 from swarmwire.world.crews.terms import Terms
 from tests.agent.hosts import GIVES, heard_from
-from tests.world.locksteps import actions, all_senses, joined, parts, ready, request, rows_of
+from tests.world.locksteps import FLOCK, GROUPS, SCOUTS, actions, all_senses, joined, parts, ready, request, rows_of
 
 LAYOUT = {"x": ("<i8", ())}
 KEPT = dict.fromkeys(("flock", "scouts", "lone"), LAYOUT)
@@ -108,6 +108,19 @@ def test_what_robots_without_an_agent_hear_is_counted() -> None:
     heard = heard_from(actions([0]).sent, [1, 4, 5])
     opened(roster, 0, heard)
     assert roster.counts() == {"packets_without_agent": 2}
+
+
+def test_what_robots_hear_while_their_next_runner_is_waited_for_is_not_lost() -> None:
+    roster = ready(joined(Lockstep(parts(dict.fromkeys(range(8), 0)), "wait"), "a"), "a")
+    opened(roster, 0)
+    roster.answer("a", encode_actions(0, actions([*FLOCK, *SCOUTS, 3, 7])))
+    roster.gone("a", "its link is gone")
+    assert opened(roster, 1, heard_from(actions([0]).sent, [1, 4, 5])) == {}
+    joined(roster, "b")
+    [(_, frame)] = roster.answer("b", frames.encode("ready", -1, {}))
+    _, heard, _ = decode_tick(frames.decode(frame), GIVES, GROUPS)
+    assert heard.receiver.tolist() == [1, 4, 5]
+    assert "packets_without_agent" not in roster.counts()
 
 
 def test_memory_follows_its_robots_through_leaving_losing_and_cutting() -> None:

@@ -44,7 +44,7 @@ class Interventions:
         keep: Callable[[Intervention], None] = lambda _: None,
         replayed: Sequence[Intervention] | None = None,
     ) -> None:
-        """`keep` records what is taken, or raises OSError: then it is not taken.
+        """`keep` records what is taken, or raises OSError: then it is not taken, and what was to end goes on.
 
         With `replayed` the run is repeated: it takes these alone, and nothing that people want. BadInput if one of them
         does not fit the scenario.
@@ -55,7 +55,9 @@ class Interventions:
         self._events: dict[int, Event] = dict(enumerate(scenario.events))
         self._texts: dict[int, str] = {}  # of events that were told
         self._waiting: list[tuple[int, Mapping[str, Any] | None]] = []
-        self._dropped: set[int] = set()  # events that ended before a tick began, or could not be recorded
+        self._dropped: set[int] = (
+            set()
+        )  # events that ended before a tick began, or whose beginning could not be recorded
         self._replayed: dict[int, list[Intervention]] | None = None if replayed is None else {}
         for given in replayed or ():
             self._replay(given)
@@ -119,7 +121,8 @@ class Interventions:
                 try:
                     self._keep(Intervention(tick, number, table))
                 except OSError:  # what is not on record would make the run one that cannot be repeated
-                    self._dropped.add(number)
+                    if table is not None:  # else the event goes on
+                        self._dropped.add(number)
                     continue
                 if table is not None:
                     at_s = to_s(tick_start_ns(tick, rate_hz))

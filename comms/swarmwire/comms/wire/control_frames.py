@@ -6,10 +6,10 @@ from math import isfinite
 from typing import Any, cast
 
 import msgpack
-from msgpack.exceptions import UnpackException
 
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.one_of import one_of
+from swarmwire.comms.wire.unpacking import unpacked
 
 CONTROL_VERSION = 1
 MOST_BYTES = 64 * 1024  # of a request
@@ -96,12 +96,7 @@ def _value(do: str, value: object) -> Any:
 
 
 def _map_of(data: bytes, most_bytes: int) -> dict[str, Any]:
-    if len(data) > most_bytes:
-        raise BadFrame("oversized", f"{len(data)} bytes, expected at most {most_bytes}")
-    try:
-        body: object = msgpack.unpackb(data)
-    except (ValueError, UnpackException) as error:
-        raise BadFrame("malformed", f"no msgpack: {error}") from error
+    body: object = unpacked(data, most_bytes)
     if type(body) is not dict or not all(type(name) is str for name in cast("dict[object, object]", body)):
         raise BadFrame("malformed", "expected a map with texts as keys")
     return cast("dict[str, Any]", body)

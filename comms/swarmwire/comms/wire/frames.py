@@ -1,6 +1,7 @@
 """Frames: msgpack maps of a version, a kind, a tick, named arrays as raw little-endian buffers, and a few plain values.
 
 Nothing is allocated from a number that the frame claims: the bytes are there, and every array must fit its own bytes.
+What else is in a frame is counted while it is unpacked.
 """
 
 # What arrives is of unknown types until it is checked, item by item; a `cast` is a call, here in the busiest of loops.
@@ -12,10 +13,10 @@ from typing import Any
 
 import msgpack
 import numpy as np
-from msgpack.exceptions import UnpackException
 
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.wire.unpacking import unpacked
 
 VERSION = 2  # of frames between world and runners, and of what runners ask before
 KEYS = {"v", "kind", "tick", "arrays", "values"}
@@ -42,12 +43,7 @@ def encode(kind: str, tick: int, arrays: Mapping[str, AnyArray], values: Mapping
 
 def decode(data: bytes, most_bytes: int = MOST_BYTES, versions: Container[int] = (VERSION,)) -> Frame:
     """The frame of these bytes; BadFrame ("oversized" or "malformed") if they are none. Arrays are read-only views."""
-    if len(data) > most_bytes:
-        raise BadFrame("oversized", f"{len(data)} bytes, expected at most {most_bytes}")
-    try:
-        body: Any = msgpack.unpackb(data)
-    except (ValueError, UnpackException) as error:
-        raise BadFrame("malformed", f"no msgpack: {error}") from error
+    body = unpacked(data, most_bytes)
     # Written out by hand, not with `match` or `cast`, here and below: a world decodes some arrays from each of hundreds
     # of runners in every tick, and a runner that shares two cores with them finds its caches cold for every step.
     if type(body) is not dict or body.keys() != KEYS:

@@ -6,10 +6,10 @@ from dataclasses import asdict, dataclass
 from typing import Any, cast
 
 import msgpack
-from msgpack.exceptions import UnpackException
 
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire.frames import VERSION
+from swarmwire.comms.wire.unpacking import unpacked
 
 MOST_BYTES = 1024 * 1024
 SHA256 = re.compile(r"[0-9a-f]{64}", re.ASCII)
@@ -55,14 +55,9 @@ class JoinRequest:
         return cls(robots, given, cast("dict[str, str] | None", agents), scenario)
 
 
-def versioned(data: bytes) -> dict[str, Any]:
+def versioned(data: bytes, most_bytes: int = MOST_BYTES) -> dict[str, Any]:
     """The map of these bytes, of this version; BadFrame otherwise."""
-    if len(data) > MOST_BYTES:
-        raise BadFrame("oversized", f"{len(data)} bytes, expected at most {MOST_BYTES}")
-    try:
-        found: object = msgpack.unpackb(data)
-    except (ValueError, UnpackException) as error:
-        raise BadFrame("malformed", f"no msgpack: {error}") from error
+    found: object = unpacked(data, most_bytes)
     if type(found) is not dict or not _texts([*cast("dict[object, object]", found)]):
         raise BadFrame("malformed", "expected a map")
     version = cast("dict[str, object]", found).get("v")

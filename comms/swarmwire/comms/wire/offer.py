@@ -7,7 +7,7 @@ from typing import Any, cast
 import msgpack
 
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.wire.frames import VERSION
+from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join_request import versioned
 
 
@@ -36,7 +36,7 @@ class Offer:
 
     def encode(self) -> bytes:
         """The offer as bytes."""
-        return msgpack.packb({"v": VERSION, **asdict(self)})
+        return msgpack.packb({"v": frames.VERSION, **asdict(self)})
 
     def with_free(self, free: Mapping[str, list[str]]) -> "Offer":
         """The same, with these robots free, by group."""
@@ -47,7 +47,7 @@ class Offer:
     @classmethod
     def decode(cls, data: bytes) -> "Offer":
         """The offer of these bytes; BadFrame if they are none, "version" if they are of another version."""
-        told = versioned(data)
+        told = versioned(data, frames.MOST_BYTES)  # with the names of all robots
         try:
             groups = tuple(_group(group) for group in told["groups"])
             factor = None if told["real_time"] is None else float(told["real_time"])

@@ -1,7 +1,7 @@
 """The runs of this machine find each other: a file per run in a private folder of the user, for as long as it goes on.
 
-The folder is `swarmwire` in XDG_RUNTIME_DIR, else one named after the user among the temporary files, which must be the
-user's own and closed to others: who may write there could lead people to another run.
+The folder is `swarmwire` in XDG_RUNTIME_DIR, if that is the user's, else one named after the user among the temporary
+files, which must be the user's own and closed to others: who may write there could lead people to another run.
 """
 
 import json
@@ -61,7 +61,7 @@ class Announced:
 def runs_folder() -> Path:
     """The user's folder of runs, made if need be; BadInput if it is not the user's alone."""
     base = os.environ.get("XDG_RUNTIME_DIR")
-    if base and Path(base).is_dir():
+    if base and _is_own(Path(base)):
         folder = Path(base, "swarmwire")
     else:
         folder = Path(tempfile.gettempdir(), f"swarmwire-{os.getuid()}")
@@ -111,6 +111,14 @@ def find_run(named: str | None) -> FoundRun:
     if meant or named is None:
         raise BadInput("", where, f"several runs go on; expected one of {', '.join(listed)}")
     raise BadInput("", where, f"expected {one_of([run.run for run in runs], named)}, or a run's folder")
+
+
+def _is_own(folder: Path) -> bool:
+    """Whether it is a folder of this user's: `su` and `sudo` may leave the variable as another's."""
+    try:
+        return folder.is_dir() and folder.stat().st_uid == os.getuid()
+    except OSError:  # in a folder that is not open to this user
+        return False
 
 
 def _read(path: Path) -> FoundRun | None:

@@ -66,10 +66,25 @@ class Published:
         self._folder, self._run_id, self._metrics, self._clock = folder, run_id, metrics, clock
         self._arena, self._selected = arena, selected
         self._open = ExitStack()
+        self._met: tuple[str, zenoh.Session] | None = None  # endpoint of this machine, and the session
         self.frames = self.left_out = 0
 
+    def open(self) -> None:
+        """Listen, before anything is there to be seen; `begin` does, if nobody did. BadInput if an endpoint is taken.
+
+        `end` closes it, and so does `close`, if there is no `begin`.
+        """
+        with ExitStack() as opening:
+            endpoint = opening.enter_context(local_endpoint(None))
+            self._met = endpoint, opening.enter_context(closed_after(self._session(endpoint)))
+            self._open = opening.pop_all()
+
+    def close(self) -> None:
+        """Close the endpoint; safe to call more than once."""
+        self._open.close()
+
     def begin(self, static: Static) -> None:
-        """Open the endpoint and tell where it is; BadInput if there is no such arena."""
+        """Tell where it can be seen; BadInput if there is no such arena."""
         if not 0 <= self._arena < static.arenas:
             raise BadInput("live view", "arena", f"expected 0 to {static.arenas - 1}")
         self._selected = selected_robot(static, self._selected, "live view")
@@ -80,9 +95,11 @@ class Published:
         self._newest: Truth | None = None
         self._fault: Exception | None = None
         self._frames: queue.Queue[Glimpse | None] = queue.Queue(maxsize=1)
-        with ExitStack() as opening:
-            endpoint = opening.enter_context(local_endpoint(None))
-            session = opening.enter_context(closed_after(self._session(endpoint)))
+        if self._met is None:
+            self.open()
+        assert self._met is not None
+        endpoint, session = self._met
+        with self._open.pop_all() as opening:
             self._declare(session, encode_scene(self._scene(static)))
             opening.callback(forget_live, self._folder)
             Live(endpoint, self._run_id, os.getpid()).write(self._folder)
@@ -135,7 +152,7 @@ class Published:
         """Show how it ended and close the endpoint; whoever looks on learns that the run is over."""
         if self._watched and self._since.ticks and self._fault is None:
             self._put(self._clock.now_ns())
-        self._open.close()
+        self.close()
         return {"published": {"frames": self.frames, "left_out": self.left_out}}
 
     def _session(self, endpoint: str) -> zenoh.Session:
@@ -144,7 +161,9 @@ class Published:
             return open_observed([endpoint, *door.endpoints], door.network, door.access)
         except zenoh.ZError as error:
             raise BadInput(
-                "--observe", ", ".join(door.endpoints), f"expected endpoints that are free: {error}"
+                "--observe",
+                ", ".join(door.endpoints),
+                f"expected endpoints that are free: {str(error).split(' at ')[0]}",
             ) from error
 
     def _put(self, now_ns: int) -> None:

@@ -36,7 +36,7 @@ class Door:
         if scope["type"] != "http":
             raise TypeError(f"the page answers requests alone, not {scope['type']}")
         fault = self._fault(Headers(scope=scope))
-        _, given, *rest = scope["path"].split("/", maxsplit=2)
+        given, slash, rest = scope["path"].removeprefix("/").partition("/")
         if not hmac.compare_digest(given.encode(), self._token):
             fault = fault or NO_TOKEN
 
@@ -48,10 +48,10 @@ class Door:
         if fault is not None:
             await PlainTextResponse(fault, 403)(scope, receive, closed)
             return
-        if not rest:  # what the page loads is named from its folder on
+        if not slash:  # what the page loads is named from its folder on
             await RedirectResponse(f"/{given}/")(scope, receive, closed)
             return
-        path = "/" + "".join(rest)
+        path = f"/{rest}"
         await self._app({**scope, "path": path, "raw_path": path.encode()}, receive, closed)
 
     def _fault(self, headers: Headers) -> str | None:

@@ -12,6 +12,7 @@ from swarmwire.comms.truth import Happened, Static
 from swarmwire.metrics.event_log import names
 
 NAMED = 5  # robots of an event, at most
+MOST_WHO = 200  # events; the status tells of no more either
 MOST_PLACES = 500  # robots: of more, the small map shows only some
 
 
@@ -45,7 +46,8 @@ class Seen:
     def _whom(self, events: Sequence[Happened]) -> dict[str, str]:
         """Whom each event changed when it began, by its number."""
         begun = {str(event.serial): whom(event, self._static) for event in events if not event.ended}
-        self._who = {**self._who, **begun}
+        if begun:  # of those that began before, the newest, as the status tells of no others
+            self._who = dict([*self._who.items(), *begun.items()][-MOST_WHO:])
         return self._who
 
     def _pdr(self, glimpse: Glimpse) -> float | None:

@@ -140,7 +140,8 @@ class RunRecord:
         try:
             self._interventions.keep(intervention)
         except OSError as error:
-            self.say(f"event {intervention.number} does not happen, as it cannot be recorded: {error}")
+            what = "end" if intervention.table is None else "happen"
+            self.say(f"event {intervention.number} does not {what}, as it cannot be recorded: {error}")
             raise
 
     def interventions(self) -> InterventionsRecord | None:

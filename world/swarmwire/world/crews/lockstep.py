@@ -67,7 +67,8 @@ class Lockstep(Roster[_Slot]):
             if slot.state == "dead" or not part:
                 continue
             if slot.idle:
-                self._to_nobody(own, its)
+                if self._on_loss in GOES_ON:  # else whoever is waited for gets it all
+                    self._to_nobody(own, its)
                 continue
             slot.move("is asked")
             out.append((slot.runner or "", encode_tick(tick, part, own, its)))

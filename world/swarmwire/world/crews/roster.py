@@ -34,12 +34,14 @@ from swarmwire.comms.wire.limits import Limits
 from swarmwire.comms.wire.memory_frames import decode_memory, encode_memory
 from swarmwire.comms.wire.offer import Offer
 from swarmwire.world.crews.change import Change, What
+from swarmwire.world.crews.printable import printable
 from swarmwire.world.crews.runner_health import RunnerHealth
 from swarmwire.world.crews.slot import Slot
 from swarmwire.world.crews.split_robots import merged, part_of
 from swarmwire.world.crews.terms import USUAL, Terms
 
 NAME = re.compile(r"[\w.-]{1,64}", re.ASCII)  # of a runner: it is part of a key, so no wildcard, slash or hash
+MOST_SAID, MOST_TRACEBACK = 500, 100_000  # letters: what a runner says of itself goes to people's terminals
 NOBODY = -1  # owner of a robot that no slot holds
 OnLoss = Literal["stop", "dead", "wait", "stand", "coast"]
 GOES_ON = ("stand", "coast")  # where the run waits for nobody once it began
@@ -295,13 +297,13 @@ class Roster(ABC, Generic[S]):
     def _failed(self, slot: S, frame: frames.Frame) -> None:
         match frame.values:
             case {"robots": str(robots), "traceback": str(traceback)}:
-                raise AgentFailed(robots, traceback)
+                raise AgentFailed(printable(robots, MOST_SAID), printable(traceback, MOST_TRACEBACK, keep="\n\t"))
             case _:
                 raise AgentFailed(slot.assignment.robots_text, "(the runner sent no traceback)")
 
     def _refuse(self, text: str, count: str = "refused_join") -> NoReturn:
         self._counts[count] += 1
-        raise Refused(text)
+        raise Refused(printable(text, MOST_SAID))
 
     def _check_scenario(self, asked: JoinRequest) -> None:
         offer = self._terms.offer
