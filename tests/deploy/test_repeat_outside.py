@@ -117,10 +117,9 @@ def test_a_run_whose_lost_runner_was_replaced_by_a_fresh_one_is_the_same_again(t
     takeovers: list[subprocess.Popen[bytes]] = []
 
     def take_over(_: RunRecord, text: str) -> None:
-        _, told, command = text.partition("such as: python ")
-        if not told:  # it is told, too, that the other came
+        command = text.partition("such as: python ")[2].replace("NAME", "fresh").split()
+        if not command:  # it is told, too, that the other came
             return
-        command = command.replace("NAME", "fresh").split()
         takeovers.append(subprocess.Popen([sys.executable, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE))
 
     monkeypatch.setattr(RunRecord, "say", take_over)
