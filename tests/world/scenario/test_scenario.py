@@ -170,7 +170,7 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("radio.gives.range.noise_m", -1, "radio.gives.range.noise_m: expected a number of at least 0 (m), got -1"),
     ("radio.send_offset", "x", f"radio.send_offset: {OFFSET}; got 'x'"),
     ("radio.send_offset", 0.1, f"radio.send_offset: {OFFSET}; got 0.1"),
-    ("run.on_runner_loss", "hope", "run.on_runner_loss: expected one of stop, dead, wait, got 'hope'"),
+    ("run.on_runner_loss", "hope", "run.on_runner_loss: expected one of stop, dead, wait, stand, coast, got 'hope'"),
     ("run.watchdog_s", 0, "run.watchdog_s: expected a number above 0 and at most 86400 (s), got 0"),
     (
         "wind",
