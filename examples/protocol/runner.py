@@ -132,7 +132,7 @@ def play(session: zenoh.Session, root: str, name: str, robots: int | None) -> No
             break
         try:
             answers.put(frame("actions", told["tick"], acted(told["arrays"], assignment), {}))
-        except Exception:
+        except Exception:  # whatever it is, the world is told before it is raised
             answers.put(frame("failed", -1, {}, {"robots": name, "traceback": traceback.format_exc()}))
             raise
     del declared

@@ -145,7 +145,7 @@ class Published:
         if self._watched and self._since.ticks:
             try:
                 self._put(self._clock.now_ns())
-            except Exception as error:  # noqa: BLE001 - the pause goes on
+            except Exception as error:  # noqa: BLE001 - raised by `see`, which is guarded
                 self._fault = error
 
     def end(self, last: Tally | None) -> dict[str, Any]:
