@@ -83,7 +83,7 @@ class Pace:
             self._quiet_until_ns = over_ns + lag_ns + to_ns(REPEAT_S)
             self._say(
                 f"real time: this machine does not keep up with {self.factor:g} x real time: "
-                f"at tick {tick} the loop is {to_s(lag_ns):.3f} s behind"
+                f"at tick {tick} the loop is {1000 * to_s(lag_ns):,.1f} ms behind"
             )
 
     def _span_ns(self, tick: int) -> int:
