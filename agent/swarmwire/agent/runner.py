@@ -37,7 +37,7 @@ from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.keys import Keys, run_of
 from swarmwire.comms.wire.memory_frames import decode_memory
 from swarmwire.comms.wire.sessions import open_runner
-from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
+from swarmwire.comms.wire.tick_frames import check_rows, decode_tick, encode_actions
 
 JOIN_S = 30.0
 FAREWELL_S = 3.0
@@ -153,7 +153,7 @@ class Inbox:
 
         What comes between ticks goes to `receive`; where no newer tick is there, its tick and time are given out.
         """
-        gives, groups = assignment.gives or (), {group.name for group in assignment.groups}
+        gives, rows = assignment.gives or (), {group.name: group.rows for group in assignment.groups}
         every = math.gcd(*(group.act_every_ticks for group in assignment.groups))
         newest: tuple[int, Senses, Heard, Outcomes] | None = None
         between: tuple[int, int] | None = None
@@ -188,7 +188,8 @@ class Inbox:
                     continue
                 if frame.kind != "tick" or frame.tick <= tick or frame.tick % every:
                     raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
-                told = decode_tick(frame, gives, groups)
+                told = decode_tick(frame, gives, rows.keys())
+                check_rows(told[0], told[1], rows)
             except BadFrame:
                 self.dropped += 1
                 continue
