@@ -91,7 +91,7 @@ class Pace:
             return
         self._tell(
             f"this machine does not keep up with {self.factor:g} x real time: "
-            f"at tick {tick} the loop is {to_s(lag_ns):.3f} s behind"
+            f"at tick {tick} the loop is {1000 * to_s(lag_ns):,.1f} ms behind"
         )
 
     def _stood_still(self, tick: int, for_ns: int) -> None:
