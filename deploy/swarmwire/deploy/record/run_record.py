@@ -118,10 +118,12 @@ class RunRecord:
         self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
     ) -> None:
         """Say in the log why there was no first tick; there is nothing to sum up. What is refused leaves no folder."""
-        if error is not None:
-            self.note(f"failed to start: {error}")
-        if isinstance(error, BadInput) and self.folder and self._log:
+        if error is None:
+            return
+        self.note(f"failed to start: {error}")
+        if self._log:
             self._log.close()
+        if isinstance(error, BadInput) and self.folder:
             rmtree(self.folder, ignore_errors=True)  # it was new or empty, so all that is in it is of this run
             self.folder = self._log = None
 
