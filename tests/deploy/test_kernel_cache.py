@@ -1,5 +1,6 @@
 """Kernels are kept somewhere also where neither the code's folder nor the user's can be written."""
 
+import atexit
 import os
 from pathlib import Path
 
@@ -15,7 +16,7 @@ def at_exit(monkeypatch):
     registered = []
     monkeypatch.setenv(SET, "x")
     monkeypatch.delenv(SET)
-    monkeypatch.setattr(kernel_cache.atexit, "register", lambda act, *given, **named: registered.append((act, given)))
+    monkeypatch.setattr(atexit, "register", lambda act, *given, **_: registered.append((act, given)))
     yield registered
     for act, given in registered:
         act(*given)
