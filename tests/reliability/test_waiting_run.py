@@ -1,8 +1,4 @@
-<<<<<<< HEAD
-"""A run that waits for its runners says so, and is controlled meanwhile; who asks for a run that is not there is told."""
-=======
 """A run that waits for its runners says so, and is controlled meanwhile; who asks for another is told."""
->>>>>>> main
 
 import signal
 import threading

@@ -24,15 +24,9 @@ from swarmwire.comms.wire.network import Network, protocol_of
 
 PRIVATE = "sw-"  # how the name of a private directory for a socket begins
 BLOCK_S = 5.0
-<<<<<<< HEAD
-# A dead peer is noticed at once, by its closed socket. One that is frozen or out of reach is noticed after its lease: on
-# one machine practically never, since nobody is out of reach there, and whoever was stopped may go on; there a run's own
-# time-outs count. Elsewhere a world allows itself as long as it allows its runners.
-=======
 # A dead peer is noticed at once, by its closed socket. One that is frozen or out of reach is noticed after its lease:
 # on one machine practically never, since nobody is out of reach there, and whoever was stopped may go on; a run's own
 # time-outs count there. Elsewhere a world allows itself as long as it allows its runners.
->>>>>>> main
 LEAST_LEASE_MS = 10_000
 CLIENT_LEASE_MS = 60_000
 LOCAL_LEASE_MS = 7 * 86_400_000
