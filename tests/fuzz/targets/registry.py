@@ -7,11 +7,13 @@ from tests.fuzz.targets.join import Given, Join, Offered
 from tests.fuzz.targets.observed import Glimpses, Scenes
 from tests.fuzz.targets.radio import Poses, Questions, Radio
 from tests.fuzz.targets.runner_frames import RunnerFrames
+from tests.fuzz.targets.scenarios import Bodies, Campaigns, Scenarios
 from tests.fuzz.targets.world_frames import WorldFrames
 
 ALL: tuple[type[Target], ...] = (
     *(WorldFrames, RunnerFrames, Join, Offered, Given),
     *(Scenes, Glimpses, Control, Replies, Page),
+    *(Scenarios, Bodies, Campaigns),
     *(Terms, Heard, AirSent, Radio, Poses, Questions),
 )
 TARGETS = {target.name: target for target in ALL}
