@@ -24,7 +24,7 @@ from tests.fuzz.dice import Dice
 from tests.fuzz.target import Target, changed_inside, check_line
 
 SHIPPED = Path("scenarios")
-WORLDS = 0.02  # of the scenarios that are let in, as many run for a tick
+WORLDS = 0.005  # of the scenarios that are let in, as many run for a tick
 MOST_ROBOTS, MOST_OBSTACLES = 60, 200  # of those that do
 
 
