@@ -3,11 +3,9 @@
 All that is found is written as it is found: `samples.csv`, `troubles.jsonl`, and `result.json` at the end.
 """
 
-import heapq
 import json
 import signal
 from collections.abc import Callable, Mapping
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +14,10 @@ import numpy as np
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.deploy.control.remote_control import controlling
+from tests.soak.agenda import Agenda
 from tests.soak.place import Kind, Place, environment
 from tests.soak.samples import Samples
-from tests.soak.troubles import Steps, Troubles
+from tests.soak.troubles import Troubles
 
 TIMEOUT_S = 8.0  # of a runner, as in soak.toml
 LOOP_S = 0.05
@@ -64,8 +63,7 @@ class Hour:
             for place, rng in zip(self.places, rngs, strict=True)
         ]
         self._gaps = np.random.default_rng(seed + 1)
-        self._due: list[tuple[int, int, Steps]] = []
-        self._serial = count()
+        self._agenda = Agenda()
         self._started_ns = self._clock.now_ns()
 
     def run(self) -> None:
@@ -104,7 +102,7 @@ class Hour:
             for at, troubles in enumerate(self.troubles):
                 if now_ns >= next_ns[at]:
                     next_ns[at] = now_ns + to_ns(float(self._gaps.exponential(GAP_S)))
-                    self._begin(troubles.next(), now_ns)
+                    self._agenda.begin(troubles.next(), now_ns)
             if now_ns >= sample_ns:
                 sample_ns += to_ns(SAMPLE_S)
                 self._sample(now_ns)
@@ -144,14 +142,8 @@ class Hour:
         """Whoever ended is started again, and what is due happens."""
         for place in self.places:
             place.tend(now_ns)
-        while self._due and self._due[0][0] <= now_ns:
-            self._begin(heapq.heappop(self._due)[2], now_ns)
+        self._agenda.step(now_ns)
         self._clock.sleep_until(now_ns + to_ns(LOOP_S))
-
-    def _begin(self, steps: Steps, now_ns: int) -> None:
-        wait_s = next(steps, None)
-        if wait_s is not None:
-            heapq.heappush(self._due, (now_ns + to_ns(wait_s), next(self._serial), steps))
 
     def _until(self, holds: Callable[[], bool], for_s: float, what: str, only: Place | None = None) -> None:
         until_ns = self._clock.now_ns() + to_ns(for_s)

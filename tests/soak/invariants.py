@@ -19,6 +19,7 @@ from tests.soak.supervised import family
 
 COMES = ("joined", "returned")
 GOES = ("left", "lost")
+SOMEBODY = "one of its own"
 
 
 class Broken(Exception):
@@ -34,12 +35,15 @@ def fates_add_up(summary: Mapping[str, Any]) -> str:
     return f"{fates} fates of {radio['intended']} intended receivers"
 
 
-def owners_are_known(summary: Mapping[str, Any], robots: Iterable[str], *, all_played: bool = True) -> str:
+def owners_are_known(
+    summary: Mapping[str, Any], robots: Iterable[str], *, all_played: bool = True, own: bool = False
+) -> str:
     """Each robot has one runner or, by `runner_changes`, none; nobody takes what another has, or loses what is not his.
 
-    `all_played` says that the run began with an agent for each robot, of which an open world tells.
+    `all_played` says that the run began with an agent for each robot, of which an open world tells. A run with `own`
+    runners does not tell who they were.
     """
-    owner: dict[str, str | None] = dict.fromkeys(robots)
+    owner: dict[str, str | None] = dict.fromkeys(robots, SOMEBODY if own else None)
     begun = False
     for change in summary["runner_changes"]:
         if change["tick"] >= 0 and not begun:
@@ -50,7 +54,7 @@ def owners_are_known(summary: Mapping[str, Any], robots: Iterable[str], *, all_p
             if robot not in owner:
                 raise Broken(f"{change['runner']} {change['what']} with {robot}, which is none")
             expected = None if change["what"] in COMES else change["runner"]
-            if owner[robot] != expected:
+            if owner[robot] not in (expected, SOMEBODY):
                 raise Broken(f"{change['runner']} {change['what']} {robot}, which {owner[robot] or 'nobody'} played")
             owner[robot] = change["runner"] if change["what"] in COMES else None
     unowned = sum(runner is None for runner in owner.values())

@@ -70,7 +70,7 @@ def look(at_s: float, who: str, pid: int, tick: int, tick_ms: float, events: int
 
 def read_samples(path: Path) -> dict[str, list[Sample]]:
     """All samples of a file, by who it was."""
-    kinds: dict[str, type[float | int | str]] = {name: kind for name, kind in get_type_hints(Sample).items()}
+    kinds: dict[str, type[float | int | str]] = dict(get_type_hints(Sample))
     found: dict[str, list[Sample]] = {}
     with path.open(newline="") as file:
         for row in csv.DictReader(file):

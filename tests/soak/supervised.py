@@ -70,6 +70,16 @@ class Supervised:
             self.frozen = number == signal.SIGSTOP
         return True
 
+    def ended_within(self, limit_s: float) -> bool:
+        """Whether it ends by itself in this time."""
+        if self._process is None:
+            return True
+        try:
+            self._process.wait(limit_s)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
     def end(self) -> int | None:
         """Wait for it to end, and help if it does not; its exit code, None if it did not run."""
         if self._process is None:

@@ -1,17 +1,17 @@
 """What happens to the processes of a soak: a trouble is a generator that acts, and yields how long it waits, in s."""
 
 import signal
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling
+from tests.soak.agenda import Steps
 from tests.soak.place import Place
 from tests.soak.supervised import PYTHON, Supervised
 
-Steps = Generator[float]
 UNTOUCHED = 2  # runners, the first
 PART = 0.1  # of all runners that die at once, as with their machine
 
