@@ -21,9 +21,10 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.keys import Keys, runner_of
 from swarmwire.comms.wire.sessions import listens_at, open_world
+from swarmwire.world.crews.admission import Refused
 from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.door import Door
-from swarmwire.world.crews.roster import Loss, Refused, Roster
+from swarmwire.world.crews.roster import Loss, Roster
 from swarmwire.world.crews.runner_health import RunnerHealth
 from swarmwire.world.crews.runner_inbox import Item, RunnerInbox
 
