@@ -22,7 +22,7 @@ from tests.soak.troubles import Troubles
 TIMEOUT_S = 8.0  # of a runner, as in soak.toml
 LOOP_S = 0.05
 SAMPLE_S = 10.0
-GAP_S = 8.0  # between two troubles of a world, on average
+GAP_S = 5.0  # between two troubles of a world, on average
 CALM_S = 30.0  # before the end, in which nothing happens and whoever is away comes back
 COME_S = 600.0  # for all runners to join at the start
 END_S = 120.0  # for all to end
@@ -33,7 +33,7 @@ def kinds(processes: int) -> list[Kind]:
     """The worlds: in lockstep nothing of what happens may matter; in real time robots coast meanwhile."""
     in_real_time = ("--realtime", "--set", "run.on_runner_loss=coast", "--packets", "0.01", "--no-rrd")
     return [
-        Kind("lockstep", processes, ("--links", "--packets", "0.001"), speed=1.0),
+        Kind("lockstep", processes, ("--links", "--packets", "0.001"), speed=0.5),
         Kind("realtime", max(2, processes // REAL_TIME_SHARE), in_real_time),
     ]
 
@@ -204,7 +204,10 @@ def counts_of(hour: Hour) -> Mapping[str, Any]:
             "troubles": dict(sorted(troubles.told.items())),
             "orders not taken": troubles.unanswered,
             "runner processes started": sum(one.starts for one in place.runners),
-            "exit codes": _tallied([code for one in place.all for code in one.codes]),
+            "exit codes": {
+                "runners": _tallied([code for one in place.runners for code in one.codes]),
+                **{name: _tallied(one.codes) for name, one in place.onlookers.items()},
+            },
             "world": place.world.codes,
         }
         for place, troubles in zip(hour.places, hour.troubles, strict=True)

@@ -122,6 +122,16 @@ def nothing_is_left(temporary: Path, but: Sequence[str] = ()) -> str:
     return "no socket or temporary file left"
 
 
+def nobody_crashed(codes: Mapping[str, Mapping[str, int]]) -> str:
+    """Who ended did so by itself, was told why (1), was asked to (130; -2 while Python starts), or was killed."""
+    allowed = {"0", "1", "130", "-2", "-9"}
+    ends = [(who, code, times) for who, of in codes.items() for code, times in of.items()]
+    strange = [f"{who} {code} ({times} times)" for who, code, times in ends if code not in allowed]
+    if strange:
+        raise Broken(", ".join(strange))
+    return f"{sum(times for *_, times in ends)} processes ended, none by a crash"
+
+
 def read_summary(folder: Path) -> Mapping[str, Any]:
     """The summary of a run that ended; Broken if there is none."""
     summary = RunFolder(folder).summary

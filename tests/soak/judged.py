@@ -43,6 +43,9 @@ def checks(folder: Path) -> list[tuple[str, bool, str]]:
         _tried("no process left", lambda: invariants.nobody_is_left(temporary, os.getpid())),
         _tried("nothing temporary left", lambda: invariants.nothing_is_left(temporary)),
     ]
+    counts = json.loads((folder / "counts.json").read_text())
+    for name, told in counts.items():
+        found.append(_tried(f"{name}: exit codes", lambda codes=told["exit codes"]: invariants.nobody_crashed(codes)))
     for run in sorted(folder.glob("*/run")):
         name = run.parent.name
         summary = invariants.read_summary(run)

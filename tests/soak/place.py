@@ -76,8 +76,9 @@ class Place:
             self._started = max(self._started, min(len(self.runners), joined + AT_ONCE))
         for runner in self.runners[: self._started]:
             runner.tend(now_ns)
-        for one in self.onlookers.values():
-            one.tend(now_ns)
+        if self.live is not None:
+            for one in self.onlookers.values():
+                one.tend(now_ns)
 
     def look_on(self, names: Sequence[str]) -> None:
         """Have observers, pages and tabs come; a tab "tab-X" is of the page "page-X"."""
