@@ -35,6 +35,7 @@ from swarmwire.deploy.commands.ui import ui_command
 from swarmwire.deploy.commands.verify import verify_command
 from swarmwire.deploy.commands.view import view_command
 from swarmwire.deploy.commands.world import world_command
+from swarmwire.deploy.refusals import refusal
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
 
@@ -102,6 +103,11 @@ def main() -> None:
         sys.exit(_fail(error, INTERRUPTED))
     except SwarmwireError as error:
         sys.exit(_fail(error, FAILED))
+    except (OSError, MemoryError, RuntimeError) as error:
+        told = refusal(error)
+        if told is None:
+            raise
+        sys.exit(_fail(told, FAILED))
 
 
 def _with_factor(arguments: list[str]) -> list[str]:
@@ -125,6 +131,6 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _fail(error: SwarmwireError, code: int) -> int:
+def _fail(error: SwarmwireError | str, code: int) -> int:
     typer.echo(f"error: {error}".rstrip(), err=True)
     return code

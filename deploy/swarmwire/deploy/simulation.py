@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Any, Self, cast
 
 from swarmwire.comms.clock import PreciseClock, WallClock, to_s
-from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.comms.errors import BadInput, Interrupted, RecordFailed
 from swarmwire.comms.in_time import TimedCrew
 from swarmwire.comms.protocols import Crew, Judge, Observer
 from swarmwire.comms.truth import Static, Truth
@@ -45,6 +45,7 @@ from swarmwire.deploy.record.run_record import RunRecord
 from swarmwire.deploy.rehearsal import rehearse
 from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
+from swarmwire.deploy.system_limits import need_open_files, need_threads
 from swarmwire.deploy.too_large import TooLarge
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.judge import Judge as StopJudge
@@ -134,6 +135,9 @@ class Simulation:
         if listening is not None:
             listening.check(self.scenario, robots)
             self.runners = 1  # at least; how many there were is told once it is over
+        need_open_files(self.runners if listening is None else robots)
+        if self.runners or out is not None:  # else there is no network, and no table
+            need_threads(self.runners)
         self._behind.check(self.static.arenas, self.runners)
         what = record or Recording()
         what.check(self.static)
@@ -171,6 +175,11 @@ class Simulation:
     def folder(self) -> Path | None:
         """The run folder, if any."""
         return self._record.folder
+
+    @property
+    def record_failed(self) -> RecordFailed | None:
+        """Why the run folder has no summary, once the run is over; None if it has one, or there is no folder."""
+        return self._record.failed
 
     @property
     def static(self) -> Static:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.deploy.certificates.dates import DAY, date_of, text_of
 from swarmwire.deploy.certificates.files import REGISTER
 from swarmwire.metrics.whole_file import write_whole
@@ -55,8 +56,7 @@ class Register:
         path = folder / REGISTER
         try:
             content: Any = json.loads(path.read_text(encoding="utf-8"))
-            if content["format"] != FORMAT:
-                raise BadInput(str(path), "format", f"expected {FORMAT}, got {content['format']}")
+            check_format(content["format"], FORMAT, str(path))
             register = cls(Issued(**content["authority"]), tuple(Issued(**of) for of in content["certificates"]))
             for of in (register.authority, *register.certificates):
                 _ = date_of(of.valid_from), date_of(of.valid_until), int(of.serial, 16)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.record import formats
 from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS, INPUTS, RUN_JSON
 from swarmwire.metrics.verify.finding import Finding, State
@@ -19,8 +20,12 @@ def check_run_json(folder: Path) -> Finding:
         return Finding(RUN_JSON, State.MISSING, "without it the run cannot be repeated")
     except (OSError, ValueError) as error:
         return Finding(RUN_JSON, State.DAMAGED, str(error))
+    try:
+        formats.refuse_other_format(found, formats.RUN_FORMAT, folder / RUN_JSON)
+    except BadInput as error:
+        return Finding(RUN_JSON, State.DAMAGED, f"{error.key}: {error.expected}")
     match found:
-        case {"format": formats.RUN_FORMAT, "seeds": list(), "ticks": int(ticks)}:
+        case {"format": int(), "seeds": list(), "ticks": int(ticks)}:
             return Finding(RUN_JSON, State.WHOLE, f"{ticks} ticks asked for")
         case _:
             return Finding(RUN_JSON, State.DAMAGED, f"expected the start of a run, format {formats.RUN_FORMAT}")

@@ -9,10 +9,13 @@ from typing import Any
 from pydantic import ValidationError
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.world.scenario.checks import check
 from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.overrides import put
 from swarmwire.world.scenario.scenario import Scenario
+
+FORMAT = 1  # that a scenario's file names
 
 
 def scenario_schema() -> dict[str, Any]:
@@ -42,6 +45,8 @@ def load_scenario(path: Path | str, overrides: Sequence[str] = ()) -> Scenario:
 
 
 def _checked(given: dict[str, Any], where: str) -> Scenario:
+    if "format" in given:  # first of all: another version may have other keys
+        check_format(given["format"], FORMAT, where)
     try:
         scenario = Scenario.model_validate(given)
     except ValidationError as error:
