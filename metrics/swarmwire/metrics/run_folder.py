@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard, cast
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
+from swarmwire.metrics.damage import damage
 from swarmwire.metrics.record.distance_totals import distance_totals_schema
 from swarmwire.metrics.record.event_recorder import event_schema
 from swarmwire.metrics.record.formats import SUMMARY_FORMAT, TABLES_FORMAT, refuse_other_format
@@ -198,7 +199,7 @@ class RunFolder:
                 return lazy.drop(*left_out, strict=False).collect()
             except FileNotFoundError:
                 continue  # the run ended just now, and its parts were joined
-            except pl.exceptions.PolarsError as error:
+            except damage() as error:
                 reason = str(error).splitlines()[0]
                 expected = f"expected whole Parquet files ({reason}); see swarmwire verify"
                 raise BadInput(self.where(name), "", expected) from error

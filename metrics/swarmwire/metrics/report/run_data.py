@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
+from swarmwire.metrics.damage import damage
 from swarmwire.metrics.drawing.film import Film, film_of
 from swarmwire.metrics.record.names import RUN_JSON, SCENARIO
 from swarmwire.metrics.report.lanes import Lane, lanes_of
@@ -77,7 +78,7 @@ class RunData:
         try:
             own = pl.scan_parquet(files).filter((pl.col("arena") == ARENA) & pl.col("receiver").is_not_null())
             return own.select(*columns).drop_nulls().collect()
-        except (OSError, pl.exceptions.PolarsError) as error:
+        except (OSError, *damage()) as error:
             return (
                 f"{self.folder.where('packets')} cannot be read ({str(error).splitlines()[0]}); see `swarmwire verify`."
             )

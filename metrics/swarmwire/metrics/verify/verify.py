@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.damage import damage
 from swarmwire.metrics.record.names import LOG, RECORDING, RUN_JSON, STATIC, SUMMARY
 from swarmwire.metrics.record.part_files import scan_files
 from swarmwire.metrics.record.tick_columns import ROBOT_COLUMNS
@@ -90,15 +91,13 @@ def _table(folder: RunFolder, name: str, summary: dict[str, Any] | None) -> Find
 
 def _fault(folder: RunFolder, name: str, files: list[Path]) -> str | None:
     """What cannot be in its readable files, in words."""
-    import polars as pl
-
     try:
         static = folder.static
     except BadInput:  # which has a finding of its own
         static = None
     try:
         return table_fault(name, scan_files(files), static)
-    except pl.exceptions.PolarsError as error:  # parts of different types
+    except damage() as error:  # parts of different types
         return str(error).splitlines()[0]
 
 
