@@ -16,13 +16,15 @@ def test_who_is_cut_off_is_told_at_both_ends_and_may_come_back(tmp_path):
         at = f"tcp/{lab.addresses[0]}:7447"
         join = "join", at, "--insecure", "--name", "a"
         world = ("world", LOSSY, *settings, "--listen", at, "--insecure", "--out", tmp_path / "run")
-        with on(lab, *world) as world, on(laptop, *join) as cut:
-            world.said("a joined with flock-0")
-            cut.said("joined run")
-            laptop.link("down")
-            world.said("a was lost with flock-0", "no answer for 1 s")
-            assert cut.ended() == 1
-            assert cut.lines[-1] == "the world is gone, or out of reach"
+        with on(lab, *world) as world:
+            world.said("0 of 20 robots have agents")
+            with on(laptop, *join) as cut:
+                world.said("a joined with flock-0")
+                cut.said("joined run")
+                laptop.link("down")
+                world.said("a was lost with flock-0", "no answer for 1 s")
+                assert cut.ended() == 1
+                assert cut.lines[-1] == "the world is gone, or out of reach"
             laptop.link("up")
             with on(laptop, *join) as back:
                 world.said("a returned with flock-0")
