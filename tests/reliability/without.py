@@ -1,6 +1,6 @@
 """Proves the fault table: each test passes, and fails without the handling that its row names.
 
-    python -m tests.reliability.without [PATTERN]    only proofs with this in the name of process, test or source
+    python -m tests.reliability.without [PATTERN…]    only proofs with one of these in the name of process, test or source
 
 The part that handles a fault is copied to a folder of its own, changed there, and put before all others on the
 path of Python, for the test and for every process that it starts. The project itself stays as it is.
@@ -39,11 +39,11 @@ class Verdict:
     wrong: str = ""
 
 
-def main(pattern: str = "") -> int:
+def main(*patterns: str) -> int:
     """Try the proofs, tell of each, and return how many do not hold."""
-    chosen = _chosen(pattern)
+    chosen = _chosen(patterns or ("",))
     if not chosen:
-        print(f"no proof has {pattern!r} in the name of process, test or source")
+        print(f"no proof has {' or '.join(patterns)} in the name of process, test or source")
         return 1
     tests = list(dict.fromkeys(proof.test for _, proof in chosen))
     code, text = _run(("pytest", *OPTIONS, *tests), os.environ, ALL_MOST_S)
@@ -63,14 +63,14 @@ def main(pattern: str = "") -> int:
     return wrong
 
 
-def _chosen(pattern: str) -> list[tuple[str, Proof]]:
+def _chosen(patterns: tuple[str, ...]) -> list[tuple[str, Proof]]:
     """Proofs, each with the row that it is of."""
     return [
         (f"{process.title}, {fault.fault}", proof)
         for process in processes()
         for fault in process.faults
         for proof in fault.proof
-        if pattern in f"{process.name} {proof.test} {proof.file}"
+        if any(pattern in f"{process.name} {proof.test} {proof.file}" for pattern in patterns)
     ]
 
 
@@ -127,4 +127,4 @@ def _end_all_of(folder: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(min(main(*sys.argv[1:2]), 1))
+    sys.exit(min(main(*sys.argv[1:]), 1))
