@@ -1,6 +1,6 @@
 """Proves the fault table: each test passes, and fails without the handling that its row names.
 
-    python -m tests.reliability.without [PATTERN…]    only proofs with one of these in the name of process, test or source
+    python -m tests.reliability.without [PATTERN…]    only those with a pattern in the name of process, test or source
 
 The part that handles a fault is copied to a folder of its own, changed there, and put before all others on the
 path of Python, for the test and for every process that it starts. The project itself stays as it is.
