@@ -19,7 +19,7 @@ def test_who_is_cut_off_is_told_at_both_ends_and_may_come_back(tmp_path):
         with on(lab, *world) as world:
             world.said("0 of 20 robots have agents")
             with on(laptop, *join) as cut:
-                world.said("a joined with flock-0")
+                world.said("20 robots, 50000 ticks")
                 cut.said("joined run")
                 laptop.link("down")
                 world.said("a was lost with flock-0", "no answer for 3 s")
