@@ -65,7 +65,7 @@ def test_what_is_said_instead_of_it_does_harm_to_its_own_robots_alone(honest: tu
     first, second = zip(result.trajectory_sha256, honest[0].trajectory_sha256, strict=True)
     assert first[0] == first[1]
     assert second[0] != second[1]
-    assert frames(result) == EARLY.counts | {"packets_to_nobody": 4}
+    assert frames(result) == {**EARLY.counts, "packets_to_nobody": 4}
     own = result.arenas[1]
     assert (own.counts["nan_commands"], own.counts["packets_to_nobody"]) == (3, 4)
     assert own.counts["clipped_commands"] >= 3
