@@ -181,14 +181,21 @@ def decode_rows(kind: type[Message], payloads: Payloads, index: IntArray) -> dic
 def encode_dict(message: dict[str, Any]) -> bytes:
     """A dict on air: the dict tag, then msgpack; TypeError unless its keys are texts and msgpack takes its values."""
     payload = DICT_TAG.to_bytes(TAG_BYTES, "little") + msgpack.packb(message)
-    if not all(type(key) is str for key in decode_dict(payload)):  # what cannot be read is refused here, not there
+    try:
+        readable = all(type(key) is str for key in decode_dict(payload))
+    except ValueError:
+        readable = False
+    if not readable:  # what cannot be read is refused here, not there
         raise TypeError(f"a dict message has texts as keys, got {list(message)}")
     return payload
 
 
 def decode_dict(payload: bytes) -> dict[str, Any]:
     """The dict of these bytes; ValueError if they hold none."""
-    message: object = msgpack.unpackb(payload[TAG_BYTES:], strict_map_key=False)
+    try:
+        message: object = msgpack.unpackb(payload[TAG_BYTES:], strict_map_key=False)
+    except TypeError as error:  # a list or a map as a key
+        raise ValueError(f"the payload holds no dict: {error}") from None
     if not isinstance(message, dict):
         raise ValueError("the payload holds no dict")
     return cast("dict[str, Any]", message)
