@@ -25,7 +25,7 @@ from zenoh.handlers import Callback
 from swarmwire.agent.host import Host, layout_of
 from swarmwire.agent.loading import NoAgent, load_agent
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
+from swarmwire.comms.errors import AgentFailed, BadFrame, BadInput, RunnerLost
 from swarmwire.comms.memory import Memory
 from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import Heard
@@ -213,9 +213,14 @@ def _join(session: zenoh.Session, keys: Keys, runner: str, asked: Asked) -> tupl
     for reply in session.get(keys.join(runner), payload=asked.request.encode(), timeout=JOIN_S):
         if reply.ok is None:
             raise RunnerLost(runner, NO_ROBOTS, reply.err.payload.to_string() if reply.err else "no answer to join")
-        given = msgpack.unpackb(reply.ok.payload.to_bytes())
-        assignment = Assignment.from_mapping(given).with_agents(asked.agents)
-        return assignment, None if given["memory"] is None else _memory(assignment, given["memory"])
+        try:
+            given = msgpack.unpackb(reply.ok.payload.to_bytes())
+            assignment = Assignment.from_mapping(given).with_agents(asked.agents)
+            return assignment, None if given["memory"] is None else _memory(assignment, given["memory"])
+        except (BadFrame, BadInput, KeyError, TypeError, ValueError) as error:
+            raise RunnerLost(
+                runner, NO_ROBOTS, f"the world's answer to join is of another version: {error!r}"
+            ) from error
     raise RunnerLost(runner, NO_ROBOTS, "the world did not answer to join")
 
 
