@@ -36,7 +36,7 @@ def played(world: MadeUpWorld, **keys: Any) -> tuple[str, str, list[str]]:
     """How a runner's play ended and why, and what people were told."""
     said: list[str] = []
     ended = join(Joining(world.endpoint, name="r", **keys), Inbox(), said.append)
-    return *ended, said
+    return ended.how, ended.why, said
 
 
 def refusal(world: MadeUpWorld, **keys: Any) -> str:
