@@ -1,4 +1,4 @@
-"""What a guard does, in this process, with agents and stops of a line each; `test_guard` has it beside a whole robot."""
+"""What a guard does, in this process, with agents and stops of a line each; `test_guard` has it with a whole robot."""
 
 import signal
 import sys
