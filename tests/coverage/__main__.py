@@ -19,15 +19,13 @@ AGAIN = ["--reruns", "1", "--only-rerun", "ZError", "--only-rerun", "it did not 
 PLAIN = ["-p", "tests.coverage.plain_kernels", "tests/comms", "tests/world"]
 THREADS = ["-p", "tests.coverage.network_threads"]
 AS_USED = [*THREADS, "tests/agent", "tests/robots", "tests/comms/wire", "tests/world/crews", "tests/world/gateways"]
-# Crews in real time and with a radio of their own clock run in no test of theirs, but in whole runs.
-RUNS = ["tests/deploy/test_quantum.py", "tests/deploy/test_joining_realtime.py", "tests/deploy/gateways"]
 
 
 def main() -> int:
     """Run, put together, and tell; 1 if a test failed or there was too little."""
     shutil.rmtree(DATA, ignore_errors=True)
     DATA.mkdir()
-    failed = _coverage("run", *PYTEST, *PLAIN) + _coverage("run", *PYTEST, *AGAIN, *AS_USED, *RUNS)
+    failed = _coverage("run", *PYTEST, *PLAIN) + _coverage("run", *PYTEST, *AGAIN, *AS_USED)
     _coverage("combine", "-q")
     _coverage("json", "-q", "-o", str(DATA / "all.json"))
     _coverage("html", "-q", "-d", str(DATA / "pages"))
