@@ -29,6 +29,10 @@ check: sync ## lint, format, types, and who may import whom
 	$(RUN) pyright
 	$(RUN) lint-imports
 
+.PHONY: coverage
+coverage: sync ## how much of comms, world and agent the tests run, with and without the compiler
+	$(RUN) python -m tests.coverage
+
 .PHONY: docs
 docs: sync ## build these pages and the reference as a site, docs/_build/html/index.html
 	$(RUN) python -m sphinx -W --keep-going -n -q docs docs/_build/html
