@@ -229,6 +229,8 @@ def test_fates_are_not_compared_where_packets_were_sampled_or_dropped_or_the_run
             {"share": 0.5},
             {"record": {**rows, "packets": {"rows": 1, "dropped": 2, "share": 1.0}}},
             {"ended": "interrupted"},
+            {"ended": "failed"},  # a runner was lost amid a tick
+            {"ended": "left"},
         ]
     ):
         folder = tmp_path / f"{number}"

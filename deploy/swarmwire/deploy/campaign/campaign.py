@@ -10,6 +10,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.campaign.columns import Columns
 from swarmwire.deploy.campaign.design import Point
+from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.campaign.about import read_about
 from swarmwire.metrics.campaign.formats import ABOUT, CAMPAIGN_FORMAT
@@ -18,6 +19,7 @@ from swarmwire.metrics.record.formats import refuse_other_format
 from swarmwire.metrics.whole_file import write_whole
 
 SCENARIO_FOLDER = "scenario"
+UNTOLD_ROBOTS = 100  # in an arena, of campaigns and tunings that do not tell: for packs of middling size
 
 
 @dataclass(frozen=True)
@@ -113,8 +115,9 @@ def _is_count(value: object) -> bool:
 def _campaign(found: dict[str, Any]) -> Campaign:
     tuples: dict[str, Any] = {name: tuple(found[name]) for name in ("seeds", "points", "overrides", "record_seeds")}
     objects: dict[str, Any] = {
-        "files": tuple(CopiedFile(**file) for file in found["files"]),
-        "outcomes": tuple(Outcome(**outcome) for outcome in found["outcomes"]),
+        "files": tuple(CopiedFile(**known_fields(CopiedFile, file)) for file in found["files"]),
+        "outcomes": tuple(Outcome(**known_fields(Outcome, outcome)) for outcome in found["outcomes"]),
         "point_overrides": tuple(tuple(texts) for texts in found["point_overrides"]),
     }
-    return Campaign(**{**found, **tuples, **objects})
+    untold: dict[str, Any] = {"robots": UNTOLD_ROBOTS}
+    return Campaign(**{**untold, **known_fields(Campaign, found), **tuples, **objects})

@@ -36,6 +36,8 @@ class FoundRun:
 class Announced:
     """Observer that makes a run one that `swarmwire ctl` finds; it must be published in its folder before it begins."""
 
+    before_agents = True  # it begins before the run's agents are there
+
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._path: Path | None = None

@@ -12,6 +12,7 @@ from typing import Any
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.record import machine
+from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.modules import changed_modules, module_digests
 from swarmwire.deploy.record.scenario_copy import CopiedFile, changed_files, copy_scenario
 from swarmwire.metrics.metric import Metric
@@ -113,7 +114,7 @@ def _origin(found: dict[str, Any]) -> Origin:
         ticks=ticks,
         runners=runners,
         realtime=None if found["realtime"] is None else float(found["realtime"]),
-        files=tuple(CopiedFile(**file) for file in found["files"]),
+        files=tuple(CopiedFile(**known_fields(CopiedFile, file)) for file in found["files"]),
         modules=dict(found["modules"]),
         cpu=str(found["cpu"]),
         versions=dict(found["versions"]),

@@ -8,7 +8,8 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parsing import from_json
-from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER
+from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, UNTOLD_ROBOTS
+from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.deploy.tuning.goal import Goal
 from swarmwire.deploy.tuning.search import Parameter, Search
@@ -77,15 +78,16 @@ def read_tuning(folder: Path) -> Tuning:
 
 def _tuning(found: dict[str, Any]) -> Tuning:
     tuples: dict[str, Any] = {name: tuple(found[name]) for name in ("seeds", "check_seeds", "overrides")}
-    goal: dict[str, Any] = {**found["goal"], "outcome": Outcome(**found["goal"]["outcome"])}
+    goal: dict[str, Any] = {**found["goal"], "outcome": Outcome(**known_fields(Outcome, found["goal"]["outcome"]))}
     objects: dict[str, Any] = {
-        "files": tuple(CopiedFile(**file) for file in found["files"]),
+        "files": tuple(CopiedFile(**known_fields(CopiedFile, file)) for file in found["files"]),
         "searches": tuple(_search(of) for of in found["searches"]),
-        "goal": Goal(**goal),
+        "goal": Goal(**known_fields(Goal, goal)),
     }
-    return Tuning(**{**found, **tuples, **objects})
+    untold: dict[str, Any] = {"robots": UNTOLD_ROBOTS}
+    return Tuning(**{**untold, **known_fields(Tuning, found), **tuples, **objects})
 
 
 def _search(found: dict[str, Any]) -> Search:
     tuples: dict[str, Any] = {name: tuple(found[name]) for name in ("choices", "overrides")}
-    return Search(**{**found, **tuples})
+    return Search(**known_fields(Search, {**found, **tuples}))
