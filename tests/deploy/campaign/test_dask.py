@@ -134,6 +134,22 @@ def test_a_worker_that_is_killed_in_the_middle_costs_no_run(tmp_path, reference)
     same(tmp_path / "c", reference)
 
 
+@pytest.mark.slow  # dask waits five seconds at least
+def test_a_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, reference, monkeypatch):
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL", "5s")  # in place of five minutes
+    with cluster(tmp_path, 1) as there:
+
+        def freeze_it():
+            there.add_worker()
+            there.workers[0].suspend()
+
+        watcher = Watcher(freeze_it)
+        done = sweep(reference / "two.toml", out=tmp_path / "c", on=there.on, watcher=watcher, **{**ASKED, "pack": 1})
+        assert done.is_over
+        assert len(workers_of(tmp_path / "c")) == 2
+    same(tmp_path / "c", reference)
+
+
 def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
     tmp_path, reference, monkeypatch, capsys, caplog
 ):
