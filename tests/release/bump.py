@@ -44,7 +44,7 @@ def _check(version: str, project: str, changelog: str) -> None:
         raise SystemExit(f"{version}: expected a version after {before}, such as 0.2.0") from None
     if changelog.count(UNRELEASED) != 1:
         raise SystemExit("CHANGELOG.md: expected one section [Unreleased]")
-    if not changelog.split(UNRELEASED)[1].split("\n## ")[0].strip():
+    if not changelog.split(UNRELEASED)[1].split("\n## ", maxsplit=1)[0].strip():
         raise SystemExit("CHANGELOG.md: expected something in the section [Unreleased]")
 
 
