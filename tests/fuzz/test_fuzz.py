@@ -1,4 +1,4 @@
-"""Each door, fuzzed for a moment: whatever comes is taken or refused by name. `python -m tests.fuzz` goes on from here."""
+"""Each door, fuzzed for a moment: whatever comes is taken or refused by name. `python -m tests.fuzz` goes further."""
 
 from pathlib import Path
 

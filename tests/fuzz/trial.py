@@ -45,7 +45,9 @@ def tried(target: Target, case: Any) -> tuple[str, str]:
         became = refusal_name(error)
     except TooSlow:
         return "finding", f"over {target.limit_s:g} s of processor time\n{_last_lines()}"
-    except Exception as error:  # noqa: BLE001 - that is what is looked for
+    except (KeyboardInterrupt, MemoryError):
+        raise
+    except BaseException as error:  # noqa: BLE001 - that is what is looked for; a panic of native code is no Exception
         return "finding", f"{type(error).__name__}: {str(error)[:SHOWN]}\n{_last_lines()}"
     grown_mb = _peak_mb() - peak_mb
     if grown_mb > MOST_MB:

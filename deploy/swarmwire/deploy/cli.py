@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
+from swarmwire.comms.wire.ending import end_now
 from swarmwire.deploy.commands.certs.group import certs_app
 from swarmwire.deploy.commands.check import check_command
 from swarmwire.deploy.commands.compare import compare_command
@@ -108,6 +109,15 @@ def main() -> None:
         if told is None:
             raise
         sys.exit(_fail(told, FAILED))
+
+
+def program() -> None:
+    """The process `swarmwire`."""
+    try:
+        main()
+    except SystemExit as ended:
+        end_now(ended.code if isinstance(ended.code, int) else 0 if ended.code is None else FAILED)
+        raise
 
 
 def _with_factor(arguments: list[str]) -> list[str]:

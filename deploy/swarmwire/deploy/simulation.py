@@ -212,19 +212,19 @@ class Simulation:
             raise RuntimeError("a simulation runs once; make another one")
         keep_memory()
         rows, realtime = self.static.arenas * self.static.robots, self._pace.factor if self._pace else None
-        self._origin = self._record.begin(
-            self.scenario,
-            self.code,
-            self.static.seeds,
-            ticks=self.ticks,
-            runners=self.runners,
-            realtime=realtime,
-            quantum_s=self._recorded_quantum_s,
-            gateways=self._behind.kinds,
-            metrics=self.metrics,
-        )
         with ExitStack() as stack:
             stack.push(self._record.failed_to_start)
+            self._origin = self._record.begin(
+                self.scenario,
+                self.code,
+                self.static.seeds,
+                ticks=self.ticks,
+                runners=self.runners,
+                realtime=realtime,
+                quantum_s=self._recorded_quantum_s,
+                gateways=self._behind.kinds,
+                metrics=self.metrics,
+            )
             if self._pace:  # before anything answers, and the pace begins
                 world = self._new_world(None, self.static.seeds)
                 rehearse(world, new_air(self.scenario, world, self._traces), self.metrics.metrics)
