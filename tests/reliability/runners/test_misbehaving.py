@@ -94,13 +94,16 @@ def test_half_an_answer_and_no_more_is_a_lost_runner(honest: tuple[Result, Playe
 
 
 def test_in_real_time_the_same_is_counted_and_the_world_keeps_its_pace() -> None:
-    expected = sum((Counter(prank.counts) for prank in BESIDE), Counter[str]())
-    result = Played(one_after_the_other(BESIDE), TICKS).run(realtime=5.0)
-    found = Counter({name: result.counts.get(name, 0) for name in expected})
-    assert (result.ended, result.ticks) == ("duration", TICKS)
-    assert not found - expected
-    assert found["malformed_frames"] > 0
+    """However many of its turns the runner comes to: on a busy machine the world does not wait for it."""
+    left = list(BESIDE)
+    result = Played(lambda turn: left.pop(0).says(turn) if left else [turn.honest], 10 * TICKS).run(realtime=50.0)
+    said = sum((Counter(prank.counts) for prank in BESIDE[: len(BESIDE) - len(left)]), Counter[str]())
+    found = Counter({name: result.counts.get(name, 0) for name in said})
+    assert (result.ended, result.ticks) == ("duration", 10 * TICKS)
     assert found["wrong_tick_frames"] > 0
+    # Where the world was ahead, an answer to the next tick was one, and the honest one came too late.
+    del found["wrong_tick_frames"]
+    assert not found - said
 
 
 def test_who_says_that_its_agent_failed_ends_the_run_with_its_words() -> None:
