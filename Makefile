@@ -45,6 +45,11 @@ pictures: sync ## draw the pictures under docs/ anew; needs a Vulkan driver
 bench: sync ## measure; ONLY=name for one of them, ENGINE=pymunk for the figures of that engine
 	$(RUN) python -m benchmarks $(if $(ENGINE),--engine $(ENGINE)) $(ONLY)
 
+.PHONY: soak
+soak: sync ## fuzz every door at length, then random faults, then an hour of a hundred processes
+	$(RUN) python -m tests.fuzz
+	$(RUN) python -m tests.soak
+
 .PHONY: sync
 sync: # the locked packages, exactly
 	@.ci/sync

@@ -12,7 +12,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign import execution, sweeping
+from swarmwire.deploy.campaign import dask_executor, execution, sweeping
 from swarmwire.deploy.campaign.campaign import read_campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
 from swarmwire.deploy.campaign.cluster_failed import ClusterFailed
@@ -156,6 +156,28 @@ def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
         patched.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
         assert resume(folder).is_over
     same(folder, reference)
+
+
+def test_a_scheduler_that_is_frozen_is_given_up_in_a_line(tmp_path, reference, two_threads, monkeypatch):
+    monkeypatch.setattr(dask_executor, "LOOK_S", 0.1)
+    monkeypatch.setattr(dask_executor, "MUTE_LOOKS", 3)
+    long, freeze = ["duration_s=100000", "robots.pair.params.share=0.0"], two_threads.scheduler.suspend
+    monkeypatch.setattr(sweeping, "execute", first_calls(freeze))
+    try:
+        with pytest.raises(ClusterFailed, match="the scheduler does not answer; what is done stays: --resume"):
+            sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", on=two_threads.on, workers=1, overrides=long)
+    finally:
+        two_threads.scheduler.resume()
+
+
+def first_calls(act):
+    """`execute`, with an act before it."""
+
+    def execute_after(*given):
+        act()
+        return execution.execute(*given)
+
+    return execute_after
 
 
 def test_without_workers_or_with_one_of_another_version_nothing_begins(tmp_path, reference):

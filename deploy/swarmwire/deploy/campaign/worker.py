@@ -25,7 +25,7 @@ def main(arguments: list[str]) -> None:
     Thread(target=_listen, args=(given, tasks), daemon=True).start()
     send(results, {"ready": name})
     while True:
-        send(results, result_message(run_piece(tasks.get(), name)))
+        send(results, result_message(run_piece(tasks.get(), name, lambda: send(results, {"alive": name}))))
 
 
 def _listen(given: BinaryIO, tasks: SimpleQueue[Task]) -> None:
