@@ -26,7 +26,7 @@ class RunFolders(FolderTarget):
     """What a run left: its tables, and what is needed to run it again."""
 
     name = "run-folder"
-    quick = 80
+    quick = 40
     limit_s = 20.0
 
     def make(self, folder: Path) -> None:
