@@ -41,6 +41,11 @@ pictures: sync ## draw the pictures under docs/ anew; needs a Vulkan driver
 bench: sync ## measure; ONLY=name for one of them, ENGINE=pymunk for the figures of that engine
 	$(RUN) python -m benchmarks $(if $(ENGINE),--engine $(ENGINE)) $(ONLY)
 
+.PHONY: mutants
+mutants: ## change the code in small ways, one by one: do tests notice? ONLY=module for one
+	@.ci/sync --group mutants
+	$(RUN) python -m tests.mutants $(ONLY)
+
 .PHONY: sync
 sync: # the locked packages, exactly
 	@.ci/sync
