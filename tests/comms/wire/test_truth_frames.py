@@ -144,8 +144,10 @@ def test_movable_obstacles_come_over_with_their_poses():
         decode_scene(frames.decode(encode_scene(uneven)))
 
 
-def test_a_scene_comes_over_whole():
-    assert decode_scene(frames.decode(encode_scene(SCENE))) == SCENE
+def test_a_scene_comes_over_whole_and_is_of_no_tick():
+    frame = frames.decode(encode_scene(SCENE))
+    assert decode_scene(frame) == SCENE
+    assert (frame.kind, frame.tick) == ("scene", -1)
 
 
 def quiet(**given: Any) -> Glimpse:
@@ -183,7 +185,7 @@ def one_finished(**given: int) -> Finished:
         ("leds", {"leds": np.zeros((ROWS, SCENE.static.most_leds + 1), np.int64)}),
         ("leds", {"leds": np.full((ROWS, SCENE.static.most_leds), -1)}),
         ("leds", {"leds": np.full((ROWS, SCENE.static.most_leds), 0x1000000)}),
-        ("state", {"state": np.full(ROWS, 1)}),
+        ("state: expected 0 to 0$", {"state": np.full(ROWS, 1)}),
         ("state", {"state": np.full(ROWS, -1)}),
         ("states", {"states": ()}),
         ("states", {"states": ("", "x" * 65)}),
@@ -194,6 +196,7 @@ def one_finished(**given: int) -> Finished:
         ("tally/fates", {"tally": Tally(*np.zeros((3, ARENAS), np.int64), np.zeros((ARENAS, 3), np.int64))}),
         ("finished.fate", {"finished": one_finished(fate=len(Fate))}),
         ("finished.receiver", {"finished": one_finished(receiver=-2)}),
+        ("finished.to: expected -1 to 2$", {"finished": one_finished(to=-2)}),
         ("finished.sender", {"finished": one_finished(sender=ROBOTS)}),
         ("events", {"events": (Happened(0, 0.0, "kill", False, np.ones(2, np.bool_)),)}),
         ("groups of this run", {"senses": {"c": GroupSenses(np.zeros(1, np.int64), {})}}),
@@ -257,6 +260,8 @@ def test_a_frame_is_not_taken_for_one_of_another_kind():
         ({"robot_names": ("a-0", "a-1")}, "groups"),
         ({"robot_names": ("a-0", "a-1", 7)}, r"robot_names\[2\]"),
         ({"groups": (Group("b", load_body("footbot"), 1, 3),)}, "groups"),
+        ({"groups": (Group("a", load_body("epuck"), 0, 0), Group("b", load_body("epuck"), 0, 3))}, "groups"),
+        ({"name": ("two", "groups")}, "scene.static.name"),
         ({"groups": (Group("b", load_body("footbot"), 0, 3, act_every_ticks=0),)}, "act_every_ticks"),
     ],
 )
@@ -291,6 +296,16 @@ def test_a_scene_with_a_body_that_is_none_is_refused(change, fault):
 def test_a_scene_has_just_its_parts(parts):
     with pytest.raises(BadFrame, match="scene: expected a map of static, series, selected"):
         decode_scene(frames.decode(frames.encode("scene", -1, {}, {"version": OBSERVED_VERSION, "scene": parts})))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"lights": ()}, {"floor": replace(FLOOR, image=packed_image(np.zeros((1, 3), np.uint8)))}, {"floor": None}],
+    ids=["no lights", "a row of grey", "no floor"],
+)
+def test_a_scene_of_little_comes_over_whole(change):
+    scene = replace(SCENE, static=replace(STATIC, **change))
+    assert decode_scene(frames.decode(encode_scene(scene))) == scene
 
 
 @given(st.recursive(st.none() | st.booleans() | st.integers(0, 9) | st.text(max_size=3), st.lists))
