@@ -39,7 +39,7 @@ class FolderTarget(Target):
         self.place = self.folder / "sound"
         self.make(self.place)
         files = sorted(path for path in self.place.rglob("*") if path.is_file() and self.is_read(path))
-        return [Changed(str(path.relative_to(self.place)), path.read_bytes(), True) for path in files]
+        return [Changed(str(path.relative_to(self.place)), path.read_bytes(), not at) for at, path in enumerate(files)]
 
     @abstractmethod
     def make(self, folder: Path) -> None:

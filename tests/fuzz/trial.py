@@ -4,7 +4,7 @@ import resource
 import signal
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
@@ -56,7 +56,7 @@ def tried(target: Target, case: Any) -> tuple[str, str]:
 
 
 @contextmanager
-def _limited(limit_s: float) -> Iterator[None]:
+def _limited(limit_s: float) -> Generator[None]:
     """TooSlow after so much time of this process's processors: another process's load does not count."""
     signal.signal(signal.SIGPROF, _too_slow)
     signal.setitimer(signal.ITIMER_PROF, limit_s)

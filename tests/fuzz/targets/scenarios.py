@@ -33,7 +33,7 @@ class Text(NamedTuple):
 
     place: str
     data: bytes
-    deep: bool = True  # whether it goes on to what costs most
+    deep: bool = False  # whether it goes on to what costs most
 
 
 class TomlTarget(Target):
@@ -91,7 +91,7 @@ class Scenarios(TomlTarget):
     """Scenarios, up to the first tick of small ones."""
 
     name = "scenarios"
-    quick = 300
+    quick = 150
     limit_s = 20.0  # the first may be compiled for
     inner = ("robots", "radio", "events", "arena")
     refusals = (BadInput, AgentFailed)
@@ -148,7 +148,7 @@ class Campaigns(TomlTarget):
     """Campaign files, up to the plan of small ones."""
 
     name = "campaigns"
-    quick = 150
+    quick = 60
     limit_s = 20.0
 
     def is_one(self, path: Path, table: dict[str, Any]) -> bool:

@@ -74,6 +74,7 @@ class Certificates(FolderTarget):
         (folder / "certs.json").write_text(json.dumps(content))
         for name in ("ca.pem", "world.pem", "world.key"):
             (folder / name).write_text("a certificate, or a key\n")
+            (folder / name).chmod(0o600)
 
     def is_read(self, path: Path) -> bool:
         """The register."""

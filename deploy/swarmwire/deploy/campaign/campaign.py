@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.campaign.columns import Columns
 from swarmwire.deploy.campaign.design import Point
 from swarmwire.deploy.record.known_fields import known_fields
@@ -73,13 +74,13 @@ def read_campaign(folder: Path) -> Campaign:
     """The campaign of this folder; BadInput if there is none."""
     path = folder / ABOUT
     try:
-        found: Any = json.loads(path.read_text(encoding="utf-8"))
+        found: Any = from_json(path.read_text(encoding="utf-8"))
     except OSError as error:
         expected = f"expected a campaign's folder, with its {ABOUT}: {error.strerror}"
         if (folder / SCENARIO_FOLDER).is_dir():
             expected += "; if it was ended before its first run, take the folder away and begin again"
         raise BadInput(str(folder), "", expected) from None
-    except (ValueError, RecursionError):  # no JSON, or no UTF-8
+    except ValueError:  # no JSON, or no UTF-8
         found = None
     try:
         refuse_other_format(found, CAMPAIGN_FORMAT, path)

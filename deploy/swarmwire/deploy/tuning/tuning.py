@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, UNTOLD_ROBOTS
 from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.scenario_copy import CopiedFile
@@ -61,7 +62,7 @@ def read_tuning(folder: Path) -> Tuning:
     """The tuning of this folder; BadInput if there is none."""
     path = folder / ABOUT
     try:
-        found: Any = json.loads(path.read_text(encoding="utf-8"))
+        found: Any = from_json(path.read_text(encoding="utf-8"))
     except OSError as error:
         expected = f"expected a tuning's folder, with its {ABOUT}: {error.strerror}"
         raise BadInput(str(folder), "", expected) from None

@@ -1,6 +1,5 @@
 """What is known of a run that is to be reported: its folder read, as far as there is something."""
 
-import json
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_json
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.damage import damage
 from swarmwire.metrics.drawing.film import Film, film_of
@@ -101,7 +101,7 @@ def read_run(path: Path) -> RunData:
 
 def _started(path: Path) -> dict[str, Any]:
     try:
-        found: object = json.loads((path / RUN_JSON).read_text(encoding="utf-8"))
+        found: object = from_json((path / RUN_JSON).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
     return cast("dict[str, Any]", found) if isinstance(found, dict) else {}

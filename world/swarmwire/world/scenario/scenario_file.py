@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.format_number import check_format
+from swarmwire.comms.parsing import from_toml
 from swarmwire.world.scenario.checks import check
 from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.overrides import put
@@ -63,7 +64,7 @@ def _checked(given: dict[str, Any], where: str) -> Scenario:
 
 def _read(path: Path | str, where: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+        return from_toml(Path(path).read_text(encoding="utf-8-sig"))
     except tomllib.TOMLDecodeError as error:
         raise BadInput(where, "", f"expected TOML: {error}") from None
     except UnicodeDecodeError:
