@@ -5,6 +5,7 @@ import numpy as np
 from swarmwire.comms.air.intake import Intake
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import NOWHERE
 from tests.comms.air.runs import at, make_air, packets, run
 
 PAIR = at((0, 0), (1, 0))
@@ -34,3 +35,8 @@ def test_packets_are_taken_in_by_sender_in_whatever_order_the_crew_tells_them():
         assert (taken.sequence - before).tolist() == [0, 1, 0, 1]
         assert [taken.payloads.row(k)[0] for k in range(4)] == [1, 3, 0, 2]
         assert (taken.intended.tolist(), taken.epoch.tolist()) == ([1] * 4, [7] * 4)
+
+
+def test_packets_to_nobody_take_a_number_and_go_nowhere():
+    taken = Intake(2).take(np.zeros(2, np.int64), packets([0, 0, 1], to=[NOWHERE, 1, NOWHERE]), np.ones(2, np.int64), 0)
+    assert (taken.sender.tolist(), taken.sequence.tolist()) == ([0], [1])

@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.signal.frame_fate import lone_deliveries
+from swarmwire.comms.air.signal.losses import passing_share
 from swarmwire.comms.air.signal.rules import rules_of
 from swarmwire.comms.draws import derive_key, purpose, uniform
 from swarmwire.comms.fates import Fate
@@ -88,3 +90,9 @@ def test_attempts_and_their_answers_have_draws_of_their_own(method: str):
     order = np.lexsort((on_air(told, "arena"), on_air(told, "sequence")))
     assert on_air(told, "fate")[order].tolist() == [fate for fate, _ in expected]
     assert len(set(expected)) == 3
+
+
+def test_losses_of_all_kinds_leave_a_share():
+    radio = replace(with_access("none"), loss=0.25)
+    assert passing_share(radio) == 0.75
+    assert passing_share(replace(radio, bursts=Bursts(0.1, 0.2))) == 0.75 * (1.0 - Bursts(0.1, 0.2).loss) < 0.75
