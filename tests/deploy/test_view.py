@@ -92,6 +92,18 @@ def test_a_recording_is_shown_on_loopback_until_ctrl_c(folder, tmp_path, killed)
         assert not [child for child in children if child.is_running()]
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux ends a child with its parent")
+def test_a_view_that_is_killed_leaves_no_viewer_and_no_file(folder, tmp_path, monkeypatch):
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    with viewing(folder / "run.rrd") as (process, _):
+        [viewer] = family(process)
+        process.kill()
+        until(lambda: not viewer.is_running() or viewer.status() == psutil.STATUS_ZOMBIE)
+    assert not list(temporary.iterdir())
+
+
 def test_the_page_is_at_the_port_asked_for_and_the_view_ends_with_its_viewer(folder):
     port = free_port()
     with viewing(folder / "run.rrd", "--port", port) as (process, page):

@@ -22,7 +22,7 @@ from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.limits import LIMITS
 from swarmwire.comms.wire.offer import Offer, OfferedGroup
 from swarmwire.comms.wire.tick_frames import encode_actions, encode_tick
-from swarmwire.world.crews import lockstep, realtime, roster, runner_crew, runner_inbox
+from swarmwire.world.crews import admission, lockstep, realtime, roster, runner_crew, runner_inbox
 from tests.agent.hosts import assignment, group
 from tests.docs.pages import ROOT
 
@@ -115,7 +115,7 @@ def test_limits() -> None:
 def test_what_is_counted() -> None:
     sources = "".join(
         inspect.getsource(module)
-        for module in (unpacking, frames, tick_frames, roster, lockstep, realtime, runner_inbox)
+        for module in (unpacking, frames, tick_frames, admission, roster, lockstep, realtime, runner_inbox)
     )
     faults = {f"{fault}_frames" for fault in re.findall(r'BadFrame\("(\w+)"', sources)}
     named = set(re.findall(r'"((?:bad|refused)_join|flooded_frames)"', sources))

@@ -15,7 +15,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.deploy import RunFolder
 from swarmwire.deploy.record.origin import read_origin
 from swarmwire.metrics.record.formats import RUN_FORMAT, SUMMARY_FORMAT, TABLES_FORMAT
-from swarmwire.world.crews.lockstep import Refused
+from swarmwire.world.crews.admission import Refused
 from swarmwire.world.scenario.scenario_file import scenario_from
 from tests.stable.recorded_run import recorded
 from tests.world.locksteps import two

@@ -19,6 +19,7 @@ from swarmwire.agent.on_robot.settings import RobotSettings
 from swarmwire.agent.on_robot.settings_file import NO_FILE, read_settings
 from swarmwire.comms.clock import DatedClock, ScaledClock, WallClock
 from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.wire.ending import end_now
 
 ABOUT = """Runs a swarmwire agent on a robot: the same code that was tested in emulation.
 
@@ -206,5 +207,12 @@ def _clock(settings: RobotSettings, wall: WallClock) -> DatedClock:
     return wall if settings.pace == 1.0 else ScaledClock(wall, settings.pace)
 
 
+def program() -> NoReturn:
+    """The process `swarmwire-agent`."""
+    code = main()
+    end_now(code)
+    sys.exit(code)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    program()

@@ -14,7 +14,7 @@ from swarmwire.agent.sensing import Sensing
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.leds import rgb_of
-from swarmwire.comms.messages import DICT_TAG, Message, decode_dict, encode_dict, message_class
+from swarmwire.comms.messages import DICT_TAG, Message, dict_in, encode_dict, message_class
 from swarmwire.comms.outcomes import SendResult
 
 M = TypeVar("M", bound=Message)
@@ -108,13 +108,17 @@ class RadioPort:
     @overload
     def heard(self, kind: type[dict[str, Any]]) -> "list[Packet[dict[str, Any]]]": ...
     def heard(self, kind: type[Any]) -> "list[Packet[Any]]":
-        """The packets of a message class (or `dict`) heard since the robot's last step, by time."""
+        """The packets of a message class (or `dict`) heard since the robot's last step, by time.
+
+        What bears the tag and is none, as a runner of others may send it, is left out.
+        """
         lists = self._turn.heard_lists
         if kind is not dict:
             mine = lists.payloads(self._row, message_class(kind).tag, kind.size_bytes)
             return [Packet(lists, at, kind.decode_at(data, start)) for at, data, start, _ in mine]
         mine = lists.payloads(self._row, DICT_TAG)
-        return [Packet(lists, at, decode_dict(data[start:end])) for at, data, start, end in mine]
+        found = ((at, dict_in(data[start:end])) for at, data, start, end in mine)
+        return [Packet(lists, at, message) for at, message in found if message is not None]
 
     def send(self, message: Message | dict[str, Any], to: int | None = None) -> int:
         """Send to all who hear it, or to the robot with index `to` in the arena; returns the packet's id."""

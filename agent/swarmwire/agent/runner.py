@@ -18,7 +18,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-import msgpack
+import numpy as np
 import zenoh
 from zenoh.handlers import Callback
 
@@ -33,11 +33,11 @@ from swarmwire.comms.senses import Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.closing import closed_after
 from swarmwire.comms.wire.in_time_frames import decode_packets, encode_sent
-from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.join_request import JoinRequest, versioned
 from swarmwire.comms.wire.keys import Keys, run_of
 from swarmwire.comms.wire.memory_frames import decode_memory
 from swarmwire.comms.wire.sessions import open_runner
-from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
+from swarmwire.comms.wire.tick_frames import check_rows, decode_tick, encode_actions
 
 JOIN_S = 30.0
 FAREWELL_S = 3.0
@@ -153,7 +153,7 @@ class Inbox:
 
         What comes between ticks goes to `receive`; where no newer tick is there, its tick and time are given out.
         """
-        gives, groups = assignment.gives or (), {group.name for group in assignment.groups}
+        gives, rows = assignment.gives or (), {group.name: group.rows for group in assignment.groups}
         every = math.gcd(*(group.act_every_ticks for group in assignment.groups))
         newest: tuple[int, Senses, Heard, Outcomes] | None = None
         between: tuple[int, int] | None = None
@@ -188,7 +188,8 @@ class Inbox:
                     continue
                 if frame.kind != "tick" or frame.tick <= tick or frame.tick % every:
                     raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
-                told = decode_tick(frame, gives, groups)
+                told = decode_tick(frame, gives, rows.keys())
+                check_rows(told[0], told[1], rows)
             except BadFrame:
                 self.dropped += 1
                 continue
@@ -213,19 +214,35 @@ def _join(session: zenoh.Session, keys: Keys, runner: str, asked: Asked) -> tupl
     for reply in session.get(keys.join(runner), payload=asked.request.encode(), timeout=JOIN_S):
         if reply.ok is None:
             raise RunnerLost(runner, NO_ROBOTS, reply.err.payload.to_string() if reply.err else "no answer to join")
-        given = msgpack.unpackb(reply.ok.payload.to_bytes())
-        assignment = Assignment.from_mapping(given).with_agents(asked.agents)
-        return assignment, None if given["memory"] is None else _memory(assignment, given["memory"])
+        try:
+            assignment, kept = given_robots(reply.ok.payload.to_bytes(), asked.agents)
+        except BadFrame as fault:
+            raise RunnerLost(runner, NO_ROBOTS, f"the world's answer to join is none: {fault}") from fault
+        return assignment, kept
     raise RunnerLost(runner, NO_ROBOTS, "the world did not answer to join")
 
 
+def given_robots(data: bytes, agents: Mapping[str, str] = PLAIN.agents) -> tuple[Assignment, Memory | None]:
+    """The robots that a world gives, and what is remembered of them; BadFrame if these bytes tell none.
+
+    `agents` are the runner's own, by group.
+    """
+    given = versioned(data, frames.MOST_BYTES)
+    assignment, memory = Assignment.from_mapping(given).with_agents(agents), given.get("memory")
+    if memory is not None and not isinstance(memory, bytes):
+        raise BadFrame("malformed", "memory: expected a frame")
+    return assignment, None if memory is None else _memory(assignment, memory)
+
+
 def _memory(assignment: Assignment, data: bytes) -> Memory:
-    """What earlier agents remembered; nothing of those whose memory does not fit these agents."""
+    """What earlier agents remembered; nothing of those whose memory does not fit these agents, or that is of others."""
     frame = frames.decode(data)
     memory: Memory = {}
     for group in assignment.groups:
         with suppress(BadFrame, NoAgent):  # without memory it starts afresh, and a missing agent is told of later
-            memory |= decode_memory(frame, {group.name: layout_of(load_agent(group.agent))})
+            found = decode_memory(frame, {group.name: layout_of(load_agent(group.agent))})
+            if all(np.isin(of.rows, group.rows).all() for of in found.values()):
+                memory |= found
     return memory
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import IntArray, KeyArray
 from swarmwire.comms.bodies.body import Body, body_from_mapping
+from swarmwire.comms.errors import BadFrame, BadInput
 
 
 @dataclass(frozen=True)
@@ -68,21 +69,51 @@ class Assignment:
 
     @classmethod
     def from_mapping(cls, given: dict[str, Any]) -> "Assignment":
-        """The assignment that `as_mapping` described."""
-        groups = tuple(
-            GroupAssignment(
-                name=group["name"],
-                agent=group["agent"],
-                params=group["params"],
-                body=body_from_mapping(group["body"], where="assignment"),
-                rows=np.array(group["rows"], np.int64),
-                robot_names=tuple(group["robot_names"]),
-                keys=np.array(group["keys"], np.uint64),
-                act_every_ticks=group["act_every_ticks"],
-            )
-            for group in given["groups"]
-        )
-        return cls(groups, given["rate_hz"], None if given["gives"] is None else tuple(given["gives"]))
+        """The assignment that `as_mapping` described; BadFrame if this is none."""
+        try:
+            gives = None if given["gives"] is None else _texts(given["gives"])
+            return cls(tuple(_group(group) for group in given["groups"]), _whole(given["rate_hz"]), gives)
+        except (KeyError, TypeError, ValueError, OverflowError, BadInput) as error:
+            raise BadFrame("malformed", f"expected robots: {' '.join(str(error).split())}") from error
+
+
+def _group(given: Any) -> GroupAssignment:
+    group = GroupAssignment(
+        name=_text(given["name"]),
+        agent=_text(given["agent"]),
+        params=given["params"],
+        body=body_from_mapping(given["body"], where="assignment"),
+        rows=np.array(given["rows"], np.int64),
+        robot_names=_texts(given["robot_names"]),
+        keys=np.array(given["keys"], np.uint64),
+        act_every_ticks=_whole(given["act_every_ticks"]),
+    )
+    rows = group.rows
+    if rows.ndim != 1 or not len(rows) or rows[0] < 0 or (rows[1:] <= rows[:-1]).any():
+        raise ValueError("rows: robots by rising numbers")
+    if len(group.robot_names) != len(rows) or group.keys.shape != rows.shape:
+        raise ValueError("robot_names, keys: one for each of the rows")
+    if type(given["params"]) is not dict or not all(type(name) is str for name in group.params):
+        raise ValueError("params: a map")
+    return group
+
+
+def _text(value: object) -> str:
+    if type(value) is not str:
+        raise TypeError(f"a text, not {str(value)[:40]}")
+    return value
+
+
+def _texts(values: Any) -> tuple[str, ...]:
+    if type(values) is not list:
+        raise TypeError(f"a list of texts, not {str(values)[:40]}")
+    return tuple(_text(value) for value in cast("list[object]", values))
+
+
+def _whole(value: object) -> int:
+    if type(value) is not int or not 0 < value < 2**31:
+        raise ValueError(f"a whole number above 0, not {str(value)[:40]}")
+    return value
 
 
 def params_of(params: dict[str, Any], index: IntArray) -> dict[str, Any]:

@@ -23,6 +23,8 @@ SwarmwireError
 └── BadFrame            a message on the wire breaks the protocol: counted and dropped, never fatal
 """
 
+MOST_LETTERS = 1500  # of a line about bad input
+
 
 class SwarmwireError(Exception):
     """Every error that swarmwire raises on purpose."""
@@ -36,7 +38,14 @@ class BadInput(SwarmwireError):
 
     def __init__(self, where: str, key: str, expected: str) -> None:
         self.where, self.key, self.expected = where, key, expected
-        super().__init__(": ".join(part for part in (where, key, expected) if part))
+        super().__init__(_one_line(": ".join(part for part in (where, key, expected) if part)))
+
+
+def _one_line(text: str) -> str:
+    """The text as a terminal can show it: keys and values in it may be anything, and of any length."""
+    if not text.isprintable():
+        text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]}…"
 
 
 class AgentFailed(SwarmwireError):

@@ -18,6 +18,7 @@ from typing import Annotated, Any, ClassVar, Self, cast, dataclass_transform, ge
 
 import msgpack
 import numpy as np
+from msgpack.exceptions import UnpackException
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import TAG_BYTES, Payloads
@@ -181,17 +182,29 @@ def decode_rows(kind: type[Message], payloads: Payloads, index: IntArray) -> dic
 def encode_dict(message: dict[str, Any]) -> bytes:
     """A dict on air: the dict tag, then msgpack; TypeError unless its keys are texts and msgpack takes its values."""
     payload = DICT_TAG.to_bytes(TAG_BYTES, "little") + msgpack.packb(message)
-    if not all(type(key) is str for key in decode_dict(payload)):  # what cannot be read is refused here, not there
+    read = dict_in(payload)  # what cannot be read is refused here, not there
+    if read is None or not all(type(key) is str for key in read):
         raise TypeError(f"a dict message has texts as keys, got {list(message)}")
     return payload
 
 
 def decode_dict(payload: bytes) -> dict[str, Any]:
     """The dict of these bytes; ValueError if they hold none."""
-    message: object = msgpack.unpackb(payload[TAG_BYTES:], strict_map_key=False)
+    try:
+        message: object = msgpack.unpackb(payload[TAG_BYTES:], strict_map_key=False)
+    except (TypeError, UnpackException) as error:  # a list as a key; all else is a ValueError
+        raise ValueError(f"the payload holds no dict: {error}") from error
     if not isinstance(message, dict):
         raise ValueError("the payload holds no dict")
     return cast("dict[str, Any]", message)
+
+
+def dict_in(payload: bytes) -> dict[str, Any] | None:
+    """The dict of these bytes; None if they hold none: its sender may be anybody's code."""
+    try:
+        return decode_dict(payload)
+    except ValueError:
+        return None
 
 
 def _wrong_fields(kind: type[Message], given: Iterable[str]) -> TypeError:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
+from swarmwire.comms.wire.ending import end_now
 from swarmwire.deploy.commands.certs.group import certs_app
 from swarmwire.deploy.commands.check import check_command
 from swarmwire.deploy.commands.compare import compare_command
@@ -35,6 +36,7 @@ from swarmwire.deploy.commands.ui import ui_command
 from swarmwire.deploy.commands.verify import verify_command
 from swarmwire.deploy.commands.view import view_command
 from swarmwire.deploy.commands.world import world_command
+from swarmwire.deploy.refusals import refusal
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
 
@@ -102,6 +104,20 @@ def main() -> None:
         sys.exit(_fail(error, INTERRUPTED))
     except SwarmwireError as error:
         sys.exit(_fail(error, FAILED))
+    except (OSError, MemoryError, RuntimeError) as error:
+        told = refusal(error)
+        if told is None:
+            raise
+        sys.exit(_fail(told, FAILED))
+
+
+def program() -> None:
+    """The process `swarmwire`."""
+    try:
+        main()
+    except SystemExit as ended:
+        end_now(ended.code if isinstance(ended.code, int) else 0 if ended.code is None else FAILED)
+        raise
 
 
 def _with_factor(arguments: list[str]) -> list[str]:
@@ -125,6 +141,6 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _fail(error: SwarmwireError, code: int) -> int:
+def _fail(error: SwarmwireError | str, code: int) -> int:
     typer.echo(f"error: {error}".rstrip(), err=True)
     return code

@@ -4,9 +4,10 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.protocols import Observer
 from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.deploy.refusals import refusal
 
 
 class Guarded:
@@ -16,6 +17,11 @@ class Guarded:
         """`say` is told what failed."""
         self._observer, self._say = observer, say
         self.failed = False
+
+    @property
+    def before_agents(self) -> bool:
+        """Whether it begins before the run's agents are there, where they come from elsewhere."""
+        return getattr(self._observer, "before_agents", False)
 
     @property
     def name(self) -> str:
@@ -38,9 +44,16 @@ class Guarded:
     def _try(self, call: Callable[[], Any]) -> Any:
         try:
             return call()
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - the run goes on; rich exits where nobody reads its output
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001 - the run goes on; rich exits where nobody reads, polars panics
             if not self.failed:
-                why = f" {error}" if isinstance(error, BadInput) else f"\n{traceback.format_exc()}"
-                self._say(f"observer {self.name} failed:{why}")
+                self._say(f"observer {self.name} failed:{_why(error)}")
             self.failed = True
             return None
+
+
+def _why(error: BaseException) -> str:
+    """In a line, if it is no fault of the observer's; else with the traceback."""
+    told = str(error) if isinstance(error, SwarmwireError) else refusal(error)
+    return f" {told}; the run goes on without it" if told else f"\n{traceback.format_exc()}"

@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Any, Self, cast
 
 from swarmwire.comms.clock import PreciseClock, WallClock, to_s
-from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.comms.errors import BadInput, Interrupted, RecordFailed
 from swarmwire.comms.in_time import TimedCrew
 from swarmwire.comms.protocols import Crew, Judge, Observer
 from swarmwire.comms.truth import Static, Truth
@@ -45,6 +45,7 @@ from swarmwire.deploy.record.run_record import RunRecord
 from swarmwire.deploy.rehearsal import rehearse
 from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
+from swarmwire.deploy.system_limits import need_open_files, need_threads
 from swarmwire.deploy.too_large import TooLarge
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.judge import Judge as StopJudge
@@ -134,6 +135,9 @@ class Simulation:
         if listening is not None:
             listening.check(self.scenario, robots)
             self.runners = 1  # at least; how many there were is told once it is over
+        need_open_files(self.runners if listening is None else robots)
+        if self.runners or out is not None:  # else there is no network, and no table
+            need_threads(self.runners)
         self._behind.check(self.static.arenas, self.runners)
         what = record or Recording()
         what.check(self.static)
@@ -155,7 +159,7 @@ class Simulation:
         )
         self._status = self._new_status()
         self._observers: list[Guarded] = []
-        self._observed = bool(listening and listening.observed)
+        self._listens, self._observed = listening is not None, bool(listening and listening.observed)
         for observer in (TooLarge(self._record.say), *self._recorders(what, listening), *observers):
             self.watch(observer)
         self._losses: list[Loss] = []
@@ -171,6 +175,11 @@ class Simulation:
     def folder(self) -> Path | None:
         """The run folder, if any."""
         return self._record.folder
+
+    @property
+    def record_failed(self) -> RecordFailed | None:
+        """Why the run folder has no summary, once the run is over; None if it has one, or there is no folder."""
+        return self._record.failed
 
     @property
     def static(self) -> Static:
@@ -203,19 +212,19 @@ class Simulation:
             raise RuntimeError("a simulation runs once; make another one")
         keep_memory()
         rows, realtime = self.static.arenas * self.static.robots, self._pace.factor if self._pace else None
-        self._origin = self._record.begin(
-            self.scenario,
-            self.code,
-            self.static.seeds,
-            ticks=self.ticks,
-            runners=self.runners,
-            realtime=realtime,
-            quantum_s=self._recorded_quantum_s,
-            gateways=self._behind.kinds,
-            metrics=self.metrics,
-        )
         with ExitStack() as stack:
             stack.push(self._record.failed_to_start)
+            self._origin = self._record.begin(
+                self.scenario,
+                self.code,
+                self.static.seeds,
+                ticks=self.ticks,
+                runners=self.runners,
+                realtime=realtime,
+                quantum_s=self._recorded_quantum_s,
+                gateways=self._behind.kinds,
+                metrics=self.metrics,
+            )
             if self._pace:  # before anything answers, and the pace begins
                 world = self._new_world(None, self.static.seeds)
                 rehearse(world, new_air(self.scenario, world, self._traces), self.metrics.metrics)
@@ -243,10 +252,17 @@ class Simulation:
                 self.interventions,
                 cast("TimedCrew", acting) if self._recorded_quantum_s is not None else None,
             )
-            crew.start()
+            early = self._early if self._listens else []
+            with ExitStack() as unless_begun:
+                for observer in early:
+                    observer.begin(self.static)
+                    unless_begun.callback(observer.end, None)
+                crew.start()
+                unless_begun.pop_all()
             self._not_its_own = bool((health := self.health()) and (health.robots_free or health.foreign))
             for observer in self._watching:
-                observer.begin(self.static)
+                if observer not in early:
+                    observer.begin(self.static)
             self._exit = stack.pop_all()
         self._started_ns = self._clock.now_ns()
         return self
@@ -307,6 +323,11 @@ class Simulation:
     def health(self) -> RunnerHealth | None:
         """How the runners are doing; None if there are none."""
         return self._crew.health() if isinstance(self._crew, RemoteCrew | RealTimeCrew) else None
+
+    @property
+    def _early(self) -> list[Observer]:
+        """Those through which people see and control a run that still waits for its agents."""
+        return [of for of in self._watching if getattr(of, "before_agents", False)]
 
     def _new_world(self, seed: int | None, seeds: Sequence[int] | None) -> World:
         """Every arena at its start, with the senses that its agents need."""

@@ -117,3 +117,9 @@ def test_an_answer_of_another_version_or_none_is_a_bad_frame():
     for data in (b"", msgpack.packb({"v": 2}), msgpack.packb({"v": 0}), msgpack.packb([1])):
         with pytest.raises(BadFrame):
             decode_reply(data)
+
+
+@pytest.mark.parametrize("value", [2**64, {"n": -(2**63) - 1}, {"x": object()}, {"x": "\ud800"}], ids=repr)
+def test_what_no_message_can_carry_is_refused_by_whoever_asks(value):
+    with pytest.raises(BadInput, match="event: expected texts, numbers of at most 64 bits, lists and tables alone"):
+        encode_request(Request("event", value))

@@ -19,7 +19,7 @@ from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
 from swarmwire.comms.values import Values
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_actions, encode_tick
+from swarmwire.comms.wire.tick_frames import check_rows, decode_actions, decode_tick, encode_actions, encode_tick
 
 I64 = np.iinfo(np.int64)
 ROWS = np.array([4, 6, 9])
@@ -50,7 +50,7 @@ def heard_(draw: st.DrawFn, gives: tuple[str, ...]) -> Heard:
     k = draw(st.integers(0, 5))
     which = draw(st.lists(st.integers(0, len(payloads) - 1), min_size=k, max_size=k))
     given_columns = {name: draw(floats(k)) for name in gives}
-    columns = [draw(ints(k)) for _ in range(4)]
+    columns = [np.sort(draw(ints(k))), *(draw(ints(k)) for _ in range(3))]
     return Heard(*columns, given_columns, np.array(which, np.int64), Payloads.of(payloads))
 
 
@@ -78,6 +78,67 @@ def test_senses_and_heard_packets_come_over_whole(senses: Senses, gives: tuple[s
     assert all(same(got.given[name], heard.given[name]) for name in gives)
     of, got_of = heard.payloads, got.payloads
     assert [got_of.row(int(p)) for p in got.payload] == [of.row(int(p)) for p in heard.payload]
+
+
+TWO_HEARD = Heard(
+    *(np.array(column, np.int64) for column in ([4, 5], [0, 1], [0, 0], [9, 9])),
+    {"range_m": np.array([0.5, 1.5])},
+    np.array([0, 1], np.int64),
+    Payloads.of([b"abc", b"de"]),
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("heard/numbers", np.array([[5, 4], [0, 1], [0, 0], [9, 9], [0, 1]])),  # receivers fall
+        ("heard/numbers", np.array([[4, 5], [0, 1], [0, 0], [9, 9], [0, 2]])),  # there is no third payload
+        ("heard/numbers", np.array([[4, 5], [0, 1], [0, 0], [9, 9], [-1, 1]])),
+        ("heard/numbers", np.array([[4, 5], [0, 1], [0, 0], [9, 9]])),
+        ("heard/numbers", np.zeros((5, 2))),
+        ("heard/given", np.array([[0.5]])),
+        ("heard/given", np.zeros((1, 2), np.int64)),
+        ("heard/data", np.zeros(4, np.uint8)),
+        ("heard/offset", np.array([0, 6, 5])),
+        ("heard/offset", np.array([1, 3, 5])),
+        ("heard/offset", np.array([0.0, 3.0, 5.0])),
+        ("heard/offset", np.array([], np.int64)),
+    ],
+    ids=repr,
+)
+def test_packets_that_contradict_themselves_are_refused(name: str, wrong: Any) -> None:
+    frame = frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, TWO_HEARD, NO_OUTCOMES))
+    decode_tick(frame, ("range_m",), {"flock"})
+    with pytest.raises(BadFrame) as caught:
+        decode_tick(replace(frame, arrays={**frame.arrays, name: wrong}), ("range_m",), {"flock"})
+    assert caught.value.fault == "malformed"
+
+
+@pytest.mark.parametrize(
+    ("rows", "column", "receiver"),
+    [
+        ([5, 4], [0.0, 0.0], [4, 5]),
+        ([4, 4], [0.0, 0.0], [4, 5]),
+        ([4, 7], [0.0, 0.0], [4, 5]),
+        ([4, 5], [0.0], [4, 5]),
+        ([4, 5], [0, 0], [4, 5]),
+        ([4, 5], [0.0, 0.0], [-1, 5]),
+        ([4, 5], [0.0, 0.0], [4, 2**62]),  # a table of all robots up to this one would not fit anywhere
+    ],
+)
+def test_senses_and_packets_of_other_robots_are_refused(
+    rows: list[int], column: list[float], receiver: list[int]
+) -> None:
+    known = {"flock": np.array([4, 5, 6])}
+
+    def checked(rows: list[int], column: list[float], receiver: list[int]) -> None:
+        senses = {"flock": GroupSenses(np.array(rows), {"compass.heading_rad": np.array(column)})}
+        check_rows(senses, replace(TWO_HEARD, receiver=np.array(receiver)), known)
+
+    checked([4, 5], [0.0, 0.0], [4, 5])
+    with pytest.raises(BadFrame) as caught:
+        checked(rows, column, receiver)
+    assert caught.value.fault == "malformed"
 
 
 def telling(outcomes: Outcomes) -> frames.Frame:

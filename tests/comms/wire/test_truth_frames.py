@@ -16,9 +16,9 @@ from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch, packed_imag
 from swarmwire.comms.glimpse import Glimpse, Scene, Series
 from swarmwire.comms.one_arena import static_of, truth_of
 from swarmwire.comms.senses import GroupSenses
-from swarmwire.comms.truth import Finished, Group, Happened, Light, Obstacle, Static, Tally, Truth
+from swarmwire.comms.truth import Departed, Finished, Group, Happened, Light, Obstacle, Static, Tally, Truth
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.scene_frames import decode_scene, encode_scene
+from swarmwire.comms.wire.scene_frames import OBSERVED_VERSION, decode_scene, encode_scene
 from swarmwire.comms.wire.truth_frames import decode_truth, encode_truth
 
 ROBOTS, ARENAS = 3, 2
@@ -225,6 +225,16 @@ def test_a_sense_may_have_a_name_of_several_parts():
     assert equal(decode_truth(frames.decode(encode_truth(glimpse)), SCENE), glimpse)
 
 
+@pytest.mark.parametrize(
+    "events", [None, {}, "kill", [3], [[0, 0.0, "kill", False, ""]], [[0, 0.0, "kill", 1, "", False]]]
+)
+def test_events_of_another_form_are_refused(events):
+    frame = frames.decode(encode_truth(quiet()))
+    arrays = {**frame.arrays, "events": np.zeros((1, ROWS), np.bool_)}
+    with pytest.raises(BadFrame, match="events: expected"):
+        decode_truth(replace(frame, arrays=arrays, values={**frame.values, "events": events}), SCENE)
+
+
 @pytest.mark.parametrize("change", [{"serial": -1}, {"ticks": 0}, {"values": np.zeros((3, ARENAS))}])
 def test_numbers_about_a_glimpse_are_checked(change):
     with pytest.raises(BadFrame):
@@ -276,6 +286,34 @@ def test_a_scene_that_contradicts_itself_is_refused(change, fault):
         decode_scene(frames.decode(encode_scene(replace(SCENE, static=replace(STATIC, **change)))))
 
 
+def test_a_scene_is_of_one_of_its_robots():
+    with pytest.raises(BadFrame, match="selected: expected one of the robots"):
+        decode_scene(frames.decode(encode_scene(replace(SCENE, selected="c-0"))))
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (None, "body: expected a body"),
+        ({"radius_m": -1.0}, "radius_m"),
+        ({"wings": 2}, "wings"),
+    ],
+)
+def test_a_scene_with_a_body_that_is_none_is_refused(change, fault):
+    frame = frames.decode(encode_scene(SCENE))
+    scene: Any = frame.values["scene"]
+    group = scene["static"]["groups"][0]
+    group["body"] = None if change is None else {**group["body"], **change}
+    with pytest.raises(BadFrame, match=fault):
+        decode_scene(frame)
+
+
+@pytest.mark.parametrize("parts", [{}, {"series": []}, {"static": None, "series": [], "selected": "", "more": 1}])
+def test_a_scene_has_just_its_parts(parts):
+    with pytest.raises(BadFrame, match="scene: expected a map of static, series, selected"):
+        decode_scene(frames.decode(frames.encode("scene", -1, {}, {"version": OBSERVED_VERSION, "scene": parts})))
+
+
 @pytest.mark.parametrize(
     ("place", "value", "fault"),
     [
@@ -315,7 +353,7 @@ def test_a_scene_of_little_comes_over_whole(change):
 def test_a_scene_of_anything_else_is_refused(junk):
     for scene in (junk, {"static": junk, "series": []}):
         with pytest.raises(BadFrame):
-            decode_scene(frames.decode(frames.encode("scene", -1, {}, {"version": 1, "scene": scene})))
+            decode_scene(frames.decode(frames.encode("scene", -1, {}, {"version": OBSERVED_VERSION, "scene": scene})))
 
 
 @given(glimpses(), st.integers(0, ARENAS - 1))
@@ -337,3 +375,18 @@ def test_one_arena_of_several_is_a_run_of_its_own(glimpse, arena):
         assert len(one.finished.fate) == np.count_nonzero(truth.finished.arena == arena)
     seen = [row for group in one.senses.values() for row in (group.rows + rows.start).tolist()]
     assert seen == [row for g in truth.senses.values() for row in g.rows.tolist() if row // ROBOTS == arena]
+
+
+def test_packets_that_left_are_of_one_arena():
+    numbers = {of.name: np.arange(4) for of in fields(Departed)}
+    left = Departed(**{**numbers, "arena": np.array([1, 0, 1, 0])})
+    one = truth_of(replace(quiet().truth, departed=left), STATIC, 1).departed
+    assert one is not None
+    assert one.sender.tolist() == [0, 2]
+    assert one.arena.tolist() == [0, 0]
+
+
+def test_the_only_arena_is_the_whole_run():
+    alone = static_of(STATIC, 0)
+    truth = truth_of(quiet().truth, STATIC, 0)
+    assert truth_of(truth, alone, 0) is truth

@@ -8,7 +8,8 @@ from swarmwire.comms.errors import AgentFailed, RunnerLost
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import encode_actions
-from swarmwire.world.crews.lockstep import Lockstep, Refused
+from swarmwire.world.crews.admission import Refused
+from swarmwire.world.crews.lockstep import Lockstep
 from tests.agent.hosts import GIVES, plain
 from tests.world.locksteps import actions, all_senses, joined, ready, request, state, two, two_parts
 

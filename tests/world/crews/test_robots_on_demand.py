@@ -11,10 +11,11 @@ from swarmwire.comms.errors import AgentFailed, Interrupted, RunnerLost
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.limits import Limits
 from swarmwire.comms.wire.offer import Offer, OfferedGroup
+from swarmwire.world.crews.admission import Refused
 from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.lockstep import Lockstep
 from swarmwire.world.crews.realtime import RealTime
-from swarmwire.world.crews.roster import OnLoss, Refused
+from swarmwire.world.crews.roster import OnLoss
 from swarmwire.world.crews.terms import Terms
 from tests.world.locksteps import FLOCK, SCOUTS, parts, ready, request, state
 
@@ -238,8 +239,8 @@ def test_an_offer_comes_over_whole(roster: Made) -> None:
 def test_the_owner_of_each_robot_follows_the_cuts(roster: Made) -> None:
     asked(roster, "a", names=["flock-4", "lone-3"])
     asked(roster, "b", robots=2)
-    owners = np.array([roster._slots[place].runner or "" for place in roster._owner])
-    assert owners.tolist() == ["b", "b", "", "a", "a", "", "", ""]
+    players = np.array([slot.runner or "" for slot in roster._slots])
+    assert players[roster._slots.owner].tolist() == ["b", "b", "", "a", "a", "", "", ""]
 
 
 @pytest.mark.parametrize("asked", [{"names": ["\x1b[2J\n"]}, {"names": ["x" * 10**5]}, {"version": "\x1b" * 10**5}])

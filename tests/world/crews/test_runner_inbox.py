@@ -65,20 +65,31 @@ def test_few_that_are_large_are_bounded_too_and_one_is_always_taken(session):
     assert inbox.counts() == {"flooded_frames": 2}
 
 
-def test_requests_of_one_runner_are_counted_over_the_whole_run(session):
-    inbox = RunnerInbox(Limits(requests=2))
+def asked_by(session: zenoh.Session, limits: Limits, *runners: str) -> RunnerInbox:
+    """An inbox that each of them asked in turn, and that answered those that it let in."""
+    inbox = RunnerInbox(limits)
     asked = session.declare_queryable("join/*", zenoh.handlers.Callback(inbox.put, indirect=False))
-    for _ in range(2):
-        for runner in ("a", "a", "b"):
-            replies = session.get(f"join/{runner}", timeout=10.0)
-            if inbox.qsize():
-                query = inbox.get(timeout=10.0)
-                assert isinstance(query, zenoh.Query)
-                with query:
-                    query.reply(query.key_expr, b"yes")
-            list(replies)
+    for runner in runners:
+        replies = session.get(f"join/{runner}", timeout=10.0)
+        if inbox.qsize():
+            query = inbox.get(timeout=10.0)
+            assert isinstance(query, zenoh.Query)
+            with query:
+                query.reply(query.key_expr, b"yes")
+        list(replies)
     asked.undeclare()
+    return inbox
+
+
+def test_requests_of_one_runner_are_counted_over_the_whole_run(session):
+    inbox = asked_by(session, Limits(requests=2), *("a", "a", "b") * 2)
     assert inbox.counts() == {"flooded_requests": 2}
+
+
+def test_who_asks_under_ever_new_names_is_remembered_so_often_and_no_more(session):
+    inbox = asked_by(session, Limits(names=2), "a", "b", "c", "d", "a")
+    assert inbox.counts() == {"flooded_requests": 2}
+    assert len(inbox._asked) == len(inbox._beyond) == 2
 
 
 def test_nothing_in_time_is_an_empty_queue():

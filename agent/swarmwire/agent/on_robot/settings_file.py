@@ -8,6 +8,7 @@ from typing import Any
 from swarmwire.agent.on_robot.settings import FORMAT, RobotSettings
 from swarmwire.comms.bodies.tables import built, mapping_of
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.comms.loading import resolve
 from swarmwire.comms.one_of import one_of
 from swarmwire.comms.plain_values import check_plain
@@ -40,8 +41,7 @@ def _put(table: dict[str, Any], key: str, value: Any, where: str) -> None:
 
 
 def _settings(table: dict[str, Any], where: str, beside: Path) -> RobotSettings:
-    if table.get("format", FORMAT) != FORMAT:
-        raise BadInput(where, "format", f"expected {FORMAT}, which this version reads; got {table['format']!r}")
+    check_format(table.get("format", FORMAT), FORMAT, where)
     table = dict(table)
     for key in ("params", "driver"):
         if key in table:

@@ -8,8 +8,6 @@ from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import GroupSenses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.air_terms import AirTerms
-from swarmwire.comms.wire.checked import checked_array
-from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_tick
 
 GROUP = "air"  # stands for the robot's own group, of which nothing is told
@@ -26,26 +24,9 @@ def decode_air(data: bytes, terms: AirTerms) -> tuple[int, Heard, Outcomes]:
     frame = frames.decode(data, MOST_BYTES)
     if frame.kind != "tick" or frame.tick < 0:
         raise BadFrame("malformed", f"{frame.kind} {frame.tick}, expected a tick")
-    if "heard/numbers" in frame.arrays:
-        _check(frame, terms)
     _, heard, outcomes = decode_tick(frame, terms.gives, {GROUP})
+    if ((heard.sender < 0) | (heard.sender >= len(terms.robots)) | (heard.receiver != terms.row)).any():
+        raise BadFrame("malformed", "heard/numbers: expected packets of the robot's arena to itself")
     if (outcomes.row != terms.row).any():
         raise BadFrame("malformed", "outcomes: expected the robot's own")
     return frame.tick, heard, outcomes
-
-
-def _check(frame: Frame, terms: AirTerms) -> None:
-    """BadFrame unless the tables of what was heard fit one another."""
-    numbers = checked_array(frame, "heard/numbers", "<i8", (5, None))
-    receiver, sender, _, _, payload = numbers
-    checked_array(frame, "heard/given", "<f8", (len(terms.gives), numbers.shape[1]))
-    data, offset = (
-        checked_array(frame, "heard/data", "|u1", (None,)),
-        checked_array(frame, "heard/offset", "<i8", (None,)),
-    )
-    if not len(offset) or offset[0] != 0 or offset[-1] != len(data) or (offset[1:] < offset[:-1]).any():
-        raise BadFrame("malformed", "heard/offset: expected rising offsets into heard/data")
-    if ((payload < 0) | (payload >= len(offset) - 1)).any():
-        raise BadFrame("malformed", "heard/numbers: expected payloads that are there")
-    if ((sender < 0) | (sender >= len(terms.robots)) | (receiver != terms.row)).any():
-        raise BadFrame("malformed", "heard/numbers: expected packets of the robot's arena to itself")

@@ -14,6 +14,8 @@ from contextlib import contextmanager
 
 import zenoh
 
+from swarmwire.comms.wire.ending import left_closing
+
 PATIENCE_S = 1.0  # whoever is well answers in milliseconds
 
 log = logging.getLogger(__name__)
@@ -24,6 +26,8 @@ def close_session(session: zenoh.Session, patience_s: float = PATIENCE_S) -> Non
     closing = threading.Thread(target=_close, args=(session,), name="closing", daemon=True)
     closing.start()
     closing.join(patience_s)
+    if closing.is_alive():
+        left_closing(closing)
 
 
 @contextmanager

@@ -37,9 +37,13 @@ class Request:
 
 
 def encode_request(request: Request) -> bytes:
-    """The bytes of a request."""
+    """The bytes of a request; BadInput if its value cannot be told."""
     key = DOES[request.do]
-    return msgpack.packb({"v": CONTROL_VERSION, "do": request.do} | ({key: request.value} if key else {}))
+    try:
+        return msgpack.packb({"v": CONTROL_VERSION, "do": request.do} | ({key: request.value} if key else {}))
+    except (OverflowError, TypeError, ValueError) as error:
+        expected = f"expected texts, numbers of at most 64 bits, lists and tables alone: {error}"
+        raise BadInput("", key or "", expected) from None
 
 
 def decode_request(data: bytes) -> Request:

@@ -25,6 +25,8 @@ class Limits:
             costs the world some 5 us, so that one that never stops would take a core.
         requests: to be told of the run, or to join it, that one runner may make in one run. A runner that comes back
             each minute for a day stays below.
+        names: of runners that ask for something or send too much, in one run, each of which is remembered; beyond them
+            nobody new is heard. A runner that comes back under a new name each minute stays below for a month.
         join_s: from the assignment of robots to the word that their agents are built.
     """
 
@@ -35,6 +37,7 @@ class Limits:
     waiting_bytes: int = 2 * MOST_BYTES
     flood: int = 5000
     requests: int = 2000
+    names: int = 50_000
     join_s: float = 60.0
 
 

@@ -51,7 +51,10 @@ def told_arrays(heard: Heard, outcomes: Outcomes) -> dict[str, AnyArray]:
 
 
 def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[Senses, Heard, Outcomes]:
-    """What `encode_tick` was given; BadFrame if there are no senses, or some of groups that are not known."""
+    """What `encode_tick` was given; BadFrame if there are no senses, or some of groups that are not known.
+
+    Whose senses they are, and who heard, `check_rows` tells.
+    """
     groups: dict[str, dict[str, AnyArray]] = {}
     try:
         for key, array in frame.arrays.items():
@@ -66,18 +69,45 @@ def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[
         raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error
 
 
+def check_rows(senses: Senses, heard: Heard, rows: Mapping[str, IntArray]) -> None:
+    """BadFrame unless senses are numbers of robots among the `rows` of their group, and who heard may be one of all."""
+    for name, group in senses.items():
+        own, n = group.rows, len(group.rows)
+        if own.ndim != 1 or own.dtype != np.int64 or np.count_nonzero(own[1:] <= own[:-1]) or not _own(own, rows[name]):
+            raise BadFrame("malformed", f"sense/{name}/rows: expected robots of this runner, rising")
+        for sense, column in group.fields.items():
+            if column.dtype != np.float64 or len(column) != n:
+                raise BadFrame("malformed", f"sense/{name}/{sense}: expected numbers of {n} robots")
+    if len(heard):
+        last = max(int(of[-1]) for of in rows.values() if len(of))
+        if heard.receiver[0] < 0 or heard.receiver[-1] > last:
+            raise BadFrame("malformed", "heard/numbers: expected packets of robots of this runner")
+
+
 def told_of(frame: Frame, gives: tuple[str, ...]) -> tuple[Heard, Outcomes]:
     """What `told_arrays` was given; KeyError, ValueError or BadFrame if the frame does not hold it."""
-    return _heard(frame.arrays, gives), _outcomes(frame)
+    return _heard(frame, gives), _outcomes(frame)
 
 
-def _heard(arrays: Mapping[str, AnyArray], gives: tuple[str, ...]) -> Heard:
-    if "heard/numbers" not in arrays:
+def _heard(frame: Frame, gives: tuple[str, ...]) -> Heard:
+    if "heard/numbers" not in frame.arrays:
         return Heard.none(gives)
-    receiver, sender, sequence, heard_at_ns, payload = arrays["heard/numbers"]
-    given = dict(zip(gives, arrays["heard/given"], strict=True))
-    payloads = Payloads(arrays["heard/data"], arrays["heard/offset"])
-    return Heard(receiver, sender, sequence, heard_at_ns, given, payload, payloads)
+    numbers = checked_array(frame, "heard/numbers", "<i8", (5, None))
+    receiver, sender, sequence, heard_at_ns, payload = numbers
+    given = dict(zip(gives, checked_array(frame, "heard/given", "<f8", (len(gives), numbers.shape[1])), strict=True))
+    data, offset = checked_array(frame, "heard/data", "|u1", (None,)), frame.arrays["heard/offset"]
+    if not _rises_to(offset, len(data)):
+        raise BadFrame("malformed", "heard/offset: expected rising offsets into heard/data")
+    if np.count_nonzero((payload < 0) | (payload >= len(offset) - 1)) or np.count_nonzero(receiver[1:] < receiver[:-1]):
+        raise BadFrame("malformed", "heard/numbers: expected payloads that are there, by rising receivers")
+    return Heard(receiver, sender, sequence, heard_at_ns, given, payload, Payloads(data, offset))
+
+
+def _rises_to(offset: AnyArray, end: int) -> bool:
+    """Whether these are offsets of payloads of so many bytes."""
+    if offset.dtype != np.int64 or offset.ndim != 1 or not len(offset) or offset[0] != 0 or offset[-1] != end:
+        return False
+    return not np.count_nonzero(offset[1:] < offset[:-1])
 
 
 def _outcomes(frame: Frame) -> Outcomes:
@@ -153,7 +183,7 @@ def sent_of(frame: Frame, rows: IntArray) -> Sent:
     sender, to = checked_array(frame, "sent", "<i8", (2, None))
     offset = checked_array(frame, "sent/offset", "<i8", (len(sender) + 1,))
     data = checked_array(frame, "sent/data", "|u1", (None,))
-    if offset[0] != 0 or offset[-1] != len(data) or np.count_nonzero(offset[1:] < offset[:-1]):
+    if not _rises_to(offset, len(data)):
         raise BadFrame("malformed", "sent/offset: expected rising offsets into sent/data")
     if not _own(sender, rows) or np.count_nonzero(to < BROADCAST):
         raise BadFrame("malformed", "sent: expected packets of the runner's own robots")

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.comms.one_of import one_of
 from swarmwire.comms.toml_file import read_toml
 from swarmwire.deploy.campaign.design import GRID
@@ -40,6 +41,8 @@ def campaign_table(path: Path) -> dict[str, Any] | None:
     table = read_toml(path)
     if "scenario" not in table and any(key in table for key in OF_SCENARIOS):
         return None
+    if "format" in table:  # first of all: another version may have other keys
+        check_format(table["format"], FORMAT, where)
     for key, value in table.items():
         if key not in TYPES:
             raise BadInput(where, key, f"unknown key; expected {one_of(TYPES, key)}")
@@ -48,8 +51,6 @@ def campaign_table(path: Path) -> dict[str, Any] | None:
     for key in ("format", "scenario"):
         if key not in table:
             raise BadInput(where, key, f"is missing: expected {WORDS[TYPES[key][0]]}")
-    if table["format"] != FORMAT:
-        raise BadInput(where, "format", f"expected {FORMAT}, got {table['format']}")
     return table
 
 

@@ -24,6 +24,7 @@ from swarmwire.deploy.record.modules import module_digests
 
 PATIENCE_S = 60.0  # without a single worker, at the begin and in between
 LOOK_S = 5.0  # between looks who is there, beside what dask tells
+MUTE_LOOKS = 12  # in a row without an answer: with the time between them two minutes, and the scheduler is given up
 AHEAD = 2  # tasks in hand for each thread: one that it is at, one that it can begin at once
 
 
@@ -54,6 +55,7 @@ class DaskExecutor:
         self._fault: ClusterFailed | None = None
         self._supplied, self._looked_ns = False, self._clock.now_ns()
         self._without_ns: int | None = None  # since when there has been no worker
+        self._mute_looks = 0
         with ExitStack() as stack:
             stack.enter_context(hushed())
             self._client = connected(on, connect_s)
@@ -118,8 +120,11 @@ class DaskExecutor:
 
     def _look_around(self) -> None:
         if self._clock.now_ns() - self._looked_ns > to_ns(LOOK_S):
-            with suppress(TimeoutError, OSError):  # then `_check` will know, or the next look
+            try:
                 self._client.sync(self._crew.look_around, callback_timeout=LOOK_S)
+                self._mute_looks = 0
+            except (TimeoutError, OSError):  # then `_check` will know, or the next look
+                self._mute_looks += 1
             self._looked_ns = self._clock.now_ns()
 
     def _check(self) -> None:
@@ -129,6 +134,8 @@ class DaskExecutor:
             raise ClusterFailed(f"{self._on}: {self._fault}; {go_on}")
         if self._client.status != "running":
             raise ClusterFailed(f"{self._on}: the scheduler has gone away; {go_on}")
+        if self._mute_looks >= MUTE_LOOKS:
+            raise ClusterFailed(f"{self._on}: the scheduler does not answer; {go_on}")
         now_ns = self._clock.now_ns()
         if self._crew.threads:
             self._without_ns = None

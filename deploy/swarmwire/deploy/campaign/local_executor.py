@@ -42,6 +42,9 @@ class LocalExecutor:
         """What is over; WorkersFailed if workers cannot start here."""
         found: list[Finished] = []
         for worker, message in self._news(timeout_s):
+            if worker not in self._workers:
+                continue  # the last words of one that was ended
+            worker.silence.broken()
             task = worker.task
             if message is None:
                 self._workers.remove(worker)
@@ -50,10 +53,10 @@ class LocalExecutor:
                     found += self._lost(worker, task)
             elif "ready" in message:
                 worker.ready, self._false_starts = True, 0
-            elif task is not None:
+            elif "rows" in message and task is not None:
                 worker.task = None
                 found.append(Finished(task, result_from(message)))
-        return found
+        return found + self._standing_still()
 
     def close(self) -> None:
         """End them all."""
@@ -66,6 +69,14 @@ class LocalExecutor:
         self._started += 1
         self._workers.append(worker)
         return worker
+
+    def _standing_still(self) -> list[Finished]:
+        """The tasks of workers that said nothing for too long, which are ended."""
+        still = [worker for worker in self._workers if worker.task is not None and worker.silence.too_long()]
+        for worker in still:
+            self._workers.remove(worker)
+            worker.end()
+        return [Finished(worker.task, None, str(worker.silence)) for worker in still if worker.task is not None]
 
     def _lost(self, worker: WorkerProcess, task: Task) -> list[Finished]:
         """The task of a worker that died of it; one that never began goes to another worker."""

@@ -6,6 +6,7 @@ its row does not depend on the packing.
 
 import platform
 import shutil
+from collections.abc import Callable
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -14,22 +15,27 @@ from re import sub
 from swarmwire.comms.clock import WallClock, to_s
 from swarmwire.comms.errors import Interrupted
 from swarmwire.deploy.campaign.row import failed_row, row_of
+from swarmwire.deploy.campaign.silence import Alive
 from swarmwire.deploy.campaign.task import PieceResult, Row, Task
 from swarmwire.deploy.campaign.tick_series import TickSeries
 from swarmwire.deploy.record import machine
 from swarmwire.deploy.simulation import Simulation
 
 
-def run_piece(task: Task, worker: str = "") -> PieceResult:
-    """Run a task to its end in this process; `worker` names who does, for the rows.
+def nobody_listens() -> None:
+    """For whoever does not watch over its workers."""
+
+
+def run_piece(task: Task, worker: str = "", alive: Callable[[], None] = nobody_listens) -> PieceResult:
+    """Run a task to its end in this process; `worker` names who does, for the rows; `alive` is called now and then.
 
     There is a row for each run of the task: what a run raises is in its row. (Interrupted alone is passed on.)
     """
     clock = WallClock()
     began_ns = clock.now_ns()
-    rows, series, error = _tried(task)
+    rows, series, error = _tried(task, alive)
     if error and len(task.runs) > 1:
-        return _joined([run_piece(half, worker) for half in task.halves()])
+        return _joined([run_piece(half, worker, alive) for half in task.halves()])
     if error:
         rows = [failed_row(error)]
     wall_s = to_s(clock.now_ns() - began_ns) / len(rows)
@@ -46,26 +52,29 @@ def lost_piece(task: Task, why: str) -> PieceResult:
     return PieceResult(({"run": run, "point": task.point, "seed": seed, **failed_row(why)},))
 
 
-def _tried(task: Task) -> tuple[list[Row], bytes | None, str]:
+def _tried(task: Task, alive: Callable[[], None]) -> tuple[list[Row], bytes | None, str]:
     """As `_together`, and what was raised instead, or ""."""
     try:
-        return *_together(task), ""
+        return *_together(task, alive), ""
     except Interrupted:
         raise
     except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever it is, it is told in the row of whose it is
         return [], None, _told(error, task)
 
 
-def _together(task: Task) -> tuple[list[Row], bytes | None]:
+def _together(task: Task, alive: Callable[[], None]) -> tuple[list[Row], bytes | None]:
     """A row for each run, and their series, of all seeds in one world."""
     out = None if task.record_to is None else _beside(Path(task.record_to))
     simulation = Simulation(task.scenario, seeds=task.seeds, overrides=task.overrides, out=out)
+    simulation.watch(Alive(alive))
     series = TickSeries(simulation.metrics)
     if task.series:
         simulation.watch(series)
     try:
         with simulation:
             simulation.run()
+        if simulation.record_failed:
+            raise simulation.record_failed
     finally:
         if out is not None and out.exists():
             out.replace(str(task.record_to))

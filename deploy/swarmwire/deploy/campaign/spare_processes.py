@@ -33,7 +33,7 @@ class SpareProcess:
         self.end = self._process.end
 
     def done(self, task: Task, wanted: Callable[[], bool]) -> Message:
-        """What came of a task: a result as a mapping, or {"lost": how the process died}.
+        """What came of a task: a result as a mapping, or {"lost": how the process died, or that it stands still}.
 
         CannotStart if it died before it could begin, NotWanted as soon as `wanted()` is not.
         """
@@ -42,13 +42,16 @@ class SpareProcess:
             try:
                 message = self._heard.get(timeout=LOOK_S)
             except Empty:
+                if self._process.silence.too_long():
+                    return {"lost": str(self._process.silence)}
                 continue
+            self._process.silence.broken()
             if message is None:
                 how = self._process.how_it_died()
                 if not self._process.ready:
                     raise CannotStart(f"no worker process can start: {how} before it was ready")
                 return {"lost": how}
-            if "ready" not in message:
+            if "rows" in message:
                 return message
             self._process.ready = True
         raise NotWanted("the task is not wanted any more")

@@ -10,6 +10,7 @@ from threading import Thread
 from typing import Any, BinaryIO, cast
 
 from swarmwire.deploy.campaign.messages import receive, send
+from swarmwire.deploy.campaign.silence import Silence
 from swarmwire.deploy.campaign.task import Task, task_message
 
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS"), "1")
@@ -22,6 +23,7 @@ class WorkerProcess:
     Attributes:
         ready: whether it has said that it can work.
         task: what it is at.
+        silence: since it was given that, or said anything.
     """
 
     def __init__(self, name: str, said: "Callable[[WorkerProcess, Message | None], None]") -> None:
@@ -38,6 +40,7 @@ class WorkerProcess:
         self._said = said
         self.ready = False
         self.task: Task | None = None
+        self.silence = Silence()
         self._thread = Thread(target=self._hear, name=f"campaign {name}", daemon=True)
         self._thread.start()
 
@@ -49,6 +52,7 @@ class WorkerProcess:
     def give(self, task: Task) -> None:
         """Let it work on a task; if it is dead already, its thread will say so."""
         self.task = task
+        self.silence.broken()
         with suppress(BrokenPipeError):
             send(self._tasks, task_message(task))
 

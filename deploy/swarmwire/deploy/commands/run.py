@@ -157,6 +157,8 @@ def run_shown(
         with leaving_when_hung_up(simulation.interrupt):
             result = finished(simulation)
         print_result(result, simulation.metrics.metrics, console)
+        if simulation.record_failed:
+            raise simulation.record_failed
         _say_where(result, folder, console)
         for beside, name in ((live, "view"), (page, "page")):
             if beside.pid is not None:

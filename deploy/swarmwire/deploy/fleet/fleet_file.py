@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.comms.one_of import one_of
 from swarmwire.comms.toml_file import read_toml
 from swarmwire.comms.wire.network_names import fault_of_name
@@ -19,12 +20,13 @@ DEFAULTS: dict[str, Any] = {"port": 22, "key": "", "python": "python3", "network
 def read_fleet(file: Path) -> Fleet:
     """The fleet of a file; BadInput names the file and the first key that is wrong."""
     where = str(file)
-    table = checked_table(read_toml(file), OF_FLEET, where, "")
+    table = read_toml(file)
+    if "format" in table:  # first of all: another version may have other keys
+        check_format(table["format"], FORMAT, where)
+    checked_table(table, OF_FLEET, where, "")
     for key in ("format", "swarm", "robots"):
         if key not in table:
             raise BadInput(where, key, "is missing")
-    if table["format"] != FORMAT:
-        raise BadInput(where, "format", f"expected {FORMAT}, which this version reads; got {table['format']}")
     fault = fault_of_name(table["swarm"])
     if fault:
         raise BadInput(where, "swarm", fault)

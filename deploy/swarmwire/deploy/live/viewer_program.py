@@ -6,12 +6,13 @@ import sys
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryFile
+from typing import IO
 from urllib.parse import quote
 
 from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.metrics.viewer.program import end, free_port, is_open, program
+from swarmwire.metrics.viewer.program import end, ending_with_this, free_port, is_open, program
 
 START_NS = 30 * NS_PER_S  # how long it may take to listen
 PAUSE_NS = NS_PER_S // 20
@@ -21,7 +22,7 @@ LIVE_MEMORY = "2GB"  # of the live view: then the oldest ticks are dropped
 class Viewer:
     """A viewer that listens on this machine alone."""
 
-    def __init__(self, process: "subprocess.Popen[bytes]", port: int, web_port: int | None, log: Path) -> None:
+    def __init__(self, process: "subprocess.Popen[bytes]", port: int, web_port: int | None, log: IO[bytes]) -> None:
         self.process, self._port, self._web_port, self._log = process, port, web_port, log
 
     @property
@@ -55,7 +56,8 @@ class Viewer:
     @property
     def told(self) -> str:
         """The end of what it printed."""
-        return self._log.read_text(encoding="utf-8", errors="replace")[-2000:].strip()
+        self._log.seek(0)
+        return self._log.read().decode(errors="replace")[-2000:].strip()
 
 
 @contextmanager
@@ -69,12 +71,10 @@ def viewer(clock: Clock, recording: Path | None, web: bool, web_port: int | None
     options += ["--serve-web", "--web-viewer-port", str(page)] if page else ["--hide-welcome-screen"]
     limits = ["--memory-limit", LIVE_MEMORY, "--server-memory-limit", LIVE_MEMORY]
     options += limits if recording is None else [str(recording)]
-    with TemporaryDirectory(prefix="swarmwire-view-") as directory:
-        log = Path(directory, "log")
+    with TemporaryFile() as log:  # without a name: whoever kills this process leaves none behind
         environment = {**os.environ, "RUST_LOG": "warn", "NO_COLOR": "1"}
-        with log.open("wb") as out:
-            # In the group of this process: Ctrl-C reaches both, and whoever kills the group kills both.
-            started = subprocess.Popen([program(), *options], env=environment, stdout=out, stderr=out)
+        command = ending_with_this([str(program()), *options])
+        started = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
         try:
             shown = Viewer(started, port, page, log)
             shown.wait(clock)

@@ -8,7 +8,7 @@ from shutil import rmtree
 from types import TracebackType
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.errors import BadInput, RecordFailed
 from swarmwire.comms.in_time import TimedCrew
 from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.comms.protocols import Crew, Observer
@@ -20,6 +20,7 @@ from swarmwire.deploy.record.new_folder import make_folder
 from swarmwire.deploy.record.origin import Origin, origin_of
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.record.trajectory_log import TrajectoryLog
+from swarmwire.deploy.refusals import refusal
 from swarmwire.deploy.result import Result
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.names import RECORDING, SUMMARY
@@ -36,6 +37,7 @@ class RunRecord:
 
     Attributes:
         folder: the run folder, if any.
+        failed: why there is no summary in it, once the run is over; None if there is, or no folder.
     """
 
     def __init__(self, out: Path | None, clock: WallClock) -> None:
@@ -45,6 +47,7 @@ class RunRecord:
         self._log = RunLog(self.folder, clock) if self.folder else None
         self._recorded: RecordedCrew | None = None
         self._interventions = InterventionsLog(self.folder) if self.folder else None
+        self.failed: RecordFailed | None = None
 
     def observers(
         self,
@@ -94,19 +97,22 @@ class RunRecord:
         gateways: Mapping[str, str],
         metrics: Metrics,
     ) -> Origin:
-        """Put into the folder all that the run is made from; what that is."""
-        origin = origin_of(
-            scenario,
-            code,
-            seeds=seeds,
-            ticks=ticks,
-            runners=runners,
-            realtime=realtime,
-            quantum_s=quantum_s,
-            metrics=metrics.metrics,
-            gateways=gateways,
-            folder=self.folder,
-        )
+        """Put into the folder all that the run is made from; what that is. RecordFailed if the disk refuses."""
+        try:
+            origin = origin_of(
+                scenario,
+                code,
+                seeds=seeds,
+                ticks=ticks,
+                runners=runners,
+                realtime=realtime,
+                quantum_s=quantum_s,
+                metrics=metrics.metrics,
+                gateways=gateways,
+                folder=self.folder,
+            )
+        except OSError as error:
+            raise self._refused(self.folder, error) from error
         what = f"{scenario.name}, seeds {list(seeds)}, {ticks} ticks, {runners} runners"
         self.note(f"swarmwire {version('swarmwire-deploy')}: {what}")
         return origin
@@ -115,10 +121,12 @@ class RunRecord:
         self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
     ) -> None:
         """Say in the log why there was no first tick; there is nothing to sum up. What is refused leaves no folder."""
-        if error is not None:
-            self.note(f"failed to start: {error}")
-        if isinstance(error, BadInput) and self.folder and self._log:
+        if error is None:
+            return
+        self.note(f"failed to start: {error}")
+        if self._log:
             self._log.close()
+        if isinstance(error, BadInput) and self.folder:
             rmtree(self.folder, ignore_errors=True)  # it was new or empty, so all that is in it is of this run
             self.folder = self._log = None
 
@@ -162,9 +170,15 @@ class RunRecord:
             self._log.say(text)
 
     def close(self, result: Result) -> None:
-        """Write the summary, the last of all: where it is, the run is over."""
+        """Write the summary, the last of all: where it is, the run is over. What the disk refuses is in `failed`."""
         self.note(f"ended: {result.ended}, {result.ticks} ticks" + (f": {result.error}" if result.error else ""))
         if self._log:
             self._log.close()
         if self.folder:
-            result.write(self.folder / SUMMARY)
+            try:
+                result.write(self.folder / SUMMARY)
+            except OSError as error:  # the result is there all the same: whoever waited for it is to have it
+                self.failed = self._refused(self.folder / SUMMARY, error)
+
+    def _refused(self, what: Path | None, error: OSError) -> RecordFailed:
+        return RecordFailed(f"{what} cannot be written: {refusal(error) or error}")

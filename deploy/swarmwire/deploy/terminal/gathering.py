@@ -21,7 +21,7 @@ class Gathering:
 
     def __init__(self, robots: tuple[str, ...], start_with: int | None, network: Network, console: Console) -> None:
         self._robots, self._network, self._console = robots, network, console
-        self._wanted = len(robots) if start_with is None else start_with
+        self._start_with = start_with
         self._status: Status | None = None
         if console.is_terminal and not console.is_dumb_terminal and not console.quiet:
             self._status = console.status("")
@@ -61,7 +61,9 @@ class Gathering:
 
     def _tell(self, free: tuple[str, ...]) -> None:
         played = len(self._robots) - len(free)
-        text = f"{played} of {self._wanted} robots have agents"
+        text = f"{played} of {len(self._robots)} robots have agents"
+        if self._start_with is not None:
+            text += f", and the run begins with {self._start_with}"
         if free:
             text += f"; without: {robots_text(list(free))}"
         if self._status is not None:
@@ -71,7 +73,7 @@ class Gathering:
 
     def _proof(self, endpoint: str) -> str:
         if self._network.proves:
-            return " --ca ca.pem --certificate NAME.pem --key NAME.key"
+            return " --certs DIR"
         return "" if is_local(endpoint) else " --insecure"
 
     def _stop(self) -> None:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import cast
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 
 SUMMARY_FORMAT = 1  # of summary.json
 RUN_FORMAT = 1  # of run.json
@@ -16,6 +16,4 @@ def refuse_other_format(written: object, known: int, path: Path) -> None:
     Whether one must be named is up to who reads the rest of the file.
     """
     if isinstance(written, dict):
-        found = cast("dict[str, object]", written).get("format", known)
-        if type(found) is not int or found != known:
-            raise BadInput(str(path), "format", f"expected {known}, got {found!r}: by another version of swarmwire")
+        check_format(cast("dict[str, object]", written).get("format", known), known, str(path))

@@ -8,6 +8,7 @@ from swarmwire.metrics.record.part_files import scan_files
 from swarmwire.metrics.verify.finding import State
 
 Verdict = tuple[State, str] | None  # None: they agree, or there is nothing to compare
+BROKEN_OFF = ("interrupted", "left", "failed")  # ends of runs that may come amid a tick, which no observer sees
 NO_ROWS = ("out_of_range", "in_flight")  # fates that have no row among the packets
 
 
@@ -48,7 +49,7 @@ def packets_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdi
     import polars as pl
 
     recorded: dict[str, Any] = {} if summary is None else summary.get("record", {}).get("packets", {})
-    if summary is None or recorded.get("share") != 1.0 or recorded["dropped"] or summary["ended"] == "interrupted":
+    if summary is None or recorded.get("share") != 1.0 or recorded["dropped"] or summary["ended"] in BROKEN_OFF:
         return None
     counted = scan_files(files).group_by("arena", "fate").agg(pl.col("receivers").sum()).collect()
     found = {(arena, fate): receivers for arena, fate, receivers in counted.iter_rows()}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from swarmwire.comms.fates import FATE_NAMES, Fate
 from swarmwire.metrics.record.part_files import scan_files
-from swarmwire.metrics.verify.agreement import Verdict, per_arena
+from swarmwire.metrics.verify.agreement import BROKEN_OFF, Verdict, per_arena
 from swarmwire.metrics.verify.finding import State
 
 if TYPE_CHECKING:
@@ -74,8 +74,8 @@ def _sums(table: "pl.LazyFrame", columns: list[str]) -> list[dict[str, Any]]:
 def _compared(
     found: Mapping[tuple[int, str], int], fates: tuple[str, ...], summary: Mapping[str, Any] | None
 ) -> Verdict:
-    """A run that was interrupted may have broken off a tick, which its summary alone counts."""
-    if summary is None or summary["ended"] == "interrupted":
+    """A run that did not end by itself may have broken off a tick, which its summary alone counts."""
+    if summary is None or summary["ended"] in BROKEN_OFF:
         return None
     radios: list[dict[str, Any] | None] = per_arena(summary, "radio")
     for arena, radio in enumerate(radios):

@@ -22,12 +22,11 @@ from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
 from swarmwire.world.crews.change import What
-from swarmwire.world.crews.roster import GOES_ON, NOBODY, OnLoss, Refused, Roster
+from swarmwire.world.crews.roster import GOES_ON, OnLoss, Roster
 from swarmwire.world.crews.slot import Slot, rows_of
+from swarmwire.world.crews.slots import NOBODY
 from swarmwire.world.crews.split_tick import acting, split_heard, split_outcomes, split_senses
 from swarmwire.world.crews.terms import USUAL, Terms
-
-__all__ = ["Lockstep", "Refused", "standing"]
 
 
 @dataclass(eq=False)
@@ -58,9 +57,9 @@ class Lockstep(Roster[_Slot]):
     ) -> list[tuple[str, bytes]]:
         """Begin a tick: one frame for each runner of a group that acts; the others stay ready."""
         self._tick, self._open = tick, _Open(tick, senses, heard, outcomes)
-        parts = split_senses(senses, self._owner, [slot.assignment for slot in self._slots])
-        packets = split_heard(heard, self._owner, len(self._slots))
-        told = split_outcomes(outcomes, self._owner, len(self._slots))
+        parts = split_senses(senses, self._slots.owner, self._slots.assignments)
+        packets = split_heard(heard, self._slots.owner, len(self._slots))
+        told = split_outcomes(outcomes, self._slots.owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
         for slot, part, own, its in zip(self._slots, parts, packets, told, strict=True):
             slot.rows, slot.actions, slot.idle = acting(part), None, not slot.may("is asked")
@@ -94,7 +93,7 @@ class Lockstep(Roster[_Slot]):
         if self._open is None or self._on_loss in GOES_ON:
             return ()
         tick, senses, heard, outcomes = self._open
-        own = np.full(len(self._owner), NOBODY)
+        own = np.full(len(self._slots.owner), NOBODY)
         own[slot.all_rows] = 0
         (part,) = split_senses(senses, own, [slot.assignment])
         slot.rows, slot.idle = acting(part), False

@@ -9,10 +9,14 @@ from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
 from swarmwire.world.crews.lateness import Lateness
 
 REPEAT_S = 5.0  # wall time: not to be told more often that the machine does not keep up
+STANDS_STILL_S = 5.0  # wall time that is lost within a tick: no machine is so slow, it was frozen
 
 
 class Pace:
     """Tick k is over its end / factor after the first `begin`. A loop that lags does not wait until it is level again.
+
+    One that was frozen, by a debugger, Ctrl-Z or with its machine, goes on from there as after a pause: thousands of
+    ticks at once would be none that an agent could act in.
 
     Attributes:
         factor: simulated seconds per second of wall time, at present.
@@ -72,19 +76,35 @@ class Pace:
     def hold(self, tick: int) -> None:
         """Return once the tick is over by the wall clock."""
         self._next_ns = over_ns = self.over_ns(tick)
-        lag_ns = self._clock.now_ns() - over_ns
+        lag_ns, before_ns = self._clock.now_ns() - over_ns, self.lag_ns
         self.lag_ns = max(0, lag_ns)
         if lag_ns <= 0:
             self._clock.sleep_until(over_ns)
+            late_ns = self._clock.now_ns() - over_ns
+            if late_ns > to_ns(STANDS_STILL_S):  # frozen as it slept
+                self._stood_still(tick, late_ns)
             return
         self.missed_ticks += 1
         self.worst_lag_ns = max(self.worst_lag_ns, lag_ns)
-        if self._quiet_until_ns is None or over_ns + lag_ns >= self._quiet_until_ns:
-            self._quiet_until_ns = over_ns + lag_ns + to_ns(REPEAT_S)
-            self._say(
-                f"real time: this machine does not keep up with {self.factor:g} x real time: "
-                f"at tick {tick} the loop is {to_s(lag_ns):.3f} s behind"
-            )
+        if lag_ns - before_ns > to_ns(STANDS_STILL_S):
+            self._stood_still(tick, lag_ns)
+            return
+        self._tell(
+            f"this machine does not keep up with {self.factor:g} x real time: "
+            f"at tick {tick} the loop is {1000 * to_s(lag_ns):,.1f} ms behind"
+        )
+
+    def _stood_still(self, tick: int, for_ns: int) -> None:
+        """Go on from here: the time in which nothing could be done counts as a pause."""
+        self.begin_anew(tick + 1, self.factor, for_ns)
+        self.lag_ns = 0
+        self._tell(f"the loop stood still for {to_s(for_ns):.1f} s in tick {tick}, and goes on from there")
+
+    def _tell(self, text: str) -> None:
+        now_ns = self._clock.now_ns()
+        if self._quiet_until_ns is None or now_ns >= self._quiet_until_ns:
+            self._quiet_until_ns = now_ns + to_ns(REPEAT_S)
+            self._say(f"real time: {text}")
 
     def _span_ns(self, tick: int) -> int:
         """Simulated time from the start of the schedule to the end of a tick."""

@@ -93,7 +93,7 @@ class RealTime(Roster[_Slot]):
         """`quantum`: packets cross also between ticks."""
         super().__init__(parts, on_loss, terms)
         self.quantum = quantum
-        rows = len(self._owner)
+        rows = len(self._slots.owner)
         self._rate_hz = parts[0].rate_hz
         self._watchdog_ns, self._timeout_ns = to_ns(watchdog_s), to_ns(timeout_s)
         self._asked_ns = np.full(rows, ANSWERED, np.int64)  # simulated time of the first question without an answer
@@ -124,9 +124,9 @@ class RealTime(Roster[_Slot]):
         """Begin a tick at wall time `now_ns`, pauses left out: one frame for each runner that is ready."""
         self._tick = tick
         start_ns = tick_start_ns(tick, self._rate_hz)
-        parts = split_senses(senses, self._owner, [slot.assignment for slot in self._slots])
-        packets = split_heard(heard, self._owner, len(self._slots))
-        told = split_outcomes(outcomes, self._owner, len(self._slots))
+        parts = split_senses(senses, self._slots.owner, self._slots.assignments)
+        packets = split_heard(heard, self._slots.owner, len(self._slots))
+        told = split_outcomes(outcomes, self._slots.owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
         for slot, part, own, its in zip(self._slots, parts, packets, told, strict=True):
             if slot.asked and now_ns - slot.asked[0].at_ns > self._timeout_ns:
@@ -146,8 +146,8 @@ class RealTime(Roster[_Slot]):
 
     def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> list[tuple[str, bytes]]:
         """Frames to runners that are ready, at `at_ns` of simulated time, with what robots were told since the last."""
-        packets = split_heard(heard, self._owner, len(self._slots))
-        told = split_outcomes(outcomes, self._owner, len(self._slots))
+        packets = split_heard(heard, self._slots.owner, len(self._slots))
+        told = split_outcomes(outcomes, self._slots.owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
         for slot, own, its in zip(self._slots, packets, told, strict=True):
             if slot.state == "ready" and (len(own) or len(its)):

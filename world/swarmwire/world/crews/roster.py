@@ -14,41 +14,32 @@ An open run, whose runners come from elsewhere, bears losses before the first ti
 counted by name and dropped; it never changes the state.
 """
 
-import re
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Generic, Literal, NoReturn, TypeVar
+from typing import Generic, Literal
 
 import msgpack
-import numpy as np
 
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.assignment import Assignment, robots_text
+from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted, RunnerLost
 from swarmwire.comms.memory import GroupMemory
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.join_request import JoinRequest, versioned
 from swarmwire.comms.wire.limits import Limits
 from swarmwire.comms.wire.memory_frames import decode_memory, encode_memory
 from swarmwire.comms.wire.offer import Offer
+from swarmwire.world.crews.admission import MOST_SAID, Refused, check_version, granted, read_request
 from swarmwire.world.crews.change import Change, What
 from swarmwire.world.crews.printable import printable
 from swarmwire.world.crews.runner_health import RunnerHealth
-from swarmwire.world.crews.slot import Slot
-from swarmwire.world.crews.split_robots import merged, part_of
+from swarmwire.world.crews.slots import S, Slots
 from swarmwire.world.crews.terms import USUAL, Terms
 
-NAME = re.compile(r"[\w.-]{1,64}", re.ASCII)  # of a runner: it is part of a key, so no wildcard, slash or hash
-MOST_SAID, MOST_TRACEBACK = 500, 100_000  # letters: what a runner says of itself goes to people's terminals
-NOBODY = -1  # owner of a robot that no slot holds
+MOST_TRACEBACK = 100_000  # letters: what a runner says of itself goes to people's terminals
 OnLoss = Literal["stop", "dead", "wait", "stand", "coast"]
 GOES_ON = ("stand", "coast")  # where the run waits for nobody once it began
-
-
-class Refused(Exception):
-    """A request to join that is not granted; the text goes back to the runner."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +54,6 @@ class Loss:
         return f"{self.runner}, which played {self.robots}: {self.reason}"
 
 
-S = TypeVar("S", bound=Slot)
-
-
 class Roster(ABC, Generic[S]):
     """The runners of a run: what lockstep and real time share.
 
@@ -76,11 +64,9 @@ class Roster(ABC, Generic[S]):
 
     def __init__(self, parts: list[Assignment], on_loss: OnLoss, terms: Terms = USUAL) -> None:
         """`parts` of the robots are free: a runner that asks for nothing in particular gets the next one."""
-        self._slots, self._on_loss, self._terms = [self._slot(part) for part in parts], on_loss, terms
+        self._slots, self._on_loss, self._terms = Slots(parts, self._slot), on_loss, terms
         self._by_runner: dict[str, S] = {}
         self._parts = len(parts)  # as many runners as the run itself started are welcome, whatever the limits say
-        self._owner = self._owners()
-        self._rows = {name: row for part in parts for name, row in _named(part)}
         self._gone: set[str] = set()  # runners that left or were lost
         self._tick = -1
         self._counts: Counter[str] = Counter()
@@ -117,8 +103,8 @@ class Roster(ABC, Generic[S]):
     @property
     def missing_robots(self) -> tuple[str, ...]:
         """Names of the robots that nobody plays, in the order of the robots."""
-        free = [name for slot in self._slots if slot.may("joins") for name in slot.assignment.robot_names]
-        return tuple(sorted(free, key=self._rows.__getitem__))
+        free = [name for slot in self._slots.free for name in slot.assignment.robot_names]
+        return tuple(sorted(free, key=self._slots.row_of.__getitem__))
 
     @property
     def bears_losses(self) -> bool:
@@ -130,6 +116,15 @@ class Roster(ABC, Generic[S]):
         """The first runner that keeps the others waiting, and its robots; for messages."""
         slot = next(slot for slot in self._slots if slot.state not in ("ready", "dead"))
         return slot.runner or "that did not join", slot.assignment.robots_text
+
+    @property
+    def waits_for(self) -> str:
+        """The first runner that the loop waits for, and its robots; "" if there is none. Safe from any thread."""
+        for slot in tuple(self._slots):
+            if self._holds_up(slot):
+                robots = slot.assignment.robots_text
+                return f"{slot.runner}, which plays {robots}" if slot.runner else f"whoever plays {robots}"
+        return ""
 
     def counts(self) -> dict[str, int]:
         """What was dropped or lost, by name."""
@@ -154,34 +149,23 @@ class Roster(ABC, Generic[S]):
 
     def offer(self, request: bytes = b"") -> Offer | None:
         """What there is to play at present; None: nothing is told. Refused if it is asked for in another version."""
-        try:
-            if request:
-                versioned(request)
-        except BadFrame as fault:
-            self._refuse(str(fault), "bad_join")
+        if request:
+            with self._refusals_counted():
+                check_version(request)
         if self._terms.offer is None:
             return None
         free: dict[str, list[str]] = {}
-        for slot in self._slots:
-            if slot.may("joins"):
-                for group in slot.assignment.groups:
-                    free.setdefault(group.name, []).extend(group.robot_names)
+        for slot in self._slots.free:
+            for group in slot.assignment.groups:
+                free.setdefault(group.name, []).extend(group.robot_names)
         return self._terms.offer.with_free(free)
 
     def join(self, runner: str, request: bytes) -> bytes:
         """Give a runner the free robots that it asks for: the reply; Refused with a reason for the runner."""
-        try:
-            asked = JoinRequest.decode(request)
-        except BadFrame as fault:
-            self._refuse(str(fault), "bad_join")
-        if not NAME.fullmatch(runner):
-            self._refuse("expected a name of letters, digits, '_', '-' and '.', 64 at most", "bad_join")
-        if runner in self._by_runner:
-            self._refuse(f"the name {runner} is in use: another runner of this name plays")
-        if len(self._by_runner) >= max(self._terms.limits.runners, self._parts):
-            self._refuse(f"there are {len(self._by_runner)} runners already, the most that this run takes")
-        self._check_scenario(asked)
-        slot = self._granted(asked)
+        with self._refusals_counted():
+            asked = read_request(runner, request)
+            self._check_room(runner)
+            slot = self._slots.cut(granted(asked, self._slots, self._terms))
         slot.move("joins")
         slot.runner = runner
         slot.foreign = self._terms.open and asked.agents is None  # a run's own runners tell nothing, either
@@ -230,6 +214,20 @@ class Roster(ABC, Generic[S]):
         except BadFrame as fault:
             self._counts[f"{fault.fault}_frames"] += 1
         return []
+
+    @contextmanager
+    def _refusals_counted(self) -> Generator[None]:
+        try:
+            yield
+        except Refused as refusal:
+            self._counts[refusal.count] += 1
+            raise
+
+    def _check_room(self, runner: str) -> None:
+        if runner in self._by_runner:
+            raise Refused(f"the name {runner} is in use: another runner of this name plays")
+        if len(self._by_runner) >= max(self._terms.limits.runners, self._parts):
+            raise Refused(f"there are {len(self._by_runner)} runners already, the most that this run takes")
 
     @abstractmethod
     def _slot(self, assignment: Assignment) -> S:
@@ -300,88 +298,3 @@ class Roster(ABC, Generic[S]):
                 raise AgentFailed(printable(robots, MOST_SAID), printable(traceback, MOST_TRACEBACK, keep="\n\t"))
             case _:
                 raise AgentFailed(slot.assignment.robots_text, "(the runner sent no traceback)")
-
-    def _refuse(self, text: str, count: str = "refused_join") -> NoReturn:
-        self._counts[count] += 1
-        raise Refused(printable(text, MOST_SAID))
-
-    def _check_scenario(self, asked: JoinRequest) -> None:
-        offer = self._terms.offer
-        if offer is not None and asked.scenario_sha256 not in (None, offer.scenario_sha256):
-            self._refuse(f"another scenario: here is {offer.scenario!r}, whose file has another sha256")
-
-    def _check_agents(self, asked: JoinRequest, groups: Sequence[str]) -> None:
-        """The runner's own agents must be those of the run, unless it says nothing of them."""
-        if asked.agents is None or self._terms.offer is None:
-            return
-        for group in self._terms.offer.groups:
-            got = asked.agents.get(group.name)
-            if group.name in groups and got != group.agent_sha256:
-                its = "none" if got is None else f"{got[:12]}…"
-                here = f"{group.agent} has sha256 {group.agent_sha256[:12]}… here"
-                self._refuse(f"another agent for {group.name}: {here}, the runner's own has {its}")
-
-    def _granted(self, asked: JoinRequest) -> S:
-        """The slot of the robots that are asked for; Refused, and nothing changed, if they are not to be had."""
-        free = [slot for slot in self._slots if slot.may("joins")]
-        if asked.names is not None:
-            rows = self._named(asked.names)
-        elif not free:
-            self._refuse("all robots are taken")
-        elif asked.robots is None:
-            rows = free[0].all_rows
-        else:
-            rows = np.sort(np.concatenate([slot.all_rows for slot in free]))[: asked.robots]
-            if len(rows) < asked.robots:
-                self._refuse(f"expected at most {len(rows)} robots, which are free, got {asked.robots}")
-        most = self._terms.limits.robots_per_runner
-        if self._terms.open and len(rows) > most:
-            self._refuse(f"expected at most {most} robots for one runner, got {len(rows)}")
-        from_slots = [slot for slot in free if np.isin(slot.all_rows, rows).any()]
-        groups = [group for slot in from_slots for group in slot.assignment.groups]
-        self._check_agents(asked, [group.name for group in groups if np.isin(group.rows, rows).any()])
-        return self._cut(from_slots, rows)
-
-    def _named(self, names: Sequence[str]) -> IntArray:
-        """The rows of robots that are free; Refused if one is not, or is none."""
-        strange = [name for name in names if name not in self._rows]
-        if strange or len(set(names)) < len(names) or not names:
-            every = robots_text(list(self._rows))
-            self._refuse(f"expected names of robots, each once ({every}), got {robots_text(list(names))}")
-        rows = np.sort(np.array([self._rows[name] for name in names], np.int64))
-        for slot in self._slots:
-            theirs = np.isin(rows, slot.all_rows)
-            if theirs.any() and not slot.may("joins"):
-                taken = robots_text([name for name in names if self._rows[name] in rows[theirs]])
-                self._refuse(f"taken, by {slot.runner}: {taken}" if slot.runner else f"given up: {taken}")
-        return rows
-
-    def _cut(self, free: Sequence[S], rows: IntArray) -> S:
-        """A slot of exactly these rows, all of which are in these free slots."""
-        if len(free) == 1 and len(free[0].all_rows) == len(rows):
-            return free[0]
-        slot = self._slot(merged([part_of(old.assignment, rows) for old in free]))
-        for old in free:
-            slot.remember(old, rows)
-            rest = old.all_rows[~np.isin(old.all_rows, rows)]
-            place = self._slots.index(old)
-            if len(rest):
-                kept = self._slots[place] = self._slot(part_of(old.assignment, rest))
-                kept.remember(old, rest)
-            else:
-                del self._slots[place]
-        self._slots.append(slot)
-        self._owner = self._owners()
-        return slot
-
-    def _owners(self) -> IntArray:
-        """The slot of each robot row."""
-        rows = [slot.all_rows for slot in self._slots]
-        owner = np.full(1 + max(int(own.max()) for own in rows), NOBODY)
-        for place, own in enumerate(rows):
-            owner[own] = place
-        return owner
-
-
-def _named(part: Assignment) -> list[tuple[str, int]]:
-    return [pair for group in part.groups for pair in zip(group.robot_names, group.rows.tolist(), strict=True)]

@@ -40,11 +40,9 @@ class RunnerInbox:
         size = 0 if payload is None else len(payload)
         limits = self._limits
         with self._lock:
-            if isinstance(item, zenoh.Query):
-                self._asked[runner] += 1
-                if self._asked[runner] > limits.requests:
-                    self._drop("flooded_requests", runner)
-                    return  # the asker gets no answer as soon as nobody holds the query
+            if isinstance(item, zenoh.Query) and not self._may_ask(runner):
+                self._drop("flooded_requests", runner)
+                return  # the asker gets no answer as soon as nobody holds the query
             items, waiting_bytes = self._waiting.get(runner, (0, 0))
             if items >= limits.waiting or (items and waiting_bytes + size > limits.waiting_bytes):
                 self._drop("flooded_frames", runner)
@@ -75,6 +73,13 @@ class RunnerInbox:
         with self._lock:
             return dict(self._dropped)
 
+    def _may_ask(self, runner: str) -> bool:
+        if runner not in self._asked and len(self._asked) >= self._limits.names:
+            return False
+        self._asked[runner] += 1
+        return self._asked[runner] <= self._limits.requests
+
     def _drop(self, what: str, runner: str) -> None:
         self._dropped[what] += 1
-        self._beyond[runner] += 1
+        if runner in self._beyond or len(self._beyond) < self._limits.names:
+            self._beyond[runner] += 1

@@ -68,17 +68,21 @@ def unpack_whole(incoming: Incoming, sha256: str, folder: Path) -> Path:
     return part
 
 
-def unpack(stream: Incoming | BinaryIO, into: Path, *, links: bool = False) -> None:
+def unpack(stream: Incoming | BinaryIO, into: Path, *, links: bool = False, most_bytes: int | None = None) -> None:
     """The files and folders of a compressed tar, none of them outside `into`; Refusal for any other.
 
-    `links` are only for archives of our own: a file that is written through one may end up anywhere.
+    `links` are only for archives of our own: a file that is written through one may end up anywhere. Of archives that
+    are not, what is packed in a few bytes may be a disk full: Refusal for more than `most_bytes` in all files.
     """
+    left = most_bytes
     with tarfile.open(fileobj=cast("BinaryIO", stream), mode="r|gz", bufsize=BLOCK) as archive:
         for member in archive:
             path = into / member.name
             outside = Path(member.name).is_absolute() or ".." in Path(member.name).parts
             if outside or (member.issym() and not links):
                 raise Refusal("damaged", f"expected files within the archive, got {member.name!r}")
+            if left is not None and (left := left - tarfile.BLOCKSIZE - member.size) < 0:
+                raise Refusal("damaged", f"expected {most_bytes} bytes at most, got more")
             if member.isdir():
                 path.mkdir(parents=True, exist_ok=True)
             elif member.issym():

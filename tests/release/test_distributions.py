@@ -1,0 +1,90 @@
+"""What the six wheels and source distributions hold, and what they say of themselves."""
+
+import base64
+import csv
+import hashlib
+import tarfile
+import tomllib
+import zipfile
+from pathlib import Path, PurePosixPath
+
+import pytest
+from packaging.metadata import Metadata
+
+from tests.release.built import PARTS, ROOT
+
+VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+NAMES = ("swarmwire", *(f"swarmwire_{part}" for part in PARTS))
+MADE = {"__pycache__"}  # beside sources, by Python and numba
+
+
+def sources(name: str) -> set[str]:
+    """The files of a part, as they lie in its folder."""
+    if name == "swarmwire":
+        return set()
+    folder = ROOT / name.removeprefix("swarmwire_")
+    paths = (path for path in (folder / "swarmwire").rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix() for path in paths if not MADE & set(path.parts)}
+
+
+def wheel(distributions: Path, name: str) -> zipfile.ZipFile:
+    return zipfile.ZipFile(distributions / f"{name}-{VERSION}-py3-none-any.whl")
+
+
+def beside(name: str) -> str:
+    return f"{name}-{VERSION}.dist-info"
+
+
+def test_there_are_a_wheel_and_a_source_distribution_of_each(distributions: Path) -> None:
+    found = {path.name for path in distributions.iterdir() if path.suffix in {".whl", ".gz"}}
+    assert found == {
+        file for name in NAMES for file in (f"{name}-{VERSION}-py3-none-any.whl", f"{name}-{VERSION}.tar.gz")
+    }
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_wheel_holds_its_part_with_all_data_the_licence_and_nothing_else(distributions: Path, name: str) -> None:
+    with wheel(distributions, name) as file:
+        held = set(file.namelist())
+        licence = file.read(f"{beside(name)}/licenses/LICENSE")
+    about = {path for path in held if path.startswith(beside(name))}
+    assert held - about == sources(name)
+    scripts = {f"{beside(name)}/entry_points.txt"}
+    told = {f"{beside(name)}/{file}" for file in ("METADATA", "WHEEL", "RECORD", "licenses/LICENSE")}
+    assert told <= about <= told | scripts
+    assert licence == (ROOT / "LICENSE").read_bytes()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_file_of_a_wheel_is_as_its_record_says(distributions: Path, name: str) -> None:
+    with wheel(distributions, name) as file:
+        rows = list(csv.reader(file.read(f"{beside(name)}/RECORD").decode().splitlines()))
+        assert {row[0] for row in rows} == set(file.namelist())
+        for path, digest, _ in rows:
+            sha256 = base64.urlsafe_b64encode(hashlib.sha256(file.read(path)).digest()).decode().rstrip("=")
+            assert digest == f"sha256={sha256}" or path.endswith("RECORD")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_a_wheel_says_of_itself_is_valid_and_whole(distributions: Path, name: str) -> None:
+    """As an index checks it, and what its page would be empty without."""
+    with wheel(distributions, name) as file:
+        told = Metadata.from_email(file.read(f"{beside(name)}/METADATA"), validate=True)
+    assert (told.name, str(told.version)) == (name.replace("_", "-"), VERSION)
+    assert (str(told.license_expression), told.license_files) == ("Apache-2.0", ["LICENSE"])
+    assert str(told.requires_python) == ">=3.11"
+    assert told.summary
+    assert told.description_content_type == "text/markdown"
+    assert told.description
+    assert told.description.startswith(f"# {told.name}\n")
+    ours = [of for of in told.requires_dist or [] if of.name.startswith("swarmwire")]
+    assert {str(of.specifier) for of in ours} <= {f"=={VERSION}"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_source_distribution_holds_its_sources_and_no_tests_docs_or_scenarios(distributions: Path, name: str) -> None:
+    with tarfile.open(distributions / f"{name}-{VERSION}.tar.gz") as file:
+        held = {PurePosixPath(path).relative_to(f"{name}-{VERSION}").as_posix() for path in file.getnames()}
+    others = {"PKG-INFO", "pyproject.toml", "README.md", "LICENSE", ".gitignore"}
+    assert held - others == (sources(name) or {"CHANGELOG.md"})
+    assert others - held <= {".gitignore"}

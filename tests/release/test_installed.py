@@ -1,0 +1,88 @@
+"""The distributions work where nothing else of this project is: for whoever emulates, and on a robot."""
+
+import json
+import re
+from collections.abc import Generator
+from contextlib import contextmanager
+from subprocess import PIPE, Popen
+
+from tests.release.built import Installed, bare
+
+ON_ROBOTS = {"eclipse-zenoh", "msgpack", "numpy", "swarmwire-agent", "swarmwire-comms"}
+QUICK = ("--set", "duration_s=0.5", "--set", "physics.engine=pymunk")
+PLACES = "import json, sys, swarmwire; print(json.dumps([sys.prefix, *swarmwire.__path__]))"
+LISTED = "import importlib.metadata as m, json; print(json.dumps([of.name for of in m.distributions()]))"
+PUSHED = "from swarmwire.deploy.fleet.environment.own_packages import own_entries as o; print(*(e.name for e in o()))"
+AGENT = """
+from swarmwire.agent import Agent
+
+class Mine(Agent):
+    needs = ("proximity",)
+
+    def step(self, robot):
+        robot.drive(linear_mps=0.05 * (1 - max(robot.proximity.value)), angular_radps=0.5)
+"""
+SCENARIO = """
+format = 1
+name = "mine"
+duration_s = 1.0
+arena = { size_m = [3.0, 3.0] }
+robots.few = { body = "epuck", count = 3, agent = "mine.py:Mine" }
+"""
+
+
+def stands_alone(installed: Installed) -> None:
+    """Nothing of the sources is in reach."""
+    prefix, *places = json.loads(installed.python(PLACES))
+    assert len(places) == 1
+    assert places[0].startswith(prefix)
+
+
+@contextmanager
+def world(installed: Installed) -> Generator[tuple["Popen[str]", str]]:
+    """A world of the scenario, and where it listens; it is ended with the test."""
+    command = [installed.program("swarmwire"), "world", "mine.toml", "--set", "physics.engine=pymunk"]
+    command += ["--listen", "tcp/127.0.0.1:0", "--out", "together"]
+    with Popen(command, cwd=installed.cwd, env=bare(), stdout=PIPE, stderr=PIPE, text=True) as process:
+        assert process.stdout is not None
+        try:
+            line = next(line for line in process.stdout if "listens at" in line)
+            [endpoint] = re.findall(r"listens at (\S+)[,;]", line)
+            yield process, endpoint
+        finally:
+            process.kill()
+
+
+def test_a_scenario_is_made_run_and_verified_from_an_empty_folder(everything: Installed) -> None:
+    stands_alone(everything)
+    assert "Usage: swarmwire" in everything.run("swarmwire", "--help")
+    assert "turtlebot3-burger" in everything.run("swarmwire", "list", "bodies")
+    everything.run("swarmwire", "new", "mine")
+    everything.run("swarmwire", "run", "mine/scenario.toml", *QUICK, "--out", "first", "--quiet")
+    summary = json.loads((everything.cwd / "first" / "summary.json").read_text())
+    assert (summary["ended"], summary["ticks"]) == ("duration", 5)
+    assert "whole: everything is there" in everything.run("swarmwire", "verify", "first")
+
+
+def test_what_is_pushed_to_robots_is_found_where_it_was_installed(everything: Installed) -> None:
+    pushed = everything.python(PUSHED).split()
+    assert {"swarmwire/agent/py.typed", "swarmwire/comms/bodies/epuck2.toml"} <= set(pushed)
+    assert sum(name.endswith("METADATA") for name in pushed) == 2
+
+
+def test_a_robot_gets_nothing_heavy_and_runs_agents(robot: Installed) -> None:
+    stands_alone(robot)
+    assert set(json.loads(robot.python(LISTED))) == ON_ROBOTS
+    (robot.cwd / "mine.py").write_text(AGENT)
+    told = robot.run("swarmwire-agent", "check", "mine.py:Mine", "--driver", "epuck2", "--address", "192.0.2.1")
+    assert told.startswith("robot-0: mine.py:Mine on epuck2")
+
+
+def test_a_world_plays_with_a_runner_that_has_only_what_a_robot_has(everything: Installed, robot: Installed) -> None:
+    (robot.cwd / "mine.py").write_text(AGENT)
+    (robot.cwd / "mine.toml").write_text(SCENARIO)
+    with world(everything) as (process, endpoint):
+        assert "the run is over" in robot.run("swarmwire-agent", "join", endpoint)
+        _, errors = process.communicate(timeout=60.0)
+    assert process.returncode == 0, errors
+    assert json.loads((robot.cwd / "together" / "summary.json").read_text())["ended"] == "duration"

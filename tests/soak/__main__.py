@@ -1,0 +1,33 @@
+"""`python -m tests.soak`: random schedules of faults, then an hour with faults all the time.
+
+docs/reliability.md tells what came of it.
+"""
+
+import argparse
+import os
+import signal
+import sys
+from pathlib import Path
+
+from tests.soak.hour import Hour
+from tests.soak.judged import main as judge
+
+
+def main() -> int:
+    """The exit code: 0 if all held."""
+    parser = argparse.ArgumentParser("python -m tests.soak", description=__doc__)
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--processes", type=int, default=100, help="runners of the world in lockstep")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=Path("runs/soak"), help="a folder that is not there yet")
+    given = parser.parse_args()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    os.environ["TMPDIR"] = str(given.out.absolute() / "tmp" / "harness")  # where its own sessions have their sockets
+    hour = Hour(given.out, given.minutes, given.processes, given.seed)
+    Path(os.environ["TMPDIR"]).mkdir()
+    hour.run()
+    return judge(given.out)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

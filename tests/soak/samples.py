@@ -1,0 +1,89 @@
+"""What the processes of a soak take of the machine, looked up every few seconds and written as it is found."""
+
+import csv
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, fields
+from itertools import pairwise
+from pathlib import Path
+from typing import get_type_hints
+
+import psutil
+
+MIB = 1024 * 1024
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One look at one process."""
+
+    at_s: float  # since the soak began
+    who: str  # world, runner, …
+    tick: int  # of its world
+    rss_mib: float  # memory in use
+    own_mib: float  # of that, what it shares with nobody
+    descriptors: int
+    threads: int
+    cpu_s: float  # processor time since it began
+    tick_ms: float  # wall time of a tick, smoothed by the world; 0: it does not say
+    events: int  # that were given so far
+
+
+class Samples:
+    """The file of all samples."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with path.open("w", newline="") as file:
+            csv.writer(file).writerow([field.name for field in fields(Sample)])
+
+    def take(self, at_s: float, pids: Mapping[str, int | None], tick: int, tick_ms: float, events: int) -> None:
+        """Look at these processes now; who is gone is left out."""
+        rows = [
+            found
+            for who, pid in pids.items()
+            if pid is not None and (found := look(at_s, who, pid, tick, tick_ms, events)) is not None
+        ]
+        with self._path.open("a", newline="") as file:
+            csv.writer(file).writerows(asdict(row).values() for row in rows)
+
+
+def look(at_s: float, who: str, pid: int, tick: int, tick_ms: float, events: int) -> Sample | None:
+    """What a process takes; None if it is gone."""
+    try:
+        process = psutil.Process(pid)
+        memory, cpu = process.memory_full_info(), process.cpu_times()
+        return Sample(
+            round(at_s, 2),
+            who,
+            tick,
+            round(memory.rss / MIB, 3),
+            round(memory.uss / MIB, 3),
+            process.num_fds(),
+            process.num_threads(),
+            round(cpu.user + cpu.system, 3),
+            round(tick_ms, 3),
+            events,
+        )
+    except psutil.Error:
+        return None
+
+
+def read_samples(path: Path) -> dict[str, list[Sample]]:
+    """All samples of a file, by who it was."""
+    kinds: dict[str, type[float | int | str]] = dict(get_type_hints(Sample))
+    found: dict[str, list[Sample]] = {}
+    with path.open(newline="") as file:
+        for row in csv.DictReader(file):
+            sample = Sample(**{name: kinds[name](text) for name, text in row.items()})
+            found.setdefault(sample.who, []).append(sample)
+    return found
+
+
+def cpu_per_tick_ms(samples: Iterable[Sample]) -> list[tuple[float, float]]:
+    """When, and how much processor time a process took per tick since the sample before."""
+    rows = list(samples)
+    return [
+        (row.at_s, 1000.0 * (row.cpu_s - before.cpu_s) / (row.tick - before.tick))
+        for before, row in pairwise(rows)
+        if row.tick > before.tick
+    ]

@@ -1,0 +1,88 @@
+"""Schedules of a campaign whose workers are killed, or that is killed itself and gone on with, again and again."""
+
+import os
+import signal
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from swarmwire.deploy import sweep
+from tests.deploy.campaign.small import rows_in, scenario_in, series_in
+from tests.soak.invariants import Broken
+from tests.soak.schedules.joined import nothing_left, own_temporary
+from tests.soak.schedules.plan import Plan
+from tests.soak.supervised import PYTHON, Supervised, family
+from tests.waiting import until
+
+SEEDS, LOSSES = 6, [0.0, 0.5]
+LONG = "duration_s=20"
+MOST_KILLS = 3
+LIMIT_S = 90.0
+
+
+def play_campaign(plan: Plan, folder: Path) -> list[str]:
+    """What held; Broken if something did not."""
+    rng = np.random.default_rng([plan.seed, 14])
+    with own_temporary(folder / "tmp") as env:
+        scenario, campaign = scenario_in(folder), folder / "campaign"
+        asked = (str(scenario), "--vary", "radio.loss=0,0.5", "--seeds", str(SEEDS), "--set", LONG, "--pack", "2",
+                 "--out", str(campaign))  # fmt: skip
+        told: list[str] = []
+
+        def start(arguments: Sequence[str]) -> Supervised:
+            command = (*PYTHON, "swarmwire.deploy", "sweep", *arguments, "--workers", "2", "--quiet")
+            made = Supervised("sweep", lambda: command, folder / "sweep.log", env)
+            made.tend(0)
+            return made
+
+        def resumed() -> Sequence[str]:
+            return ("--resume", str(campaign), "--retry-failed") if (campaign / "campaign.json").exists() else asked
+
+        for _ in range(int(rng.integers(1, MOST_KILLS + 1))):
+            one = start(resumed())
+            try:
+                threading.Event().wait(float(rng.uniform(0.5, 7.0)))
+                told.append(_break(one, rng))
+                if not one.ended_within(LIMIT_S):
+                    raise Broken(f"the campaign did not end within {LIMIT_S:g} s")
+                until(lambda: not [child for child in family(os.getpid()) if child.status() != "zombie"])
+            finally:
+                one.kill()
+                one.end()
+        last = start(resumed())
+        try:
+            if not last.ended_within(LIMIT_S):
+                raise Broken(f"the campaign did not end within {LIMIT_S:g} s")
+        finally:
+            last.kill()
+            code = last.end()
+        if code != 0:
+            raise Broken(f"the last resume ended with {code}: {(folder / 'sweep.log').read_text()[-600:]}")
+        return [", ".join(told), each_run_once(campaign, scenario, folder / "whole"), *nothing_left(folder)]
+
+
+def each_run_once(campaign: Path, scenario: Path, whole: Path) -> str:
+    """The campaign's tables have each run exactly once, as those of one that was left alone."""
+    sweep(scenario, out=whole, seeds=SEEDS, vary={"radio.loss": LOSSES}, overrides=[LONG], pack=2, workers=1)
+    got, expected = rows_in(campaign), rows_in(whole)
+    numbers = [row["run"] for row in got]
+    if sorted(numbers) != list(range(SEEDS * len(LOSSES))):
+        raise Broken(f"the table has the runs {sorted(numbers)}")
+    if got != expected:
+        raise Broken("rows differ from those of a campaign that was left alone")
+    if not series_in(campaign).equals(series_in(whole), null_equal=True):
+        raise Broken("series differ from those of a campaign that was left alone")
+    return f"{len(numbers)} runs, each once, the same as without faults"
+
+
+def _break(one: Supervised, rng: np.random.Generator) -> str:
+    if rng.random() < 0.5 and one.pid is not None:
+        workers = family(one.pid)
+        if workers:
+            workers[int(rng.integers(len(workers)))].kill()
+            return "worker killed"
+    number = (signal.SIGKILL, signal.SIGKILL, signal.SIGINT, signal.SIGTERM)[int(rng.integers(4))]
+    one.send(number)
+    return f"campaign {number.name}"
