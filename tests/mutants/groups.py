@@ -37,22 +37,20 @@ DRAWS: dict[str, Tests] = {
     "draws_compiled": ("tests/comms/test_draws.py",),
 }
 DISK = (
-    *_in("tests/comms/air/disk", "queue", "backlog"),
+    *_in("tests/comms/air/disk", "senders", "queue", "backlog"),
     *_in("tests/comms/air", "disruption", "times", "accounts", "layouts"),
     *_in("tests/comms/events", "fail", "blackout", "partition"),
 )
 # Without those that hypothesis leads through hundreds of runs: the compiler is off.
 SIGNAL = (
-    *_in("tests/comms/air/signal", "outcomes", "retries", "signal_accounts"),
+    *_in("tests/comms/air/signal", "keyed_fates", "outcomes"),
     "--deselect=tests/comms/air/signal/test_outcomes.py::test_each_addressed_packet_has_one_outcome_unless_it_is_in_flight",
-    "--deselect=tests/comms/air/signal/test_signal_accounts.py::test_fates_add_up_to_intended_receivers",
-    "--deselect=tests/comms/air/signal/test_signal_accounts.py::test_tally_agrees_with_what_is_listed",
-    "--deselect=tests/comms/air/signal/test_signal_accounts.py::test_fates_add_up_when_robots_die_and_are_revived",
 )
 FATES: dict[str, Tests] = {
     "fates": _in("tests/comms", "fates"),
     **{f"air.disk.{name}": DISK for name in ("queue", "backlog", "senders", "disk_way", "channel")},
-    **{f"air.{name}": DISK for name in ("intake", "lives", "links", "transmissions", "accounts", "news")},
+    **{f"air.{name}": DISK for name in ("intake", "links", "transmissions", "accounts", "news")},
+    "air.lives": (*_in("tests/comms/air", "lives"), *DISK),
     **{f"air.stages.{name}": DISK for name in ("fixed_loss", "disrupted", "line_of_sight")},
     **{f"air.signal.{name}": SIGNAL for name in ("send_results", "frame_fate", "losses", "reports", "attempts")},
 }

@@ -87,6 +87,6 @@ def _mutant(module: str, path: Path, source: str, operator: Any, occurrence: int
     if same:
         return None
     olds, news = source.split("\n"), changed.split("\n")
-    at = next(at for at, (old, new) in enumerate(zip(olds, news, strict=False)) if old != new)
+    at = next(at for at, (old, new) in enumerate(zip(olds, news, strict=False)) if old.strip() != new.strip())
     after = "" if len(news) < len(olds) else news[at].strip()
     return Mutant(module, path, at + 1, olds[at].strip(), after, changed, is_inside(at + 1, source))

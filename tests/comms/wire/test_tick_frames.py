@@ -180,7 +180,7 @@ def test_packets_that_tell_more_or_less_than_the_radio_gives_are_refused(gives: 
 )
 def test_outcomes_that_are_none_are_refused(wrong: Any) -> None:
     frame = telling(NO_OUTCOMES)
-    with pytest.raises(BadFrame) as caught:
+    with pytest.raises(BadFrame, match="from 0 to 4$|outcomes: expected <i8") as caught:
         decode_tick(replace(frame, arrays={**frame.arrays, "outcomes": wrong}), (), {"flock"})
     assert caught.value.fault == "malformed"
 
@@ -362,6 +362,7 @@ def noting(rows: list[int], code: list[int], names: tuple[str, ...]) -> bytes:
 def test_named_states_come_over_whole() -> None:
     notes = decode_actions(frames.decode(noting([9, 4], [1, 0], ("search", "wait"))), ROWS).notes
     assert (notes.rows.tolist(), notes.code.tolist(), notes.names) == ([9, 4], [1, 0], ("search", "wait"))
+    assert decode_actions(frames.decode(noting([9], [0], ("search",))), ROWS).notes.names == ("search",)
 
 
 @pytest.mark.parametrize(

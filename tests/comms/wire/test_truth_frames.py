@@ -209,6 +209,22 @@ def test_a_glimpse_that_contradicts_itself_is_refused(fault, given):
         decode_truth(frames.decode(encode_truth(quiet(**given))), SCENE)
 
 
+EVENT = [0, 0.0, "kill", False, "", False]
+
+
+@pytest.mark.parametrize("wrong", [7, [], EVENT[:5], [*EVENT, 0], [0, 0, *EVENT[2:]], [*EVENT[:5], 1]], ids=str)
+def test_events_that_are_none_are_refused(wrong):
+    frame = frames.decode(encode_truth(quiet(events=(Happened(0, 0.0, "kill", False, np.ones(ROWS, np.bool_)),))))
+    assert frame.values["events"] == [EVENT]
+    with pytest.raises(BadFrame, match="events: expected serial"):
+        decode_truth(replace(frame, values={**frame.values, "events": [wrong]}), SCENE)
+
+
+def test_a_sense_may_have_a_name_of_several_parts():
+    glimpse = quiet(senses={"a": GroupSenses(np.array([0]), {"own/of/mine": np.zeros(1)})})
+    assert equal(decode_truth(frames.decode(encode_truth(glimpse)), SCENE), glimpse)
+
+
 @pytest.mark.parametrize(
     "events", [None, {}, "kill", [3], [[0, 0.0, "kill", False, ""]], [[0, 0.0, "kill", 1, "", False]]]
 )
@@ -296,6 +312,31 @@ def test_a_scene_with_a_body_that_is_none_is_refused(change, fault):
 def test_a_scene_has_just_its_parts(parts):
     with pytest.raises(BadFrame, match="scene: expected a map of static, series, selected"):
         decode_scene(frames.decode(frames.encode("scene", -1, {}, {"version": OBSERVED_VERSION, "scene": parts})))
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "fault"),
+    [
+        ((), 7, "scene: expected a map"),
+        (("more",), 7, "scene: expected a map"),
+        (("static", "groups", 0), [], r"groups\[0\]: expected a map"),
+        (("static", "groups", 0, "body"), 7, "body: expected a body"),
+        (("static", "groups", 0, "body"), {"name": 7}, "body"),
+        (("static", "obstacles", 0, 0, "height_m"), float("-inf"), "height_m"),
+        (("static", "obstacles", 0, 0, "x_m"), float("inf"), "x_m"),
+        (("static", "obstacles", 0, 0, "x_m"), "1", "x_m"),
+        (("selected",), "nobody", "selected: expected one of the robots"),
+    ],
+)
+def test_a_scene_with_something_else_in_a_place_is_refused(place, value, fault):
+    frame = frames.decode(encode_scene(SCENE))
+    values: dict[str, Any] = {"scene": None, **frame.values}
+    inside: Any = values
+    for step in ("scene", *place)[:-1]:
+        inside = inside[step]
+    inside[("scene", *place)[-1]] = value
+    with pytest.raises(BadFrame, match=fault):
+        decode_scene(replace(frame, values=values))
 
 
 @pytest.mark.parametrize(
