@@ -20,7 +20,6 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.format_number import check_format
 from swarmwire.comms.in_time import AirTime, Put, TimedCrew
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard, Sent
@@ -29,11 +28,11 @@ from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.checked import checked_array
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions, sent_arrays, sent_of
-from swarmwire.comms.wire.unpacking import unpacked
 from swarmwire.metrics.record.names import INPUTS
 
 LENGTH_BYTES = 4
 VERSIONS = (1, frames.VERSION)  # of frames in records: those of 1 hold actions as those of today do
+LATER = range(frames.VERSION + 1, 2**31)
 WITHIN = "within/"  # name of the array of what came within the tick, and of its packets' arrays before their names
 AT_ONCE = -1  # in place of a tick: packets that waited for nobody's turn
 
@@ -182,11 +181,9 @@ class RecordedInputs:
     def _refuse_newer(self, data: bytes) -> None:
         """BadInput if the frame is of a version that is not known here yet."""
         with suppress(BadFrame):
-            match unpacked(data, len(data)):
-                case {"v": int(version)} if version > frames.VERSION:
-                    check_format(version, frames.VERSION, str(self._path), "v")
-                case _:
-                    return
+            frames.decode(data, len(data), LATER)
+            newer = f"expected {frames.VERSION}, got a later one: made by a newer swarmwire; upgrade to read it"
+            raise BadInput(str(self._path), "v", newer)
 
     def _damaged(self, place: int, fault: BadFrame) -> BadInput:
         return BadInput(str(self._path), f"frame {place}", f"expected the actions of a tick: {fault}")
