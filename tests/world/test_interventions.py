@@ -188,7 +188,7 @@ def test_an_event_that_is_given_begins_and_ends_in_the_run_at_the_ticks_it_was_g
     given, watch = Interventions(scenario, bodies_of(scenario, "s.toml")), Watch()
     loop = Loop(World(scenario, [1], {}), None, Ahead(), [watch], interventions=given)
     loop.run(2)
-    number = given.give({"do": "kill", "robots": {"names": ["flock-1"]}})
+    number = given.give({"do": "kill", "robots": {"names": ["a-1"]}})
     loop.run(5)
     given.end(number)
     loop.run(8)
