@@ -92,6 +92,9 @@ def test_a_module_that_is_not_there(text: str) -> None:
             "Mine.seen: a dict that all robots would share: make it in __init__",
         ),
         ("class Mine(VectorAgent): ...\n", "Mine has no step method"),
+        ("class Mine(Agent):\n    api = 99\n    def step(self, robot): ...\n", "Mine.api: expected 1"),
+        ("class Mine(Agent):\n    needs = 'compass'\n    def step(self, robot): ...\n", "expected a tuple of texts"),
+        ("class Mine(Agent):\n    needs = ('a', 1)\n    def step(self, robot): ...\n", "expected a tuple of texts"),
         (
             "class Mine(Agent):\n    speeds: list[float]\n    def step(self, robot): ...\n",
             "Mine.speeds: a parameter is a float, int, bool or str",

@@ -14,12 +14,14 @@ def test_each_says_what_and_where_and_what_to_do():
     assert refusal(OSError(errno.EMFILE, "Too many open files", "/x")) == (
         "/x: Too many open files (raise the limit: ulimit -n)"
     )
-    assert refusal(BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")).startswith("Resource temporarily")
-    assert refusal(RuntimeError("can't start new thread")).startswith("no thread can be started (raise the limit")
+    assert str(refusal(BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable"))).startswith(
+        "Resource temporarily"
+    )
+    assert str(refusal(RuntimeError("can't start new thread"))).startswith("no thread can be started (raise the limit")
     assert refusal(MemoryError()) == "no memory is left (fewer robots, seeds or runners need less)"
     with pytest.raises(MemoryError) as told:
         np.empty(2**56)
-    assert refusal(told.value).startswith("no memory is left: Unable to allocate")
+    assert str(refusal(told.value)).startswith("no memory is left: Unable to allocate")
     assert (
         refusal(RuntimeError("wrong")) is refusal(FileNotFoundError(errno.ENOENT, "x")) is refusal(KeyError()) is None
     )

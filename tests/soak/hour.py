@@ -5,7 +5,8 @@ All that is found is written as it is found: `samples.csv`, `troubles.jsonl`, an
 
 import json
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ def kinds(processes: int) -> list[Kind]:
     in_real_time = ("--realtime", "--set", "run.on_runner_loss=coast", "--packets", "0.01", "--no-rrd")
     return [
         Kind("lockstep", processes, ("--links", "--packets", "0.001"), speed=0.5),
-        Kind("realtime", max(2, processes // REAL_TIME_SHARE), in_real_time),
+        Kind("realtime", max(4, processes // REAL_TIME_SHARE), in_real_time),
     ]
 
 
@@ -44,6 +45,7 @@ class Hour:
     Attributes:
         places: its worlds.
         temporary: where its processes have their temporary files.
+        faults: errors of the soak itself.
     """
 
     def __init__(self, folder: Path, minutes: float, processes: int, seed: int) -> None:
@@ -64,6 +66,7 @@ class Hour:
         ]
         self._gaps = np.random.default_rng(seed + 1)
         self._agenda = Agenda()
+        self.faults: list[str] = []
         self._started_ns = self._clock.now_ns()
 
     def run(self) -> None:
@@ -98,21 +101,27 @@ class Hour:
         end_ns = self._started_ns + to_ns(60.0 * self._minutes - CALM_S)
         sample_ns, next_ns = self._started_ns, [self._started_ns + to_ns(5.0)] * len(self.places)
         while (now_ns := self._clock.now_ns()) < end_ns:
-            self._step(now_ns)
+            self._clock.sleep_until(now_ns + to_ns(LOOP_S))
+            with self._noted():
+                self._step(now_ns)
             for at, troubles in enumerate(self.troubles):
                 if now_ns >= next_ns[at]:
                     next_ns[at] = now_ns + to_ns(float(self._gaps.exponential(GAP_S)))
-                    self._agenda.begin(troubles.next(), now_ns)
+                    with self._noted():
+                        self._agenda.begin(troubles.next(), now_ns)
             if now_ns >= sample_ns:
                 sample_ns += to_ns(SAMPLE_S)
-                self._sample(now_ns)
+                with self._noted():
+                    self._sample(now_ns)
 
     def _calm_down(self) -> None:
         """What was begun comes to its end; whoever is frozen thaws, and all come back."""
         self._tell("harness", "calm", "")
         until_ns = self._clock.now_ns() + to_ns(CALM_S)
         while (now_ns := self._clock.now_ns()) < until_ns:
-            self._step(now_ns)
+            self._clock.sleep_until(now_ns + to_ns(LOOP_S))
+            with self._noted():
+                self._step(now_ns)
         for place in self.places:
             for one in place.all:
                 one.send(signal.SIGCONT)
@@ -143,7 +152,15 @@ class Hour:
         for place in self.places:
             place.tend(now_ns)
         self._agenda.step(now_ns)
-        self._clock.sleep_until(now_ns + to_ns(LOOP_S))
+
+    @contextmanager
+    def _noted(self) -> Generator[None]:
+        """What goes wrong in here is noted, and ends no soak that has gone on for most of an hour."""
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001 - told in the result, which then does not hold
+            self.faults.append(repr(error))
+            self._tell("harness", "fault", "", repr(error))
 
     def _until(self, holds: Callable[[], bool], for_s: float, what: str, only: Place | None = None) -> None:
         until_ns = self._clock.now_ns() + to_ns(for_s)
@@ -200,6 +217,8 @@ class Hour:
 def counts_of(hour: Hour) -> Mapping[str, Any]:
     """How often each trouble happened, and how often processes were started again."""
     return {
+        "faults of the soak": hour.faults,
+    } | {
         place.kind.name: {
             "troubles": dict(sorted(troubles.told.items())),
             "orders not taken": troubles.unanswered,

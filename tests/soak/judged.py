@@ -44,6 +44,8 @@ def checks(folder: Path) -> list[tuple[str, bool, str]]:
         _tried("nothing temporary left", lambda: invariants.nothing_is_left(temporary)),
     ]
     counts = json.loads((folder / "counts.json").read_text())
+    faults = counts.pop("faults of the soak")
+    found.append(("the soak itself", not faults, "; ".join(faults) or "no fault of its own"))
     for name, told in counts.items():
         found.append(_tried(f"{name}: exit codes", lambda codes=told["exit codes"]: invariants.nobody_crashed(codes)))
     for run in sorted(folder.glob("*/run")):

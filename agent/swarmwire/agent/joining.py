@@ -98,9 +98,8 @@ def join(joining: Joining, inbox: Inbox, say: Callable[[str], None]) -> Ended:
         session = open_runner(joining.endpoint, joining.connect_s, joining.network)
     except zenoh.ZError as error:
         reason = str(error).split(" at ")[0]
-        raise RunnerLost(
-            runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}{_or_else(joining)}: {reason}"
-        ) from error
+        why = "" if "Timeout" in reason else f": {reason}"
+        raise RunnerLost(runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}{_or_else(joining)}{why}") from error
     with closed_after(session):
         run_id = _chosen_run(session, runner, joining)
         keys = Keys(run_id)

@@ -2,15 +2,20 @@
 
 import os
 import secrets
+import shutil
 import socket
 import tempfile
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from swarmwire.comms.clock import WallClock, to_ns
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.sessions import PRIVATE, unix_endpoint
 
+STALE_S = 60.0  # of a socket at which nobody listens: one that was just made may be about to
+ANSWER_S = 0.5  # of the system, for whoever listens
+SOCKET = "world"  # in a private directory
 LONGEST_PATH = 107  # of a unix socket, in bytes (sun_path has 108 with its end mark)
 
 
@@ -27,8 +32,33 @@ def local_endpoint(path: Path | None) -> Generator[str]:
         yield unix_endpoint(str(path.absolute()))
         return
     base = tempfile.gettempdir()
-    with tempfile.TemporaryDirectory(prefix=PRIVATE, dir=base if len(base) < 60 else "/tmp") as directory:
-        yield unix_endpoint(f"{directory}/world")
+    base = base if len(base) < 60 else "/tmp"
+    _remove_stale(Path(base))
+    with tempfile.TemporaryDirectory(prefix=PRIVATE, dir=base) as directory:
+        yield unix_endpoint(f"{directory}/{SOCKET}")
+
+
+def _remove_stale(base: Path) -> None:
+    """Take away the directories of this user's runs that were killed, and so could not do it themselves."""
+    before_ns = WallClock().utc_ns() - to_ns(STALE_S)
+    for path in base.glob(f"{PRIVATE}*/{SOCKET}"):
+        with suppress(OSError):  # not this user's, or gone by now
+            about = path.lstat()
+            is_old = path.is_socket() and about.st_uid == os.getuid() and about.st_mtime_ns < before_ns
+            if is_old and not _is_listened_at(path):
+                shutil.rmtree(path.parent)
+
+
+def _is_listened_at(path: Path) -> bool:
+    with socket.socket(socket.AF_UNIX) as probe:
+        probe.settimeout(ANSWER_S)
+        try:
+            probe.connect(str(path))
+        except ConnectionRefusedError:
+            return False
+        except (TimeoutError, BlockingIOError):  # it is frozen, and many have called
+            return True
+        return True
 
 
 def check_socket(path: Path) -> None:
@@ -42,9 +72,5 @@ def check_socket(path: Path) -> None:
         return
     if not path.is_socket():
         raise BadInput("--socket", str(path), "expected a path that is free; something else is there")
-    with (
-        socket.socket(socket.AF_UNIX) as probe,
-        suppress(ConnectionRefusedError),
-    ):  # refused: nobody listens, it is stale
-        probe.connect(str(path))
+    if _is_listened_at(path):  # else it is stale
         raise BadInput("--socket", str(path), "expected a path that is free; the socket is in use")

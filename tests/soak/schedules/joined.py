@@ -58,10 +58,10 @@ def held(plan: Plan, folder: Path) -> list[str]:
     ]
 
 
-def nothing_left(folder: Path) -> list[str]:
-    """Neither processes nor files."""
+def nothing_left(folder: Path, *, killed: bool = False) -> list[str]:
+    """Neither processes nor files, but what a killed world leaves to the next."""
     temporary = folder.absolute() / "tmp"
-    return [invariants.nobody_is_left(temporary, os.getpid()), invariants.nothing_is_left(temporary)]
+    return [invariants.nobody_is_left(temporary, os.getpid()), invariants.nothing_is_left(temporary, killed=killed)]
 
 
 def overrides(plan: Plan) -> list[str]:

@@ -50,7 +50,11 @@ def play_killed_world(plan: Plan, folder: Path) -> list[str]:
             code = world.end()
         if code != ENDS[number]:
             raise Broken(f"{number.name}: exit code {code}; {(folder / 'world.log').read_text()[-600:]}")
-        return [f"{number.name} after {after_s:.1f} s", *_left_behind(folder, number), *nothing_left(folder)]
+        return [
+            f"{number.name} after {after_s:.1f} s",
+            *_left_behind(folder, number),
+            *nothing_left(folder, killed=number == signal.SIGKILL),
+        ]
 
 
 def _left_behind(folder: Path, number: signal.Signals) -> list[str]:
