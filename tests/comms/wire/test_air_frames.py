@@ -110,3 +110,9 @@ def test_a_frame_may_have_a_megabyte_and_no_more() -> None:
     assert decode_air(fits, TERMS)[0] == 3
     with pytest.raises(BadFrame, match="oversized"):
         decode_air(exceeds, TERMS)
+
+
+@pytest.mark.parametrize("tick", [2**62 // 10**8 + 1, 2**63, 2**64 - 1])
+def test_a_tick_that_no_run_has_is_refused(tick: int) -> None:
+    with pytest.raises(BadFrame):
+        decode_air(encode_air(tick, ROW, HEARD, OUTCOMES), TERMS)

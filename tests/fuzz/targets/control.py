@@ -11,6 +11,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.control_frames import Request, decode_reply, encode_reply, encode_request
 from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.controls import Controls
+from swarmwire.deploy.page.app import MOST_BYTES
 from swarmwire.deploy.page.orders import Order
 from swarmwire.world.interventions import Interventions
 from swarmwire.world.scenario.scenario_file import scenario_from
@@ -118,6 +119,8 @@ class Page(PackedTarget):
 
                 return ask
 
+        if len(case) > MOST_BYTES:
+            raise ValueError("too large")  # the page's server takes no more
         try:
             order = self.adapter.validate_json(case)
         except ValidationError as error:

@@ -27,7 +27,8 @@ class Compass:
 
     def heading_rad(self, field_ut: AnyArray) -> FloatArray:
         """The robot's heading (n,) in the arena, in (-pi, pi], from what its magnetometer reads (n, 3)."""
-        wide = field_ut.astype(np.float64)  # the wire has half that
+        with np.errstate(invalid="ignore"):  # a nan may be a signalling one
+            wide = field_ut.astype(np.float64)  # the wire has half that
         x, y = wide[..., 0] - self.offset_x_ut, wide[..., 1] - self.offset_y_ut
         ahead, left = (-x, y) if self.chip == CHIPS[0] else (y, x)
         return within_a_turn(self.north_rad - np.arctan2(left, ahead))
