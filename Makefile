@@ -49,6 +49,7 @@ bench: sync ## measure; ONLY=name for one of them, ENGINE=pymunk for the figures
 soak: sync ## fuzz every door at length, then random faults, then an hour of a hundred processes
 	$(RUN) python -m tests.fuzz
 	$(RUN) python -m tests.soak
+
 .PHONY: mutants
 mutants: ## change the code in small ways, one by one: do tests notice? ONLY=module for one
 	@.ci/sync --group mutants
