@@ -63,7 +63,7 @@ def test_the_first_tick_of_a_robot_that_hears_nothing_comes_over() -> None:
 @pytest.mark.parametrize(
     ("arrays", "told"),
     [
-        ({"heard_numbers": numbers(receiver=[ROW, 5, ROW])}, "to itself"),
+        ({"heard_numbers": numbers(receiver=[ROW, ROW, 5])}, "to itself"),
         ({"heard_numbers": numbers(receiver=[3, ROW, ROW])}, "to itself"),
         ({"heard_numbers": numbers(sender=[0, 2, 1])}, "to itself"),
         ({"heard_numbers": numbers(sender=[-1, 1, 1])}, "to itself"),
