@@ -29,6 +29,10 @@ check: sync ## lint, format, types, and who may import whom
 	$(RUN) pyright
 	$(RUN) lint-imports
 
+.PHONY: coverage
+coverage: sync ## how much of comms, world and agent the tests run, with and without the compiler
+	$(RUN) python -m tests.coverage
+
 .PHONY: docs
 docs: sync ## build these pages and the reference as a site, docs/_build/html/index.html
 	$(RUN) python -m sphinx -W --keep-going -n -q docs docs/_build/html
@@ -40,6 +44,16 @@ pictures: sync ## draw the pictures under docs/ anew; needs a Vulkan driver
 .PHONY: bench
 bench: sync ## measure; ONLY=name for one of them, ENGINE=pymunk for the figures of that engine
 	$(RUN) python -m benchmarks $(if $(ENGINE),--engine $(ENGINE)) $(ONLY)
+
+.PHONY: soak
+soak: sync ## fuzz every door at length, then random faults, then an hour of a hundred processes
+	$(RUN) python -m tests.fuzz
+	$(RUN) python -m tests.soak
+
+.PHONY: mutants
+mutants: ## change the code in small ways, one by one: do tests notice? ONLY=module for one
+	@.ci/sync --group mutants
+	$(RUN) python -m tests.mutants $(ONLY)
 
 .PHONY: sync
 sync: # the locked packages, exactly

@@ -12,7 +12,8 @@ from swarmwire.agent.host import Host, Hosted, hosted
 from swarmwire.agent.loading import AgentClass
 from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.messages import encode_dict
+from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions
 from tests.agent.hosts import GIVES, assignment, group, heard_from, one_group, plain, senses, spec
 from tests.agent.players import Chatter, Counter, Failing, Other, Unmade, VectorCounter, Word
@@ -167,6 +168,20 @@ def test_a_dict_is_a_message_too() -> None:
     sent = step(host, 0, [2, 5]).sent
     step(host, 1, [2, 5], heard_from(sent, [2, 5]))
     assert found == [{"state": "search", "at": [1, 2.5]}] * 2
+
+
+@pytest.mark.parametrize("junk", [b"", b"\x05", b"\x81", b"\x81\x80\x01", b"\xc1", b"\x91" * 2000])
+def test_bytes_that_hold_no_dict_are_not_heard_as_one(junk: bytes) -> None:
+    found: list[object] = []
+
+    class Prototype(Agent):
+        def step(self, robot: Robot) -> None:
+            found.extend(packet.message for packet in robot.radio.heard(dict))
+
+    dict_tag = bytes(TAG_BYTES)
+    payloads = Payloads.of([dict_tag + junk, encode_dict({"x": 1}), dict_tag + junk])
+    once(Prototype, [2], heard_from(Sent(np.zeros(3, np.int64), np.full(3, BROADCAST), payloads), [2]))
+    assert found == [{"x": 1}]
 
 
 def test_packet_ids_count_per_robot_and_go_on_after_an_absence() -> None:

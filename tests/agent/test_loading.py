@@ -92,6 +92,9 @@ def test_a_module_that_is_not_there(text: str) -> None:
             "Mine.seen: a dict that all robots would share: make it in __init__",
         ),
         ("class Mine(VectorAgent): ...\n", "Mine has no step method"),
+        ("class Mine(Agent):\n    api = 99\n    def step(self, robot): ...\n", "Mine.api: expected 1"),
+        ("class Mine(Agent):\n    needs = 'compass'\n    def step(self, robot): ...\n", "expected a tuple of texts"),
+        ("class Mine(Agent):\n    needs = ('a', 1)\n    def step(self, robot): ...\n", "expected a tuple of texts"),
         (
             "class Mine(Agent):\n    speeds: list[float]\n    def step(self, robot): ...\n",
             "Mine.speeds: a parameter is a float, int, bool or str",
@@ -120,3 +123,8 @@ def test_what_lies_beside_a_file_is_not_there_for_it(tmp_path: Path) -> None:
     (tmp_path / "swarmwire_test_beside.py").write_text("")
     told = "No module named 'swarmwire_test_beside' (line 2); a file is loaded alone: it imports what is installed"
     assert told in refused(written(tmp_path, "import swarmwire_test_beside\n"))
+
+
+@pytest.mark.parametrize("place", ["x" * 5000 + ".py", "é" * 300, "a\0b.py", "x" * 5000], ids=lambda place: place[:3])
+def test_names_that_no_file_can_have_lead_nowhere(tmp_path: Path, place: str) -> None:
+    refused(resolve(f"{place}:Mine", tmp_path))

@@ -94,6 +94,8 @@ def test_misuse_of_a_robot_is_refused(deed: Callable[[Any], object], told: str) 
             lambda robots: robots.radio.send(Word, np.array([True, False, True]), number=np.zeros(2)),
             "expected one number or an array (3,), also with rows=, got (2,)",
         ),
+        (lambda robots: robots.radio.heard(Word).message.numbers, "the message has no field 'numbers'; it has number"),
+        (lambda robots: robots.radio.send(Word, number=1.0, to=-2), "expected the index of a robot in the arena"),
         (lambda robots: setattr(robots, "linear_mps", 0.1), "no attribute 'linear_mps'"),
     ],
 )

@@ -3,9 +3,12 @@
 from dataclasses import dataclass
 from typing import Any
 
+import msgpack
 import numpy as np
+import pytest
 
-from swarmwire.agent.runner import Inbox
+from swarmwire.agent.runner import Inbox, given_robots
+from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.wire import frames
@@ -48,13 +51,14 @@ def test_of_frames_that_wait_the_newest_is_acted_on_and_the_others_are_counted()
     assert next(ticks)[0] == 2
     assert inbox.dropped == 2
     strange = encode_tick(9, {"others": senses(9, [1])}, Heard.none(GIVES), NO_OUTCOMES)
-    for data in (tick(2), tick(1), b"\xc1", strange, tick(3), tick(5), tick(4)):
+    of_others = encode_tick(9, {"flock": senses(9, [1])}, Heard.none(GIVES), NO_OUTCOMES)
+    for data in (tick(2), tick(1), b"\xc1", strange, of_others, tick(3), tick(5), tick(4)):
         inbox.put_frame(Sample(Bytes(data)))
     assert next(ticks)[0] == 5
-    assert inbox.dropped == 2 + 6
+    assert inbox.dropped == 2 + 7
     inbox.put_frame(Sample(Bytes(tick(6))))
     assert next(ticks)[0] == 6
-    assert inbox.dropped == 8
+    assert inbox.dropped == 9
 
 
 def test_nothing_is_acted_on_once_the_run_is_over() -> None:
@@ -120,3 +124,27 @@ def test_why_a_runner_ended_is_told() -> None:
     assert inbox.ended.how == "left"
     inbox.put_frame(Sample(Bytes(END)))
     inbox.wait_for_farewell()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"groups": None},
+        {"groups": [3]},
+        {"rate_hz": 0},
+        {"gives": [1]},
+        {"memory": "text"},
+        {"memory": b"\xc1"},
+        {"v": frames.VERSION - 1},
+        *({"groups": [{**ASSIGNMENT.as_mapping()["groups"][0], **one}]} for one in (
+            {"rows": [[1, 2]]}, {"rows": [-1]}, {"rows": [2**63]}, {"rows": ["x"]}, {"robot_names": []},
+            {"keys": [1, 2]}, {"keys": [-1]}, {"params": []}, {"body": {}}, {"act_every_ticks": 0}, {"agent": 3},
+        )),
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_robots_that_a_world_cannot_give_are_refused(wrong: dict[str, Any]) -> None:
+    given = {**ASSIGNMENT.as_mapping(), "v": frames.VERSION, "memory": None}
+    assert given_robots(msgpack.packb(given))[0].robot_names == ("flock-0",)
+    with pytest.raises(BadFrame):
+        given_robots(msgpack.packb({**given, **wrong}))

@@ -4,6 +4,8 @@ The statistics tests have fixed keys, so they pass or fail alike in every run; e
 with fresh keys would fail one time in a thousand or less.
 """
 
+from hashlib import blake2b
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -118,6 +120,14 @@ def test_the_normal_quantile_is_finite_at_the_ends_that_draws_can_reach() -> Non
     assert 8.0 < high < 8.5
 
 
+def test_both_forms_give_the_same_quantile_bit_for_bit_from_end_to_end() -> None:
+    pieces = [0.075, 0.925, np.exp(-25.0), 0.5 * draws.TO_UNIT, 1.0]  # where the three meet, and what draws can reach
+    small = np.geomspace(2.0**-54, 0.5, 200)
+    p = np.concatenate([pieces, np.nextafter(pieces[:4], 0.0), np.nextafter(pieces[:4], 1.0), small, 1.0 - small])
+    compiled = [draws_compiled.normal_quantile(one) for one in p]
+    assert draws.normal_quantile(p).tolist() == compiled
+
+
 @given(st.floats(2.0**-54, 0.5))
 def test_the_normal_quantile_never_falls(p: float) -> None:
     low, high = draws.normal_quantile(np.array([p, p * (1.0 + 1e-9)]))
@@ -134,6 +144,14 @@ def test_a_key_is_a_plain_64_bit_number_and_the_same_every_time() -> None:
     assert type(key) is int
     assert 0 <= key < 2**64
     assert key == draws.derive_key(1, "robot", 0)
+
+
+def test_keys_and_purposes_are_the_first_bytes_of_blake2b() -> None:
+    """Written out once more: a run of another version draws the same."""
+    key = blake2b(b"(1, 'robot')", digest_size=8, person=b"swarmwire").digest()
+    assert draws.derive_key(1, "robot") == int.from_bytes(key, "little")
+    word = blake2b(b"loss", digest_size=4, person=b"purpose").digest()
+    assert draws.purpose("loss") == int.from_bytes(word, "little")
 
 
 def test_a_key_does_not_depend_on_whether_a_number_came_from_an_array() -> None:

@@ -253,9 +253,31 @@ def test_a_dict_comes_back_as_it_was_sent(message: dict[str, Any]) -> None:
     assert decode_dict(payload) == message
 
 
+UNHASHABLE = (b"\0\0\x81\x80\x01", b"\0\0\x81\x90\x01")  # a map with a map or a list as its key
+
+
 @pytest.mark.parametrize(
-    "payload", [b"\0\0", b"\0\0\x01", b"\0\0\x81", b"\0\0\x80\x80", b"\0\0\xc1", b"\0\0\x81\xa1\xff\0"]
+    "payload", [b"\0\0", b"\0\0\x01", b"\0\0\x81", b"\0\0\x80\x80", b"\0\0\xc1", b"\0\0\x81\xa1\xff\0", *UNHASHABLE]
 )
 def test_bytes_that_hold_no_dict_are_refused(payload: bytes) -> None:
     with pytest.raises(ValueError):
         decode_dict(payload)
+
+
+def test_dicts_are_not_decoded_as_messages_of_their_length() -> None:
+    said = encode_dict({"heading": "x" * 20})
+    kind = type("AsLong", (Message,), {"__annotations__": {f"b{i}": u1 for i in range(len(said) - TAG_BYTES)}})
+    assert kind.size_bytes == len(said)
+    assert decode_alike(kind, Payloads.of([said]), np.array([0])) is None
+
+
+@pytest.mark.parametrize("message", [{1: "one"}, {None: 1}, {(1, 2): 1}, {"a": {(1, 2): 3}}])
+def test_a_dict_with_other_keys_than_texts_is_refused_where_it_is_sent(message: dict[Any, Any]) -> None:
+    with pytest.raises(TypeError, match="a dict message has texts as keys"):
+        encode_dict(message)
+
+
+@pytest.mark.parametrize("column", [np.zeros(2), np.zeros((3, 1)), [[1.0], [2.0], [3.0]]])
+def test_a_column_of_another_length_is_refused_by_the_fields_name(column: Any) -> None:
+    with pytest.raises(ValueError, match=r"Numbered.heading_rad: expected one number or an array \(3,\)"):
+        encode_rows(Numbered, 3, {"heading_rad": column, "number": 1})

@@ -3,11 +3,11 @@
 import resource
 import subprocess
 import sys
+from _thread import start_new_thread
 
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy import system_limits
 from swarmwire.deploy.system_limits import OWN_FILES, OWN_THREADS, need_open_files, need_threads
 from tests.deploy.commands import LOSSY, called
 
@@ -40,14 +40,14 @@ def test_where_files_are_too_few_for_all_runners_nothing_begins(tmp_path):
 
 
 def test_where_threads_are_too_few_nothing_begins(tmp_path, monkeypatch, capsys):
-    started, start = [], system_limits.start_new_thread
+    started, start = [], start_new_thread
 
     def limited(*arguments):
         if len(started) == OWN_THREADS:
             raise RuntimeError("can't start new thread")
         started.append(start(*arguments))
 
-    monkeypatch.setattr(system_limits, "start_new_thread", limited)
+    monkeypatch.setattr("swarmwire.deploy.system_limits.start_new_thread", limited)
     code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--runners", "10", "--out", tmp_path / "run")
     assert code == 2
     assert errors.startswith("error: this machine: expected room for ")

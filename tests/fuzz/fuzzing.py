@@ -51,14 +51,14 @@ def fuzz(
     measured_from, base_mb = cases // 4, 0.0
     for number in numbers:
         try_one(target, seed, number, report)
-        if report.cases == measured_from:
+        if report.cases == measured_from and cases >= WORTH_MEASURING:
             base_mb = _memory_mb()
         if len(report.findings) >= MOST_FINDINGS or not go_on(report):
             break
-    report.memory_mb = _memory_mb()
     if base_mb:
+        report.memory_mb = _memory_mb()
         report.growth_mb = report.memory_mb - base_mb
-    if report.cases >= WORTH_MEASURING and report.growth_mb > GROWTH_MB:
+    if report.growth_mb > GROWTH_MB:
         text = f"memory grew by {report.growth_mb:.0f} MB since case {measured_from}"
         report.findings.append(Finding(target.name, seed, -1, text, ""))
     return report

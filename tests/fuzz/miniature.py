@@ -5,6 +5,7 @@ The frames are real: of agents that use all that there is, in a world that goes 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -98,12 +99,6 @@ class Miniature:
         self._hosts = dict(zip(RUNNERS, map(Host, self.parts), strict=True))
         self._roster = playing(Lockstep(list(self.parts), terms=Terms(memory=self.layouts)))
 
-    def begun(self) -> "Miniature":
-        """The same after its first ticks."""
-        for _ in range(TICKS):
-            self.truths.append(self.loop.step())
-        return self
-
     def do(self, actions: Actions) -> Truth:
         """A tick in which the robots do this."""
         self.given = actions
@@ -131,6 +126,14 @@ class Miniature:
         senses, heard, outcomes = decode_tick(frame, self.whole.gives or (), senses_of(self.parts, runner))
         actions = host.act(frame.tick, senses, heard, outcomes)
         return encode_actions(frame.tick, with_all(actions), memory=host.memory(senses))
+
+
+@cache
+def begun() -> Miniature:
+    """The miniature after its first ticks, the same for all who only look at it."""
+    made = Miniature()
+    made.truths = [made.loop.step() for _ in range(TICKS)]
+    return made
 
 
 def playing(roster: Any, *, ready: bool = True) -> Any:

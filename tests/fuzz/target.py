@@ -87,17 +87,23 @@ class PackedTarget(Target):
             return changed_bytes(dice, dice.pick(self.samples), self.samples)
         at = dice.below(len(self.trees))
         try:
-            return self.pack(self.changed(dice, self.trees[at]))
+            return self.pack(changed_inside(dice, self.trees[at], self.trees, self.inner))
         except (ValueError, TypeError, OverflowError):  # what cannot be told cannot arrive
             return changed_bytes(dice, self.samples[at], self.samples)
 
-    def changed(self, dice: Dice, tree: Any) -> Any:
-        """The tree with something in it changed."""
-        inner = [key for key in self.inner if isinstance(tree, dict) and tree.get(key)]
-        if inner and dice.chance(0.7):
-            key = dice.pick(inner)
-            return {**tree, key: changed_tree(dice, tree[key], [other.get(key) for other in self.trees])}
-        return changed_tree(dice, tree, self.trees)
+
+def changed_inside(dice: Dice, tree: Any, trees: Sequence[Any], inner: Sequence[str]) -> Any:
+    """The tree with something in it changed: mostly what stands at the keys `inner`, if any."""
+    some = [key for key in inner if isinstance(tree, dict) and tree.get(key)]
+    if some and dice.chance(0.7):
+        key = dice.pick(some)
+        return {
+            **tree,
+            key: changed_tree(
+                dice, tree[key], [other[key] for other in trees if isinstance(other, dict) and key in other]
+            ),
+        }
+    return changed_tree(dice, tree, trees)
 
 
 def refusal_name(error: Exception) -> str:

@@ -4,7 +4,7 @@ import resource
 import signal
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
@@ -45,7 +45,9 @@ def tried(target: Target, case: Any) -> tuple[str, str]:
         became = refusal_name(error)
     except TooSlow:
         return "finding", f"over {target.limit_s:g} s of processor time\n{_last_lines()}"
-    except Exception as error:  # noqa: BLE001 - that is what is looked for
+    except (KeyboardInterrupt, MemoryError):
+        raise
+    except BaseException as error:  # noqa: BLE001 - that is what is looked for; a panic of native code is no Exception
         return "finding", f"{type(error).__name__}: {str(error)[:SHOWN]}\n{_last_lines()}"
     grown_mb = _peak_mb() - peak_mb
     if grown_mb > MOST_MB:
@@ -54,7 +56,7 @@ def tried(target: Target, case: Any) -> tuple[str, str]:
 
 
 @contextmanager
-def _limited(limit_s: float) -> Iterator[None]:
+def _limited(limit_s: float) -> Generator[None]:
     """TooSlow after so much time of this process's processors: another process's load does not count."""
     signal.signal(signal.SIGPROF, _too_slow)
     signal.setitimer(signal.ITIMER_PROF, limit_s)

@@ -1,6 +1,6 @@
 """Proves the fault table: each test passes, and fails without the handling that its row names.
 
-    python -m tests.reliability.without [PATTERN]    only proofs with this in the name of process, test or source
+    python -m tests.reliability.without [PATTERN…]    only those with a pattern in the name of process, test or source
 
 The part that handles a fault is copied to a folder of its own, changed there, and put before all others on the
 path of Python, for the test and for every process that it starts. The project itself stays as it is.
@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,76 +20,74 @@ from tempfile import TemporaryDirectory
 import psutil
 
 from swarmwire.comms.clock import WallClock
-from tests.reliability.fault_table import ROOT, Process, Proof, processes
+from tests.reliability.fault_table import ROOT, Proof, processes
+from tests.reliability.one_test import OPTIONS
 
 FAILED = 1  # pytest's exit code when tests ran and failed; a higher one means that they did not run
 FAILURES = (" failed", "+ Timeout +")  # in its output; errors of what a test stands on are none
-PYTEST = ("pytest", "-q", "-x", "-p", "no:cacheprovider", "--tb=short", "--timeout=100")
-MOST_S = 400.0  # of a test with all that it waits for; pytest ends one that hangs after --timeout
+MOST_S = 300.0  # of a test with all that it waits for
+ALL_MOST_S = 3600.0  # of all of them together
+AT_ONCE = 2  # most of their time they wait
 TELLING_LINES = 25
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came of a proof: nothing to tell of if it holds."""
+    """What came of a proof: nothing is wrong if it holds."""
 
     seconds: float
     wrong: str = ""
 
 
-def main(pattern: str = "") -> int:
-    """Try the proofs one after the other, tell of each, and return how many do not hold."""
+def main(*patterns: str) -> int:
+    """Try the proofs, tell of each, and return how many do not hold."""
+    chosen = _chosen(patterns or ("",))
+    if not chosen:
+        print(f"no proof has {' or '.join(patterns)} in the name of process, test or source")
+        return 1
+    tests = list(dict.fromkeys(proof.test for _, proof in chosen))
+    code, text = _run(("pytest", *OPTIONS, *tests), os.environ, ALL_MOST_S)
+    print(f"{len(tests)} tests as things are: {text.splitlines()[-1]}", flush=True)
+    if code:
+        print(text)
+        return 1
     wrong = 0
-    tried = 0
-    passing: dict[str, str] = {}
-    for process, fault, proof in _chosen(pattern):
-        verdict = tried_proof(proof, passing)
-        tried += 1
-        wrong += bool(verdict.wrong)
-        told = "DOES NOT HOLD" if verdict.wrong else "holds"
-        print(f"{told:13} {verdict.seconds:6.1f} s  {process.title}, {fault}: {proof.test}, {proof.file}", flush=True)
-        if verdict.wrong:
-            print(verdict.wrong, flush=True)
-    print(f"{tried} proofs, {wrong} of which do not hold")
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        for (row, proof), verdict in zip(chosen, pool.map(tried, (proof for _, proof in chosen)), strict=True):
+            wrong += bool(verdict.wrong)
+            told = "DOES NOT HOLD" if verdict.wrong else "holds"
+            print(f"{told:13} {verdict.seconds:6.1f} s  {row}: {proof.test}, {proof.file}", flush=True)
+            if verdict.wrong:
+                print(verdict.wrong, flush=True)
+    print(f"{len(chosen)} proofs of {len({row for row, _ in chosen})} faults, {wrong} of which do not hold")
     return wrong
 
 
-def _chosen(pattern: str) -> list[tuple[Process, str, Proof]]:
+def _chosen(patterns: tuple[str, ...]) -> list[tuple[str, Proof]]:
+    """Proofs, each with the row that it is of."""
     return [
-        (process, fault.fault, proof)
+        (f"{process.title}, {fault.fault}", proof)
         for process in processes()
         for fault in process.faults
         for proof in fault.proof
-        if pattern in f"{process.name} {proof.test} {proof.file}"
+        if any(pattern in f"{process.name} {proof.test} {proof.file}" for pattern in patterns)
     ]
 
 
-def tried_proof(proof: Proof, passing: dict[str, str]) -> Verdict:
-    """Whether the test passes as things are, and fails without the handling. `passing` keeps what is known of tests."""
+def tried(proof: Proof) -> Verdict:
+    """What is wrong with the test when the handling is gone: nothing, if it fails."""
     clock = WallClock()
     start_ns = clock.now_ns()
-    if proof.test not in passing:
-        code, text = _run((*PYTEST, proof.test), os.environ)
-        passing[proof.test] = "" if code == 0 else f"it does not pass as things are:\n{text}"
-    wrong = passing[proof.test] or _without(proof)
-    return Verdict((clock.now_ns() - start_ns) / 1e9, wrong)
-
-
-def _without(proof: Proof) -> str:
-    """What is wrong with the test when the handling is gone: nothing, if it fails."""
-    with TemporaryDirectory(prefix="without-") as folder:
-        environment = os.environ | {"PYTHONPATH": folder, "PYTHONWARNINGS": "ignore::SyntaxWarning"}
+    with TemporaryDirectory(prefix="without-", ignore_cleanup_errors=True) as folder:
+        environment = os.environ | {"PYTHONPATH": folder, "PYTHONUNBUFFERED": "1"}
         module = _changed_copy(proof, Path(folder))
         try:
-            code, text = _run(("-c", f"import {module}, sys; print(sys.modules['{module}'].__file__)"), environment)
-            if code or folder not in text:
-                return f"what is left of {proof.file} cannot be loaded:\n{text}"
-            code, text = _run((*PYTEST, proof.test), environment)
+            code, text = _run(("tests.reliability.one_test", module, folder, proof.test), environment, MOST_S)
         finally:
             _end_all_of(folder)
-    if code == FAILED and any(mark in text for mark in FAILURES):
-        return ""
-    return f"without the handling it does not fail (exit code {code}):\n{text}"
+    fails = code == FAILED and any(mark in text for mark in FAILURES)
+    wrong = "" if fails else f"without the handling it does not fail (exit code {code}):\n{text}"
+    return Verdict((clock.now_ns() - start_ns) / 1e9, wrong)
 
 
 def _changed_copy(proof: Proof, folder: Path) -> str:
@@ -101,22 +100,21 @@ def _changed_copy(proof: Proof, folder: Path) -> str:
     return ".".join(Path(*inner).with_suffix("").parts)
 
 
-def _run(command: tuple[str, ...], environment: Mapping[str, str]) -> tuple[int, str]:
-    """Exit code and the last that was printed."""
-    arguments = command if command[0] == "-c" else ("-m", *command)
+def _run(module: tuple[str, ...], environment: Mapping[str, str], most_s: float) -> tuple[int, str]:
+    """Exit code of a module with its arguments, and the last that it printed; -1: it took too long."""
     try:
         done = subprocess.run(
-            [sys.executable, *arguments],
+            [sys.executable, "-m", *module],
             cwd=ROOT,
             env=environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            timeout=MOST_S,
+            timeout=most_s,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        return -1, f"it took more than {MOST_S:.0f} s"
+        return -1, f"it took more than {most_s:.0f} s"
     return done.returncode, "\n".join(done.stdout.splitlines()[-TELLING_LINES:])
 
 
@@ -129,4 +127,4 @@ def _end_all_of(folder: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(min(main(*sys.argv[1:2]), 1))
+    sys.exit(min(main(*sys.argv[1:]), 1))

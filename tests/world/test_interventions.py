@@ -7,9 +7,12 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.kill import Kill
 from swarmwire.world.interventions import MOST_WAITING, Intervention, Interventions
+from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario_file import scenario_from
-from tests.world.samples import changed
+from swarmwire.world.world import World
+from tests.world.samples import changed, posed
+from tests.world.test_events import Ahead, Watch
 
 RATE_HZ = 10
 KILL: dict[str, Any] = {"do": "kill", "robots": {"names": ["flock-1"]}}
@@ -178,3 +181,19 @@ def test_a_repetition_takes_what_was_done_and_nothing_new():
         door(replayed=[Intervention(0, 2, {"do": "kill"})])
     with pytest.raises(BadInput, match="^event 1 that was given: expected a number that no other event has"):
         door(replayed=[Intervention(0, 1, KILL)])
+
+
+def test_an_event_that_is_given_begins_and_ends_in_the_run_at_the_ticks_it_was_given_and_ended():
+    scenario = posed([[-1.0, 0.0, 0.0], [-1.0, 1.0, 0.0]])
+    given, watch = Interventions(scenario, bodies_of(scenario, "s.toml")), Watch()
+    loop = Loop(World(scenario, [1], {}), None, Ahead(), [watch], interventions=given)
+    loop.run(2)
+    number = given.give({"do": "kill", "robots": {"names": ["flock-1"]}})
+    loop.run(5)
+    given.end(number)
+    loop.run(8)
+    assert [truth.alive.tolist() for truth in watch.seen] == [[True, True]] * 2 + [[True, False]] * 3 + [
+        [True, True]
+    ] * 3
+    told = [(truth.tick, event.serial, event.ended) for truth in watch.seen for event in truth.events]
+    assert told == [(2, number, False), (5, number, True)]

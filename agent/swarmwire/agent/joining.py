@@ -98,11 +98,10 @@ def join(joining: Joining, inbox: Inbox, say: Callable[[str], None]) -> Ended:
         session = open_runner(joining.endpoint, joining.connect_s, joining.network)
     except zenoh.ZError as error:
         reason = str(error).split(" at ")[0]
-        raise RunnerLost(
-            runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}{_or_else(joining)}: {reason}"
-        ) from error
+        why = "" if "Timeout" in reason else f": {reason}"
+        raise RunnerLost(runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}{_or_else(joining)}{why}") from error
     with closed_after(session):
-        run_id = joining.run or _only_run(session, runner, joining.endpoint)
+        run_id = _chosen_run(session, runner, joining)
         keys = Keys(run_id)
 
         def asked() -> Asked:
@@ -120,15 +119,19 @@ def _or_else(joining: Joining) -> str:
     return ", or one certificate or the other is not accepted" if joining.network.proves else ""
 
 
-def _only_run(session: zenoh.Session, runner: str, endpoint: str) -> str:
-    """The id of the only run at the endpoint."""
+def _chosen_run(session: zenoh.Session, runner: str, joining: Joining) -> str:
+    """The id of the run that is meant, or of the only one at the endpoint."""
+    endpoint = joining.endpoint
     replies = session.liveliness().get(EVERY_WORLD, timeout=LOOK_S)
     found = {run_of(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None}
     runs = sorted(found or _runs_to_come(session))
-    if len(runs) == 1:
+    if joining.run in runs:
+        return joining.run
+    if len(runs) == 1 and joining.run is None:
         return runs[0]
     if runs:
-        raise BadInput("--run", "", f"expected one of the runs at {endpoint}: {', '.join(runs)}")
+        got = "" if joining.run is None else f", got {joining.run}"
+        raise BadInput("--run", "", f"expected one of the runs at {endpoint}: {', '.join(runs)}{got}")
     raise RunnerLost(runner, NO_ROBOTS, f"there is no run at {endpoint}, or it does not let {runner} in")
 
 

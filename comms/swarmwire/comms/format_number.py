@@ -5,7 +5,7 @@ from swarmwire.comms.errors import BadInput
 KEY = "format"
 
 
-def check_format(found: object, known: int, where: str) -> None:
+def check_format(found: object, known: int, where: str, key: str = KEY) -> None:
     """Return if a file names the format that is known here; else BadInput, of a newer, an older or no version at all.
 
     >>> check_format(1, 1, "a.toml")
@@ -21,4 +21,4 @@ def check_format(found: object, known: int, where: str) -> None:
         whose = ": made by an older swarmwire; that one reads it"
     else:
         whose = ""
-    raise BadInput(where, KEY, f"expected {known}, got {found!r}{whose}")
+    raise BadInput(where, key, f"expected {known}, got {found!r}{whose}")

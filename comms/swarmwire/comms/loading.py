@@ -23,7 +23,7 @@ class NotLoaded(ValueError):
 def resolve(spec: str, beside: Path) -> str:
     """The spec with the path of a file made absolute: "my_agent.py:Mine" lies beside the scenario."""
     place, _, name = spec.rpartition(":")
-    return f"{(beside / place).resolve()}:{name}" if place.endswith(".py") else spec
+    return f"{(beside / place).resolve()}:{name}" if place.endswith(".py") and "\0" not in place else spec
 
 
 def load_named(spec: str) -> object:
@@ -35,7 +35,7 @@ def load_named(spec: str) -> object:
     if not place or not name.isidentifier():
         raise NotLoaded(f'expected "package.module:Class" or "file.py:Class", got {spec!r}')
     of_file = place.endswith(".py")
-    if of_file and not Path(place).is_file():
+    if of_file and not _is_file(Path(place)):
         raise NotLoaded(f"there is no file {place}")
     try:
         module = _load_file(Path(place)) if of_file else importlib.import_module(place)
@@ -52,9 +52,17 @@ def _hint(error: BaseException, place: str) -> str:
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == place]
     hint = f" (line {lines[-1]})" if lines else ""
     missing = error.name or "" if isinstance(error, ModuleNotFoundError) else ""
-    if missing.isidentifier() and Path(place).with_name(f"{missing}.py").is_file():
+    if missing.isidentifier() and _is_file(Path(place).with_name(f"{missing}.py")):
         hint += "; a file is loaded alone: it imports what is installed, not what lies beside it"
     return hint
+
+
+def _is_file(path: Path) -> bool:
+    """Whether there is such a file; not with a name that is too long for any."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 class _SourceLoader(SourceFileLoader):

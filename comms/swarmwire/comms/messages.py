@@ -182,7 +182,8 @@ def decode_rows(kind: type[Message], payloads: Payloads, index: IntArray) -> dic
 def encode_dict(message: dict[str, Any]) -> bytes:
     """A dict on air: the dict tag, then msgpack; TypeError unless its keys are texts and msgpack takes its values."""
     payload = DICT_TAG.to_bytes(TAG_BYTES, "little") + msgpack.packb(message)
-    if not all(type(key) is str for key in decode_dict(payload)):  # what cannot be read is refused here, not there
+    read = dict_in(payload)  # what cannot be read is refused here, not there
+    if read is None or not all(type(key) is str for key in read):
         raise TypeError(f"a dict message has texts as keys, got {list(message)}")
     return payload
 

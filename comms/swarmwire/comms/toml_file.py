@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_toml
 
 
 def read_toml(path: Path, named_by: tuple[str, str] | None = None) -> dict[str, Any]:
@@ -13,7 +14,7 @@ def read_toml(path: Path, named_by: tuple[str, str] | None = None) -> dict[str, 
     A file that another one names, `named_by` as (file, key), is refused there if it is missing.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        return from_toml(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         if named_by is not None:
             raise BadInput(*named_by, f"expected a readable file: {path}: {error.strerror}") from None

@@ -6,6 +6,8 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from swarmwire.deploy.kernel_cache import keep_kernels
+
 if TYPE_CHECKING:
     from swarmwire.deploy.campaign.sweeping import Sweep, resume, sweep
     from swarmwire.deploy.gateways.gateways import Gateways
@@ -49,6 +51,8 @@ _PLACES = {
     "run": "swarmwire.deploy.running",
     "sweep": "swarmwire.deploy.campaign.sweeping",
 }  # all else is part of a result
+
+keep_kernels()
 
 
 def __getattr__(name: str) -> Any:

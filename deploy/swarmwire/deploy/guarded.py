@@ -19,6 +19,11 @@ class Guarded:
         self.failed = False
 
     @property
+    def before_agents(self) -> bool:
+        """Whether it begins before the run's agents are there, where they come from elsewhere."""
+        return getattr(self._observer, "before_agents", False)
+
+    @property
     def name(self) -> str:
         """The observer's class."""
         return type(self._observer).__name__

@@ -5,10 +5,11 @@ import errno
 CURES = {
     errno.ENOSPC: "make room: df -h",
     errno.EDQUOT: "make room: quota",
+    errno.EFBIG: "raise the limit: ulimit -f",
     errno.EMFILE: "raise the limit: ulimit -n",
     errno.ENFILE: "raise the limit of the system: fs.file-max",
     errno.ENOMEM: "fewer robots, seeds or runners need less",
-    errno.EAGAIN: "raise the limit of processes and threads: ulimit -u",
+    errno.EAGAIN: "raise the limit of processes and threads, ulimit -u, or of memory, ulimit -v",
     errno.EROFS: "choose another folder",
     errno.EIO: "the disk may be worn out",
 }

@@ -159,7 +159,7 @@ class Simulation:
         )
         self._status = self._new_status()
         self._observers: list[Guarded] = []
-        self._observed = bool(listening and listening.observed)
+        self._listens, self._observed = listening is not None, bool(listening and listening.observed)
         for observer in (TooLarge(self._record.say), *self._recorders(what, listening), *observers):
             self.watch(observer)
         self._losses: list[Loss] = []
@@ -212,19 +212,19 @@ class Simulation:
             raise RuntimeError("a simulation runs once; make another one")
         keep_memory()
         rows, realtime = self.static.arenas * self.static.robots, self._pace.factor if self._pace else None
-        self._origin = self._record.begin(
-            self.scenario,
-            self.code,
-            self.static.seeds,
-            ticks=self.ticks,
-            runners=self.runners,
-            realtime=realtime,
-            quantum_s=self._recorded_quantum_s,
-            gateways=self._behind.kinds,
-            metrics=self.metrics,
-        )
         with ExitStack() as stack:
             stack.push(self._record.failed_to_start)
+            self._origin = self._record.begin(
+                self.scenario,
+                self.code,
+                self.static.seeds,
+                ticks=self.ticks,
+                runners=self.runners,
+                realtime=realtime,
+                quantum_s=self._recorded_quantum_s,
+                gateways=self._behind.kinds,
+                metrics=self.metrics,
+            )
             if self._pace:  # before anything answers, and the pace begins
                 world = self._new_world(None, self.static.seeds)
                 rehearse(world, new_air(self.scenario, world, self._traces), self.metrics.metrics)
@@ -252,10 +252,17 @@ class Simulation:
                 self.interventions,
                 cast("TimedCrew", acting) if self._recorded_quantum_s is not None else None,
             )
-            crew.start()
+            early = self._early if self._listens else []
+            with ExitStack() as unless_begun:
+                for observer in early:
+                    observer.begin(self.static)
+                    unless_begun.callback(observer.end, None)
+                crew.start()
+                unless_begun.pop_all()
             self._not_its_own = bool((health := self.health()) and (health.robots_free or health.foreign))
             for observer in self._watching:
-                observer.begin(self.static)
+                if observer not in early:
+                    observer.begin(self.static)
             self._exit = stack.pop_all()
         self._started_ns = self._clock.now_ns()
         return self
@@ -316,6 +323,11 @@ class Simulation:
     def health(self) -> RunnerHealth | None:
         """How the runners are doing; None if there are none."""
         return self._crew.health() if isinstance(self._crew, RemoteCrew | RealTimeCrew) else None
+
+    @property
+    def _early(self) -> list[Observer]:
+        """Those through which people see and control a run that still waits for its agents."""
+        return [of for of in self._watching if getattr(of, "before_agents", False)]
 
     def _new_world(self, seed: int | None, seeds: Sequence[int] | None) -> World:
         """Every arena at its start, with the senses that its agents need."""

@@ -14,7 +14,7 @@ OWN_FILES = 100  # of a world, its tables, and who looks on; 40 were counted bef
 OWN_THREADS = 40  # of a world with runners on two cores, beside those that its libraries have already
 THREADS_PER_CORE = 2
 THREADS_PER_RUNNER = 4  # three of the runner's process, and less than one here
-SMALL_STACK_BYTES = 1 << 16
+SMALL_STACK_BYTES = 1 << 18
 
 
 def need_open_files(runners: int) -> None:

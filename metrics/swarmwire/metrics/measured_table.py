@@ -8,6 +8,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.damage import damage
 
 if TYPE_CHECKING:
     import polars as pl
@@ -77,5 +78,5 @@ def _read(path: Path) -> "pl.DataFrame":
             return pl.read_csv(file, infer_schema_length=None, null_values=["", "nan", "NaN", "null"])
     except OSError as error:
         raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
-    except pl.exceptions.PolarsError as error:
+    except damage() as error:
         raise BadInput(str(path), "", f"expected a table: {str(error).splitlines()[0]}") from None

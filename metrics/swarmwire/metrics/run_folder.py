@@ -1,6 +1,5 @@
 """A run folder, read back: of runs that ended, that were killed, and that still go on."""
 
-import json
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import cached_property
@@ -8,7 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard, cast
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_json
 from swarmwire.comms.truth import Static
+from swarmwire.metrics.damage import damage
 from swarmwire.metrics.record.distance_totals import distance_totals_schema
 from swarmwire.metrics.record.event_recorder import event_schema
 from swarmwire.metrics.record.formats import SUMMARY_FORMAT, TABLES_FORMAT, refuse_other_format
@@ -53,7 +54,7 @@ class RunFolder:
         """`summary.json`; None if the run has not ended, or was killed."""
         path = self.path / SUMMARY
         try:
-            found: object = json.loads(path.read_text(encoding="utf-8"))
+            found: object = from_json(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
             return None
         except (OSError, ValueError) as error:
@@ -176,7 +177,7 @@ class RunFolder:
         """Tables are of the format of the static part; should that be missing or damaged, they can be read still."""
         path = self.path / STATIC
         with suppress(OSError, ValueError):
-            refuse_other_format(json.loads(path.read_text(encoding="utf-8")), TABLES_FORMAT, path)
+            refuse_other_format(from_json(path.read_text(encoding="utf-8")), TABLES_FORMAT, path)
 
     def _checked(self, arena: int) -> int:
         if not 0 <= arena < self.static.arenas:
@@ -198,7 +199,7 @@ class RunFolder:
                 return lazy.drop(*left_out, strict=False).collect()
             except FileNotFoundError:
                 continue  # the run ended just now, and its parts were joined
-            except pl.exceptions.PolarsError as error:
+            except damage() as error:
                 reason = str(error).splitlines()[0]
                 expected = f"expected whole Parquet files ({reason}); see swarmwire verify"
                 raise BadInput(self.where(name), "", expected) from error

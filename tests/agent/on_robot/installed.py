@@ -83,7 +83,8 @@ def install(folder: Path) -> dict[str, str]:
     (of / "entry_points.txt").write_text(POINTS)
     (folder / "written_driver.py").write_text(DRIVER)
     (folder / "lacking_driver.py").write_text(LACKING)
-    return {**os.environ, "PYTHONPATH": str(folder), "XDG_RUNTIME_DIR": str(folder)}
+    path = os.pathsep.join(filter(None, [str(folder), os.environ.get("PYTHONPATH")]))
+    return {**os.environ, "PYTHONPATH": path, "XDG_RUNTIME_DIR": str(folder)}
 
 
 class Command:

@@ -4,7 +4,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from swarmwire.comms.air.accounts import Accounts
+from swarmwire.comms.air.intake import Intake
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST, Sent
 from swarmwire.comms.truth import Obstacle
@@ -90,3 +93,17 @@ def test_what_the_run_ends_under_way_or_queued_is_in_flight():
     assert told.fates() == {"IN_FLIGHT": 8}
     assert told.tally.in_range.tolist() == [0]
     assert told.air.end().fates.sum() == 0
+
+
+def test_the_books_of_some_arenas_may_be_closed_and_the_others_count_on():
+    def handed_over(rows: list[int]) -> Transmissions:
+        return Intake(6).take(np.zeros(6, np.int64), packets(rows), np.full(6, 1), 0)
+
+    accounts = Accounts(arenas=3, robots=2)
+    accounts.take_up(handed_over([0, 2, 3, 4, 5, 5]))
+    closed = accounts.close(np.array([True, False, True]))
+    assert (closed.sent.tolist(), closed.intended.tolist()) == ([1, 0, 3], [1, 0, 3])
+    accounts.take_up(handed_over([0]))
+    rest = accounts.close()
+    assert (rest.sent.tolist(), rest.intended.tolist(), rest.fates.sum()) == ([1, 2, 0], [1, 2, 0], 0)
+    assert accounts.close().sent.tolist() == [0, 0, 0]

@@ -117,3 +117,16 @@ def test_time_does_not_run_backwards():
         air.advance(TICK_NS - 1)
     with pytest.raises(ValueError, match="at_ns"):
         air.send(0, 0, packets([0]))
+
+
+def test_nothing_sent_takes_no_sequence_number_and_needs_no_time():
+    air = make_air(Radio(9.0, send_offset="tick"), 2)
+    air.advance(TICK_NS)
+    air.send_at(np.zeros(2, np.int64), packets([]))  # long ago: packets would be refused
+    with pytest.raises(ValueError):
+        air.send_at(np.zeros(2, np.int64), packets([0]))
+
+
+def test_a_disk_without_a_range_is_refused():
+    with pytest.raises(ValueError, match="range_m: expected a range, as a disk has one"):
+        make_air(Radio(None), 2)

@@ -50,3 +50,12 @@ def test_every_robot_is_in_the_one_cell_of_its_place_and_arena(seed: int, arenas
 def test_there_are_neither_too_many_cells_nor_none(reach_m: float) -> None:
     cells = cells_over((100.0, 50.0), reach_m, 1, 1)
     assert 1 <= min(cells.nx, cells.ny) <= max(cells.nx, cells.ny) <= MOST_PER_SIDE
+
+
+def test_arenas_that_are_over_have_nobody_in_their_cells() -> None:
+    state = np.zeros((3, 4, 2))
+    cells = cells_over((2.0, 2.0), 0.5, 3, 12)
+    sort(cells, state, np.array([True, False, True]))
+    filled = np.diff(cells.start).reshape(3, -1).sum(axis=1)
+    assert filled.tolist() == [4, 0, 4]
+    assert cells.start[-1] == 8

@@ -37,6 +37,45 @@ def test_a_request_arrives_as_it_was_sent(request_):
 def test_a_step_is_one_tick_and_a_whole_speed_is_a_number():
     assert decode_request(msgpack.packb({"v": 1, "do": "step"})) == Request("step", 1)
     assert decode_request(msgpack.packb({"v": 1, "do": "speed", "factor": 2})) == Request("speed", 2.0)
+    assert decode_request(msgpack.packb({"v": 1, "do": "speed"})) == Request("speed", None)
+
+
+def test_a_request_cannot_be_changed_on_its_way():
+    with pytest.raises(AttributeError):
+        Request("pause").do = "stop"
+
+
+def test_a_million_ticks_may_be_asked_for_and_no_more():
+    assert decode_request(encode_request(Request("step", 10**6))).value == 10**6
+    with pytest.raises(BadInput, match="from 1 to 1000000, got 1000001"):
+        decode_request(encode_request(Request("step", 10**6 + 1)))
+
+
+def of_bytes(count):
+    """A map of version 1 with so many bytes: nine are for the keys and the length of the rest, or eleven."""
+    data = msgpack.packb({"v": 1, "x": bytes(count - (9 if count < 2**16 + 9 else 11))})
+    assert len(data) == count
+    return data
+
+
+def test_a_request_may_have_64_kilobytes_and_an_answer_16_megabytes():
+    with pytest.raises(BadInput, match="do: expected one of"):  # it was read
+        decode_request(of_bytes(2**16))
+    with pytest.raises(BadInput, match="oversized"):
+        decode_request(of_bytes(2**16 + 1))
+    assert decode_reply(of_bytes(2**24))["v"] == 1
+    with pytest.raises(BadFrame, match="oversized"):
+        decode_reply(of_bytes(2**24 + 1))
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [("x" * 58, "got '" + "x" * 58 + "'"), ("x" * 59, "got '" + "x" * 56 + "...")],
+)
+def test_a_long_value_is_shown_by_its_beginning(value, shown):
+    with pytest.raises(BadInput) as caught:
+        decode_request(msgpack.packb({"v": 1, "do": "end", "event": value}))
+    assert str(caught.value).endswith(shown)
 
 
 @pytest.mark.parametrize(
@@ -45,6 +84,7 @@ def test_a_step_is_one_tick_and_a_whole_speed_is_a_number():
         ({}, "v: expected version 1 of control, got None"),
         ({"v": True}, "v: expected version 1"),
         ({"v": 2, "do": "pause"}, "v: expected version 1"),
+        ({"v": 0, "do": "pause"}, "v: expected version 1"),
         ({"v": 1}, "do: expected one of pause, resume"),
         ({"v": 1, "do": "paus"}, "did you mean pause?"),
         ({"v": 1, "do": ["pause"]}, "do: expected one of"),
@@ -57,6 +97,7 @@ def test_a_step_is_one_tick_and_a_whole_speed_is_a_number():
         ({"v": 1, "do": "event", "event": "kill"}, "event: expected a table as in a scenario"),
         ({"v": 1, "do": "event", "event": {"do": "kill", 1: 2}}, "expected"),
         ([1], "expected a map"),
+        (["v"], "expected a map"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_one_line(asked, line):
@@ -73,6 +114,12 @@ def test_bytes_that_are_no_request_are_refused(data):
 
 def test_an_answer_of_another_version_or_none_is_a_bad_frame():
     assert decode_reply(encode_reply({"done": "paused", "tick": 3})) == {"v": 1, "done": "paused", "tick": 3}
-    for data in (b"", msgpack.packb({"v": 2}), msgpack.packb([1])):
+    for data in (b"", msgpack.packb({"v": 2}), msgpack.packb({"v": 0}), msgpack.packb([1])):
         with pytest.raises(BadFrame):
             decode_reply(data)
+
+
+@pytest.mark.parametrize("value", [2**64, {"n": -(2**63) - 1}, {"x": object()}, {"x": "\ud800"}], ids=repr)
+def test_what_no_message_can_carry_is_refused_by_whoever_asks(value):
+    with pytest.raises(BadInput, match="event: expected texts, numbers of at most 64 bits, lists and tables alone"):
+        encode_request(Request("event", value))

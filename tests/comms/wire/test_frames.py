@@ -51,6 +51,23 @@ def test_what_is_packed_comes_back(kind: str, tick: int, given_arrays: dict[str,
         assert (got.dtype, got.shape, got.tobytes()) == (array.dtype, array.shape, array.tobytes())
 
 
+def test_a_frame_is_a_map_of_these_keys_in_msgpack() -> None:
+    """Written out, so that the two sides cannot change together without a new version."""
+    data = frames.encode("tick", 3, {"a": np.array([[0.5], [1.0]])}, {"b": 1})
+    array = ["<f8", [2, 1], b"\0\0\0\0\0\0\xe0\x3f\0\0\0\0\0\0\xf0\x3f"]
+    assert msgpack.unpackb(data) == {"v": 2, "kind": "tick", "tick": 3, "arrays": {"a": array}, "values": {"b": 1}}
+
+
+def test_a_frame_may_have_64_megabytes_and_no_more() -> None:
+    assert fault(bytes(2**26)) == "malformed"
+    assert fault(bytes(2**26 + 1)) == "oversized"
+
+
+def test_a_frame_cannot_be_changed() -> None:
+    with pytest.raises(AttributeError):
+        frames.decode(whole()).tick = 4  # pyright: ignore[reportAttributeAccessIssue]
+
+
 def test_an_array_that_does_not_lie_in_one_piece_is_packed_as_it_reads() -> None:
     array = np.arange(12.0).reshape(3, 4).T[::2]
     assert np.array_equal(frames.decode(frames.encode("k", 0, {"a": array})).arrays["a"], array)

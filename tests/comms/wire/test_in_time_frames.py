@@ -62,3 +62,13 @@ def test_nothing_heard_is_a_frame_of_outcomes_alone() -> None:
     outcomes = Outcomes(np.array([2]), np.array([0]), np.array([1]))
     _, _, heard, told = decode_packets(frames.decode(encode_packets(0, 0, 0, Heard.none(GIVES), outcomes)), GIVES)
     assert (len(heard), len(told)) == (0, 1)
+
+
+def test_a_runner_of_one_robot_or_of_none_speaks_for_no_other() -> None:
+    for sender in (4, 6):
+        one = frames.decode(encode_sent(7, Sent(np.array([sender]), np.array([0]), Payloads.of([b"a"]))))
+        assert decode_sent(one, np.array([sender])).sender.tolist() == [sender]
+        assert one.values == {}
+        for rows in ([5], []):
+            with pytest.raises(BadFrame, match="expected packets of the runner's own robots"):
+                decode_sent(one, np.array(rows, np.int64))

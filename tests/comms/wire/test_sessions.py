@@ -71,6 +71,24 @@ def test_who_says_that_it_is_insecure_may():
         assert listens_at(world)
 
 
+@pytest.mark.parametrize(
+    ("opened", "lease_s"),
+    [
+        (lambda: open_world(unix_endpoint("/tmp/w"), 1.0), 7 * 86_400),
+        (lambda: open_runner(unix_endpoint("/tmp/w")), 7 * 86_400),
+        (lambda: open_observed([unix_endpoint("/tmp/w")]), 7 * 86_400),
+        (lambda: open_world("tcp/127.0.0.1:0", 1.0), 10),
+        (lambda: open_world([unix_endpoint("/tmp/w"), "tcp/127.0.0.1:0"], 45.0), 45),
+        (lambda: open_runner("tcp/127.0.0.1:1"), 60),
+    ],
+)
+def test_how_long_somebody_may_be_frozen_before_its_link_is_cut(monkeypatch, opened, lease_s):
+    configs: list[zenoh.Config] = []
+    monkeypatch.setattr(zenoh, "open", configs.append)
+    opened()
+    assert int(configs[0].get_json("transport/link/tx/lease")) == lease_s * 1000
+
+
 def test_a_query_passes_two_routers_whichever_begins_first():
     insecure = Network(insecure=True)
     with ExitStack() as opened:

@@ -152,6 +152,21 @@ def test_outcomes_come_over_whole(listed: list[tuple[int, int, int]]) -> None:
     assert all(same(getattr(got, name), getattr(outcomes, name)) for name in ("row", "id", "result"))
 
 
+def test_senses_of_other_groups_or_none_are_refused() -> None:
+    for senses, known in (({"flock": GroupSenses(ROWS, {})}, {"scouts"}), ({}, {"flock"})):
+        frame = frames.decode(encode_tick(5, senses, Heard.none(), NO_OUTCOMES))
+        with pytest.raises(BadFrame, match="expected groups of this runner"):
+            decode_tick(frame, (), known)
+
+
+@pytest.mark.parametrize("gives", [(), ("range_m", "bearing_rad")])
+def test_packets_that_tell_more_or_less_than_the_radio_gives_are_refused(gives: tuple[str, ...]) -> None:
+    heard = Heard(*np.zeros((4, 1), np.int64), {"range_m": np.zeros(1)}, np.zeros(1, np.int64), Payloads.of([b"a"]))
+    frame = frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, heard, NO_OUTCOMES))
+    with pytest.raises(BadFrame):
+        decode_tick(frame, gives, {"flock"})
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -165,7 +180,7 @@ def test_outcomes_come_over_whole(listed: list[tuple[int, int, int]]) -> None:
 )
 def test_outcomes_that_are_none_are_refused(wrong: Any) -> None:
     frame = telling(NO_OUTCOMES)
-    with pytest.raises(BadFrame) as caught:
+    with pytest.raises(BadFrame, match="from 0 to 4$|outcomes: expected <i8") as caught:
         decode_tick(replace(frame, arrays={**frame.arrays, "outcomes": wrong}), (), {"flock"})
     assert caught.value.fault == "malformed"
 
@@ -231,6 +246,11 @@ def test_own_actuators_that_are_none_are_refused(wrong: Any) -> None:
     with pytest.raises(BadFrame) as caught:
         decode_actions(replace(frame, arrays={**frame.arrays, **wrong}), ROWS)
     assert caught.value.fault == "malformed"
+
+
+def test_frames_that_were_dropped_are_told_if_there_were_any() -> None:
+    assert frames.decode(encode_actions(0, sound())).values == {}
+    assert frames.decode(encode_actions(0, sound(), 3)).values == {"dropped": 3}
 
 
 def test_actions_of_a_silent_runner_carry_no_packets() -> None:
@@ -342,6 +362,7 @@ def noting(rows: list[int], code: list[int], names: tuple[str, ...]) -> bytes:
 def test_named_states_come_over_whole() -> None:
     notes = decode_actions(frames.decode(noting([9, 4], [1, 0], ("search", "wait"))), ROWS).notes
     assert (notes.rows.tolist(), notes.code.tolist(), notes.names) == ([9, 4], [1, 0], ("search", "wait"))
+    assert decode_actions(frames.decode(noting([9], [0], ("search",))), ROWS).notes.names == ("search",)
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,9 @@ from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch, packed_imag
 from swarmwire.comms.glimpse import Glimpse, Scene, Series
 from swarmwire.comms.one_arena import static_of, truth_of
 from swarmwire.comms.senses import GroupSenses
-from swarmwire.comms.truth import Finished, Group, Happened, Light, Obstacle, Static, Tally, Truth
+from swarmwire.comms.truth import Departed, Finished, Group, Happened, Light, Obstacle, Static, Tally, Truth
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.scene_frames import decode_scene, encode_scene
+from swarmwire.comms.wire.scene_frames import OBSERVED_VERSION, decode_scene, encode_scene
 from swarmwire.comms.wire.truth_frames import decode_truth, encode_truth
 
 ROBOTS, ARENAS = 3, 2
@@ -144,8 +144,10 @@ def test_movable_obstacles_come_over_with_their_poses():
         decode_scene(frames.decode(encode_scene(uneven)))
 
 
-def test_a_scene_comes_over_whole():
-    assert decode_scene(frames.decode(encode_scene(SCENE))) == SCENE
+def test_a_scene_comes_over_whole_and_is_of_no_tick():
+    frame = frames.decode(encode_scene(SCENE))
+    assert decode_scene(frame) == SCENE
+    assert (frame.kind, frame.tick) == ("scene", -1)
 
 
 def quiet(**given: Any) -> Glimpse:
@@ -183,7 +185,7 @@ def one_finished(**given: int) -> Finished:
         ("leds", {"leds": np.zeros((ROWS, SCENE.static.most_leds + 1), np.int64)}),
         ("leds", {"leds": np.full((ROWS, SCENE.static.most_leds), -1)}),
         ("leds", {"leds": np.full((ROWS, SCENE.static.most_leds), 0x1000000)}),
-        ("state", {"state": np.full(ROWS, 1)}),
+        ("state: expected 0 to 0$", {"state": np.full(ROWS, 1)}),
         ("state", {"state": np.full(ROWS, -1)}),
         ("states", {"states": ()}),
         ("states", {"states": ("", "x" * 65)}),
@@ -194,6 +196,7 @@ def one_finished(**given: int) -> Finished:
         ("tally/fates", {"tally": Tally(*np.zeros((3, ARENAS), np.int64), np.zeros((ARENAS, 3), np.int64))}),
         ("finished.fate", {"finished": one_finished(fate=len(Fate))}),
         ("finished.receiver", {"finished": one_finished(receiver=-2)}),
+        ("finished.to: expected -1 to 2$", {"finished": one_finished(to=-2)}),
         ("finished.sender", {"finished": one_finished(sender=ROBOTS)}),
         ("events", {"events": (Happened(0, 0.0, "kill", False, np.ones(2, np.bool_)),)}),
         ("groups of this run", {"senses": {"c": GroupSenses(np.zeros(1, np.int64), {})}}),
@@ -204,6 +207,32 @@ def one_finished(**given: int) -> Finished:
 def test_a_glimpse_that_contradicts_itself_is_refused(fault, given):
     with pytest.raises(BadFrame, match=fault):
         decode_truth(frames.decode(encode_truth(quiet(**given))), SCENE)
+
+
+EVENT = [0, 0.0, "kill", False, "", False]
+
+
+@pytest.mark.parametrize("wrong", [7, [], EVENT[:5], [*EVENT, 0], [0, 0, *EVENT[2:]], [*EVENT[:5], 1]], ids=str)
+def test_events_that_are_none_are_refused(wrong):
+    frame = frames.decode(encode_truth(quiet(events=(Happened(0, 0.0, "kill", False, np.ones(ROWS, np.bool_)),))))
+    assert frame.values["events"] == [EVENT]
+    with pytest.raises(BadFrame, match="events: expected serial"):
+        decode_truth(replace(frame, values={**frame.values, "events": [wrong]}), SCENE)
+
+
+def test_a_sense_may_have_a_name_of_several_parts():
+    glimpse = quiet(senses={"a": GroupSenses(np.array([0]), {"own/of/mine": np.zeros(1)})})
+    assert equal(decode_truth(frames.decode(encode_truth(glimpse)), SCENE), glimpse)
+
+
+@pytest.mark.parametrize(
+    "events", [None, {}, "kill", [3], [[0, 0.0, "kill", False, ""]], [[0, 0.0, "kill", 1, "", False]]]
+)
+def test_events_of_another_form_are_refused(events):
+    frame = frames.decode(encode_truth(quiet()))
+    arrays = {**frame.arrays, "events": np.zeros((1, ROWS), np.bool_)}
+    with pytest.raises(BadFrame, match="events: expected"):
+        decode_truth(replace(frame, arrays=arrays, values={**frame.values, "events": events}), SCENE)
 
 
 @pytest.mark.parametrize("change", [{"serial": -1}, {"ticks": 0}, {"values": np.zeros((3, ARENAS))}])
@@ -247,6 +276,8 @@ def test_a_frame_is_not_taken_for_one_of_another_kind():
         ({"robot_names": ("a-0", "a-1")}, "groups"),
         ({"robot_names": ("a-0", "a-1", 7)}, r"robot_names\[2\]"),
         ({"groups": (Group("b", load_body("footbot"), 1, 3),)}, "groups"),
+        ({"groups": (Group("a", load_body("epuck"), 0, 0), Group("b", load_body("epuck"), 0, 3))}, "groups"),
+        ({"name": ("two", "groups")}, "scene.static.name"),
         ({"groups": (Group("b", load_body("footbot"), 0, 3, act_every_ticks=0),)}, "act_every_ticks"),
     ],
 )
@@ -255,11 +286,74 @@ def test_a_scene_that_contradicts_itself_is_refused(change, fault):
         decode_scene(frames.decode(encode_scene(replace(SCENE, static=replace(STATIC, **change)))))
 
 
+def test_a_scene_is_of_one_of_its_robots():
+    with pytest.raises(BadFrame, match="selected: expected one of the robots"):
+        decode_scene(frames.decode(encode_scene(replace(SCENE, selected="c-0"))))
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (None, "body: expected a body"),
+        ({"radius_m": -1.0}, "radius_m"),
+        ({"wings": 2}, "wings"),
+    ],
+)
+def test_a_scene_with_a_body_that_is_none_is_refused(change, fault):
+    frame = frames.decode(encode_scene(SCENE))
+    scene: Any = frame.values["scene"]
+    group = scene["static"]["groups"][0]
+    group["body"] = None if change is None else {**group["body"], **change}
+    with pytest.raises(BadFrame, match=fault):
+        decode_scene(frame)
+
+
+@pytest.mark.parametrize("parts", [{}, {"series": []}, {"static": None, "series": [], "selected": "", "more": 1}])
+def test_a_scene_has_just_its_parts(parts):
+    with pytest.raises(BadFrame, match="scene: expected a map of static, series, selected"):
+        decode_scene(frames.decode(frames.encode("scene", -1, {}, {"version": OBSERVED_VERSION, "scene": parts})))
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "fault"),
+    [
+        ((), 7, "scene: expected a map"),
+        (("more",), 7, "scene: expected a map"),
+        (("static", "groups", 0), [], r"groups\[0\]: expected a map"),
+        (("static", "groups", 0, "body"), 7, "body: expected a body"),
+        (("static", "groups", 0, "body"), {"name": 7}, "body"),
+        (("static", "obstacles", 0, 0, "height_m"), float("-inf"), "height_m"),
+        (("static", "obstacles", 0, 0, "x_m"), float("inf"), "x_m"),
+        (("static", "obstacles", 0, 0, "x_m"), "1", "x_m"),
+        (("selected",), "nobody", "selected: expected one of the robots"),
+    ],
+)
+def test_a_scene_with_something_else_in_a_place_is_refused(place, value, fault):
+    frame = frames.decode(encode_scene(SCENE))
+    values: dict[str, Any] = {"scene": None, **frame.values}
+    inside: Any = values
+    for step in ("scene", *place)[:-1]:
+        inside = inside[step]
+    inside[("scene", *place)[-1]] = value
+    with pytest.raises(BadFrame, match=fault):
+        decode_scene(replace(frame, values=values))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"lights": ()}, {"floor": replace(FLOOR, image=packed_image(np.zeros((1, 3), np.uint8)))}, {"floor": None}],
+    ids=["no lights", "a row of grey", "no floor"],
+)
+def test_a_scene_of_little_comes_over_whole(change):
+    scene = replace(SCENE, static=replace(STATIC, **change))
+    assert decode_scene(frames.decode(encode_scene(scene))) == scene
+
+
 @given(st.recursive(st.none() | st.booleans() | st.integers(0, 9) | st.text(max_size=3), st.lists))
 def test_a_scene_of_anything_else_is_refused(junk):
     for scene in (junk, {"static": junk, "series": []}):
         with pytest.raises(BadFrame):
-            decode_scene(frames.decode(frames.encode("scene", -1, {}, {"version": 1, "scene": scene})))
+            decode_scene(frames.decode(frames.encode("scene", -1, {}, {"version": OBSERVED_VERSION, "scene": scene})))
 
 
 @given(glimpses(), st.integers(0, ARENAS - 1))
@@ -281,3 +375,18 @@ def test_one_arena_of_several_is_a_run_of_its_own(glimpse, arena):
         assert len(one.finished.fate) == np.count_nonzero(truth.finished.arena == arena)
     seen = [row for group in one.senses.values() for row in (group.rows + rows.start).tolist()]
     assert seen == [row for g in truth.senses.values() for row in g.rows.tolist() if row // ROBOTS == arena]
+
+
+def test_packets_that_left_are_of_one_arena():
+    numbers = {of.name: np.arange(4) for of in fields(Departed)}
+    left = Departed(**{**numbers, "arena": np.array([1, 0, 1, 0])})
+    one = truth_of(replace(quiet().truth, departed=left), STATIC, 1).departed
+    assert one is not None
+    assert one.sender.tolist() == [0, 2]
+    assert one.arena.tolist() == [0, 0]
+
+
+def test_the_only_arena_is_the_whole_run():
+    alone = static_of(STATIC, 0)
+    truth = truth_of(quiet().truth, STATIC, 0)
+    assert truth_of(truth, alone, 0) is truth

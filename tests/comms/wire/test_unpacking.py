@@ -45,3 +45,10 @@ def test_large_messages_of_few_things_and_all_small_ones_come_through() -> None:
     assert unpacked(msgpack.packb(large), 2 * LARGE) == large
     small = [[]] * (UNCOUNTED_BYTES // 2)
     assert unpacked(msgpack.packb(small), LARGE) == small
+
+
+def test_half_a_million_things_come_through_and_not_one_more() -> None:
+    """The list itself counts, too."""
+    assert len(unpacked(msgpack.packb([None] * 499_999), LARGE)) == 499_999
+    with pytest.raises(BadFrame, match="more than 500000 items"):
+        unpacked(msgpack.packb([None] * 500_000), LARGE)

@@ -12,7 +12,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign import execution, sweeping
+from swarmwire.deploy.campaign import dask_executor, execution, sweeping
 from swarmwire.deploy.campaign.campaign import read_campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
 from swarmwire.deploy.campaign.cluster_failed import ClusterFailed
@@ -134,6 +134,22 @@ def test_a_worker_that_is_killed_in_the_middle_costs_no_run(tmp_path, reference)
     same(tmp_path / "c", reference)
 
 
+@pytest.mark.slow  # dask waits five seconds at least
+def test_a_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, reference, monkeypatch):
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL", "5s")  # in place of five minutes
+    with cluster(tmp_path, 1) as there:
+
+        def freeze_it():
+            there.add_worker()
+            there.workers[0].suspend()
+
+        watcher = Watcher(freeze_it)
+        done = sweep(reference / "two.toml", out=tmp_path / "c", on=there.on, watcher=watcher, **{**ASKED, "pack": 1})
+        assert done.is_over
+        assert len(workers_of(tmp_path / "c")) == 2
+    same(tmp_path / "c", reference)
+
+
 def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
     tmp_path, reference, monkeypatch, capsys, caplog
 ):
@@ -156,6 +172,28 @@ def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
         patched.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
         assert resume(folder).is_over
     same(folder, reference)
+
+
+def test_a_scheduler_that_is_frozen_is_given_up_in_a_line(tmp_path, reference, two_threads, monkeypatch):
+    monkeypatch.setattr(dask_executor, "LOOK_S", 0.1)
+    monkeypatch.setattr(dask_executor, "MUTE_LOOKS", 3)
+    long, freeze = ["duration_s=100000", "robots.pair.params.share=0.0"], two_threads.scheduler.suspend
+    monkeypatch.setattr(sweeping, "execute", first_calls(freeze))
+    try:
+        with pytest.raises(ClusterFailed, match="the scheduler does not answer; what is done stays: --resume"):
+            sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", on=two_threads.on, workers=1, overrides=long)
+    finally:
+        two_threads.scheduler.resume()
+
+
+def first_calls(act):
+    """`execute`, with an act before it."""
+
+    def execute_after(*given):
+        act()
+        return execution.execute(*given)
+
+    return execute_after
 
 
 def test_without_workers_or_with_one_of_another_version_nothing_begins(tmp_path, reference):

@@ -90,6 +90,13 @@ def test_an_operator_controls_and_an_observer_looks(certs, controls, endpoint, m
         only_run_at(endpoint, runner)
 
 
+def test_who_is_of_another_authority_is_told_that_a_certificate_may_be_at_fault(tmp_path, endpoint):
+    begin_authority(tmp_path / "ca", WallClock())
+    issue(tmp_path / "ca", [wanted("operator", [], "operator")], 2, WallClock())
+    with pytest.raises(RunGone, match="cannot be reached, or one certificate or the other is not accepted"):
+        only_run_at(endpoint, member("operator", certs=tmp_path / "ca").network)
+
+
 def test_the_command_line_takes_a_folder_of_certificates(certs, controls, endpoint):
     called = CliRunner().invoke(
         app,

@@ -4,6 +4,7 @@ import subprocess
 import sys
 import tarfile
 import zipfile
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -79,7 +80,9 @@ def test_what_only_some_versions_of_python_need_goes_to_robots_that_have_them():
 def test_wheels_for_the_robot_are_unpacked_without_what_it_has_no_use_for(tmp_path, wheels):
     own, others = made(tmp_path, wheels)
     assert {"swarmwire/agent/cli.py", "swarmwire/comms/clock.py"} <= names(own)
-    assert any(name.endswith("swarmwire_agent-0.1.0.dist-info/entry_points.txt") for name in names(own))
+    assert any(
+        name.endswith(f"swarmwire_agent-{version('swarmwire-agent')}.dist-info/entry_points.txt") for name in names(own)
+    )
     assert not any("__pycache__" in name for name in names(own))
     packed = names(others)
     assert {"numpy_small.py", "msgpack_small.py", "of_data_eclipse_zenoh.py"} <= packed

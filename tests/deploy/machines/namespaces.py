@@ -17,10 +17,15 @@ class Machine:
     def __init__(self, name: str) -> None:
         self.name = name
         self.addresses = list[str]()
+        self.devices = list[str]()  # of its links, with these addresses
 
     def command(self, *words: object) -> list[str]:
         """What to start instead of these words, for them to run on this machine."""
         return ["ip", "netns", "exec", self.name, *map(str, words)]
+
+    def link(self, state: str) -> None:
+        """Take its first link "down", or "up" again: nothing of the other end is told."""
+        subprocess.run(["ip", "-n", self.name, "link", "set", self.devices[0], state], check=True)
 
 
 @contextmanager
@@ -45,6 +50,7 @@ def machines(several: int) -> Generator[list[Machine]]:
             )
             for place, (machine, device) in enumerate(ends, 1):
                 machine.addresses.append(f"10.77.{i}.{place}")
+                machine.devices.append(device)
                 _permitted("ip", "-n", machine.name, "address", "add", f"{machine.addresses[-1]}/24", "dev", device)
                 _permitted("ip", "-n", machine.name, "link", "set", device, "up")
         yield made

@@ -3,6 +3,7 @@
 import io
 import sys
 
+import psutil
 import pytest
 from rich.console import Console
 
@@ -12,6 +13,7 @@ from swarmwire.deploy.page.extra import need_ui_extra
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
 from tests.deploy.commands import LOSSY, called
+from tests.waiting import until
 
 
 @pytest.mark.parametrize("command", [["/none/such"], [sys.executable, "-c", "import sys; sys.exit('no page today')"]])
@@ -24,6 +26,29 @@ def test_a_run_whose_page_cannot_be_had_goes_on_by_itself(tmp_path, command, mon
         result = finished(simulation)
     assert (result.ended, result.ticks) == ("duration", 5)
     assert "no live view" in capsys.readouterr().err or out.getvalue() == "no page today\n"
+
+
+@pytest.mark.parametrize(
+    ("paused", "held"), [(True, "paused: swarmwire ctl resume lets it go on"), (False, "going on")]
+)
+def test_a_page_that_is_killed_ends_no_run_and_what_can_be_done_is_said(tmp_path, monkeypatch, paused, held):
+    out = io.StringIO()
+    simulation = Simulation(LOSSY, overrides=["duration_s=1"], out=tmp_path / "run")
+    page = PageBeside(simulation, tmp_path / "run", Console(file=out))
+    monkeypatch.setattr(page, "_command", [sys.executable, "-c", "import sys; sys.stdin.read()"])
+    simulation.watch(page)
+    with page, simulation:
+        simulation.step()
+        simulation.step()
+        if not paused:
+            simulation.controls.resume()
+        assert page.pid is not None
+        psutil.Process(page.pid).kill()
+        until(lambda: out.getvalue() == f"the page has ended, the run is {held}; swarmwire ui opens another page\n")
+        simulation.controls.set_speed(None)
+        simulation.controls.resume()
+        simulation.run()
+    assert simulation.result.ended == "duration"
 
 
 def test_a_run_begins_paused_at_the_speed_of_the_wall_clock(tmp_path, monkeypatch):

@@ -1,5 +1,6 @@
 """The page lets in whoever has its token, asks the run for what people ask it for, and tells what the run tells."""
 
+import asyncio
 import contextlib
 import http.client
 import json
@@ -224,6 +225,33 @@ def test_news_reach_a_page_until_the_run_is_gone(control, news):
             assert (over["tick"], over["gone"]) == (0, "nobody answers")
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(address, timeout=5)
+
+
+def test_a_run_that_is_frozen_is_silent_until_it_answers_again(control):
+    news = NewsThread(control, dict, WallClock(), over=lambda: False)
+    with contextlib.closing(news):
+        news.start()
+        for gone, state in ((False, "running"), (True, "silent"), (False, "running")):
+            control.gone = gone
+            until(lambda state=state: news.latest.get("state") == state)
+
+
+def test_a_page_that_does_not_read_keeps_but_the_newest(control, news):
+    """However long a browser's tab sleeps, it costs the server one status."""
+
+    async def slow() -> list[int]:
+        reading = news.read()
+        got = []
+        for ticks in (1, 50):
+            for _ in range(ticks):
+                control.tick += 1
+                news._tell(control.status())
+            got.append((await anext(reading))["tick"])
+        await reading.aclose()
+        return got
+
+    assert asyncio.run(slow()) == [1, 51]
+    assert not news._readers
 
 
 def test_a_server_that_ends_lets_no_page_wait(control, news):

@@ -15,7 +15,7 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.swarm_keys import SwarmKeys
 from swarmwire.comms.wire.tick_frames import encode_actions
 from swarmwire.world.gateways.air_bridge import AirBridge, LentAir
-from tests.fuzz.miniature import Miniature
+from tests.fuzz.miniature import begun
 from tests.fuzz.target import FrameTarget, MsgpackTarget
 
 GIVES = ("range_m", "bearing_rad")
@@ -58,7 +58,7 @@ class Heard(FrameTarget):
 
     def make_samples(self) -> list[bytes]:
         """Of a real tick."""
-        of = Miniature().begun()
+        of = begun()
         self.robots, row = of.world.static.robot_names, 1
         self.terms = AirTerms(row, self.robots, 10, 100, GIVES, ())
         its = of.heard.select(np.flatnonzero(of.heard.receiver == row)).compacted()

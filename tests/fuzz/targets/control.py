@@ -14,7 +14,7 @@ from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.page.orders import Order
 from swarmwire.world.interventions import Interventions
 from swarmwire.world.scenario.scenario_file import scenario_from
-from tests.fuzz.miniature import SCENARIO, Miniature
+from tests.fuzz.miniature import SCENARIO, begun
 from tests.fuzz.target import MsgpackTarget, PackedTarget, check_line
 
 EVENTS: tuple[dict[str, Any], ...] = (
@@ -41,7 +41,7 @@ class Control(MsgpackTarget):
         """Each thing that may be asked."""
         asked = [Request("pause"), Request("resume"), Request("step", 3), Request("speed", 2.5), Request("speed")]
         self.scenario = scenario_from(SCENARIO, "miniature.toml")
-        self.bodies = {group.name: group.body for group in Miniature().world.static.groups}
+        self.bodies = {group.name: group.body for group in begun().world.static.groups}
         self._renew()
         return [encode_request(of) for of in (*asked, *(Request("event", event) for event in EVENTS))]
 

@@ -12,12 +12,12 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.memory_frames import encode_memory
 from swarmwire.comms.wire.offer import Offer, OfferedGroup
+from swarmwire.world.crews.admission import Refused
 from swarmwire.world.crews.lockstep import Lockstep
-from swarmwire.world.crews.roster import Refused
 from swarmwire.world.crews.terms import Terms
 from tests.fuzz.dice import Dice
 from tests.fuzz.magic import TEXTS
-from tests.fuzz.miniature import Miniature
+from tests.fuzz.miniature import begun
 from tests.fuzz.target import MsgpackTarget
 
 SHA256 = "0123456789abcdef" * 4
@@ -39,7 +39,7 @@ class Join(MsgpackTarget):
 
     def make_samples(self) -> list[bytes]:
         """Every kind of request."""
-        self.miniature = Miniature()
+        self.miniature = begun()
         groups = tuple(
             OfferedGroup(group.name, group.agent, SHA256, len(group.rows), group.robot_names)
             for group in self.miniature.whole.groups
@@ -102,7 +102,7 @@ class Given(MsgpackTarget):
 
     def make_samples(self) -> list[bytes]:
         """Answers for both runners, with and without memory."""
-        of = Miniature().begun()
+        of = begun()
         memory = Host(of.parts[0]).memory([group.name for group in of.parts[0].groups])
         kept = (encode_memory(memory), None, encode_memory({}))
         parts = (of.parts[0], of.parts[1], of.whole)

@@ -9,7 +9,7 @@ from swarmwire.comms.wire.frames import decode
 from swarmwire.comms.wire.scene_frames import decode_scene, encode_scene
 from swarmwire.comms.wire.truth_frames import decode_truth, encode_truth
 from tests.comms.wire.test_truth_frames import SCENE
-from tests.fuzz.miniature import Miniature
+from tests.fuzz.miniature import Miniature, begun
 from tests.fuzz.target import FrameTarget
 
 
@@ -21,7 +21,7 @@ class Scenes(FrameTarget):
 
     def make_samples(self) -> list[bytes]:
         """The miniature's, one with obstacles and a floor, and one of each type's own samples."""
-        return [encode_scene(_scene(Miniature())), encode_scene(SCENE)]
+        return [encode_scene(_scene(begun())), encode_scene(SCENE)]
 
     def door(self, case: bytes) -> None:
         """The decoder."""
@@ -35,7 +35,7 @@ class Glimpses(FrameTarget):
 
     def make_samples(self) -> list[bytes]:
         """Real ticks."""
-        of = Miniature().begun()
+        of = begun()
         self.scene = _scene(of)
         return [
             encode_truth(Glimpse(truth, at, len(of.truths), np.array([[0.5]])))

@@ -10,7 +10,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.in_time_frames import encode_packets
 from swarmwire.comms.wire.tick_frames import decode_tick
 from tests.agent.hosts import PLAYERS
-from tests.fuzz.miniature import Miniature, senses_of
+from tests.fuzz.miniature import begun, senses_of
 from tests.fuzz.target import FrameTarget
 
 
@@ -52,7 +52,7 @@ class RunnerFrames(FrameTarget):
 
     def make_samples(self) -> list[bytes]:
         """Real ticks, packets between them, and the end."""
-        self.miniature = of = Miniature().begun()
+        self.miniature = of = begun()
         sound = decode_tick(frames.decode(of.told["one"][-1]), of.whole.gives or (), senses_of(of.parts, "one"))
         self.shapes = _shapes(sound[0])
         between = encode_packets(11, 1_150_000_000, 3, of.heard, of.outcomes)
@@ -84,9 +84,9 @@ class RunnerFrames(FrameTarget):
         return None
 
     def _host(self) -> Host:
-        if getattr(self, "_kept", None) is None:
-            self._kept = Host(self.miniature.parts[0])
-        return self._kept
+        kept = getattr(self, "_kept", None) or Host(self.miniature.parts[0])
+        self._kept = kept
+        return kept
 
 
 def _shapes(senses: Senses) -> Any:

@@ -13,7 +13,7 @@ from swarmwire.world.crews.realtime import RealTime
 from swarmwire.world.crews.roster import Roster
 from swarmwire.world.crews.terms import Terms
 from tests.fuzz.dice import Dice
-from tests.fuzz.miniature import RUNNERS, Miniature, playing
+from tests.fuzz.miniature import RUNNERS, begun, playing
 from tests.fuzz.target import FrameTarget
 
 TICK = 11  # that is open: the last of the miniature
@@ -43,7 +43,7 @@ class WorldFrames(FrameTarget):
 
     def make_samples(self) -> list[bytes]:
         """Real answers, and what else a runner says."""
-        self.miniature = Miniature().begun()
+        self.miniature = begun()
         self.sound = {name: answers[-1] for name, answers in self.miniature.answers.items()}
         self.rosters: dict[str, Roster[Any]] = {}
         answer = frames.decode(self.sound["one"])

@@ -77,6 +77,12 @@ def test_what_was_written_is_read_back_equal(tmp_path_factory, of):
         ({"wheels": 3}, "expected the static part of a run: .*wheels"),
         ({"groups": [{"name": "a"}]}, "expected the static part of a run: 'body'"),
         ({"obstacles": None}, "expected the static part of a run"),
+        ({"obstacles": []}, "expected the static part of a run: no size, or not as many obstacles as arenas"),
+        ({"rate_hz": ["g-0"]}, "expected the static part of a run: .*where a run writes int"),
+        ({"rate_hz": 0}, "expected the static part of a run: .*no rate"),
+        ({"robot_names": [["g-0"]]}, "expected the static part of a run: .*where a run writes str"),
+        ({"robot_names": ["g-0"]}, "expected the static part of a run: groups that do not hold each robot once"),
+        ({"range_m": True}, "expected the static part of a run: 'True' where a run writes"),
     ],
 )
 def test_what_is_no_static_is_refused(tmp_path, change, fault):

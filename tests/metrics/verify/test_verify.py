@@ -14,8 +14,9 @@ from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.record import table_writer, tick_recorder
 from swarmwire.metrics.record.run_log import RunLog
+from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.verify.finding import State
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.verify.verify import TABLES, verify
 from tests.metrics.recorded import links, record, wandering
 from tests.metrics.truths import static, tally
 
@@ -207,6 +208,9 @@ def test_ticks_that_were_dropped_make_the_table_partial(tmp_path):
         ({"metrics": [{"order": {"final": 2.0}}] * 2}, "ticks", "the summary has 2.0"),
         ({"metrics": [{"speed": {"final": 2.0}}] * 2}, "ticks", "speed ends at no column"),
         ({"radio": [{"fates": {"heard": 11}}] * 2}, "packets", "10 heard (arena 0); the summary has 11"),
+        ({"metrics": [{"order": {}}] * 2}, "ticks", "summary.json does not say what a run says there"),
+        ({"radio": [{"fates": 3}] * 2}, "packets", "summary.json does not say what a run says there"),
+        ({"events": [1]}, "events", "summary.json does not say what a run says there"),
     ],
 )
 def test_tables_that_differ_from_the_summary_are_found(tmp_path, change, part, text):
@@ -295,6 +299,18 @@ def test_what_says_something_else_is_found(tmp_path, name, content, state):
     fill(tmp_path)
     (tmp_path / name).write_bytes(content)
     assert states(tmp_path)[name] == state
+
+
+def test_a_table_at_which_the_reader_itself_breaks_is_damaged(tmp_path, monkeypatch):
+    def breaks(*_):
+        raise pl.exceptions.PanicException("assertion failed: offset + length <= self.length")
+
+    fill(tmp_path)
+    monkeypatch.setattr("swarmwire.metrics.run_folder.scan_files", breaks)
+    with pytest.raises(BadInput, match="assertion failed.*see swarmwire verify"):
+        RunFolder(tmp_path).ticks()
+    monkeypatch.setitem(TABLES, "ticks", breaks)
+    assert states(tmp_path)["ticks"] == State.DAMAGED
 
 
 def test_a_folder_in_place_of_a_file_is_damage(tmp_path):

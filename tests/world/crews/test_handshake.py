@@ -116,3 +116,22 @@ def test_before_the_first_tick_only_a_first_ready_counts(roster: Made, kind: str
     roster.answer("a", frames.encode(kind, -1, {}))
     assert state(roster) == before
     assert roster.counts() == {{"ready": "unexpected_kind_frames", "actions": "wrong_tick_frames"}[kind]: 1}
+
+
+@pytest.mark.parametrize("asked", [b"\xc1", msgpack.packb(3), request(frames.VERSION + 1)])
+def test_an_offer_is_not_told_to_who_asks_in_another_version(roster: Made, asked: bytes) -> None:
+    with pytest.raises(Refused):
+        roster.offer(asked)
+    assert roster.counts() == {"bad_join": 1}
+
+
+def test_where_there_is_nothing_to_offer_nothing_is_told(roster: Made) -> None:
+    assert roster.offer() is None
+
+
+def test_a_runner_is_building_from_when_it_joined_until_it_is_ready(roster: Made) -> None:
+    assert not roster.is_building("a")
+    joined(roster, "a")
+    assert roster.is_building("a")
+    ready(roster, "b")
+    assert not roster.is_building("b")

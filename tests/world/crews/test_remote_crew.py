@@ -358,3 +358,29 @@ def test_a_pause_between_ticks_that_is_longer_than_the_time_out_loses_no_runner(
             assert not crew.counts()
             assert crew.health() == RunnerHealth(ready=1, lost=0)
         assert ends.get(timeout=20.0) is None
+
+
+def test_time_for_which_the_world_itself_was_frozen_is_no_runners_fault(endpoint: str) -> None:
+    """A runner is slow, and meanwhile the world is frozen for longer than its time-out; both go on together."""
+    clock, waits = LeapingClock(), list[RunnerHealth]()
+    with processes(endpoint, ["a"]) as nursery:
+
+        def frozen() -> bool:
+            if crew.health().ready and not waits:
+                waits.append(crew.health())
+                clock.ahead_ns += to_ns(10 * TIMEOUT_S)
+                child.resume()
+            return False
+
+        crew = RemoteCrew(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, clock, Surroundings(stopped=frozen))
+        with closing(crew):
+            crew.start()
+            child = psutil.Process(nursery.pid).children()[0]
+            waits.clear()
+            child.suspend()
+            actions = crew.act(0, one_group(0, [0]), Heard.none(GIVES))
+            assert actions.linear_mps.tolist() == [1.0]
+            assert waits[0].waits_s > 0
+            assert waits[0].waits_for == "a, which plays flock-0"
+            assert crew.health() == RunnerHealth(ready=1, lost=0)
+            crew.close()

@@ -69,8 +69,10 @@ def test_a_robot_out_of_range_changes_no_bit(name: str, bearing: float, size_m: 
         assert np.array_equal(one, other[:-1], equal_nan=True)
 
 
+@pytest.mark.parametrize("running", [(True, True, True), (True, False, True)])
 @pytest.mark.parametrize("name", SHEETS)
-def test_a_group_of_many_arenas_sees_what_it_sees_alone(name: str) -> None:
+def test_a_group_of_many_arenas_sees_what_it_sees_alone(name: str, running: tuple[bool, ...]) -> None:
+    """Also beside an arena that is over, where nobody looks any more."""
     poses = np.random.default_rng(4).uniform(-1, 1, (3, 12, 3)) * [0.7, 0.7, np.pi]
     many = scene(poses[0], FOOTBOT, size_m=2.0, colour=0xFF0000, lights=(Lamp(0.1, 0.2, 1.0),))
     state = np.zeros((3, 12, 6))
@@ -82,11 +84,12 @@ def test_a_group_of_many_arenas_sees_what_it_sees_alone(name: str) -> None:
         leds=np.repeat(many.leds, 3, axis=0),
         lights=many.lights * 3,
         alive=np.ones((3, many.state.shape[1]), np.bool_),
+        running=np.array(running),
         obstacles=many.obstacles._replace(circle_start=np.zeros(4, np.int64), polygon_start=np.zeros(4, np.int64)),
     )
     group = Group("a", FOOTBOT, 3, 9)
     together = SENSORS[name](many, group, SHEETS[name]).truth(0)
-    for arena in range(3):
+    for arena in np.flatnonzero(running):
         alone = scene(poses[arena], FOOTBOT, size_m=2.0, colour=0xFF0000, lights=(Lamp(0.1, 0.2, 1.0),))
         for one, other in zip(SENSORS[name](alone, group, SHEETS[name]).truth(0), together, strict=True):
             assert np.array_equal(one[0], other[arena], equal_nan=True)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from swarmwire.agent.on_robot.settings_file import NO_FILE, Flags
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.loading import resolve
+from swarmwire.comms.parsing import from_toml
 
 
 class Flag(NamedTuple):
@@ -141,6 +142,6 @@ def _pairs(flag: Flag, texts: list[str]) -> list[tuple[str, Any]]:
 def _plain(text: str) -> Any:
     """The value of a text as TOML has it, or the text itself: 0.1, true, [1, 2], left."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        return from_toml(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return text

@@ -24,7 +24,13 @@ from swarmwire.comms.wire.network import Network, protocol_of
 
 PRIVATE = "sw-"  # how the name of a private directory for a socket begins
 BLOCK_S = 5.0
-LEASE_MS = 10_000  # a frozen peer is noticed after this; a dead one at once, by its closed socket
+# A dead peer is noticed at once, by its closed socket. One that is frozen or out of reach is noticed after its lease:
+# on one machine practically never, since nobody is out of reach there, and whoever was stopped may go on; a run's own
+# time-outs count there. Elsewhere a world allows itself as long as it allows its runners.
+LEAST_LEASE_MS = 10_000
+CLIENT_LEASE_MS = 60_000
+LOCAL_LEASE_MS = 7 * 86_400_000
+LOCAL = "unixsock-stream/"
 LOCATORS_S = 2.0
 RETRY = {"period_init_ms": 50, "period_max_ms": 1000, "period_increase_factor": 1.5}
 SPARE_LINKS = 64  # of routers, and of runners whose old link is not yet known to be dead
@@ -70,7 +76,8 @@ def open_runner(endpoint: str, connect_s: float = 10.0, network: Network | None 
     """
     os.environ.setdefault("ZENOH_RUNTIME", SMALL_RUNTIME)
     connect = {"endpoints": [endpoint], "timeout_ms": round(connect_s * 1000), "retry": RETRY}
-    return zenoh.open(_config("client", {"connect": connect}, [endpoint], network))
+    settings = _settings("client", {"connect": connect}, [endpoint], network, lease_ms=CLIENT_LEASE_MS)
+    return zenoh.open(_as_config(settings))
 
 
 def open_observed(
@@ -120,7 +127,7 @@ def router_config(
 
 def unix_endpoint(path: str) -> str:
     """The endpoint of a unix socket; a path may have 108 characters at most."""
-    return f"unixsock-stream/{path}"
+    return f"{LOCAL}{path}"
 
 
 def _router(
@@ -132,10 +139,6 @@ def _router(
     limits: Limits,
 ) -> zenoh.Config:
     return _as_config(router_config(listen, connect, runner_timeout_s, network, access, limits))
-
-
-def _config(mode: str, more: dict[str, Any], endpoints: Sequence[str], network: Network | None) -> zenoh.Config:
-    return _as_config(_settings(mode, more, endpoints, network))
 
 
 def _as_config(settings: dict[str, Any]) -> zenoh.Config:
@@ -152,11 +155,14 @@ def _settings(
     endpoints: Sequence[str],
     network: Network | None,
     runner_timeout_s: float = 2 * BLOCK_S,
+    lease_ms: int = LEAST_LEASE_MS,
 ) -> dict[str, Any]:
     for endpoint in endpoints:
         (network or Network()).check_safe(endpoint, "network", "endpoint")
     block = {"wait_before_close": round(min(BLOCK_S, runner_timeout_s / 2) * 1e6)}
-    lease_ms = max(LEASE_MS, round(runner_timeout_s * 1000))
+    lease_ms = max(lease_ms, round(runner_timeout_s * 1000))
+    if all(endpoint.startswith(LOCAL) for endpoint in endpoints):
+        lease_ms = max(lease_ms, LOCAL_LEASE_MS)
     link: dict[str, Any] = {"tx": {"lease": lease_ms, "queue": {"congestion_control": {"block": block}}}}
     if network is not None and network.proves:
         link |= {"protocols": sorted({protocol_of(endpoint) for endpoint in endpoints}), "tls": mutual_tls(network)}

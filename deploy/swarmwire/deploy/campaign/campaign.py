@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.campaign.columns import Columns
 from swarmwire.deploy.campaign.design import Point
+from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.campaign.about import read_about
 from swarmwire.metrics.campaign.formats import ABOUT, CAMPAIGN_FORMAT
@@ -17,6 +19,7 @@ from swarmwire.metrics.record.formats import refuse_other_format
 from swarmwire.metrics.whole_file import write_whole
 
 SCENARIO_FOLDER = "scenario"
+UNTOLD_ROBOTS = 100  # in an arena, of campaigns and tunings that do not tell: for packs of middling size
 
 
 @dataclass(frozen=True)
@@ -71,13 +74,13 @@ def read_campaign(folder: Path) -> Campaign:
     """The campaign of this folder; BadInput if there is none."""
     path = folder / ABOUT
     try:
-        found: Any = json.loads(path.read_text(encoding="utf-8"))
+        found: Any = from_json(path.read_text(encoding="utf-8"))
     except OSError as error:
         expected = f"expected a campaign's folder, with its {ABOUT}: {error.strerror}"
         if (folder / SCENARIO_FOLDER).is_dir():
             expected += "; if it was ended before its first run, take the folder away and begin again"
         raise BadInput(str(folder), "", expected) from None
-    except (ValueError, RecursionError):  # no JSON, or no UTF-8
+    except ValueError:  # no JSON, or no UTF-8
         found = None
     try:
         refuse_other_format(found, CAMPAIGN_FORMAT, path)
@@ -112,8 +115,9 @@ def _is_count(value: object) -> bool:
 def _campaign(found: dict[str, Any]) -> Campaign:
     tuples: dict[str, Any] = {name: tuple(found[name]) for name in ("seeds", "points", "overrides", "record_seeds")}
     objects: dict[str, Any] = {
-        "files": tuple(CopiedFile(**file) for file in found["files"]),
-        "outcomes": tuple(Outcome(**outcome) for outcome in found["outcomes"]),
+        "files": tuple(CopiedFile(**known_fields(CopiedFile, file)) for file in found["files"]),
+        "outcomes": tuple(Outcome(**known_fields(Outcome, outcome)) for outcome in found["outcomes"]),
         "point_overrides": tuple(tuple(texts) for texts in found["point_overrides"]),
     }
-    return Campaign(**{**found, **tuples, **objects})
+    untold: dict[str, Any] = {"robots": UNTOLD_ROBOTS}
+    return Campaign(**{**untold, **known_fields(Campaign, found), **tuples, **objects})

@@ -24,7 +24,7 @@ from swarmwire.deploy.record.modules import module_digests
 
 PATIENCE_S = 60.0  # without a single worker, at the begin and in between
 LOOK_S = 5.0  # between looks who is there, beside what dask tells
-MUTE_LOOKS = 24  # in a row without an answer: two minutes, and the scheduler is taken for gone
+MUTE_LOOKS = 12  # in a row without an answer: with the time between them two minutes, and the scheduler is given up
 AHEAD = 2  # tasks in hand for each thread: one that it is at, one that it can begin at once
 
 

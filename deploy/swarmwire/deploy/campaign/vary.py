@@ -9,6 +9,7 @@ from math import isinf
 from typing import Any, cast
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_toml
 
 EXPECTED = (
     "expected PATH=FIRST:LAST:COUNT, such as radio.loss=0:0.8:9, or PATH=5,10,20; "
@@ -103,7 +104,7 @@ def _range_from(table: Mapping[str, Any], said: str) -> Range:
 def _list_of(text: str) -> list[Any]:
     """TOML values between commas; what is none is a text."""
     with suppress(tomllib.TOMLDecodeError):  # not all of them are TOML
-        found = tomllib.loads(f"value = [{text}]")
+        found = from_toml(f"value = [{text}]")
         if len(found) == 1:
             return cast("list[Any]", found["value"])
     return [_value(part.strip()) for part in text.split(",") if part.strip()]
@@ -111,7 +112,7 @@ def _list_of(text: str) -> list[Any]:
 
 def _value(text: str) -> Any:
     try:
-        found = tomllib.loads(f"value = {text}")
+        found = from_toml(f"value = {text}")
     except tomllib.TOMLDecodeError:
         return text
     return found["value"] if len(found) == 1 else text

@@ -6,6 +6,7 @@ Standard input is the life line: when it ends, the campaign is gone, and the wor
 
 import os
 import sys
+from contextlib import suppress
 from queue import SimpleQueue
 from threading import Thread
 from typing import BinaryIO
@@ -24,8 +25,13 @@ def main(arguments: list[str]) -> None:
     tasks = SimpleQueue[Task]()
     Thread(target=_listen, args=(given, tasks), daemon=True).start()
     send(results, {"ready": name})
+
+    def alive() -> None:
+        with suppress(OSError):  # nobody is there any more: the other thread ends this process
+            send(results, {"alive": name})
+
     while True:
-        send(results, result_message(run_piece(tasks.get(), name, lambda: send(results, {"alive": name}))))
+        send(results, result_message(run_piece(tasks.get(), name, alive)))
 
 
 def _listen(given: BinaryIO, tasks: SimpleQueue[Task]) -> None:

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.format_number import check_format
+from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.certificates.dates import DAY, date_of, text_of
 from swarmwire.deploy.certificates.files import REGISTER
 from swarmwire.metrics.whole_file import write_whole
@@ -55,11 +56,12 @@ class Register:
         """The register in a CA's folder; BadInput if there is none that can be read."""
         path = folder / REGISTER
         try:
-            content: Any = json.loads(path.read_text(encoding="utf-8"))
+            content: Any = from_json(path.read_text(encoding="utf-8"))
             check_format(content["format"], FORMAT, str(path))
             register = cls(Issued(**content["authority"]), tuple(Issued(**of) for of in content["certificates"]))
             for of in (register.authority, *register.certificates):
                 _ = date_of(of.valid_from), date_of(of.valid_until), int(of.serial, 16)
+                _ = "".join((of.name, of.purpose, *of.hosts))  # TypeError if one is no text
         except FileNotFoundError:
             raise BadInput(str(folder), "", f"expected a CA's folder: swarmwire certs init {folder}") from None
         except OSError as error:

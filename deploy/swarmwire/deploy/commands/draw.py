@@ -1,12 +1,12 @@
 """`swarmwire draw`."""
 
-import tomllib
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_toml
 from swarmwire.deploy.commands.options import USUAL_SIZE_PX, Overrides, Seed
 
 _ONLY_IN_BODIES = ("like", "drive", "radius_m")
@@ -71,7 +71,7 @@ def _draw_sheet(path: Path, to: Path, size_px: int) -> None:
 def _is_sheet(path: Path) -> bool:
     """Whether the file describes a body; all else is for a scenario's reader, which refuses it if need be."""
     try:
-        found = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        found = from_toml(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
         return False
     return "robots" not in found and any(key in found for key in _ONLY_IN_BODIES)

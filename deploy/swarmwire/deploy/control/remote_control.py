@@ -107,6 +107,8 @@ def _observing(endpoint: str, network: Network | None) -> Generator[zenoh.Sessio
     try:
         session = open_observer(endpoint, network)
     except zenoh.ZError as error:
-        raise RunGone(f"the run at {endpoint} cannot be reached: {str(error).split(' at ')[0]}") from error
+        refused = ", or one certificate or the other is not accepted" if network and network.proves else ""
+        reason = str(error).split(" at ")[0]
+        raise RunGone(f"the run at {endpoint} cannot be reached{refused}: {reason}") from error
     with closed_after(session):
         yield session

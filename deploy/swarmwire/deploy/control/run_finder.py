@@ -14,6 +14,7 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.one_of import one_of
+from swarmwire.comms.parsing import from_json
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy.live.live_file import goes_on, read_live
 from swarmwire.metrics.whole_file import write_whole
@@ -34,6 +35,8 @@ class FoundRun:
 
 class Announced:
     """Observer that makes a run one that `swarmwire ctl` finds; it must be published in its folder before it begins."""
+
+    before_agents = True  # it begins before the run's agents are there
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -124,7 +127,7 @@ def _is_own(folder: Path) -> bool:
 def _read(path: Path) -> FoundRun | None:
     """The run of a file; None if it says something else."""
     try:
-        told: Any = json.loads(path.read_bytes())
+        told: Any = from_json(path.read_bytes())
         run, endpoint, scenario, folder = (str(told[name]) for name in ("run", "endpoint", "scenario", "folder"))
         return FoundRun(run, endpoint, int(told["pid"]), scenario, folder)
     except (ValueError, KeyError, TypeError):

@@ -14,6 +14,7 @@ from swarmwire.metrics.viewer.plotted import Measured
 from swarmwire.world.crews.runner_health import RunnerHealth
 
 NAMED = 1000  # robots: up to so many, their names are told; those of more follow from the groups
+WAITS_S = 1.0  # for runners: a run that has waited so long is said to wait
 SMOOTHING = 0.1  # weight of the newest tick in the mean time of a tick
 
 
@@ -22,6 +23,8 @@ class Status:
 
     Of several arenas it tells of one, as what is published does, but for counts, which are of all.
     """
+
+    before_agents = True  # it begins before the run's agents are there
 
     def __init__(
         self,
@@ -84,7 +87,7 @@ class Status:
             "tick": tick,
             "ticks": self._ticks,
             "time_s": to_s(tick_start_ns(tick, static.rate_hz)),
-            "state": "over" if self._over else "paused" if self._controls.stands_still else "running",
+            "state": self._state(health),
             "speed": self._controls.speed,
             "real_time": self._controls.real_time,
             "alive": int(truth.alive[rows].sum()) if truth else static.robots,
@@ -98,6 +101,13 @@ class Status:
             "events": [dict(event) for event in self._events()],
             "measures_ms": None if self._tick_ns is None else self._tick_ns / 1e6,
         }
+
+    def _state(self, health: RunnerHealth | None) -> str:
+        if self._over:
+            return "over"
+        if health and health.waits_s > WAITS_S:
+            return "waiting"
+        return "paused" if self._controls.stands_still else "running"
 
     def _measured(self) -> dict[str, float | None]:
         if self._truth is None:

@@ -11,6 +11,7 @@ from typing import Any, cast
 import asyncssh
 
 from swarmwire.comms.clock import DatedClock
+from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.fleet.archive import Archive
 from swarmwire.deploy.fleet.connecting import CONNECT_S, connected, lost
 from swarmwire.deploy.fleet.fleet import Host
@@ -146,7 +147,7 @@ def _trial_failed(lines: list[str]) -> HostFailed:
 def _object(line: bytes) -> dict[str, Any] | None:
     """The object that a line of JSON is; None if it is anything else."""
     try:
-        found: object = json.loads(line)
+        found: object = from_json(line)
     except ValueError:
         return None
     return cast("dict[str, Any]", found) if isinstance(found, dict) else None

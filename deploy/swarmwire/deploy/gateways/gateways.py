@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_toml
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.certificates.revoked import revoked_in
 
@@ -110,7 +111,7 @@ def _option(text: str) -> tuple[str, Any]:
     if not equals or not name.strip():
         raise BadInput("--gateway-set", text, "expected OPTION=VALUE or GROUP.OPTION=VALUE")
     try:
-        found = tomllib.loads(f"value = {value}")
+        found = from_toml(f"value = {value}")
     except tomllib.TOMLDecodeError:
         return name.strip(), value.strip()
     return name.strip(), found["value"] if len(found) == 1 else value

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.whole_file import write_whole
 
 LIVE = "live.json"
@@ -30,7 +31,7 @@ def read_live(folder: Path) -> Live | None:
     """The run that goes on in this folder, None if there is none; BadInput if its file says something else."""
     path = folder / LIVE
     try:
-        told: Any = json.loads(path.read_bytes())
+        told: Any = from_json(path.read_bytes())
         live = Live(str(told["endpoint"]), str(told["run"]), int(told["pid"]))
     except FileNotFoundError:
         return None

@@ -42,8 +42,12 @@ class Published:
     Frames are encoded and sent in a thread of their own, and a tick that finds it busy is left out: an observer that is
     slow, frozen or dead does not hold the run. It publishes what `metrics` measured, so that must see each tick before.
 
+    It begins before the run's agents are there, where they come from elsewhere.
+
     Summary part: `published`: `frames` sent, and `left_out`: due while the one before was not yet sent.
     """
+
+    before_agents = True
 
     def __init__(
         self,

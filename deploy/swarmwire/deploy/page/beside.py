@@ -1,10 +1,11 @@
 """The page of a run that this process executes: the run waits for it, and goes on without if it cannot be had."""
 
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
-from swarmwire.comms.truth import Static
+from swarmwire.comms.truth import Static, Tally
 from swarmwire.deploy.live.live_view import LiveView
 from swarmwire.deploy.simulation import Simulation
 
@@ -19,6 +20,7 @@ class PageBeside(LiveView):
         say = None if console.quiet else self._print
         super().__init__(folder, page=True, say=say, closed=self._gone)
         self._simulation, self._console = simulation, console
+        self._over = False
 
     def begin(self, static: Static) -> None:
         """Pause the run before its first tick, and start the page's process."""
@@ -28,9 +30,18 @@ class PageBeside(LiveView):
             controls.set_speed(SPEED)
         super().begin(static)
 
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """The run is over; the page stays."""
+        self._over = True
+        return super().end(last)
+
     def _print(self, text: str) -> None:
         self._console.print(text, markup=False, soft_wrap=True)
 
     def _gone(self) -> None:
+        controls = self._simulation.controls
         if self._simulation.tick <= 1:  # it never came to be used, so nobody will press play
-            self._simulation.controls.resume()
+            controls.resume()
+        elif not self._over:
+            held = "paused: swarmwire ctl resume lets it go on" if controls.paused else "going on"
+            self._print(f"the page has ended, the run is {held}; swarmwire ui opens another page")

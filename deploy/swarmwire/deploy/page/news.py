@@ -21,15 +21,23 @@ News = dict[str, Any]
 class NewsThread(threading.Thread):
     """Asks for the status of a run until the run is over or `close` is called, and hands it to all that read.
 
+    A run that does not answer is "silent" until it does, for it may be frozen; it is over once `over()` says so, too.
+
     Attributes:
         latest: what was told last.
         history: what the numbers were, by tick, as far as it is kept.
     """
 
-    def __init__(self, control: RemoteControl, seen: Callable[[], Mapping[str, Any]], clock: Clock) -> None:
-        """`seen` tells what else there is to tell at each look."""
+    def __init__(
+        self,
+        control: RemoteControl,
+        seen: Callable[[], Mapping[str, Any]],
+        clock: Clock,
+        over: Callable[[], bool] = lambda: True,
+    ) -> None:
+        """`seen` tells what else there is to tell at each look, `over` whether a run that does not answer is gone."""
         super().__init__(name="news", daemon=True)
-        self._control, self._seen, self._clock = control, seen, clock
+        self._control, self._seen, self._clock, self._over = control, seen, clock, over
         self.latest: News = {}
         self.history: deque[News] = deque(maxlen=KEPT)
         self._marks: deque[tuple[int, float]] = deque(maxlen=50)  # wall time in ns, simulated time in s
@@ -43,8 +51,8 @@ class NewsThread(threading.Thread):
         while not self._closed:
             try:
                 status = dict(self._control.status())
-            except SwarmwireError as error:  # it has ended, or its process is gone: what is known of it stays
-                status = {**self.latest, "state": "over", "gone": str(error)}
+            except SwarmwireError as error:  # what is known of it stays
+                status = {**self.latest, "state": "over" if self._over() else "silent", "gone": str(error)}
             self._tell(status)
             if status["state"] == "over":
                 return

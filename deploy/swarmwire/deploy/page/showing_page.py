@@ -33,7 +33,7 @@ def show_page(live: Live, way: Way, network: Network | None = None, *, begin: bo
         drawer = Drawer(run, shown.url, way, seen.see)
         drawer.start()
         told = Shown(shown.web, shown.url, facts(run.scene))
-        news = NewsThread(control, lambda: seen.numbers, clock)
+        news = NewsThread(control, lambda: seen.numbers, clock, lambda: run.over)
         with (
             serving(lambda token, port: page_app(control, news, told, token, port), clock, way.port) as address,
             closing(news),  # first, so that no page waits for more

@@ -10,6 +10,7 @@ ticks; a frame that is cut off at the end of the file is passed over.
 
 import hashlib
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -19,6 +20,7 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.comms.in_time import AirTime, Put, TimedCrew
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard, Sent
@@ -27,6 +29,7 @@ from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.checked import checked_array
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions, sent_arrays, sent_of
+from swarmwire.comms.wire.unpacking import unpacked
 from swarmwire.metrics.record.names import INPUTS
 
 LENGTH_BYTES = 4
@@ -169,11 +172,21 @@ class RecordedInputs:
         ]
 
     def _frame(self, place: int) -> frames.Frame:
+        data = self._data[self._spans[place]]
         try:
-            data = self._data[self._spans[place]]
             return frames.decode(data, len(data), VERSIONS)
         except BadFrame as fault:
+            self._refuse_newer(data)
             raise self._damaged(place, fault) from None
+
+    def _refuse_newer(self, data: bytes) -> None:
+        """BadInput if the frame is of a version that is not known here yet."""
+        with suppress(BadFrame):
+            match unpacked(data, len(data)):
+                case {"v": int(version)} if version > frames.VERSION:
+                    check_format(version, frames.VERSION, str(self._path), "v")
+                case _:
+                    return
 
     def _damaged(self, place: int, fault: BadFrame) -> BadInput:
         return BadInput(str(self._path), f"frame {place}", f"expected the actions of a tick: {fault}")

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.record.names import INTERVENTIONS
 from swarmwire.world.interventions import Intervention
 
@@ -74,7 +75,7 @@ def read_interventions(folder: Path) -> tuple[tuple[Intervention, ...], str | No
 
 def _of_line(line: bytes, key: str, path: Path) -> Intervention:
     try:
-        said: Any = json.loads(line)
+        said: Any = from_json(line)
         tick, number = said["tick"], said["number"]
         table = None if said.get("end") is True else said["event"]
     except (ValueError, KeyError, TypeError, AttributeError):

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.record import machine
+from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.modules import changed_modules, module_digests
 from swarmwire.deploy.record.scenario_copy import CopiedFile, changed_files, copy_scenario
 from swarmwire.metrics.metric import Metric
@@ -90,7 +92,7 @@ def read_origin(folder: Path) -> Origin:
     if not folder.is_dir():
         raise BadInput(str(folder), "", "expected a run folder: there is none")
     try:
-        found: Any = json.loads(path.read_text(encoding="utf-8"))
+        found: Any = from_json(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise BadInput(str(folder), "", f"expected a run folder, with its {RUN_JSON}: {error.strerror}") from None
     except ValueError:  # no JSON, or no UTF-8
@@ -99,17 +101,20 @@ def read_origin(folder: Path) -> Origin:
         refuse_other_format(found, RUN_FORMAT, path)
         del found["format"]  # KeyError: every start of a run names one
         return replace(_origin(found), metrics=tuple(read_facts(folder).values()))
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise BadInput(str(path), "", "expected what swarmwire writes at the start of a run") from None
 
 
 def _origin(found: dict[str, Any]) -> Origin:
+    seeds, ticks, runners = tuple(int(seed) for seed in found["seeds"]), int(found["ticks"]), int(found["runners"])
+    if not seeds or len(set(seeds)) < len(seeds) or min(*seeds, ticks, runners) < 0:
+        raise ValueError(seeds)
     return Origin(
-        seeds=tuple(int(seed) for seed in found["seeds"]),
-        ticks=int(found["ticks"]),
-        runners=int(found["runners"]),
+        seeds=seeds,
+        ticks=ticks,
+        runners=runners,
         realtime=None if found["realtime"] is None else float(found["realtime"]),
-        files=tuple(CopiedFile(**file) for file in found["files"]),
+        files=tuple(CopiedFile(**known_fields(CopiedFile, file)) for file in found["files"]),
         modules=dict(found["modules"]),
         cpu=str(found["cpu"]),
         versions=dict(found["versions"]),

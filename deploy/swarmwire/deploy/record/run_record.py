@@ -97,19 +97,22 @@ class RunRecord:
         gateways: Mapping[str, str],
         metrics: Metrics,
     ) -> Origin:
-        """Put into the folder all that the run is made from; what that is."""
-        origin = origin_of(
-            scenario,
-            code,
-            seeds=seeds,
-            ticks=ticks,
-            runners=runners,
-            realtime=realtime,
-            quantum_s=quantum_s,
-            metrics=metrics.metrics,
-            gateways=gateways,
-            folder=self.folder,
-        )
+        """Put into the folder all that the run is made from; what that is. RecordFailed if the disk refuses."""
+        try:
+            origin = origin_of(
+                scenario,
+                code,
+                seeds=seeds,
+                ticks=ticks,
+                runners=runners,
+                realtime=realtime,
+                quantum_s=quantum_s,
+                metrics=metrics.metrics,
+                gateways=gateways,
+                folder=self.folder,
+            )
+        except OSError as error:
+            raise self._refused(self.folder, error) from error
         what = f"{scenario.name}, seeds {list(seeds)}, {ticks} ticks, {runners} runners"
         self.note(f"swarmwire {version('swarmwire-deploy')}: {what}")
         return origin
@@ -118,10 +121,12 @@ class RunRecord:
         self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
     ) -> None:
         """Say in the log why there was no first tick; there is nothing to sum up. What is refused leaves no folder."""
-        if error is not None:
-            self.note(f"failed to start: {error}")
-        if isinstance(error, BadInput) and self.folder and self._log:
+        if error is None:
+            return
+        self.note(f"failed to start: {error}")
+        if self._log:
             self._log.close()
+        if isinstance(error, BadInput) and self.folder:
             rmtree(self.folder, ignore_errors=True)  # it was new or empty, so all that is in it is of this run
             self.folder = self._log = None
 
@@ -173,5 +178,7 @@ class RunRecord:
             try:
                 result.write(self.folder / SUMMARY)
             except OSError as error:  # the result is there all the same: whoever waited for it is to have it
-                why = refusal(error) or str(error)
-                self.failed = RecordFailed(f"{self.folder / SUMMARY} cannot be written: {why}")
+                self.failed = self._refused(self.folder / SUMMARY, error)
+
+    def _refused(self, what: Path | None, error: OSError) -> RecordFailed:
+        return RecordFailed(f"{what} cannot be written: {refusal(error) or error}")

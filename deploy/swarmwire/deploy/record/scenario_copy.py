@@ -10,7 +10,6 @@ their digests (`modules`).
 """
 
 import hashlib
-import tomllib
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -19,6 +18,7 @@ from typing import Any
 import tomli_w
 
 from swarmwire.comms.loading import resolve
+from swarmwire.comms.parsing import from_toml
 from swarmwire.deploy.radio.link_trace_file import trace_path
 from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.world.placement.grey_image import beside
@@ -76,7 +76,7 @@ def copied_mapping(scenario: Scenario, copies: "Copies") -> dict[str, Any]:
 
 def _copied_body(sheet: Path, copies: "Copies") -> str:
     """The path within the run folder of a body's sheet, which names the copies of its files."""
-    body: dict[str, Any] = tomllib.loads(sheet.read_text(encoding="utf-8-sig"))
+    body: dict[str, Any] = from_toml(sheet.read_text(encoding="utf-8-sig"))
     body.setdefault("name", sheet.stem)  # the copy's may be another
     for what, tables in (("own sense", body.get("senses", {})), ("own actuator", body.get("actuators", {}))):
         for table in tables.values():

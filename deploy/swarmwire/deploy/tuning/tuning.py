@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER
+from swarmwire.comms.parsing import from_json
+from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, UNTOLD_ROBOTS
+from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.deploy.tuning.goal import Goal
 from swarmwire.deploy.tuning.search import Parameter, Search
@@ -60,7 +62,7 @@ def read_tuning(folder: Path) -> Tuning:
     """The tuning of this folder; BadInput if there is none."""
     path = folder / ABOUT
     try:
-        found: Any = json.loads(path.read_text(encoding="utf-8"))
+        found: Any = from_json(path.read_text(encoding="utf-8"))
     except OSError as error:
         expected = f"expected a tuning's folder, with its {ABOUT}: {error.strerror}"
         raise BadInput(str(folder), "", expected) from None
@@ -76,15 +78,16 @@ def read_tuning(folder: Path) -> Tuning:
 
 def _tuning(found: dict[str, Any]) -> Tuning:
     tuples: dict[str, Any] = {name: tuple(found[name]) for name in ("seeds", "check_seeds", "overrides")}
-    goal: dict[str, Any] = {**found["goal"], "outcome": Outcome(**found["goal"]["outcome"])}
+    goal: dict[str, Any] = {**found["goal"], "outcome": Outcome(**known_fields(Outcome, found["goal"]["outcome"]))}
     objects: dict[str, Any] = {
-        "files": tuple(CopiedFile(**file) for file in found["files"]),
+        "files": tuple(CopiedFile(**known_fields(CopiedFile, file)) for file in found["files"]),
         "searches": tuple(_search(of) for of in found["searches"]),
-        "goal": Goal(**goal),
+        "goal": Goal(**known_fields(Goal, goal)),
     }
-    return Tuning(**{**found, **tuples, **objects})
+    untold: dict[str, Any] = {"robots": UNTOLD_ROBOTS}
+    return Tuning(**{**untold, **known_fields(Tuning, found), **tuples, **objects})
 
 
 def _search(found: dict[str, Any]) -> Search:
     tuples: dict[str, Any] = {name: tuple(found[name]) for name in ("choices", "overrides")}
-    return Search(**{**found, **tuples})
+    return Search(**known_fields(Search, {**found, **tuples}))

@@ -1,6 +1,5 @@
 """What a campaign was asked for: campaign.json, read and checked."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any, cast
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.one_of import one_of
+from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.campaign.formats import CAMPAIGN_FORMAT
 from swarmwire.metrics.campaign.outcome import KINDS, Outcome
 from swarmwire.metrics.record.formats import refuse_other_format
@@ -47,10 +47,10 @@ class About:
 def read_about(path: Path) -> About:
     """What campaign.json at this path says; BadInput if it is none, is damaged, or is of another format."""
     try:
-        found: object = json.loads(path.read_text(encoding="utf-8"))
+        found: object = from_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise BadInput(str(path.parent), path.name, "expected a campaign's folder: the file is missing") from None
-    except (OSError, ValueError, RecursionError) as error:
+    except (OSError, ValueError) as error:
         raise BadInput(str(path), "", f"expected what a campaign was asked for: {error}") from error
     refuse_other_format(found, CAMPAIGN_FORMAT, path)
     return _about(_Fields(found, str(path)))

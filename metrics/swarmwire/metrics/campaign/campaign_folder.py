@@ -15,6 +15,7 @@ from swarmwire.metrics.campaign.about import About, Point, read_about
 from swarmwire.metrics.campaign.formats import ABOUT, FAILED, PARTS, SUMMARY
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.campaign.statistic import Statistic, find_outcome, find_statistic
+from swarmwire.metrics.damage import damage
 from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ class CampaignFolder:
                 frames = [pl.read_parquet(file) for file in files]
             except FileNotFoundError:
                 continue  # it finished just now, and its parts went
-            except (OSError, pl.exceptions.PolarsError) as error:
+            except (OSError, *damage()) as error:
                 reason = str(error).splitlines()[0]
                 raise BadInput(str(self.path), "", f"expected whole Parquet files: {reason}") from error
             for file, frame in zip(files, frames, strict=True):

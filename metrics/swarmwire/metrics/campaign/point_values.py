@@ -5,6 +5,7 @@ import math
 import tomllib
 from collections.abc import Iterable
 
+from swarmwire.comms.parsing import from_toml
 from swarmwire.metrics.campaign.about import Point, Value
 
 ROUNDING = 1e-9  # relative: 0.1 + 0.2 is 0.3
@@ -27,7 +28,7 @@ def value_from(text: str) -> Value:
     (0.4, True, 'discs')
     """
     try:
-        found = tomllib.loads(f"value = {text}")
+        found = from_toml(f"value = {text}")
     except tomllib.TOMLDecodeError:
         return text.strip()
     return found["value"] if len(found) == 1 else text

@@ -1,6 +1,5 @@
 """What a robot's log says of the robot: robot.json, read and checked."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
@@ -9,6 +8,7 @@ from typing import Any, cast
 
 from swarmwire.comms.bodies.body import Body, body_from_mapping
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.record.formats import refuse_other_format
 
 LOG_FORMAT = 1
@@ -34,10 +34,10 @@ class AboutRobot:
 def read_about_robot(path: Path) -> AboutRobot:
     """What the file says; BadInput if it is none, is damaged, or is of another format."""
     try:
-        found: object = json.loads(path.read_text(encoding="utf-8"))
+        found: object = from_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise BadInput(str(path.parent), path.name, "expected a robot's log: the file is missing") from None
-    except (OSError, ValueError, RecursionError) as error:
+    except (OSError, ValueError) as error:
         raise BadInput(str(path), "", f"expected what a robot says of itself: {error}") from None
     if not isinstance(found, dict):
         raise BadInput(str(path), "", "expected an object")

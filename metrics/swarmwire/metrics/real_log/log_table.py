@@ -9,6 +9,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.damage import damage
 from swarmwire.metrics.measured_table import MeasuredTable
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class LogTable(MeasuredTable):
         self.half_line = half
         try:
             self._frame = pl.read_csv(BytesIO(whole), infer_schema=False) if whole else _empty(columns)
-        except pl.exceptions.PolarsError as error:
+        except damage() as error:
             raise self.refused("", f"expected a table of a robot's log: {str(error).splitlines()[0]}") from None
         self.need(columns)
 

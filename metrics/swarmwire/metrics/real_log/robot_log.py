@@ -1,6 +1,5 @@
 """The log of one robot: what it did in each step, and what its radio sent and heard."""
 
-import json
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.real_log.about import ROBOT, AboutRobot, read_about_robot
 from swarmwire.metrics.real_log.log_table import LogTable
 
@@ -146,6 +146,6 @@ def _sent(table: LogTable) -> SentPackets:
 def _ended(folder: Path) -> str | None:
     """How it did, as the summary says; a summary that cannot be read was not written to its end."""
     try:
-        return str(json.loads((folder / SUMMARY).read_text(encoding="utf-8"))["ended"])
+        return str(from_json((folder / SUMMARY).read_text(encoding="utf-8"))["ended"])
     except (OSError, ValueError, KeyError, TypeError):
         return None

@@ -1,11 +1,11 @@
 """What the metrics of a run say of themselves, as `run.json` keeps it, so that drawings need nobody's code."""
 
-import json
 from dataclasses import dataclass
 from math import isinf
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.record.names import RUN_JSON
 
@@ -30,7 +30,7 @@ def facts_of(metric: Metric | type[Metric]) -> MetricFacts:
 def read_facts(folder: Path) -> dict[str, MetricFacts]:
     """By name, the metrics of the run of this folder; none where they were not kept, or cannot be read."""
     try:
-        found: Any = json.loads((folder / RUN_JSON).read_text(encoding="utf-8"))
+        found: Any = from_json((folder / RUN_JSON).read_text(encoding="utf-8"))
         facts = [_facts(item) for item in found["metrics"]]
     except (OSError, ValueError, KeyError, TypeError):  # what is amiss with the file is told by those who need it
         return {}

@@ -4,6 +4,7 @@
 its name is whole: a Parquet file that is cut off is unreadable.
 """
 
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,8 +53,10 @@ def scan_files(files: list[Path]) -> "pl.LazyFrame":
 
 def write_file(frame: "pl.DataFrame", path: Path) -> None:
     """Write a frame under this name, all of it or nothing; OSError if the disk will not have it."""
+    data = BytesIO()  # in memory first: what a full disk then says is an OSError
+    frame.write_parquet(data, **PARQUET)
     with written_aside(path) as aside:
-        frame.write_parquet(aside, **PARQUET)
+        aside.write_bytes(data.getbuffer())
 
 
 def join_parts(folder: Path, name: str) -> None:

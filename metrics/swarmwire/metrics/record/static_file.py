@@ -10,6 +10,7 @@ from typing import Any, cast
 from swarmwire.comms.bodies.body import body_from_mapping
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch
+from swarmwire.comms.parsing import from_json
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
 from swarmwire.metrics.record.formats import TABLES_FORMAT, refuse_other_format
 from swarmwire.metrics.whole_file import write_whole
@@ -23,13 +24,15 @@ def write_static(static: Static, path: Path) -> None:
 def read_static(path: Path) -> Static:
     """What `write_static` wrote, equal to it; BadInput if there is no such file, or it holds something else."""
     try:
-        read = json.loads(path.read_text(encoding="utf-8"))
+        read = from_json(path.read_text(encoding="utf-8"))
         refuse_other_format(read, TABLES_FORMAT, path)
         del read["format"]
-        return _static(read, str(path))
+        static = _static(read, str(path))
+        _check(static)
+        return static
     except FileNotFoundError:
         raise BadInput(str(path), "", "expected a file that a run wrote; there is none") from None
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
         raise BadInput(str(path), "", f"expected the static part of a run: {error}") from error
 
 
@@ -40,6 +43,23 @@ def _static(read: Mapping[str, Any], where: str) -> Static:
     fields["floor"] = _floor(read["floor"]) if read["floor"] is not None else None
     fields["groups"] = tuple(_group(item, where) for item in read["groups"])
     return Static(**fields)
+
+
+def _check(static: Static) -> None:
+    """TypeError or ValueError unless what rows of tables are named and counted by is there, and fits."""
+    groups = static.groups
+    texts = (static.name, static.boundary, *static.robot_names, *(of.name for of in groups))
+    wholes = (static.rate_hz, *static.seeds, *(n for of in groups for n in (of.start, of.stop, of.act_every_ticks)))
+    numbers = (*static.arena_size_m, *(() if static.range_m is None else (static.range_m,)))
+    for kind, values in ((str, texts), (int, wholes), (int | float, numbers)):
+        wrong = next((value for value in values if not isinstance(value, kind) or isinstance(value, bool)), None)
+        if wrong is not None:
+            raise TypeError(f"{str(wrong)[:40]!r} where a run writes {getattr(kind, '__name__', 'a number')}")
+    ends = [0, *(of.stop for of in groups)]
+    if [of.start for of in groups] != ends[:-1] or ends[-1] != len(static.robot_names) or static.rate_hz < 1:
+        raise ValueError("groups that do not hold each robot once, or no rate")
+    if len(static.arena_size_m) != 2 or not static.seeds or len(static.obstacles) != len(static.seeds):
+        raise ValueError("no size, or not as many obstacles as arenas")
 
 
 def _finite(static: Static) -> dict[str, Any]:

@@ -1,6 +1,5 @@
 """What is known of a run that is to be reported: its folder read, as far as there is something."""
 
-import json
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_json
 from swarmwire.comms.truth import Static
+from swarmwire.metrics.damage import damage
 from swarmwire.metrics.drawing.film import Film, film_of
 from swarmwire.metrics.record.names import RUN_JSON, SCENARIO
 from swarmwire.metrics.report.lanes import Lane, lanes_of
@@ -77,7 +78,7 @@ class RunData:
         try:
             own = pl.scan_parquet(files).filter((pl.col("arena") == ARENA) & pl.col("receiver").is_not_null())
             return own.select(*columns).drop_nulls().collect()
-        except (OSError, pl.exceptions.PolarsError) as error:
+        except (OSError, *damage()) as error:
             return (
                 f"{self.folder.where('packets')} cannot be read ({str(error).splitlines()[0]}); see `swarmwire verify`."
             )
@@ -100,7 +101,7 @@ def read_run(path: Path) -> RunData:
 
 def _started(path: Path) -> dict[str, Any]:
     try:
-        found: object = json.loads((path / RUN_JSON).read_text(encoding="utf-8"))
+        found: object = from_json((path / RUN_JSON).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
     return cast("dict[str, Any]", found) if isinstance(found, dict) else {}

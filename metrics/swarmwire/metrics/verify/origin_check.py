@@ -1,12 +1,12 @@
 """Whether what a run folder keeps for its repetition is there, and as the summary says."""
 
 import hashlib
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.record import formats
 from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS, INPUTS, RUN_JSON
 from swarmwire.metrics.verify.finding import Finding, State
@@ -15,7 +15,7 @@ from swarmwire.metrics.verify.finding import Finding, State
 def check_run_json(folder: Path) -> Finding:
     """From what the run was made."""
     try:
-        found: object = json.loads((folder / RUN_JSON).read_text(encoding="utf-8"))
+        found: object = from_json((folder / RUN_JSON).read_text(encoding="utf-8"))
     except FileNotFoundError:
         return Finding(RUN_JSON, State.MISSING, "without it the run cannot be repeated")
     except (OSError, ValueError) as error:

@@ -4,6 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
+from swarmwire.metrics.damage import damage
 from swarmwire.metrics.record.part_files import part_file, parts_of, table_file
 from swarmwire.metrics.verify.finding import State
 
@@ -51,6 +52,6 @@ def _fault(file: Path, columns: Collection[str]) -> str | None:
             return f"no column {missing[0]}"
         for column in there:
             pl.read_parquet(file, columns=[column])
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
+    except (OSError, *damage()) as error:
         return str(error).splitlines()[0]
     return None

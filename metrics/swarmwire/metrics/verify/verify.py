@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.record.names import LOG, RECORDING, RUN_JSON, STATIC, SUMMARY
+from swarmwire.metrics.damage import damage
+from swarmwire.metrics.record.names import DIGESTS, INPUTS, LOG, RECORDING, RUN_JSON, STATIC, SUMMARY
 from swarmwire.metrics.record.part_files import scan_files
 from swarmwire.metrics.record.tick_columns import ROBOT_COLUMNS
 from swarmwire.metrics.run_folder import SCHEMAS, RunFolder
@@ -27,6 +28,7 @@ TABLES: dict[str, Agreement] = {
     "radio_distances": distances_agree,
     "radio_links": links_agree,
 }
+COPIES = "copies of files"
 ALWAYS = ("ticks", "events")  # recorded unless the summary says otherwise
 
 
@@ -44,10 +46,21 @@ def verify(path: Path | str) -> list[Finding]:
         _recording(folder, summary),
         _log(folder),
         check_run_json(folder.path),
-        check_digests(folder.path, summary),
-        *check_inputs(folder.path, summary),
-        *_copies(folder, summary),
+        *_told(DIGESTS, lambda: [check_digests(folder.path, summary)]),
+        *_told(INPUTS, lambda: check_inputs(folder.path, summary)),
+        *_told(COPIES, lambda: _copies(folder, summary)),
     ]
+
+
+def _told(name: str, compared: Callable[[], list[Finding]]) -> list[Finding]:
+    """What a comparison with the summary finds; a summary that is damaged further in than `RunFolder` looks differs."""
+    try:
+        return compared()
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OSError) as error:
+        reason = " ".join(repr(error)[:60].split())
+        return [Finding(name, State.DIFFERS, f"{SUMMARY} does not say what a run says there ({reason})")]
+    except damage() as error:
+        return [Finding(name, State.DAMAGED, str(error).splitlines()[0])]
 
 
 def _summary(folder: RunFolder) -> tuple[dict[str, Any] | None, Finding]:
@@ -83,22 +96,24 @@ def _table(folder: RunFolder, name: str, summary: dict[str, Any] | None) -> Find
     if fault is not None:
         return Finding(name, State.DAMAGED, fault)
     reach = "; ".join(part for part in (_reach(name, found.files), found.text) if part)
-    verdict = TABLES[name](found.files, summary) if found.state is not State.DAMAGED else None
-    state, text = verdict or (found.state, "")
-    return Finding(name, state, f"{text}; {reach}" if text else reach)
+
+    def compared() -> list[Finding]:
+        verdict = TABLES[name](found.files, summary) if found.state is not State.DAMAGED else None
+        state, text = verdict or (found.state, "")
+        return [Finding(name, state, f"{text}; {reach}" if text else reach)]
+
+    return _told(name, compared)[0]
 
 
 def _fault(folder: RunFolder, name: str, files: list[Path]) -> str | None:
     """What cannot be in its readable files, in words."""
-    import polars as pl
-
     try:
         static = folder.static
     except BadInput:  # which has a finding of its own
         static = None
     try:
         return table_fault(name, scan_files(files), static)
-    except pl.exceptions.PolarsError as error:  # parts of different types
+    except damage() as error:  # parts of different types
         return str(error).splitlines()[0]
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from swarmwire.comms.air.disruption import ALL, DROP, NEWEST, Disruption
 from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import Sent
 from tests.comms.air.runs import Run, at, make_air, packets
 from tests.comms.air.test_disruption import ran
@@ -114,3 +115,28 @@ def test_a_backlog_keeps_to_its_own_radio():
     assert on_air[sender == 0].tolist() == [800, 880, 960, 1040]
     assert on_air[sender == 1].tolist() == [200, 280, 360, 440, 520, 600, 680, 760]
     assert told.fates() == {"HEARD": 4, "BLACKOUT": 8}
+
+
+def test_a_radio_keeps_back_only_its_own_packets_and_only_those_that_it_took():
+    """Handed over at 0.35 s: the radio of robot 1 is off by then, and of its two packets the first is too large."""
+    later = replace(SLOW, send_offset=0.25)
+    sent, now = {1: packets([0, 0, 1, 1], size=[10, 10, 101, 10])}, {2: off(ALL, 1), 8: Disruption.none(2)}
+    told = ran(make_air(later, 2), PAIR, sent, now, 12)
+    assert told.fates() == {"HEARD": 1, "BLACKOUT": 2, "TOO_LARGE": 1}
+    assert on_air_ms(told) == [350, 430, 800]
+    assert [one.tally.fates[0, Fate.TOO_LARGE] for one in told.news].index(1) == 4
+
+
+def test_the_first_that_waited_goes_on_air_when_the_one_before_it_has_ended():
+    """As above, but the radio is on again at 300 ms: the second frame has ended at 260."""
+    told = ran(make_air(SLOW, 2), PAIR, {1: packets([0] * 4)}, {2: off(ALL, 0), 3: Disruption.none(2)}, 15)
+    assert on_air_ms(told) == [100, 180, 300, 380]
+
+
+def test_each_radio_lets_go_its_own_packets():
+    """Both are off from 0.2 s on, that of robot 1 until 0.5 s, that of robot 0 until 0.8 s."""
+    now = {2: off(ALL, 0, 1), 5: off(ALL, 0), 8: Disruption.none(2)}
+    told = ran(make_air(SLOW, 2), PAIR, {3: packets([0, 0, 1, 1])}, now, 15)
+    sender, on_air = told.on_air("sender"), np.array(on_air_ms(told))
+    assert on_air[sender == 1].tolist() == [500, 580]
+    assert on_air[sender == 0].tolist() == [800, 880]

@@ -31,3 +31,9 @@ def test_the_gamma_quantile_has_the_ends_of_its_range():
     assert gamma_quantile(1.5, 1.0, 0.0) == np.inf
     assert nakagami_gain(0.0, 0.75) == 0.0
     assert np.isfinite(nakagami_gain(32.0, 0.5))
+
+
+def test_the_gamma_quantile_is_infinite_where_nothing_is_above_and_0_where_nothing_is_below():
+    assert gamma_quantile(0.75, 1.0, 0.0) == np.inf
+    assert gamma_quantile(0.75, 0.0, 1.0) == 0.0
+    assert gamma_tails(0.75, 0.0) == (0.0, 1.0)

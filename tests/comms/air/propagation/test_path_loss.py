@@ -14,6 +14,7 @@ from swarmwire.comms.air.propagation.log_distance import LogDistance
 from swarmwire.comms.air.propagation.loss_curve import LossCurve
 from swarmwire.comms.air.propagation.path_loss import loss_db, reach_m
 from swarmwire.comms.air.propagation.two_ray import TwoRay
+from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.receiver import chunk_success, ieee802154
 
 getcontext().prec = 40
@@ -196,3 +197,21 @@ def test_reach_stops_at_a_jump_that_it_cannot_afford():
     for spare_db in (0.0, 6.0, 12.0):
         assert reach_m(curve, at_break_db + spare_db) == pytest.approx(16.0, rel=EXACT)
     assert reach_m(curve, loss_db(curve, 30.0)) == pytest.approx(30.0, rel=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("radio", "law"),
+    [
+        (Radio(model="log-distance"), LogDistance()),
+        (Radio(model="friis"), Friis()),
+        (Radio(model="two-ray"), TwoRay()),
+        (Radio(model="itu-indoor"), ItuIndoor()),
+    ],
+)
+def test_a_model_without_a_table_has_the_usual_one(radio: Radio, law: object):
+    assert radio.loss_model == law
+
+
+def test_a_disk_has_no_path_loss():
+    with pytest.raises(ValueError, match="model: a disk has no path loss"):
+        _ = Radio(2.0).loss_model

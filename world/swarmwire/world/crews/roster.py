@@ -117,6 +117,15 @@ class Roster(ABC, Generic[S]):
         slot = next(slot for slot in self._slots if slot.state not in ("ready", "dead"))
         return slot.runner or "that did not join", slot.assignment.robots_text
 
+    @property
+    def waits_for(self) -> str:
+        """The first runner that the loop waits for, and its robots; "" if there is none. Safe from any thread."""
+        for slot in tuple(self._slots):
+            if self._holds_up(slot):
+                robots = slot.assignment.robots_text
+                return f"{slot.runner}, which plays {robots}" if slot.runner else f"whoever plays {robots}"
+        return ""
+
     def counts(self) -> dict[str, int]:
         """What was dropped or lost, by name."""
         return dict(self._counts)

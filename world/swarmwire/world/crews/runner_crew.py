@@ -6,13 +6,13 @@
 import queue
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 import zenoh
 from zenoh.handlers import Callback
 
-from swarmwire.comms.clock import Clock, to_ns
+from swarmwire.comms.clock import Clock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import Heard
@@ -29,6 +29,7 @@ from swarmwire.world.crews.runner_health import RunnerHealth
 from swarmwire.world.crews.runner_inbox import Item, RunnerInbox
 
 POLL_S = 0.2  # how often a wait looks up whether to go on waiting
+AWAY_S = 2.0  # longer between two looks: this process was frozen itself
 START_S = 60.0  # how long runners may take to join and build their agents
 MOST_TOLD = 200  # refusals: whoever asks for ever shall not fill the log
 FLOODED = "it sent far more than it was asked for"
@@ -83,7 +84,8 @@ class RunnerCrew(ABC, Generic[R]):
         self._building: dict[str, int] = {}  # until when runners may take, wall time
         self._losses_told = self._changes_told = self._refusals = 0
         self._patience_s = start_s  # how long a wait may last; in ticks the time-out
-        self._deadline_ns = 0
+        self._deadline_ns = self._looked_ns = 0
+        self._waits_since_ns: int | None = None
 
     def open(self) -> None:
         """Listen at the endpoints, so that runners may join; BadInput if one is taken."""
@@ -123,8 +125,12 @@ class RunnerCrew(ABC, Generic[R]):
         return {**self._roster.counts(), **self._inbox.counts()}
 
     def health(self) -> RunnerHealth:
-        """How the runners are doing."""
-        return self._roster.health()
+        """How the runners are doing; safe from any thread."""
+        health, since_ns = self._roster.health(), self._waits_since_ns
+        if since_ns is None:
+            return health
+        waits_s = to_s(self._clock.now_ns() - since_ns)
+        return replace(health, waits_s=waits_s, waits_for=self._roster.waits_for)
 
     def close(self) -> None:
         """Tell the runners that the run is over, give them a moment to leave, and close the session."""
@@ -151,6 +157,11 @@ class RunnerCrew(ABC, Generic[R]):
         would be cold for each, since the runners use the cores in between.
         """
         self._allow_time()
+        self._waits_since_ns = self._looked_ns
+        self._wait_for_all()
+        self._waits_since_ns = None
+
+    def _wait_for_all(self) -> None:
         if not self._roster.waiting:  # who joins is let in also where nobody is waited for
             self._take_in()
         arrived: list[Item] = []
@@ -168,7 +179,7 @@ class RunnerCrew(ABC, Generic[R]):
             arrived.clear()
             if trouble is not None and self._roster.waiting:
                 raise RunnerLost(*self._roster.missing, trouble)
-            if self._clock.now_ns() > self._deadline_ns:
+            if self._looked() > self._deadline_ns:
                 self._roster.lose_silent(f"no answer for {self._patience_s:g} s")
                 self._allow_time()
             self._tell_changes()
@@ -180,7 +191,17 @@ class RunnerCrew(ABC, Generic[R]):
         self._tell_changes()
 
     def _allow_time(self) -> None:
-        self._deadline_ns = self._clock.now_ns() + to_ns(self._patience_s)
+        self._looked_ns = self._clock.now_ns()
+        self._deadline_ns = self._looked_ns + to_ns(self._patience_s)
+
+    def _looked(self) -> int:
+        """The time. For as long as this process was frozen, no runner can be blamed: it is allowed to them again."""
+        now_ns, before_ns = self._clock.now_ns(), self._looked_ns
+        if now_ns - before_ns > to_ns(AWAY_S):
+            self._deadline_ns += now_ns - before_ns
+            self._building = {runner: until_ns + now_ns - before_ns for runner, until_ns in self._building.items()}
+        self._looked_ns = now_ns
+        return now_ns
 
     def _trouble(self) -> str | None:
         return None if self._roster.bears_losses else self._around.trouble()
@@ -190,6 +211,8 @@ class RunnerCrew(ABC, Generic[R]):
             return self._inbox.get(timeout=POLL_S)
         except queue.Empty:
             return None
+        finally:
+            self._looked()
 
     def _handle(self, item: Item) -> None:
         if isinstance(item, zenoh.Query):

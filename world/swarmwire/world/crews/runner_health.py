@@ -15,3 +15,5 @@ class RunnerHealth:
     left: int = 0  # runners that said so
     robots_free: int = 0  # that no agent plays now
     foreign: int = 0  # of those that are ready: with code of their own, of which they told nothing
+    waits_s: float = 0.0  # how long the run has been waiting for runners by now
+    waits_for: str = ""  # the first that it waits for, and its robots

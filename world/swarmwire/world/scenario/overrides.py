@@ -4,6 +4,7 @@ import tomllib
 from typing import Any, cast
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_toml
 
 
 def put(mapping: dict[str, Any], text: str) -> str:
@@ -40,7 +41,7 @@ def _parsed(text: str) -> tuple[list[str], Any]:
     if not equals or not all(keys):
         raise BadInput(f"--set {text}", "", "expected path=value, such as robots.flock.count=30")
     try:
-        found = tomllib.loads(f"value = {value}")
+        found = from_toml(f"value = {value}")
     except tomllib.TOMLDecodeError:
         return keys, value.strip()
     return keys, found["value"] if len(found) == 1 else value

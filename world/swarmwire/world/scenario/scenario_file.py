@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from pydantic import ValidationError
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.format_number import check_format
+from swarmwire.comms.parsing import from_toml
 from swarmwire.world.scenario.checks import check
 from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.overrides import put
@@ -20,7 +22,12 @@ FORMAT = 1  # that a scenario's file names
 
 def scenario_schema() -> dict[str, Any]:
     """The JSON schema of a scenario's file, with bounds, units and a description of every key."""
-    return Scenario.model_json_schema()
+    return deepcopy(_schema())
+
+
+@cache
+def _schema() -> dict[str, Any]:
+    return Scenario.model_json_schema()  # takes longer than all else about a scenario
 
 
 def scenario_from(mapping: Mapping[str, Any], where: str, overrides: Sequence[str] = ()) -> Scenario:
@@ -50,14 +57,14 @@ def _checked(given: dict[str, Any], where: str) -> Scenario:
     try:
         scenario = Scenario.model_validate(given)
     except ValidationError as error:
-        raise fault(error, scenario_schema(), where) from None
+        raise fault(error, _schema(), where) from None
     check(scenario, where)
     return scenario.with_source(where, deepcopy(given))
 
 
 def _read(path: Path | str, where: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+        return from_toml(Path(path).read_text(encoding="utf-8-sig"))
     except tomllib.TOMLDecodeError as error:
         raise BadInput(where, "", f"expected TOML: {error}") from None
     except UnicodeDecodeError:

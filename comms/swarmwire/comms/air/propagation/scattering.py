@@ -30,7 +30,7 @@ from swarmwire.comms.draws_compiled import uniform
 
 WAVES = 2 * SUMS  # as `scattered` adds them up
 GENERATOR = 19  # v's index is so many times u's: near the golden section of WAVES, and without common divisor
-SCALE = 1.0 / math.sqrt(WAVES)
+SCALE = np.float64(1.0 / math.sqrt(WAVES))  # a plain float would leave sums of float32 what they are, but for numba
 FADING = purpose("fading")
 TURN_U, TURN_V, PHASE, OWN = range(4)  # what draws are for
 _MIX = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB), np.uint64(0x9E3779B97F4A7C15)

@@ -22,7 +22,13 @@ NOT_LEARNED = -1  # the result of a packet whose sender died while it was on air
 
 _I, _F = np.int64, np.float64
 
-ROBOT = np.dtype(
+
+def _rows(fields: list[tuple[str, type]]) -> np.dtype[np.void]:
+    """Rows whose fields are attributes, as they are in compiled code, also where the compiler is off."""
+    return np.dtype((np.record, np.dtype(fields, align=True)))
+
+
+ROBOT = _rows(
     [
         # The queue: places in the order of packets by sender.
         ("next", _I),  # the first packet that is not served yet
@@ -52,11 +58,10 @@ ROBOT = np.dtype(
         ("last_fate", _I),  # of the latest attempt at an addressed packet
         ("last_in_range", _I),
         ("last_mw", _F),
-    ],
-    align=True,
+    ]
 )
 # What every frame on air changes at every robot near, and so in one line of the processor's cache.
-RECEPTION = np.dtype(
+RECEPTION = _rows(
     [
         ("power_mw", _F),  # all frames on air here
         ("peak_mw", _F),  # CSMA: most of `power_mw` while it listens
@@ -70,10 +75,9 @@ RECEPTION = np.dtype(
         ("jam_log", np.float32),  # what that has taken from `log_success`
         ("is_deaf", np.int8),  # it sends, or is about to
         ("is_busy", np.int8),  # DCF: as it was when last looked at
-    ],
-    align=True,
+    ]
 )
-PACKET = np.dtype(
+PACKET = _rows(
     [
         ("sender", _I),
         ("to", _I),  # robot row, or NOBODY: a broadcast
@@ -90,20 +94,18 @@ PACKET = np.dtype(
         ("on_air_at_ns", _I),  # of the latest attempt
         ("fate", _I),  # that it had at the sender's radio, or HEARD: it was on air
         ("result", _I),  # SendResult, once it is done: what its sender knows
-    ],
-    align=True,
+    ]
 )
 # Links by sender: to robots that may be told of a frame, and then to those that it only disturbs. In few bytes, since
 # each frame goes over its links three times, and the next frame over others.
-LINK = np.dtype(
+LINK = _rows(
     [
         ("power_mw", _F),  # at the receiver, with fading
         ("receiver", np.int32),  # robot row
         ("is_listed", np.bool_),  # mean power reaches the sensitivity
         ("fate", np.uint8),  # HEARD: open; else what ends every packet here
         ("now", np.uint8),  # of the frame on air: RECEIVING or a fate
-    ],
-    align=True,
+    ]
 )
 Table = NDArray[np.void]
 

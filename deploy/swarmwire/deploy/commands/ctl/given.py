@@ -6,6 +6,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.parsing import from_toml
 from swarmwire.deploy.commands.ctl.chosen_run import control_of
 from swarmwire.deploy.commands.ctl.told import give, tell
 
@@ -75,7 +76,7 @@ def end_command(
 
 def _table(text: str) -> dict[str, Any]:
     try:
-        found = tomllib.loads(f"event = {text}")
+        found = from_toml(f"event = {text}")
     except tomllib.TOMLDecodeError as error:
         raise BadInput("event", "", f"expected a TOML table on one line: {error}") from None
     table: object = found["event"]

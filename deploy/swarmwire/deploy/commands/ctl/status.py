@@ -74,7 +74,7 @@ def _print_table(told: list[tuple[dict[str, Any], str | None]]) -> None:
 def _print_one(status: dict[str, Any], folder: str | None) -> None:
     from swarmwire.deploy.terminal.rows import aligned
 
-    runners = status["runners"]
+    runners: dict[str, Any] = status["runners"] or {}
     groups = ", ".join(f"{count} {name}" for name, count in status["groups"].items())
     rows = [
         ("run", status["run"]),
@@ -83,7 +83,8 @@ def _print_one(status: dict[str, Any], folder: str | None) -> None:
         ("state", f"{status['state']}, {_speed(status)}"),
         ("tick", f"{status['tick']} of {status['ticks']} ({status['time_s']:g} s)"),
         ("robots", f"{status['alive']} of {status['robots']} alive ({groups})"),
-        ("runners", "" if runners is None else f"{runners['ready']} ready, {runners['lost']} lost"),
+        ("runners", f"{runners['ready']} ready, {runners['lost']} lost" if runners else ""),
+        ("waits", f"{runners['waits_s']:.0f} s for {runners['waits_for']}" if status["state"] == "waiting" else ""),
         ("radio", _numbers(status["radio"] or {})),
         ("metrics", _numbers({name: value for name, value in status["metrics"].items() if value is not None})),
         ("counts", _numbers({name: count for name, count in status["counts"].items() if count})),

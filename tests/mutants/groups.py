@@ -1,0 +1,57 @@
+"""What is mutated, and by which tests each module is tried: those that are near it, the quick ones first."""
+
+COMMS = "swarmwire.comms."  # before the names of all modules here
+LEAST_KILLED = 0.85  # of each group
+
+Tests = tuple[str, ...]
+
+
+def _in(folder: str, *names: str) -> Tests:
+    return tuple(f"{folder}/test_{name}.py" for name in names)
+
+
+def _wire(*names: str) -> Tests:
+    return _in("tests/comms/wire", *names)
+
+
+TICKS = _wire("tick_frames", "frames")
+TRUTHS = _wire("truth_frames")
+
+CODEC: dict[str, Tests] = {
+    "wire.frames": _wire("frames", "tick_frames"),
+    "wire.unpacking": _wire("unpacking", "frames"),
+    "wire.checked": TICKS,
+    "wire.tick_frames": (*TICKS, *_wire("in_time_frames")),
+    "wire.truth_frames": TRUTHS,
+    "wire.memory_frames": ("tests/agent/test_memory.py",),
+    "wire.air_frames": _wire("air_frames"),
+    "wire.in_time_frames": _wire("in_time_frames"),
+    "wire.control_frames": _wire("control_frames"),
+    "wire.scene_frames": TRUTHS,
+    "wire.offer": _wire("offer"),
+    "wire.join_request": _wire("join_request", "offer"),
+    "wire.poses": _wire("poses"),
+}
+DRAWS: dict[str, Tests] = {
+    "draws": ("tests/comms/test_draws.py",),
+    "draws_compiled": ("tests/comms/test_draws.py",),
+}
+DISK = (
+    *_in("tests/comms/air/disk", "senders", "queue", "backlog"),
+    *_in("tests/comms/air", "disruption", "times", "accounts", "layouts"),
+    *_in("tests/comms/events", "fail", "blackout", "partition"),
+)
+# Without those that hypothesis leads through hundreds of runs: the compiler is off.
+SIGNAL = (
+    *_in("tests/comms/air/signal", "keyed_fates", "outcomes"),
+    "--deselect=tests/comms/air/signal/test_outcomes.py::test_each_addressed_packet_has_one_outcome_unless_it_is_in_flight",
+)
+FATES: dict[str, Tests] = {
+    "fates": _in("tests/comms", "fates"),
+    **{f"air.disk.{name}": DISK for name in ("queue", "backlog", "senders", "disk_way", "channel")},
+    **{f"air.{name}": DISK for name in ("intake", "links", "transmissions", "accounts", "news")},
+    "air.lives": (*_in("tests/comms/air", "lives"), *DISK),
+    **{f"air.stages.{name}": DISK for name in ("fixed_loss", "disrupted", "line_of_sight")},
+    **{f"air.signal.{name}": SIGNAL for name in ("send_results", "frame_fate", "losses", "reports", "attempts")},
+}
+GROUPS = {"codec": CODEC, "draws": DRAWS, "fates": FATES}
