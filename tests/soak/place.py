@@ -125,7 +125,7 @@ class Place:
         return (*PYTHON, "swarmwire.deploy", "ui", str(self.folder))
 
     def _tab(self, name: str) -> Sequence[str]:
-        return (*PYTHON, "tests.soak.tab", str(self.log(f"page-{name.partition('-')[2]}")))
+        return (*PYTHON, "tests.soak.tab", str(self.log(name.replace("tab", "page"))))
 
 
 def environment(temporary: Path) -> Mapping[str, str]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from swarmwire.deploy import repeat
+from swarmwire.metrics.record.names import DIGESTS
 from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.verify import verify
 from tests.soak import invariants
@@ -20,7 +21,8 @@ from tests.waiting import until
 
 SIGNALS = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 ENDS = {signal.SIGKILL: -9, signal.SIGTERM: 130, signal.SIGINT: 130, signal.SIGHUP: 129}
-END_S = 40.0
+BEGIN_S, END_S = 240.0, 120.0  # on a machine that is busy
+EACH_S = 0.02
 
 
 def play_killed_world(plan: Plan, folder: Path) -> list[str]:
@@ -34,8 +36,7 @@ def play_killed_world(plan: Plan, folder: Path) -> list[str]:
         world = Supervised("world", lambda: command, folder / "world.log", env)
         world.tend(0)
         try:
-            until(lambda: (folder / "run" / "live.json").exists() or world.pid is None)
-            until(lambda: (folder / "run" / "trajectory.digests").exists() or world.pid is None)
+            _begun(folder / "run" / DIGESTS, world)
             threading.Event().wait(after_s)
             if rng.random() < 0.3:
                 world.send(signal.SIGSTOP)
@@ -55,6 +56,17 @@ def play_killed_world(plan: Plan, folder: Path) -> list[str]:
             *_left_behind(folder, number),
             *nothing_left(folder, killed=number == signal.SIGKILL),
         ]
+
+
+def _begun(digests: Path, world: Supervised) -> None:
+    """Return once the run has ticked."""
+    for _ in range(int(BEGIN_S / EACH_S)):
+        if digests.exists():
+            return
+        if world.pid is None:
+            break
+        threading.Event().wait(EACH_S)
+    raise Broken("the run did not begin")
 
 
 def _left_behind(folder: Path, number: signal.Signals) -> list[str]:

@@ -92,7 +92,7 @@ def play_own_runners(plan: Plan, folder: Path) -> list[str]:
         return [
             f"{summary['ticks']} ticks, {summary['ended']}",
             invariants.fates_add_up(summary),
-            "" if failed else invariants.owners_are_known(summary, robots, own=True),
+            "no owners" if failed else invariants.owners_are_known(summary, robots, own=True),
             invariants.folder_is_whole(run),
             invariants.repeats(run) if summary["ticks"] else "no tick to repeat",
             *nothing_left(folder),
