@@ -82,15 +82,15 @@ class Told(ByteTarget):
             garbage += feed.garbage
         return "garbage" if garbage else None
 
-    def _readers(self) -> list[Reader]:
+    def _readers(self) -> tuple[Reader, ...]:
         body = self.body
-        return [
+        return (
             LaserReader(body, 0.0),
             OdometryReader(body.wheels.wheel_base_m, 0.22),
             ImuReader(30.0),
             BatteryReader(body.senses["battery"]),
             LightReader(np.zeros((1, 2)), 0, 1000.0),
-        ]
+        )
 
 
 class Commanded(ByteTarget):
