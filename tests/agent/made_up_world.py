@@ -27,7 +27,7 @@ OFFER = Offer("run1", "by hand", "", "1.2.3", 10, None, (OFFERED,)).encode()
 
 def given(**change: Any) -> bytes:
     """The answer to a runner that joins."""
-    return msgpack.packb({**ASSIGNED.as_mapping(), "memory": None, **change})
+    return msgpack.packb({"v": frames.VERSION, **ASSIGNED.as_mapping(), "memory": None, **change})
 
 
 class MadeUpWorld:

@@ -109,9 +109,9 @@ def test_no_agent_is_asked_after_for_robots_of_other_groups() -> None:
         (NOTHING, given(), "the world told nothing of its run: it may not let r in"),
         (OFFER, None, REFUSED),
         (OFFER, NOTHING, "the world did not answer to join"),
-        (OFFER, b"\xc1", "the world's answer to join is of another version"),
-        (OFFER, given(groups=[{}]), "the world's answer to join is of another version"),
-        (OFFER, given(memory=b"\xc1"), "the world's answer to join is of another version"),
+        (OFFER, b"\xc1", "the world's answer to join is none"),
+        (OFFER, given(groups=[{}]), "the world's answer to join is none"),
+        (OFFER, given(memory=b"\xc1"), "the world's answer to join is none"),
     ],
 )
 def test_who_is_not_let_in_is_told_why(offer: bytes | None, robots: bytes | None, expected: str) -> None:
