@@ -3,6 +3,9 @@
 import subprocess
 import sys
 
+from swarmwire.comms.wire import ending
+from swarmwire.comms.wire.ending import end_now
+
 # A session whose close takes long, as on a machine that is busy.
 PROGRAM = """
 import atexit, sys, threading
@@ -26,6 +29,11 @@ def ended(program: str) -> tuple[int, str, str]:
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     return done.returncode, done.stdout, done.stderr
+
+
+def test_where_nothing_is_closing_it_returns(monkeypatch):
+    monkeypatch.setattr(ending, "_left", [])
+    end_now(3)
 
 
 def test_a_program_ends_at_once_with_its_exit_code():

@@ -1,6 +1,7 @@
 """Schedules of a run that starts its own runners, as `swarmwire run --runners` does."""
 
 import signal
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,8 +57,12 @@ class Nursed(Actors):
         own[at].send(signal.SIGCONT)
 
     def _own(self) -> list[Own]:
-        nurseries = [one for one in psutil.Process().children() if "swarmwire.agent.nursery" in one.cmdline()]
-        return [Own(child) for one in nurseries for child in sorted(one.children(), key=lambda child: child.pid)]
+        found: list[Own] = []
+        for one in psutil.Process().children():
+            with suppress(psutil.Error):  # a nursery whose runners are all dead has ended
+                if "swarmwire.agent.nursery" in one.cmdline():
+                    found += [Own(child) for child in sorted(one.children(), key=lambda child: child.pid)]
+        return found
 
 
 def play_own_runners(plan: Plan, folder: Path) -> list[str]:

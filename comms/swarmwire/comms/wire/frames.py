@@ -20,7 +20,7 @@ from swarmwire.comms.wire.unpacking import unpacked
 
 VERSION = 2  # of frames between world and runners, and of what runners ask before
 KEYS = {"v", "kind", "tick", "arrays", "values"}
-MOST_BYTES = 64 * 1024 * 1024
+MOST_BYTES = 64 * 1024 * 1024  # of a frame
 DTYPES = {code: np.dtype(code) for code in ("<f8", "<i8", "<u8", "|b1", "|u1")}
 TRUTHS = DTYPES["|b1"]
 
