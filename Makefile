@@ -5,9 +5,9 @@ RUN := $(UV) run --no-sync
 export UV_PYTHON_DOWNLOADS := never
 export PYRIGHT_PYTHON_IGNORE_WARNINGS := 1 # does not ask the network for a newer version
 
-# Whoever of the two processes is done first takes over half of what the other has left. What a busy machine's network did
-# not do in time is tried once more, and told as "rerun"; a wrong value never is.
-TEST_RUN := -n 2 --dist worksteal --reruns 1 --only-rerun ZError --only-rerun "it did not come to hold"
+# Three processes on two cores, since many tests wait for others; who is done first takes over from those that are not. What
+# a busy machine's network did not do in time is tried once more, and told as "rerun"; a wrong value never is.
+TEST_RUN := -n 3 --dist worksteal --reruns 1 --only-rerun ZError --only-rerun "it did not come to hold"
 
 .PHONY: help
 help: ## list the commands
@@ -19,7 +19,7 @@ demo: sync ## fly a flock over a lossy radio, a process per robot, and record it
 	$(RUN) swarmwire run scenarios/flocking-lossy.toml --runners per-robot
 
 .PHONY: test
-test: check ## check, then the quick tests, in two processes
+test: check ## check, then the quick tests, in three processes
 	$(RUN) pytest -m "not slow" $(TEST_RUN)
 
 .PHONY: check
