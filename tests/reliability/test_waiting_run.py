@@ -73,7 +73,7 @@ def waits(control: RemoteControl) -> str:
 
 def test_a_run_that_waits_for_its_first_agents_is_found_controlled_and_stopped(tmp_path, joiners):
     with listening(tmp_path / "run", joiners) as (simulation, control, errors):
-        assert simulation.run_id in [run.run for run in found_runs()]
+        until(lambda: simulation.run_id in [run.run for run in found_runs()])
         assert waits(control) == "whoever plays flock-0 … flock-19 (20 robots)"
         control.step(2)
         control.event({"do": "kill", "robots": {"names": ["flock-3"]}})

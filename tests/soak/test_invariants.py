@@ -135,7 +135,10 @@ def test_growth_is_found_by_what_grows():
 
 def test_samples_are_read_as_they_were_taken(tmp_path):
     samples = Samples(tmp_path / "samples.csv")
-    with subprocess.Popen((sys.executable, "-c", "input()"), stdin=subprocess.PIPE) as process:
+    code, pipe = "print(1, flush=True); input()", subprocess.PIPE
+    with subprocess.Popen((sys.executable, "-c", code), stdin=pipe, stdout=pipe) as process:
+        assert process.stdout is not None
+        process.stdout.readline()  # what it has is there
         samples.take(1.0, {"a world": process.pid, "nobody": None}, 7, 2.5, 3)
         process.communicate(b"\n")
     samples.take(2.0, {"a world": process.pid}, 8, 2.5, 3)
