@@ -15,8 +15,11 @@ def test_the_tree_at_the_top_of_the_file_names_every_error_of_the_five_parts() -
 
 
 def test_bad_input_is_a_line_that_a_terminal_can_show_whatever_was_given() -> None:
-    error = errors.BadInput("flock.toml", "robots.\x1b[31m\n\u202e", f"expected a name, got {'x' * 5000}")
+    error = errors.BadInput(
+        "flock.toml", "robots.\x1b[31m\n\u202e", f"expected a name, got {'x' * 5000}, did you mean y"
+    )
     assert str(error).startswith("flock.toml: robots.\\x1b[31m\\n\\u202e: expected a name, got xxx")
+    assert str(error).endswith("xxx, did you mean y")
     assert str(error).isprintable()
     assert len(str(error)) < 1600
     assert error.key == "robots.\x1b[31m\n\u202e", "what programs look at stays as it was"

@@ -45,7 +45,10 @@ def _one_line(text: str) -> str:
     """The text as a terminal can show it: keys and values in it may be anything, and of any length."""
     if not text.isprintable():
         text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-    return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]}…"
+    if len(text) <= MOST_LETTERS:
+        return text
+    half = MOST_LETTERS // 2  # a line begins with the place, and often ends with what was meant
+    return f"{text[:half]}…{text[-half:]}"
 
 
 class AgentFailed(SwarmwireError):
