@@ -1,5 +1,6 @@
 """Runners that tests start as processes of their own, at a world that listens."""
 
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,37 +13,18 @@ from swarmwire.deploy.result import Result
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.crews.change import Change
-from tests.deploy.commands import LOSSY
+from tests.deploy.commands import LOSSY, ROOT
 from tests.deploy.test_realtime import Watcher
 
 HERE = ("tcp/127.0.0.1:0",)
-AGENT = """
-from swarmwire.agent import FloatColumn, IntColumn, Message, Robots, State, VectorAgent, column, f4
-
-class Word(Message):
-    number: f4
-
-class Memory(State):
-    steps: IntColumn = column(0)
-    heard: FloatColumn = column(0.0)
-
-class Wanderer(VectorAgent[Memory]):
-    def step(self, robots: Robots, state: Memory) -> None:
-        state.steps += 1
-        words = robots.radio.heard(Word)
-        state.heard += words.sum(words.message.number)
-        robots.radio.send(Word, number=state.steps)
-        turn = robots.draw.uniform("turn") - 0.5
-        robots.drive(0.02 + 0.0001 * (state.steps % 50), turn + 0.001 * (state.heard % 100))
-"""
+WANDERER = ROOT / "tests/soak/wanderer.py"  # a step that is lost or made twice shows in its run
 
 
 class Joiners:
     """Told of runners that come and go; starts runners, and what the test wants to happen then."""
 
     def __init__(self, folder: Path) -> None:
-        self.agent = folder / "wanderer.py"
-        self.agent.write_text(AGENT)
+        self.agent = Path(shutil.copy(WANDERER, folder))
         self.endpoint = ""
         self.before: tuple[str, ...] = ()  # of each command: what starts it
         self.processes: dict[str, subprocess.Popen[str]] = {}

@@ -13,7 +13,7 @@ from swarmwire.comms.errors import BadInput
 from tests.fuzz.byte_changes import changed_bytes
 from tests.fuzz.dice import Dice
 from tests.fuzz.magic import TEXTS
-from tests.fuzz.target import Target, changed_inside, check_line
+from tests.fuzz.target import Target, changed_inside, check_file_line
 from tests.fuzz.tree_changes import changed_tree
 
 CELLS = ("", "nan", "inf", "-inf", "0", "-1", "1e308", "-0.0", "1e19", "9223372036854775808", "0.5", "true", '"', "é")
@@ -69,9 +69,7 @@ class FolderTarget(Target):
             path.unlink() if case.data is None else path.write_bytes(case.data)
             return self.read(self.place, deep=case.deep)
         except BadInput as error:
-            check_line(error)
-            if not error.where:
-                raise AssertionError(f"a refusal that names no file: {error}") from error
+            check_file_line(error)
             raise
         finally:
             path.write_bytes(before)

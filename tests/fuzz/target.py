@@ -123,6 +123,13 @@ def check_line(error: Exception, *must_name: str) -> None:
             raise AssertionError(f"a refusal that does not name {name}: {text[:300]!r}")
 
 
+def check_file_line(error: BadInput) -> None:
+    """A refusal of a file is one line that names the file."""
+    check_line(error)
+    if not error.where:
+        raise AssertionError(f"a refusal that names no file: {error}")
+
+
 class MsgpackTarget(PackedTarget):
     """Of msgpack."""
 

@@ -37,7 +37,7 @@ class Finding:
 
 def tried(target: Target, case: Any) -> tuple[str, str]:
     """What became of a case, in a word; and what was found, "" if nothing."""
-    peak_mb = _peak_mb()
+    before_mb = peak_mb()
     try:
         with _limited(target.limit_s):
             became = target.door(case) or ACCEPTED
@@ -49,7 +49,7 @@ def tried(target: Target, case: Any) -> tuple[str, str]:
         raise
     except BaseException as error:  # noqa: BLE001 - that is what is looked for; a panic of native code is no Exception
         return "finding", f"{type(error).__name__}: {str(error)[:SHOWN]}\n{_last_lines()}"
-    grown_mb = _peak_mb() - peak_mb
+    grown_mb = peak_mb() - before_mb
     if grown_mb > MOST_MB:
         return "finding", f"{grown_mb} MB at its peak, at most {MOST_MB} were expected"
     return became, ""
@@ -74,6 +74,7 @@ def _last_lines() -> str:
     return "".join(traceback.format_exc().splitlines(keepends=True)[-14:])
 
 
-def _peak_mb() -> int:
+def peak_mb() -> int:
+    """The most memory that this process has ever had."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak >> (20 if sys.platform == "darwin" else 10)

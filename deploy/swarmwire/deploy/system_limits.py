@@ -38,8 +38,9 @@ def need_threads(runners: int) -> None:
     before, gate, started = stack_size(SMALL_STACK_BYTES), allocate_lock(), 0
     try:
         with gate:
-            for started in range(needed):  # noqa: B007 - how many there were is told
+            while started < needed:
                 start_new_thread(_wait_for, (gate,))
+                started += 1
     except RuntimeError:
         cures = "ulimit -u, or the container's limit of pids"
         raise _refused(runners, f"room for {needed} more threads and processes", started, cures) from None

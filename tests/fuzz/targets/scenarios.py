@@ -2,6 +2,7 @@
 
 import shutil
 import tomllib
+from abc import abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -21,7 +22,7 @@ from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.scenario_file import load_scenario
 from tests.fuzz.byte_changes import changed_bytes
 from tests.fuzz.dice import Dice
-from tests.fuzz.target import Target, changed_inside, check_line
+from tests.fuzz.target import Target, changed_inside, check_file_line
 
 SHIPPED = Path("scenarios")
 WORLDS = 0.005  # of the scenarios that are let in, as many run for a tick
@@ -51,9 +52,9 @@ class TomlTarget(Target):
         self.bytes = [text.data for text in texts]
         return texts
 
+    @abstractmethod
     def is_one(self, path: Path, table: dict[str, Any]) -> bool:
         """Whether a shipped file is one of these."""
-        raise NotImplementedError
 
     def case(self, dice: Dice) -> Text:
         """A file, its text or its table changed."""
@@ -75,16 +76,14 @@ class TomlTarget(Target):
         try:
             return self.read(path, case)
         except BadInput as error:
-            check_line(error)
-            if not error.where:
-                raise AssertionError(f"a refusal that names no file: {error}") from error
+            check_file_line(error)
             raise
         finally:
             path.unlink()
 
+    @abstractmethod
     def read(self, path: Path, case: Text) -> str | None:
         """Read the file."""
-        raise NotImplementedError
 
 
 class Scenarios(TomlTarget):
