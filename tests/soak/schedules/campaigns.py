@@ -20,6 +20,7 @@ SEEDS, LOSSES = 6, [0.0, 0.5]
 LONG = "duration_s=20"
 MOST_KILLS = 3
 LIMIT_S = 240.0
+STACKS_S = 10.0  # for a process that is aborted to write where it stood
 
 
 def play_campaign(plan: Plan, folder: Path) -> list[str]:
@@ -33,7 +34,7 @@ def play_campaign(plan: Plan, folder: Path) -> list[str]:
 
         def start(arguments: Sequence[str]) -> Supervised:
             command = (*PYTHON, "swarmwire.deploy", "sweep", *arguments, "--workers", "2", "--quiet")
-            made = Supervised("sweep", lambda: command, folder / "sweep.log", env)
+            made = Supervised("sweep", lambda: command, folder / "sweep.log", {**env, "PYTHONFAULTHANDLER": "1"})
             made.tend(0)
             return made
 
@@ -45,16 +46,14 @@ def play_campaign(plan: Plan, folder: Path) -> list[str]:
             try:
                 threading.Event().wait(float(rng.uniform(0.5, 7.0)))
                 told.append(_break(one, rng))
-                if not one.ended_within(LIMIT_S):
-                    raise Broken(f"the campaign did not end within {LIMIT_S:g} s")
+                _await_end(one, folder / "sweep.log")
                 until(lambda: not [child for child in family(os.getpid()) if child.status() != "zombie"])
             finally:
                 one.kill()
                 one.end()
         last = start(resumed())
         try:
-            if not last.ended_within(LIMIT_S):
-                raise Broken(f"the campaign did not end within {LIMIT_S:g} s")
+            _await_end(last, folder / "sweep.log")
         finally:
             last.kill()
             code = last.end()
@@ -75,6 +74,18 @@ def each_run_once(campaign: Path, scenario: Path, whole: Path) -> str:
     if not series_in(campaign).equals(series_in(whole), null_equal=True):
         raise Broken("series differ from those of a campaign that was left alone")
     return f"{len(numbers)} runs, each once, the same as without faults"
+
+
+def _await_end(one: Supervised, log: Path) -> None:
+    """Return when it has ended; Broken, with where each of its threads stood, if it takes too long."""
+    if one.ended_within(LIMIT_S):
+        return
+    if one.pid is not None:
+        for process in family(one.pid):
+            process.send_signal(signal.SIGABRT)
+    one.send(signal.SIGABRT)
+    one.ended_within(STACKS_S)
+    raise Broken(f"the campaign did not end within {LIMIT_S:g} s: {log.read_text(errors='replace')[-6000:]}")
 
 
 def _break(one: Supervised, rng: np.random.Generator) -> str:
