@@ -41,17 +41,33 @@ DISK = (
     *_in("tests/comms/air", "disruption", "times", "accounts", "layouts"),
     *_in("tests/comms/events", "fail", "blackout", "partition"),
 )
-# Without those that hypothesis leads through hundreds of runs: the compiler is off.
+STAGES = (*_in("tests/comms/air/stages", "loss", "trace", "bodies_block", "chain"), *DISK)
+REACH = (*_in("tests/comms/air/disk", "reach", "torus"), *DISK)
+# Without those that hypothesis leads through hundreds of runs, or that count on single precision: the compiler is off.
 SIGNAL = (
     *_in("tests/comms/air/signal", "keyed_fates", "outcomes"),
     "--deselect=tests/comms/air/signal/test_outcomes.py::test_each_addressed_packet_has_one_outcome_unless_it_is_in_flight",
 )
+RECEIVED = (
+    *SIGNAL,
+    *_in("tests/comms/air/signal", "signal_reception", "jamming", "trace_of_signals"),
+    *(
+        f"--deselect=tests/comms/air/signal/test_{test}"
+        for test in (
+            "signal_reception.py::test_throughput_of_aloha_is_that_of_abramson",
+            "signal_reception.py::test_strength_is_equal_both_ways_to_the_last_bit",
+            "trace_of_signals.py::test_fates_add_up_and_arenas_do_not_meet",
+        )
+    ),
+)
 FATES: dict[str, Tests] = {
     "fates": _in("tests/comms", "fates"),
-    **{f"air.disk.{name}": DISK for name in ("queue", "backlog", "senders", "disk_way", "channel")},
+    **{f"air.disk.{name}": DISK for name in ("queue", "backlog", "senders")},
+    **{f"air.disk.{name}": REACH for name in ("disk_way", "channel")},
     **{f"air.{name}": DISK for name in ("intake", "links", "transmissions", "accounts", "news")},
     "air.lives": (*_in("tests/comms/air", "lives"), *DISK),
-    **{f"air.stages.{name}": DISK for name in ("fixed_loss", "disrupted", "line_of_sight")},
-    **{f"air.signal.{name}": SIGNAL for name in ("send_results", "frame_fate", "losses", "reports", "attempts")},
+    **{f"air.stages.{name}": STAGES for name in ("fixed_loss", "disrupted", "line_of_sight")},
+    **{f"air.signal.{name}": SIGNAL for name in ("send_results", "reports", "attempts")},
+    **{f"air.signal.{name}": RECEIVED for name in ("frame_fate", "losses")},
 }
 GROUPS = {"codec": CODEC, "draws": DRAWS, "fates": FATES}

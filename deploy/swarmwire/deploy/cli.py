@@ -36,6 +36,7 @@ from swarmwire.deploy.commands.ui import ui_command
 from swarmwire.deploy.commands.verify import verify_command
 from swarmwire.deploy.commands.view import view_command
 from swarmwire.deploy.commands.world import world_command
+from swarmwire.deploy.kept_memory import share_heaps
 from swarmwire.deploy.refusals import refusal
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
@@ -113,6 +114,7 @@ def main() -> None:
 
 def program() -> None:
     """The process `swarmwire`."""
+    share_heaps()  # before any library starts threads
     try:
         main()
     except SystemExit as ended:

@@ -18,7 +18,8 @@ from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selected import selected_robot
 
 ROOM_BYTES = 1_000_000  # for what is written before the first tick
-SEND_BYTES = 3_000_000  # each time costs half a kilobyte and more per entity, whatever it holds
+SEND_BYTES = 3_000_000  # each time costs half a kilobyte and more per entity, in the file and in memory to its end
+SEND_SHARE = 0.01  # of the time so far: where ticks are slow, sending every 2 s takes memory without end
 
 
 class RerunRecording:
@@ -35,7 +36,9 @@ class RerunRecording:
     def __init__(
         self, path: Path | None, metrics: Measured, clock: Clock, arena: int = 0, selected: str | None = None
     ) -> None:
-        """Record to this file, which is replaced, at least every 2 s of `clock`; BadInput without the extra [view].
+        """Record to this file, which is replaced; BadInput without the extra [view].
+
+        What was seen is written after 2 s of `clock` at the latest, and in long runs after a hundredth of their time.
 
         `selected` names the robot that is shown in detail: its rays, its ring, its radio's range. None: the first robot
         of the first group that has rays or photocells. A subclass that leads elsewhere has no path.
@@ -56,7 +59,7 @@ class RerunRecording:
         self._arena_view = RerunArena(static, self._arena, selected)
         self._plots = RerunPlots(static, self._metrics.metrics, self._arena)
         self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
-        self._rows, self._limit = RerunRows(self._rec), ChunkLimit(self._send_bytes, self._clock)
+        self._rows, self._limit = RerunRows(self._rec), ChunkLimit(self._send_bytes, self._clock, SEND_SHARE)
         self._ticks = 0
         self._rec.set_log_time_enabled(False)
         self._rec.set_log_tick_enabled(False)
