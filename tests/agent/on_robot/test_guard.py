@@ -39,9 +39,9 @@ def robots() -> Iterator[list[Robot]]:
     started: list[Robot] = []
     yield started
     for robot in started:
-        robot.command.__exit__()
-        if psutil.pid_exists(robot.agent):
+        if psutil.pid_exists(robot.agent):  # first: it has the pipes of its guard, whose end is waited for
             os.kill(robot.agent, signal.SIGKILL)
+        robot.command.__exit__()
 
 
 def test_an_agent_that_is_killed_has_its_motors_stopped_by_the_guard(tmp_path, robots):
