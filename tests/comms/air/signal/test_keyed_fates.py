@@ -1,6 +1,8 @@
 """Each fate over signals is told beforehand by its draws, written out here once more: what they are keyed by."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -47,6 +49,24 @@ def test_a_weak_frame_is_right_if_its_draw_is_below_the_probability():
     assert sorted(heard) == sorted(expected)
 
 
+def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
+    """A packet is sent up to three times, until an answer to it is right; it is heard if one of its frames is."""
+    radio = with_access("csma-802154")
+    radio = replace(radio, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
+    rules, ticks, frame_bits = rules_of(radio, 2), 80, 8.0 * (10 + radio.overhead_bytes)
+    told = run(make_air(radio, 2, SEEDS), np.tile(at((0, 0), (122, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    rssi_dbm = on_air(told, "rssi_dbm")[:1]
+    frame, answer = (lone_deliveries(rules, rssi_dbm, bits)[0] for bits in (frame_bits, rules.acknowledgement_bits))
+    keys, sequence, tries = KEYS[:, None, None], np.arange(ticks)[:, None], np.arange(3)
+    right = uniform(keys, 0, 1, sequence, purpose("reception") + tries) < frame
+    is_answered = right & (uniform(keys, 1, 0, sequence, purpose("reception of an acknowledgement") + tries) < answer)
+    heard = sorted(zip(on_air(told, "arena").tolist(), on_air(told, "sequence").tolist(), strict=True))
+    assert heard == [tuple(of) for of in np.argwhere(right.any(axis=2)).tolist()]
+    acknowledged = sorted((row // 2, i) for i, row, result in learned(told) if result == SendResult.ACKNOWLEDGED)
+    assert acknowledged == [tuple(of) for of in np.argwhere(is_answered.any(axis=2)).tolist()]
+    assert 20 < len(acknowledged) < len(heard) < 2 * ticks - 20
+
+
 @pytest.mark.parametrize("loss", [0.3, 1.0])
 def test_a_frame_is_lost_if_its_draw_is_below_the_loss(loss: float):
     radio = replace(with_access("none"), send_offset="tick", loss=loss)
@@ -54,6 +74,21 @@ def test_a_frame_is_lost_if_its_draw_is_below_the_loss(loss: float):
     told = run(make_air(radio, ROBOTS, SEEDS), pose, everybody(2 * ROBOTS), 10, 1)
     fate = np.where(draws_of(told, "fixed loss") < loss, Fate.LOST, Fate.HEARD)
     assert on_air(told, "fate").tolist() == fate.tolist()
+
+
+def asking(senders: list[int]) -> Callable[[int], Sent]:
+    """A packet in each tick from each of these to robot 1 of its arena, whose outcome it asks for, by the tick."""
+    sent = packets(senders, 1)
+    return lambda tick: Sent(sent.sender, sent.to, sent.payloads, np.full(len(senders), tick))
+
+
+def learned(told: Run) -> list[tuple[int, int, int]]:
+    """Outcomes that senders were told, sorted: (id, row, result)."""
+    found = (
+        zip(one.outcomes.id.tolist(), one.outcomes.row.tolist(), one.outcomes.result.tolist(), strict=True)
+        for one in told.news
+    )
+    return sorted(chain.from_iterable(found))
 
 
 def told_beforehand(key: np.uint64, sequence: int, loss: float, attempts: int) -> tuple[Fate, SendResult]:
@@ -72,21 +107,10 @@ def told_beforehand(key: np.uint64, sequence: int, loss: float, attempts: int) -
 def test_attempts_and_their_answers_have_draws_of_their_own(method: str):
     radio = with_access(method)
     radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
-    sent = packets([0, 2], 1)
-    asked = Sent(sent.sender, sent.to, sent.payloads, np.zeros(2, np.int64))
-
-    def numbered(tick: int) -> Sent:
-        return replace(asked, outcome_id=np.full(2, tick))
-
     ticks = 60
-    told = run(make_air(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), numbered, ticks, 2)
+    told = run(make_air(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
     expected = [told_beforehand(key, tick, 0.6, 3) for tick in range(ticks) for key in KEYS]
-    learned = [
-        (int(i), int(row), int(result))
-        for one in told.news
-        for row, i, result in zip(one.outcomes.row, one.outcomes.id, one.outcomes.result, strict=True)
-    ]
-    assert [result for _, _, result in sorted(learned)] == [result for _, result in expected]
+    assert [result for _, _, result in learned(told)] == [result for _, result in expected]
     order = np.lexsort((on_air(told, "arena"), on_air(told, "sequence")))
     assert on_air(told, "fate")[order].tolist() == [fate for fate, _ in expected]
     assert len(set(expected)) == 3
