@@ -62,7 +62,7 @@ def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
     is_answered = right & (uniform(keys, 1, 0, sequence, purpose("reception of an acknowledgement") + tries) < answer)
     heard = sorted(zip(on_air(told, "arena").tolist(), on_air(told, "sequence").tolist(), strict=True))
     assert heard == [tuple(of) for of in np.argwhere(right.any(axis=2)).tolist()]
-    acknowledged = sorted((row // 2, i) for i, row, result in learned(told) if result == SendResult.ACKNOWLEDGED)
+    acknowledged = sorted((row // 2, i) for i, row, result in learned(told) if result == int(SendResult.ACKNOWLEDGED))
     assert acknowledged == [tuple(of) for of in np.argwhere(is_answered.any(axis=2)).tolist()]
     assert 20 < len(acknowledged) < len(heard) < 2 * ticks - 20
 
