@@ -40,6 +40,7 @@ from swarmwire.deploy.new_air import new_air
 from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.deploy.record.inputs import ReplayedCrew
+from swarmwire.deploy.record.origin import Origin
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.record.run_record import RunRecord
 from swarmwire.deploy.rehearsal import rehearse
@@ -211,20 +212,9 @@ class Simulation:
         if self._loop is not None:
             raise RuntimeError("a simulation runs once; make another one")
         keep_memory()
-        rows, realtime = self.static.arenas * self.static.robots, self._pace.factor if self._pace else None
         with ExitStack() as stack:
             stack.push(self._record.failed_to_start)
-            self._origin = self._record.begin(
-                self.scenario,
-                self.code,
-                self.static.seeds,
-                ticks=self.ticks,
-                runners=self.runners,
-                realtime=realtime,
-                quantum_s=self._recorded_quantum_s,
-                gateways=self._behind.kinds,
-                metrics=self.metrics,
-            )
+            self._origin = self._begin_record()
             if self._pace:  # before anything answers, and the pace begins
                 world = self._new_world(None, self.static.seeds)
                 rehearse(world, new_air(self.scenario, world, self._traces), self.metrics.metrics)
@@ -240,29 +230,8 @@ class Simulation:
             self._watching: list[Observer] = [*looking, *self._observers]
             if self.served:
                 self._watching.append(Undriven(self.served, pace, self._record.say))
-            acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows, self.static.rate_hz)
-            acting = self._record.recorded(acting, self._from_outside)
-            self._loop = Loop(
-                self.world,
-                new_air(self.scenario, self.world, self._traces),
-                acting,
-                self._watching,
-                self.scenario.events,
-                self.judge,
-                self.interventions,
-                cast("TimedCrew", acting) if self._recorded_quantum_s is not None else None,
-            )
-            early = self._early if self._listens else []
-            with ExitStack() as unless_begun:
-                for observer in early:
-                    observer.begin(self.static)
-                    unless_begun.callback(observer.end, None)
-                crew.start()
-                unless_begun.pop_all()
-            self._not_its_own = bool((health := self.health()) and (health.robots_free or health.foreign))
-            for observer in self._watching:
-                if observer not in early:
-                    observer.begin(self.static)
+            self._loop = self._new_loop(crew)
+            self._start(crew)
             self._exit = stack.pop_all()
         self._started_ns = self._clock.now_ns()
         return self
@@ -328,6 +297,50 @@ class Simulation:
     def _early(self) -> list[Observer]:
         """Those through which people see and control a run that still waits for its agents."""
         return [of for of in self._watching if getattr(of, "before_agents", False)]
+
+    def _begin_record(self) -> Origin:
+        """Write down what is about to run, before anything does."""
+        return self._record.begin(
+            self.scenario,
+            self.code,
+            self.static.seeds,
+            ticks=self.ticks,
+            runners=self.runners,
+            realtime=self._pace.factor if self._pace else None,
+            quantum_s=self._recorded_quantum_s,
+            gateways=self._behind.kinds,
+            metrics=self.metrics,
+        )
+
+    def _new_loop(self, crew: Crew) -> Loop:
+        """The loop over world, air and crew, whose actions are kept where they need not follow from the seed."""
+        rows = self.static.arenas * self.static.robots
+        acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows, self.static.rate_hz)
+        acting = self._record.recorded(acting, self._from_outside)
+        return Loop(
+            self.world,
+            new_air(self.scenario, self.world, self._traces),
+            acting,
+            self._watching,
+            self.scenario.events,
+            self.judge,
+            self.interventions,
+            cast("TimedCrew", acting) if self._recorded_quantum_s is not None else None,
+        )
+
+    def _start(self, crew: Crew) -> None:
+        """Have the crew ready, and all who look on begin: some before, since people want to see who is missing."""
+        early = self._early if self._listens else []
+        with ExitStack() as unless_begun:
+            for observer in early:
+                observer.begin(self.static)
+                unless_begun.callback(observer.end, None)
+            crew.start()
+            unless_begun.pop_all()
+        self._not_its_own = bool((health := self.health()) and (health.robots_free or health.foreign))
+        for observer in self._watching:
+            if observer not in early:
+                observer.begin(self.static)
 
     def _new_world(self, seed: int | None, seeds: Sequence[int] | None) -> World:
         """Every arena at its start, with the senses that its agents need."""
