@@ -66,6 +66,11 @@ RECEIVED = (
         )
     ),
 )
+REPORTED = (
+    *RECEIVED,
+    *_in("tests/comms/air", "departed", "times"),
+    *_in("tests/comms/air/signal", "retries", "signal_accounts"),
+)
 FATES: dict[str, Tests] = {
     "fates": _in("tests/comms", "fates"),
     **{f"air.disk.{name}": DISK for name in ("queue", "backlog", "senders")},
@@ -74,7 +79,8 @@ FATES: dict[str, Tests] = {
     "air.news": TOLD,
     "air.lives": (*_in("tests/comms/air", "lives"), *DISK),
     **{f"air.stages.{name}": REACH for name in ("fixed_loss", "disrupted", "line_of_sight")},
-    **{f"air.signal.{name}": SIGNAL for name in ("send_results", "reports", "attempts")},
+    "air.signal.send_results": SIGNAL,
+    **{f"air.signal.{name}": REPORTED for name in ("reports", "attempts")},
     **{f"air.signal.{name}": RECEIVED for name in ("frame_fate", "losses")},
 }
 GROUPS = {"codec": CODEC, "draws": DRAWS, "fates": FATES}
