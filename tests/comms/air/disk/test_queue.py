@@ -5,6 +5,7 @@ import pytest
 
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.fates import Fate
+from swarmwire.comms.truth import Obstacle
 from tests.comms.air.runs import TICK_NS, at, make_air, packets, run
 
 TRIO = at((0, 0), (1, 0), (9, 0))
@@ -30,6 +31,14 @@ def test_a_full_queue_refuses_for_every_intended_receiver(limit: int):
     assert told.on_air("sequence").tolist() == list(range(limit + 1))
     assert told.fates() == {"HEARD": limit + 1, "OUT_OF_RANGE": limit + 1, "QUEUE_FULL": 2 * (4 - limit)}
     assert told.tally.in_range.tolist() == [5]
+
+
+def test_who_stands_behind_an_obstacle_was_not_in_range_of_what_was_refused():
+    radio = Radio(2.0, line_of_sight=True, bit_rate_bps=4000, send_offset="tick", queue_limit=0)
+    air = make_air(radio, 3, obstacles=[[Obstacle("cylinder", 0.5, 0.0, radius_m=0.1)]])
+    told = run(air, at((0, 0), (1, 0), (0, 1)), lambda _: packets([0, 0]), 1, 3)
+    assert told.fates() == {"HEARD": 1, "BLOCKED": 1, "QUEUE_FULL": 2}
+    assert told.tally.in_range.tolist() == [2]
 
 
 def test_the_queue_empties_as_time_passes():
