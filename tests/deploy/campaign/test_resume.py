@@ -13,6 +13,7 @@ from swarmwire.deploy.campaign import campaign_folder
 from swarmwire.deploy.campaign.campaign import read_campaign
 from tests.deploy.campaign.small import rows_in, scenario_in, series_in
 from tests.deploy.commands import ROOT
+from tests.waiting import until
 
 VARY = {"radio.loss": [0.0, 0.5]}
 ASKED = {"seeds": 4, "vary": VARY, "pack": 2}
@@ -142,13 +143,14 @@ class Watcher:
     def begin(self, campaign, done, failed): print("begins", flush=True)
     def see(self, result): print("piece", flush=True)
     def end(self): pass
-sweep(sys.argv[1], seeds=4, vary={"radio.loss": [0.0, 0.5]}, pack=1, workers=1, out=sys.argv[2], watcher=Watcher())
+vary = {sys.argv[3]: [float(value) for value in sys.argv[4:]]}
+sweep(sys.argv[1], seeds=4, vary=vary, pack=1, workers=1, out=sys.argv[2], watcher=Watcher())
 """
 
 
 def test_a_campaign_that_is_killed_leaves_no_worker_and_is_gone_on_with(tmp_path, here):
     scenario, folder = scenario_in(tmp_path), tmp_path / "c"
-    command = [sys.executable, "-c", KILLED, str(scenario), str(folder)]
+    command = [sys.executable, "-c", KILLED, str(scenario), str(folder), "radio.loss", "0.0", "0.5"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stdout is not None
         lines = iter(process.stdout)
@@ -163,3 +165,19 @@ def test_a_campaign_that_is_killed_leaves_no_worker_and_is_gone_on_with(tmp_path
     assert resume(folder).is_over
     sweep(scenario, seeds=4, vary=VARY, out=tmp_path / "whole")
     same(folder, tmp_path / "whole")
+
+
+def test_a_worker_ends_with_its_campaign_also_in_the_middle_of_a_run(tmp_path):
+    """Of runs of half a second, and of a day, which would take minutes."""
+    asked = (str(scenario_in(tmp_path)), str(tmp_path / "c"), "duration_s", "0.5", "100000.0")
+    with subprocess.Popen(
+        [sys.executable, "-c", KILLED, *asked], stdout=subprocess.PIPE, text=True, cwd=ROOT
+    ) as process:
+        assert process.stdout is not None
+        lines = iter(process.stdout)
+        assert [next(lines).strip() for _ in range(5)] == ["begins", *["piece"] * 4]
+        [worker] = psutil.Process(process.pid).children(recursive=True)
+        busy_s = worker.cpu_times().user + 0.2
+        until(lambda: worker.cpu_times().user > busy_s)
+        process.kill()
+        assert psutil.wait_procs([worker], timeout=20)[1] == []
