@@ -67,8 +67,9 @@ RECEIVED = (
     ),
 )
 REPORTED = (
-    *RECEIVED,
+    *SIGNAL,
     *_in("tests/comms/air", "departed", "times"),
+    "tests/comms/air/signal/test_trace_of_signals.py::test_a_delay_comes_after_reception",
     *_in("tests/comms/air/signal", "retries", "signal_accounts"),
 )
 FATES: dict[str, Tests] = {
