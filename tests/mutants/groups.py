@@ -66,11 +66,22 @@ RECEIVED = (
         )
     ),
 )
+ACCOUNTS = "tests/comms/air/signal/test_signal_accounts.py"
 REPORTED = (
+    "tests/comms/air/signal/test_reports.py",
     *SIGNAL,
     *_in("tests/comms/air", "departed", "times"),
     "tests/comms/air/signal/test_trace_of_signals.py::test_a_delay_comes_after_reception",
-    *_in("tests/comms/air/signal", "retries", "signal_accounts"),
+    "tests/comms/air/signal/test_retries.py",
+    ACCOUNTS,
+    *(
+        f"--deselect={ACCOUNTS}::test_{test}"
+        for test in (
+            "fates_add_up_to_intended_receivers",
+            "fates_add_up_when_robots_die_and_are_revived",
+            "tally_agrees_with_what_is_listed",
+        )
+    ),
 )
 FATES: dict[str, Tests] = {
     "fates": _in("tests/comms", "fates"),
