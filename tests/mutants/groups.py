@@ -48,7 +48,11 @@ REACH = (
     "tests/comms/air/probe/test_coverage.py::test_the_radio_graph_has_the_pairs_with_enough_delivery",
     *DISK,
 )
-TOLD = (*_in("tests/comms/air", "departed", "kept_order", "within_ticks"), *DISK)
+TOLD = (
+    *_in("tests/comms/air", "departed", "kept_order", "within_ticks"),
+    "tests/comms/air/signal/test_keyed_fates.py",
+    *DISK,
+)
 # Without those that hypothesis leads through hundreds of runs, or that count on single precision: the compiler is off.
 SIGNAL = (
     *_in("tests/comms/air/signal", "keyed_fates", "outcomes"),
