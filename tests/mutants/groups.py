@@ -49,7 +49,7 @@ REACH = (
     *DISK,
 )
 TOLD = (
-    *_in("tests/comms/air", "departed", "kept_order", "within_ticks"),
+    *_in("tests/comms/air", "news", "departed", "kept_order", "within_ticks"),
     "tests/comms/air/signal/test_keyed_fates.py",
     *DISK,
 )
