@@ -1,13 +1,17 @@
 """What happened to frames is told wholly, in however many goes, to whoever was meant, from where it happened."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from swarmwire.comms.air.disruption import Disruption
 from swarmwire.comms.air.parameters.gives import Gives, RangeGiven
 from swarmwire.comms.air.signal import signal_way
-from swarmwire.comms.air.signal.told import taken_out
+from swarmwire.comms.air.signal.reports import Reports
+from swarmwire.comms.air.signal.told import Told
+from swarmwire.comms.air.way import Decided
 from tests.comms.air.runs import TICK_NS, Run, at, make_air, packets, run, scattered
 from tests.comms.air.signal.radios import with_access
 
@@ -27,13 +31,17 @@ def finished(told: Run) -> list[tuple[int, ...]]:
 
 
 def test_in_how_many_goes_it_is_told_does_not_matter(monkeypatch: pytest.MonkeyPatch):
-    at_once, goes = finished(crowded()), list[int]()
-    monkeypatch.setattr(signal_way, "LEAST_ROOM", 1)
-    monkeypatch.setattr(
-        f"{signal_way.__name__}.taken_out", lambda room: (goes.append(int(room.count[0])), taken_out(room))[1]
-    )
-    assert finished(crowded()) == at_once
-    assert len(goes) > 5
+    at_once, goes, decided = finished(crowded()), set[int](), Reports.decided
+
+    def counted(self: Reports, parts: list[Told], *more: Any) -> Decided:
+        goes.add(len(parts))
+        return decided(self, parts, *more)
+
+    monkeypatch.setattr(Reports, "decided", counted)
+    for room in (1, 200, 300, 400):
+        monkeypatch.setattr(signal_way, "LEAST_ROOM", room)
+        assert finished(crowded()) == at_once
+    assert goes >= {1, 2, 3}
 
 
 @pytest.mark.parametrize("queue_limit", [0, 9])
@@ -52,6 +60,20 @@ def test_the_dead_are_meant_only_by_who_addresses_them(queue_limit: int):
     }
     assert told.fates() == refused[queue_limit]
     assert told.tally.intended.tolist() == [6]
+    assert told.tally.in_range.tolist() == [4]
+
+
+def test_what_its_sender_did_not_live_to_send_would_have_been_in_range():
+    """Frames of 90 ms: at 100 ms the second is on air, and the third waits."""
+    air, held = make_air(replace(with_access("aloha"), bit_rate_bps=2400, send_offset="tick"), 2), Disruption.none(2)
+    told = Run(air)
+    air.hold(at((0, 0), (1, 0)), np.ones(2, np.bool_))
+    air.send(0, 0, packets([0, 0, 0]))
+    held.alive[0] = False
+    air.disrupt(held)
+    told.news += [air.advance(TICK_NS), air.advance(5 * TICK_NS)]
+    assert told.fates() == {"HEARD": 2, "SENDER_DEAD": 1}
+    assert told.tally.in_range.tolist() == [3]
 
 
 def test_ranges_are_those_at_which_frames_went_on_air():
