@@ -202,6 +202,7 @@ class _Forks:
 def attempts(module: str, mutants: Sequence[Mutant], tests: Sequence[str], tell: Callable[[Attempt], None]) -> None:
     """Try these mutants of a module by these tests, and `tell` of each; RuntimeError if the tests cannot be run."""
     forks = _Forks(module, mutants, tell)
+    os.environ.pop("PYTEST_ADDOPTS", None)  # meant for the tests of all else; without its terminal pytest knows no -v
     code = pytest.main([*OPTIONS, *tests], plugins=[forks])
     if forks.is_child:
         os._exit(code)  # the change itself has ended the tests, before the first
