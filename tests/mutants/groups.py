@@ -44,7 +44,7 @@ DISK = (
 REACH = (
     *_in("tests/comms/air/disk", "reach", "torus"),
     *_in("tests/comms/air/stages", "loss", "trace", "bodies_block", "chain"),
-    "tests/comms/air/test_tune.py",
+    *_in("tests/comms/air", "tune", "news"),
     "tests/comms/air/probe/test_coverage.py::test_the_radio_graph_has_the_pairs_with_enough_delivery",
     *DISK,
 )

@@ -116,6 +116,14 @@ def test_attempts_and_their_answers_have_draws_of_their_own(method: str):
     assert len(set(expected)) == 3
 
 
+def test_bursts_alone_take_frames_that_nothing_else_could():
+    radio = replace(with_access("none"), send_offset="tick", bursts=Bursts(0.3, 0.3))
+    pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
+    fates = run(make_air(radio, ROBOTS, SEEDS), pose, everybody(2 * ROBOTS), 30, 1).fates()
+    assert set(fates) == {"HEARD", "BURST"}
+    assert min(fates.values()) > 50
+
+
 def test_losses_of_all_kinds_leave_a_share():
     radio = replace(with_access("none"), loss=0.25)
     assert passing_share(radio) == 0.75
