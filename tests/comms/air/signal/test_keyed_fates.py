@@ -116,10 +116,11 @@ def test_attempts_and_their_answers_have_draws_of_their_own(method: str):
     assert len(set(expected)) == 3
 
 
-def test_bursts_alone_take_frames_that_nothing_else_could():
-    radio = replace(with_access("none"), send_offset="tick", bursts=Bursts(0.3, 0.3))
+@pytest.mark.parametrize("method", ["none", "aloha"])
+def test_bursts_alone_take_frames_that_nothing_else_could(method: str):
+    radio = replace(with_access(method), send_offset="tick", bursts=Bursts(0.3, 0.3))
     pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
-    fates = run(make_air(radio, ROBOTS, SEEDS), pose, everybody(2 * ROBOTS), 30, 1).fates()
+    fates = run(make_air(radio, ROBOTS, SEEDS), pose, lambda _: packets([0, ROBOTS]), 60, 1).fates()
     assert set(fates) == {"HEARD", "BURST"}
     assert min(fates.values()) > 50
 
