@@ -81,6 +81,18 @@ def test_what_was_measured_holds_shadows_and_obstacles_and_fades_on_top():
     assert [strengths(measured, *link)[0] + 60.0 for link in ((0, 1), (2, 0))] == pytest.approx(gain_db, abs=1e-4)
 
 
+def test_each_link_has_its_own_ratio_and_one_that_was_not_measured_is_as_the_model_has_it():
+    """All or nothing; robots send one after the other, each in a run of its own."""
+    ratios = {(0, 1): 0.0, (0, 2): 1.0, (1, 2): 0.0, (2, 0): 1.0, (2, 1): 0.0}
+    traces = LinkTraces(delivery_ratio=of("delivery_ratio", [(0, *link, ratio) for link, ratio in ratios.items()]))
+    passing = set[tuple[int, int]]()
+    for sender in range(ROBOTS):
+        air = make_air(replace(ALONE, trace=Trace("a.csv", "model")), ROBOTS, traces=traces)
+        told = run(air, NEAR, lambda _, sender=sender: packets([sender]), 3, 1)
+        passing |= {(sender, r) for r in told.heard("receiver").tolist()}
+    assert passing == {(0, 2), (1, 0), (2, 0)}
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_a_ratio_is_the_share_that_is_heard_whatever_the_access(method: str):
     """Of lone packets, so that nothing else takes any."""
