@@ -10,6 +10,11 @@ def _in(folder: str, *names: str) -> Tests:
     return tuple(f"{folder}/test_{name}.py" for name in names)
 
 
+def _but(path: str, test: str) -> str:
+    """Without one of the tests of the air."""
+    return f"--deselect=tests/comms/air/{path}::test_{test}"
+
+
 def _wire(*names: str) -> Tests:
     return _in("tests/comms/wire", *names)
 
@@ -56,36 +61,24 @@ TOLD = (
 # Without those that hypothesis leads through hundreds of runs, or that count on single precision: the compiler is off.
 SIGNAL = (
     *_in("tests/comms/air/signal", "keyed_fates", "outcomes"),
-    "--deselect=tests/comms/air/signal/test_outcomes.py::test_each_addressed_packet_has_one_outcome_unless_it_is_in_flight",
+    _but("signal/test_outcomes.py", "each_addressed_packet_has_one_outcome_unless_it_is_in_flight"),
 )
 RECEIVED = (
     *SIGNAL,
     *_in("tests/comms/air/signal", "signal_reception", "jamming", "trace_of_signals"),
-    *(
-        f"--deselect=tests/comms/air/signal/test_{test}"
-        for test in (
-            "signal_reception.py::test_throughput_of_aloha_is_that_of_abramson",
-            "signal_reception.py::test_strength_is_equal_both_ways_to_the_last_bit",
-            "trace_of_signals.py::test_fates_add_up_and_arenas_do_not_meet",
-        )
-    ),
+    _but("signal/test_signal_reception.py", "throughput_of_aloha_is_that_of_abramson"),
+    _but("signal/test_signal_reception.py", "strength_is_equal_both_ways_to_the_last_bit"),
+    _but("signal/test_trace_of_signals.py", "fates_add_up_and_arenas_do_not_meet"),
 )
-ACCOUNTS = "tests/comms/air/signal/test_signal_accounts.py"
 REPORTED = (
-    "tests/comms/air/signal/test_reports.py",
+    *_in("tests/comms/air/signal", "reports"),
     *SIGNAL,
     *_in("tests/comms/air", "departed", "times"),
     "tests/comms/air/signal/test_trace_of_signals.py::test_a_delay_comes_after_reception",
-    "tests/comms/air/signal/test_retries.py",
-    ACCOUNTS,
-    *(
-        f"--deselect={ACCOUNTS}::test_{test}"
-        for test in (
-            "fates_add_up_to_intended_receivers",
-            "fates_add_up_when_robots_die_and_are_revived",
-            "tally_agrees_with_what_is_listed",
-        )
-    ),
+    *_in("tests/comms/air/signal", "retries", "signal_accounts"),
+    _but("signal/test_signal_accounts.py", "fates_add_up_to_intended_receivers"),
+    _but("signal/test_signal_accounts.py", "fates_add_up_when_robots_die_and_are_revived"),
+    _but("signal/test_signal_accounts.py", "tally_agrees_with_what_is_listed"),
 )
 FATES: dict[str, Tests] = {
     "fates": _in("tests/comms", "fates"),

@@ -47,7 +47,7 @@ from tests.mutants.mutant import Mutant, is_inside
 
 folder = Path(sys.argv[1])
 sys.path.insert(0, str(folder))
-trying.HEAVY, trying.LEAST_S, trying.TIMES = (), 12, 1
+trying.HEAVY, trying.LEAST_S, trying.TIMES = (), 4, 1
 path, mutants = folder / "swarm_counter.py", []
 source = path.read_text()
 for before, after in json.loads(sys.argv[2]):

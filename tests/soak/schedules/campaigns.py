@@ -4,9 +4,11 @@ import os
 import signal
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
+import psutil
 
 from swarmwire.deploy import sweep
 from tests.deploy.campaign.small import rows_in, scenario_in, series_in
@@ -82,7 +84,8 @@ def _await_end(one: Supervised, log: Path) -> None:
         return
     if one.pid is not None:
         for process in family(one.pid):
-            process.send_signal(signal.SIGABRT)
+            with suppress(psutil.NoSuchProcess):  # some end at this very moment
+                process.send_signal(signal.SIGABRT)
     one.send(signal.SIGABRT)
     one.ended_within(STACKS_S)
     raise Broken(f"the campaign did not end within {LIMIT_S:g} s: {log.read_text(errors='replace')[-6000:]}")
