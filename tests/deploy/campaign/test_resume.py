@@ -173,11 +173,16 @@ def test_a_worker_ends_with_its_campaign_also_in_the_middle_of_a_run(tmp_path):
     with subprocess.Popen(
         [sys.executable, "-c", KILLED, *asked], stdout=subprocess.PIPE, text=True, cwd=ROOT
     ) as process:
-        assert process.stdout is not None
-        lines = iter(process.stdout)
-        assert [next(lines).strip() for _ in range(5)] == ["begins", *["piece"] * 4]
-        [worker] = psutil.Process(process.pid).children(recursive=True)
-        busy_s = worker.cpu_times().user + 0.2
-        until(lambda: worker.cpu_times().user > busy_s)
-        process.kill()
-        assert psutil.wait_procs([worker], timeout=20)[1] == []
+        try:
+            assert process.stdout is not None
+            lines = iter(process.stdout)
+            assert [next(lines).strip() for _ in range(5)] == ["begins", *["piece"] * 4]
+            [worker] = psutil.Process(process.pid).children(recursive=True)
+            busy_s = worker.cpu_times().user + 0.2
+            until(lambda: worker.cpu_times().user > busy_s)
+        finally:
+            process.kill()
+        alive = psutil.wait_procs([worker], timeout=20)[1]
+        for one in alive:
+            one.kill()
+        assert alive == []
