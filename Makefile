@@ -31,7 +31,7 @@ check: sync ## lint, format, types, and who may import whom
 
 .PHONY: coverage
 coverage: sync ## how much of comms, world and agent the tests run, with and without the compiler
-	$(RUN) python -m tests.coverage
+	$(RUN) python -m tests.tools.coverage
 
 .PHONY: docs
 docs: sync ## build these pages and the reference as a site, docs/_build/html/index.html
@@ -47,13 +47,13 @@ bench: sync ## measure; ONLY=name for one of them, ENGINE=pymunk for the figures
 
 .PHONY: soak
 soak: sync ## fuzz every door at length, then random faults, then an hour of a hundred processes
-	$(RUN) python -m tests.fuzz
-	$(RUN) python -m tests.soak
+	$(RUN) python -m tests.tools.fuzz
+	$(RUN) python -m tests.tools.soak
 
 .PHONY: mutants
 mutants: ## change the code in small ways, one by one: do tests notice? ONLY=module for one
 	@.ci/sync --group mutants
-	$(RUN) python -m tests.mutants $(ONLY)
+	$(RUN) python -m tests.tools.mutants $(ONLY)
 
 .PHONY: sync
 sync: # the locked packages, exactly

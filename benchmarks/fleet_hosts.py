@@ -11,8 +11,8 @@ from pathlib import Path
 
 import asyncssh
 
-from tests.deploy.fleet.fake_host import FakeHost, HostServers, host_servers
-from tests.deploy.fleet.sshd import openssh
+from tests.support.deploy.fleet.fake_host import FakeHost, HostServers, host_servers
+from tests.support.deploy.fleet.sshd import openssh
 
 
 def main() -> None:

@@ -24,9 +24,9 @@ from swarmwire.deploy.fleet.fleet import Fleet
 from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.fleet.host_side.facts import facts
 from swarmwire.deploy.fleet.push import push
-from tests.deploy.fleet.fake_host import new_key, write_key
-from tests.deploy.fleet.small_fleet import AGENT
-from tests.deploy.fleet.sshd import SSHD
+from tests.support.deploy.fleet.fake_host import new_key, write_key
+from tests.support.deploy.fleet.small_fleet import AGENT
+from tests.support.deploy.fleet.sshd import SSHD
 
 KINDS = ("asyncssh", "openssh") if SSHD else ("asyncssh",)  # the last is the one that robots are more like
 FLEET = """format = 1

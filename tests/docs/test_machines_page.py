@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 
 from swarmwire.deploy import run
-from tests.deploy.commands import LOSSY
-from tests.deploy.machines.namespaces import Machine, machines
-from tests.deploy.machines.on_machines import Started
 from tests.docs.pages import ROOT, commands_of
 from tests.docs.test_pages import UV
+from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.machines.namespaces import Machine, machines
+from tests.support.deploy.machines.on_machines import Started
 
 PAGE = "docs/machines.md"
 NAMES = ("lab", "gate", "laptop")

@@ -23,8 +23,8 @@ from swarmwire.comms.wire.limits import LIMITS
 from swarmwire.comms.wire.offer import Offer, OfferedGroup
 from swarmwire.comms.wire.tick_frames import encode_actions, encode_tick
 from swarmwire.world.crews import admission, lockstep, realtime, roster, runner_crew, runner_inbox
-from tests.agent.hosts import assignment, group
 from tests.docs.pages import ROOT
+from tests.support.agent.hosts import assignment, group
 
 PAGE = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
 ROWS = np.array([4, 6])

@@ -28,7 +28,7 @@ from swarmwire.deploy.certificates.certificate_folder import begin_authority, is
 from swarmwire.deploy.certificates.wanted import wanted
 from swarmwire.deploy.cli import app
 from tests.docs.pages import ROOT, blocks_of, files_of
-from tests.waiting import until
+from tests.support.waiting import until
 
 PAGE = "docs/robots.md"
 TRIED = re.compile(r"^<!-- try: (\w+) -->\n```text\n(.*?)\n```$", re.DOTALL | re.MULTILINE)

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from swarmwire.deploy import Recording, Simulation
-from tests.metrics.real_log.test_written_on_robots import by_robots
+from tests.unit.metrics.real_log.test_written_on_robots import by_robots
 
 SCENARIO = """format = 1
 name = "tiny"

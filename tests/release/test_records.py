@@ -22,7 +22,7 @@ from swarmwire.metrics.real_log.real_logs import read_real_logs
 from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.verify import verify
-from tests.deploy.commands import called
+from tests.support.deploy.commands import called
 
 RECORDS = Path(__file__).parent / "records"
 RUNS = ("run-2", "run-2-frames-1", "run-2-frames-2")

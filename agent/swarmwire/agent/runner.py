@@ -93,7 +93,7 @@ def play(
     answer = session.declare_publisher(
         keys.answer(runner), congestion_control=zenoh.CongestionControl.BLOCK, express=True
     )
-    for data in _answers(assignment, memory, inbox):
+    for data in answers(assignment, memory, inbox):
         answer.put(data)
     if inbox.ended.how == "left":
         answer.put(frames.encode("leave", -1, {}))
@@ -246,7 +246,7 @@ def _memory(assignment: Assignment, data: bytes) -> Memory:
     return memory
 
 
-def _answers(assignment: Assignment, memory: Memory | None, inbox: Inbox) -> Iterator[bytes]:
+def answers(assignment: Assignment, memory: Memory | None, inbox: Inbox) -> Iterator[bytes]:
     """A frame "ready", then an answer to every tick; a failure, if there is one, is the last."""
     try:
         host = Host(assignment, memory)

@@ -1,0 +1,161 @@
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.swarm_control import ESTOP, ask_all
+from swarmwire.comms.wire.swarm_keys import SwarmKeys
+from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm
+from tests.support.agent.on_robot.installed import Command, deeds, install
+from tests.support.agent.on_robot.scripted import PLAYERS
+from tests.support.waiting import until
+
+FIRST_STEPS = 2
+
+
+class Robot:
+    """A robot that runs under a guard, and has taken its first steps."""
+
+    def __init__(self, folder: Path, agent: str, *more: str, watchdog_s: float = 5.0) -> None:
+        self.file, environment = folder / "deeds", install(folder / "installed")
+        settings = ("--driver", "written", "--address", str(self.file), "--log", str(folder))
+        watchdog = ("--watchdog-s", str(watchdog_s))
+        self.command = Command(environment, "run", f"{PLAYERS}:{agent}", *settings, *watchdog, *more)
+        self.guard = self.command.process
+        until(lambda: sum(deed.startswith("act") for _, deed in deeds(self.file)) >= FIRST_STEPS)
+        self.agent = deeds(self.file)[0][0]
+
+    def last(self) -> list[str]:
+        """What was done by another process than the agent's, at the end."""
+        return [deed for process, deed in deeds(self.file) if process != self.agent]
+
+
+@pytest.fixture
+def robots() -> Iterator[list[Robot]]:
+    started: list[Robot] = []
+    yield started
+    for robot in started:
+        if psutil.pid_exists(robot.agent):  # first: it has the pipes of its guard, whose end is waited for
+            os.kill(robot.agent, signal.SIGKILL)
+        robot.command.__exit__()
+
+
+def test_an_agent_that_is_killed_has_its_motors_stopped_by_the_guard(tmp_path, robots):
+    robots.append(robot := Robot(tmp_path, "Driving"))
+    os.kill(robot.agent, signal.SIGKILL)
+    code, _, said = robot.command.wait()
+    assert (code, robot.last()) == (1, ["open", "stop", "close"])
+    assert said.splitlines() == ["guard: the agent is gone: its process ended (SIGKILL); the motors were stopped"]
+
+
+def test_an_agent_that_is_frozen_is_ended_and_its_motors_stopped(tmp_path, robots):
+    robots.append(robot := Robot(tmp_path, "Driving", watchdog_s=0.2))
+    os.kill(robot.agent, signal.SIGSTOP)
+    code, _, said = robot.command.wait()
+    assert (code, robot.last()) == (1, ["open", "stop", "close"])
+    assert said.splitlines() == ["guard: the agent is gone: it has been frozen for 0.4 s; the motors were stopped"]
+    assert not psutil.pid_exists(robot.agent)
+
+
+@pytest.mark.parametrize(("agent", "how"), [("Holding", "frozen for 0.4 s"), ("Vanishing", "(exit code 0)")])
+def test_an_agent_that_holds_the_interpreter_or_vanishes_is_found_out(tmp_path, robots, agent, how):
+    robots.append(robot := Robot(tmp_path, agent, watchdog_s=0.2))
+    code, _, said = robot.command.wait()
+    assert (code, robot.last()) == (1, ["open", "stop", "close"])
+    assert how in said
+
+
+def test_what_an_agent_started_ends_with_it_and_holds_no_connection(tmp_path, robots):
+    robots.append(robot := Robot(tmp_path, "Forking", watchdog_s=0.2))
+    started = psutil.Process(robot.agent).children()
+    code, _, _ = robot.command.wait()
+    assert (code, robot.last()) == (1, ["open", "stop", "close"])
+    assert not any(other.is_running() for other in started)
+
+
+def test_an_agent_that_failed_and_left_something_behind_ends_all_the_same(tmp_path, robots):
+    robots.append(robot := Robot(tmp_path, "Forking", "--param", "dies=false"))
+    code, _, said = robot.command.wait()
+    assert (code, robot.last()) == (1, ["open", "stop", "close"])  # who knows what it told the robot
+    assert "the fourth step" in said
+    assert said.splitlines()[-1].startswith("guard: the agent is gone: it was done 3 s ago, and something of it still")
+
+
+@pytest.mark.parametrize(("sent", "code"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)])
+def test_signals_reach_the_agent_which_stops_its_motors_and_closes_its_log(tmp_path, robots, sent, code):
+    robots.append(robot := Robot(tmp_path, "Driving"))
+    robot.guard.send_signal(sent)
+    assert robot.command.wait()[0] == code
+    assert robot.last() == []
+    assert [deed for _, deed in deeds(robot.file)][-2:] == ["stop", "close"]
+    assert len(list(tmp_path.glob("robot-0-*/summary.json"))) == 1
+
+
+def test_an_agent_whose_guard_is_killed_stops_its_motors_and_ends(tmp_path, robots):
+    robots.append(robot := Robot(tmp_path, "Driving"))
+    robot.guard.kill()
+    until(lambda: not psutil.pid_exists(robot.agent))
+    assert [deed for _, deed in deeds(robot.file)][-2:] == ["stop", "close"]
+    assert '"the guard is gone"' in next(tmp_path.glob("robot-0-*/summary.json")).read_text()
+
+
+def test_an_agent_that_raises_has_stopped_its_motors_itself(tmp_path, robots):
+    robots.append(robot := Robot(tmp_path, "Failing", "--rate-hz", "20"))
+    code, _, said = robot.command.wait()
+    assert code == 1
+    assert "the third step" in said
+    assert "guard" not in said
+    assert robot.last() == []
+
+
+def test_a_small_guard_is_the_process_that_was_started_and_leaves_nothing_behind(tmp_path, robots):
+    robots.append(robot := Robot(tmp_path, "Driving"))
+    guard = psutil.Process(robot.guard.pid)
+    assert psutil.Process(robot.agent).ppid() == guard.pid
+    assert guard.memory_info().rss < 16e6
+    until(lambda: len(guard.children()) == 2)  # the agent, and whoever would stop its motors
+    others = guard.children(recursive=True)
+    robot.guard.send_signal(signal.SIGTERM)
+    assert robot.command.wait()[0] == 0
+    assert not any(other.is_running() for other in others)
+    assert robot.last() == []
+
+
+def test_all_may_be_told_to_end_at_once_and_the_motors_are_off(tmp_path, robots):
+    robots.append(robot := Robot(tmp_path, "Driving"))
+    guard = psutil.Process(robot.guard.pid)
+    until(lambda: len(guard.children()) == 2)
+    for process in (*guard.children(), guard):
+        process.terminate()
+    robot.command.wait()
+    assert [deed for _, deed in deeds(robot.file)][-2:] == ["stop", "close"]
+
+
+def test_a_robot_that_cannot_be_stopped_any_more_is_told_of(tmp_path, robots):
+    robots.append(robot := Robot(tmp_path, "Driving"))
+    robot.file.unlink()
+    robot.file.mkdir()  # nobody can write there
+    os.kill(robot.agent, signal.SIGKILL)
+    code, _, said = robot.command.wait()
+    assert code == 1
+    assert said.splitlines()[-1].endswith("the motors could not be stopped")
+
+
+def test_a_robot_that_was_stopped_for_good_has_not_failed_when_its_process_dies(tmp_path, robots):
+    network = Network(listen=("tcp/127.0.0.1:0",))
+    session = open_swarm(network)
+    try:
+        endpoint = endpoints_of(session, network)[0]
+        robots.append(robot := Robot(tmp_path, "Driving", "--radio", "zenoh", "--connect", endpoint, watchdog_s=0.5))
+        assert ask_all(session, SwarmKeys("swarm"), ESTOP, ["robot-0"], 30.0) == {"robot-0": "stopped"}
+        stopped = len(deeds(robot.file))
+        until(lambda: len(deeds(robot.file)) > stopped + 5)  # so that the guard has heard of it
+        os.kill(robot.agent, signal.SIGKILL)
+        assert robot.command.wait()[0] == 0
+        assert robot.last() == ["open", "stop", "close"]
+    finally:
+        session.close()

@@ -1,0 +1,179 @@
+"""Poses that a tracker publishes, and the range and bearing that a radio makes of them."""
+
+import math
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.agent.radios.range_bearing import range_bearing
+from swarmwire.agent.radios.tracker import OLDEST_NS, Tracker
+from swarmwire.comms.clock import NS_PER_S, WallClock
+from swarmwire.comms.wire.poses import Pose
+from tests.support.clocks import FakeClock
+from tests.support.swarms import KEYS, ROBOTS, KeptLog, heard_by, meet, peers, radio, words
+from tests.support.waiting import until
+
+NOW_NS = 1_767_225_600 * NS_PER_S
+metres = st.floats(-50, 50)
+turns = st.floats(-7, 7)
+poses = st.builds(Pose, metres, metres, turns)
+
+
+def packed(pose: tuple[float, float, float], stamp_ns: int = NOW_NS) -> bytes:
+    return struct.pack("<3dq", *pose, stamp_ns)
+
+
+class DatedClock(FakeClock):
+    """A clock whose date a test sets, too."""
+
+    date_ns = NOW_NS
+
+    def utc_ns(self) -> int:
+        return self.date_ns
+
+
+@given(poses, st.floats(0.01, 50), turns)
+def test_a_robot_that_turns_by_the_bearing_and_drives_the_range_is_where_the_sender_was(own, range_m, direction_rad):
+    sender = Pose(own.x_m + range_m * math.cos(direction_rad), own.y_m + range_m * math.sin(direction_rad), 0.0)
+    found_m, bearing_rad = range_bearing(own, sender)
+    heading_rad = own.heading_rad + bearing_rad
+    reached = own.x_m + found_m * math.cos(heading_rad), own.y_m + found_m * math.sin(heading_rad)
+    assert reached == pytest.approx((sender.x_m, sender.y_m), abs=1e-9)
+    assert found_m >= 0
+    assert -math.pi < bearing_rad <= math.pi
+
+
+@given(poses, poses, metres, metres, turns)
+def test_range_and_bearing_are_the_same_in_every_frame_of_the_tracker(own, sender, x_m, y_m, turn_rad):
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+
+    def moved(pose: Pose) -> Pose:
+        x, y = c * pose.x_m - s * pose.y_m + x_m, s * pose.x_m + c * pose.y_m + y_m
+        return Pose(x, y, pose.heading_rad + turn_rad)
+
+    before, after = range_bearing(own, sender), range_bearing(moved(own), moved(sender))
+    assert after[0] == pytest.approx(before[0], abs=1e-9)
+    if before[0] > 0.001:
+        assert math.cos(after[1] - before[1]) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("heading_rad", [0.0, math.pi, -math.pi, 3 * math.pi])
+def test_straight_behind_is_pi_never_minus_pi(heading_rad):
+    behind = Pose(-math.cos(heading_rad), -math.sin(heading_rad), 0.0)
+    _, bearing_rad = range_bearing(Pose(0.0, 0.0, heading_rad), behind)
+    assert abs(bearing_rad) == pytest.approx(math.pi)
+    assert bearing_rad > -math.pi
+    assert range_bearing(Pose(0, 0, math.pi), Pose(1, 0, 0)) == (1, math.pi)
+
+
+def test_the_newest_pose_counts_until_it_is_a_second_old():
+    with peers(2) as (session, other):
+        tracker = Tracker(session, KEYS, ROBOTS)
+        tracker.open()
+        assert tracker.pose("flock-1", NOW_NS) is None
+
+        def there(pose, stamp_ns=NOW_NS) -> bool:
+            other.put(KEYS.pose("flock-1"), packed(pose, stamp_ns))
+            return tracker.pose("flock-1", stamp_ns) == Pose(*pose)
+
+        until(lambda: there((1.0, 2.0, 3.0)))
+        until(lambda: there((4.0, 5.0, 6.0), NOW_NS + 7))
+        for shift_ns in (-OLDEST_NS, OLDEST_NS):
+            assert tracker.pose("flock-1", NOW_NS + 7 + shift_ns) == (4.0, 5.0, 6.0)
+            assert tracker.pose("flock-1", NOW_NS + 7 + shift_ns + (1 if shift_ns > 0 else -1)) is None
+        assert tracker.pose("flock-2", NOW_NS) is None
+        assert tracker.pose("stranger", NOW_NS) is None
+
+
+def test_what_is_no_pose_is_counted_and_leaves_the_last_one_as_it_was():
+    with peers(2) as (session, other):
+        tracker = Tracker(session, KEYS, ROBOTS)
+        tracker.open()
+        good = packed((1.0, 2.0, 3.0))
+
+        def there() -> bool:
+            other.put(KEYS.pose("flock-0"), good)
+            return tracker.pose("flock-0", NOW_NS) is not None
+
+        until(there)
+        bad = [b"", good[:-1], good + b"\0", *(packed((1.0, 2.0, x)) for x in (math.nan, math.inf))]
+        bad += [packed((x, 0.0, 0.0)) for x in (math.nan, -math.inf)]
+        for data in bad:
+            other.put(KEYS.pose("flock-0"), data)
+        other.delete(KEYS.pose("flock-0"))
+        other.put(KEYS.pose("stranger"), good)
+        other.put(f"{KEYS.root}/pose/*", packed((9.0, 9.0, 9.0)))
+        until(lambda: tracker.unknown == 2)
+        assert tracker.counts() == {"poses_malformed": len(bad) + 1, "poses_of_unknown": 2}
+        assert tracker.pose("flock-0", NOW_NS) == (1.0, 2.0, 3.0)
+        tracker.close()
+        tracker.close()
+
+
+def tracked(session, other, clock, own=(1.0, 1.0, math.pi / 2), its=(1.0, 3.0, 0.0)) -> Tracker:
+    """A tracker at flock-0 that has seen flock-0 and flock-1."""
+    tracker = Tracker(session, KEYS, ROBOTS)
+    tracker.open()
+
+    def there() -> bool:
+        for robot, pose in (("flock-0", own), ("flock-1", its)):
+            other.put(KEYS.pose(robot), packed(pose, clock.utc_ns()))
+        return all(tracker.pose(robot, clock.utc_ns()) for robot in ("flock-0", "flock-1"))
+
+    until(there)
+    return tracker
+
+
+def test_packets_come_with_range_and_bearing_of_the_tracker():
+    with peers(2) as (session, other):
+        log, clock = KeptLog(), DatedClock()
+        tracker = tracked(session, other, clock)
+        a = radio(session, "flock-0", clock, tracker=tracker, asks_pose=True, log=log)
+        assert a.gives == ("range_m", "bearing_rad")
+        assert a.needs == {"radio.range", "radio.bearing"}
+        b = radio(other, "flock-1")
+        meet(other, [a])
+        b.send(words(1.0, 2.0))
+        until(lambda: len(a._inbox._waiting) == 2)
+        heard, _ = a.heard(0)
+        assert heard.given["range_m"].tolist() == [2.0, 2.0]
+        assert np.allclose(heard.given["bearing_rad"], 0.0)
+        assert all(column.flags.c_contiguous for column in heard.given.values())
+        assert [packet.distance_m for packet in log.heard_packets] == [2.0, 2.0]
+        assert {name: column.shape for name, column in a.heard(0)[0].given.items()} == {
+            "range_m": (0,),
+            "bearing_rad": (0,),
+        }
+
+
+def test_without_a_fresh_pose_a_packet_is_for_an_agent_only_that_needs_none():
+    with peers(2) as (session, other):
+        log, clock = KeptLog(), DatedClock()
+        tracker = tracked(session, other, clock)
+        asks = radio(session, "flock-0", clock, tracker=tracker, asks_pose=True, log=log)
+        b = radio(other, "flock-1")
+        meet(other, [asks])
+        clock.date_ns += OLDEST_NS + 1
+        b.send(words(1.0))
+        until(lambda: not len(asks.heard(0)[0]) and asks.counts().get("packets_without_pose") == 1)
+        assert [(packet.distance_m, packet.given) for packet in log.heard_packets] == [(None, False)]
+        asks.close()
+        asks_not = radio(session, "flock-0", clock, tracker=tracker)
+        meet(other, [asks_not])
+        b.send(words(2.0))
+        until(lambda: len(asks_not._inbox._waiting) == 1)
+        heard, _ = asks_not.heard(0)
+        assert np.isnan(heard.given["range_m"]).tolist() == [True]
+        assert np.isnan(heard.given["bearing_rad"]).tolist() == [True]
+
+
+def test_without_a_tracker_nothing_is_given():
+    with peers(2) as (session, other):
+        a, b = radio(session, "flock-0", WallClock()), radio(other, "flock-1")
+        meet(other, [a])
+        b.send(words(1.0))
+        assert heard_by(a, 1) == [(1, 0, 1.0)]
+        assert (a.gives, a.needs) == ((), frozenset())

@@ -1,0 +1,175 @@
+"""Joining a run by hand: what is asked for, what is refused on either side, and how the play ends."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zenoh
+
+from swarmwire.agent import joining as joining_module
+from swarmwire.agent.joining import Joining, join
+from swarmwire.agent.runner import Inbox
+from swarmwire.comms.errors import BadInput, RunnerLost
+from swarmwire.comms.outcomes import NO_OUTCOMES
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.sessions import listens_at, open_world
+from swarmwire.comms.wire.tick_frames import encode_tick
+from tests.support.agent.hosts import GIVES, senses, spec
+from tests.support.agent.made_up_world import NOTHING, OFFER, OFFERED, REFUSED, MadeUpWorld, given, made_up_world
+
+END = frames.encode("end", -1, {})
+SHORT_S = 0.3
+
+
+def ticks_of(*numbers: int) -> list[bytes]:
+    return [encode_tick(tick, {"flock": senses(tick, [0, 1])}, Heard.none(GIVES), NO_OUTCOMES) for tick in numbers]
+
+
+def played(world: MadeUpWorld, **keys: Any) -> tuple[str, str, list[str]]:
+    """How a runner's play ended and why, and what people were told."""
+    said: list[str] = []
+    ended = join(Joining(world.endpoint, name="r", **keys), Inbox(), said.append)
+    return ended.how, ended.why, said
+
+
+def refusal(world: MadeUpWorld, **keys: Any) -> str:
+    with pytest.raises(RunnerLost) as refused:
+        played(world, **keys)
+    return str(refused.value)
+
+
+def test_a_runner_asks_is_given_robots_answers_every_tick_and_ends_with_the_run() -> None:
+    with made_up_world() as world:
+        world.to_send = [*ticks_of(0, 1), END]
+        how, why, said = played(world, robots=2)
+        assert (how, why) == ("over", "")
+        assert said == ["r: joined run run1 with flock-0, flock-1"]
+        assert [(frame.kind, frame.tick) for frame in world.answers] == [("ready", -1), ("actions", 0), ("actions", 1)]
+        asked = JoinRequest.decode(world.asked[0])
+        assert (asked.robots, asked.names, asked.agents) == (2, None, {"flock": OFFERED.agent_sha256})
+
+
+def test_a_runner_that_is_let_go_is_told_why() -> None:
+    with made_up_world() as world:
+        world.to_send = [frames.encode("end", -1, {}, {"why": "it was silent"})]
+        assert played(world)[:2] == ("let go", "it was silent")
+
+
+def test_an_agent_that_fails_is_told_to_the_world_before_the_runner_ends() -> None:
+    offer = OFFER.replace(b"players.py:Counter", b"players.py:Failing")
+    robots = given().replace(b"players.py:Counter", b"players.py:Failing")
+    with made_up_world(offer, robots) as world:
+        world.to_send = [*ticks_of(0, 1, 2, 3), END]
+        played(world)
+        failed = world.answers[-1]
+        assert failed.kind == "failed"
+        assert "Traceback" in str(failed.values["traceback"])
+
+
+def test_only_the_scenario_and_the_robots_that_were_named_are_asked_for(tmp_path: Path) -> None:
+    scenario = tmp_path / "s.toml"
+    scenario.write_text("name = 's'")
+    with made_up_world() as world:
+        world.to_send = [END]
+        played(world, names=("flock-1",), scenario=scenario, agents=(f"flock={spec('Counter')}",))
+        asked = JoinRequest.decode(world.asked[0])
+        assert asked.names == ("flock-1",)
+        assert asked.scenario_sha256 == hashlib.sha256(scenario.read_bytes()).hexdigest()
+
+
+def test_an_agent_that_is_not_here_is_told_of_and_left_out() -> None:
+    with made_up_world() as world:
+        world.to_send = [END]
+        said = played(world, agents=("nowhere.py:Mine",), names=("flock-0",))[2]
+        assert said[0].startswith("no agent for flock: ")
+        assert said[0].endswith("--agent names another")
+        assert JoinRequest.decode(world.asked[0]).agents == {}
+
+
+def test_no_agent_is_asked_after_for_robots_of_other_groups() -> None:
+    with made_up_world() as world:
+        world.to_send = [END]
+        played(world, names=("wolf-0",))
+        assert JoinRequest.decode(world.asked[0]).agents == {}
+
+
+@pytest.mark.parametrize(
+    ("offer", "robots", "expected"),
+    [
+        (None, given(), REFUSED),
+        (b"\xc1", given(), "another version of swarmwire"),
+        (OFFER.replace(b"\xa1v", b"\xa1w"), given(), "another version of swarmwire"),
+        (NOTHING, given(), "the world told nothing of its run: it may not let r in"),
+        (OFFER, None, REFUSED),
+        (OFFER, NOTHING, "the world did not answer to join"),
+        (OFFER, b"\xc1", "the world's answer to join is none"),
+        (OFFER, given(groups=[{}]), "the world's answer to join is none"),
+        (OFFER, given(memory=b"\xc1"), "the world's answer to join is none"),
+    ],
+)
+def test_who_is_not_let_in_is_told_why(offer: bytes | None, robots: bytes | None, expected: str) -> None:
+    with made_up_world(offer, robots) as world:
+        assert expected in refusal(world)
+
+
+def test_who_is_given_robots_of_another_memory_starts_afresh() -> None:
+    arrays = {"memory/flock/rows": np.arange(2), "memory/flock/speed": np.zeros(2)}
+    with made_up_world(join=given(memory=frames.encode("memory", -1, arrays))) as world:
+        world.to_send = [*ticks_of(0), END]
+        assert played(world)[0] == "over"
+        assert world.answers[-1].kind == "actions"
+
+
+def test_a_group_that_the_run_does_not_have_has_no_agent() -> None:
+    with made_up_world() as world, pytest.raises(BadInput, match="expected a group of the run: flock"):
+        played(world, agents=("wolves=mine.py:Mine",))
+
+
+def test_of_several_runs_one_must_be_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    with made_up_world() as world:
+        token = world._session.liveliness().declare_token(Keys("run2").world)
+        with pytest.raises(BadInput, match=r"--run: expected one of the runs at tcp/127.0.0.1:\d+: run1, run2"):
+            played(world)
+        world.to_send = [END]
+        assert played(world, run="run1")[0] == "over"
+        token.undeclare()
+
+
+def test_where_no_run_is_or_nobody_answers_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(joining_module, "LOOK_S", SHORT_S)
+    with closed_after(open_world("tcp/127.0.0.1:0", 10.0)) as session:
+        endpoint = listens_at(session)[0]
+        with pytest.raises(RunnerLost, match="there is no run at"):
+            join(Joining(endpoint, name="r"), Inbox(), print)
+    with pytest.raises(RunnerLost, match=f"nobody answers at {endpoint}") as lost:
+        join(Joining(endpoint, name="r", connect_s=SHORT_S), Inbox(), print)
+    assert isinstance(lost.value.__cause__, zenoh.ZError)
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ({"robots": 1, "names": ("a",)}, "expected only one of --robots and --names"),
+        ({"robots": 0}, "expected at least 1, got 0"),
+        ({"name": "a/b"}, "--name"),
+        ({"scenario": Path("nowhere.toml")}, "expected a file, it is none"),
+        ({"endpoint": "tcp/192.0.2.1:1"}, "ENDPOINT"),
+    ],
+)
+def test_what_cannot_be_asked_for_is_refused_before_anybody_is_called(keys: dict[str, Any], expected: str) -> None:
+    with pytest.raises(BadInput, match=expected):
+        join(Joining(**{"endpoint": "tcp/127.0.0.1:1", **keys}), Inbox(), print)
+
+
+def test_a_runner_has_the_name_of_its_certificate_or_one_of_its_own() -> None:
+    certified = Network(ca=Path("ca.pem"), certificate=Path("lab/alice.pem"), key=Path("lab/alice.key"))
+    assert Joining("tcp/127.0.0.1:1", network=certified).runner == "alice"
+    made_up = {Joining("tcp/127.0.0.1:1").runner for _ in range(2)}
+    assert len(made_up) == 2

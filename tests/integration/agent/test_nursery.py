@@ -1,0 +1,85 @@
+"""A nursery forks runners, reports those that end badly, and leaves none behind when the world is gone."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.sessions import PRIVATE
+from tests.support.agent.hosts import spec
+from tests.support.agent.made_up_world import MadeUpWorld, made_up_world
+from tests.support.waiting import until
+
+END = frames.encode("end", -1, {})
+PATIENCE_S = 60.0
+
+
+class Nursery:
+    """A nursery with a pipe to its life line and one from its reports."""
+
+    def __init__(self, endpoint: str, *names: str) -> None:
+        command = [sys.executable, "-m", "swarmwire.agent.nursery", endpoint, "run1", spec("Counter"), *names]
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+
+    def ended(self) -> tuple[int, str, str]:
+        """Its exit code, what it reported, and what people were told."""
+        assert self.process.stdout
+        assert self.process.stderr
+        code = self.process.wait(PATIENCE_S)
+        return code, self.process.stdout.read(), self.process.stderr.read()
+
+
+@pytest.fixture
+def started() -> Iterator[list[Nursery]]:
+    nurseries: list[Nursery] = []
+    yield nurseries
+    for nursery in nurseries:
+        with nursery.process as process:  # its pipes are closed with it
+            process.kill()
+
+
+def ready(world: MadeUpWorld, runners: int) -> None:
+    until(lambda: len([frame for frame in world.answers if frame.kind == "ready"]) == runners)
+
+
+def test_runners_that_play_to_the_end_are_not_reported(started: list[Nursery]) -> None:
+    with made_up_world() as world:
+        world.to_send = [END, END]
+        started.append(nursery := Nursery(world.endpoint, "r1", "r2"))
+        assert nursery.ended() == (0, "", "")
+
+
+def test_runners_that_end_badly_are_reported_by_name(started: list[Nursery]) -> None:
+    with made_up_world(join=None) as world:
+        started.append(nursery := Nursery(world.endpoint, "r1", "r2"))
+        code, reported, told = nursery.ended()
+        assert (code, sorted(reported.splitlines())) == (0, ["r1 1", "r2 1"])
+        assert "refused by the test" in told
+
+
+def test_no_runner_outlives_the_world(started: list[Nursery]) -> None:
+    with made_up_world() as world:
+        started.append(nursery := Nursery(world.endpoint, "r1", "r2"))
+        ready(world, 2)
+        runners = psutil.Process(nursery.process.pid).children()
+        assert len(runners) == 2
+        assert nursery.process.stdin
+        nursery.process.stdin.close()
+        assert nursery.ended()[0] == 0
+        until(lambda: not any(runner.is_running() for runner in runners))
+
+
+def test_the_socket_of_a_world_that_is_gone_is_taken_away(started: list[Nursery], tmp_path: Path) -> None:
+    folder = tmp_path / f"{PRIVATE}x"
+    folder.mkdir()
+    started.append(nursery := Nursery(f"unixsock-stream/{folder}/socket", "r1"))
+    assert nursery.process.stdin
+    nursery.process.stdin.close()
+    assert nursery.ended()[0] == 0
+    assert not folder.exists()

@@ -1,0 +1,188 @@
+"""A campaign that was ended at any moment is gone on with, and comes to what it would have come to."""
+
+import json
+import subprocess
+import sys
+
+import psutil
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy import resume, sweep
+from swarmwire.deploy.campaign import campaign_folder
+from swarmwire.deploy.campaign.campaign import read_campaign
+from tests.support.deploy.campaign.small import rows_in, scenario_in, series_in
+from tests.support.deploy.commands import ROOT
+from tests.support.waiting import until
+
+VARY = {"radio.loss": [0.0, 0.5]}
+ASKED = {"seeds": 4, "vary": VARY, "pack": 2}
+
+
+class Killed(BaseException):
+    """Stands for a process that is no more."""
+
+
+@pytest.fixture
+def whole(tmp_path, stumbling, here):
+    """A campaign that was left alone."""
+    sweep(stumbling, out=tmp_path / "whole", **ASKED)
+    return tmp_path / "whole"
+
+
+def dying_at(monkeypatch, count, error):
+    """The write of this number, counted from 0, is the last that is tried; how many there were."""
+    write, tried = campaign_folder._write, []
+
+    def dying(path, data):
+        tried.append(path)
+        if len(tried) > count:
+            raise error
+        write(path, data)
+
+    monkeypatch.setattr(campaign_folder, "_write", dying)
+    return tried
+
+
+def same(folder, whole):
+    assert rows_in(folder) == rows_in(whole)
+    assert series_in(folder).equals(series_in(whole), null_equal=True)
+    assert sorted(path.name for path in folder.iterdir()) == sorted(path.name for path in whole.iterdir())
+
+
+WRITES = 9  # four pieces of rows and series each, and the table
+
+
+def test_whichever_write_was_the_last_nothing_is_lost_or_there_twice(tmp_path, stumbling, whole, monkeypatch):
+    tried = []
+    for count in range(WRITES):
+        folder = tmp_path / f"died{count}"
+        with monkeypatch.context() as patched:
+            tried = dying_at(patched, count, Killed())
+            with pytest.raises(Killed):
+                sweep(stumbling, out=folder, **ASKED)
+        before = rows_in(folder)
+        assert len(before) == 2 * (count // 2)
+        assert all(row in rows_in(whole) for row in before)
+        done = resume(folder)
+        assert done.is_over
+        same(folder, whole)
+    assert len(tried) == WRITES
+
+
+def test_only_what_is_missing_is_run(tmp_path, whole, here):
+    (whole / "summary.parquet").unlink()
+    assert resume(whole).done == 8
+    assert resume(whole).is_over
+    (tmp_path / "stumbling.py").unlink()  # the folder holds its own
+    assert [len(executor.tasks) for executor in here] == [0, 0, 0]
+
+
+def test_failed_runs_stay_unless_they_are_to_be_tried_again(tmp_path, whole):
+    rows = rows_in(whole)
+    failed = [row["run"] for row in rows if row["ended"] == "failed"]
+    assert failed
+    assert resume(whole).failed == len(failed)
+    agent = whole / "scenario" / "files" / "stumbling.py"
+    campaign = read_campaign(whole)
+    agent.write_text(agent.read_text().replace("< self.share", "< 0.0"))
+    with pytest.raises(BadInput, match="scenario/files/stumbling.py is not as the run left it"):
+        resume(whole, retry_failed=True)
+    _say_as_it_is_now(whole, agent)
+    done = resume(whole, retry_failed=True)
+    assert (done.is_over, done.failed) == (True, 0)
+    assert [row for row in rows_in(whole) if row["run"] not in failed] == [
+        row for row in rows if row["run"] not in failed
+    ]
+    assert set(series_in(whole)["run"]) == set(range(campaign.runs))
+    assert len(series_in(whole)) == 5 * campaign.runs
+
+
+def _say_as_it_is_now(folder, agent):
+    import hashlib
+
+    found = json.loads((folder / "campaign.json").read_text())
+    for file in found["files"]:
+        if file["path"].endswith(agent.name):
+            file["sha256"] = hashlib.sha256(agent.read_bytes()).hexdigest()
+    (folder / "campaign.json").write_text(json.dumps(found))
+
+
+def test_other_code_versions_and_machines_are_refused_unless_people_insist(whole):
+    found = json.loads((whole / "campaign.json").read_text())
+    for key, value, told in (
+        ("modules", {**found["modules"], "swarmwire.world": "0"}, "module swarmwire.world has changed"),
+        ("versions", {**found["versions"], "numpy": "1.0"}, r"numpy is .*; it was 1\.0"),
+        ("cpu", "another", "the CPU is .*; it was another"),
+    ):
+        (whole / "campaign.json").write_text(json.dumps({**found, key: value}))
+        with pytest.raises(BadInput, match=f"^--resume {whole}: {told}.*--anyway"):
+            resume(whole)
+        assert resume(whole, anyway=True).is_over
+
+
+@pytest.mark.parametrize("text", [None, "{", "[]", '{"format": 1}', '{"format": 2}'])
+def test_a_folder_that_is_no_campaign_is_refused_in_a_line(tmp_path, text):
+    if text is not None:
+        (tmp_path / "campaign.json").write_text(text)
+    with pytest.raises(BadInput, match=f"^{tmp_path}.*expected ") as refused:
+        resume(tmp_path)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_folder_is_for_one_process_at_a_time(whole):
+    folder = campaign_folder.CampaignFolder(whole, read_campaign(whole))
+    with folder.taken(), pytest.raises(BadInput, match="another process is at work"):
+        resume(whole)
+
+
+KILLED = """
+import sys
+from swarmwire.deploy import sweep
+class Watcher:
+    def begin(self, campaign, done, failed): print("begins", flush=True)
+    def see(self, result): print("piece", flush=True)
+    def end(self): pass
+vary = {sys.argv[3]: [float(value) for value in sys.argv[4:]]}
+sweep(sys.argv[1], seeds=4, vary=vary, pack=1, workers=1, out=sys.argv[2], watcher=Watcher())
+"""
+
+
+def test_a_campaign_that_is_killed_leaves_no_worker_and_is_gone_on_with(tmp_path, here):
+    scenario, folder = scenario_in(tmp_path), tmp_path / "c"
+    command = [sys.executable, "-c", KILLED, str(scenario), str(folder), "radio.loss", "0.0", "0.5"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
+        assert process.stdout is not None
+        lines = iter(process.stdout)
+        assert [next(lines).strip() for _ in range(3)] == ["begins", "piece", "piece"]
+        workers = psutil.Process(process.pid).children(recursive=True)
+        assert len(workers) == 1
+        process.kill()
+        gone, alive = psutil.wait_procs(workers, timeout=60)
+    assert (len(gone), alive) == (1, [])
+    there = rows_in(folder)
+    assert 2 <= len(there) <= 8
+    assert resume(folder).is_over
+    sweep(scenario, seeds=4, vary=VARY, out=tmp_path / "whole")
+    same(folder, tmp_path / "whole")
+
+
+def test_a_worker_ends_with_its_campaign_also_in_the_middle_of_a_run(tmp_path):
+    """Of runs of half a second, and of a day, which would take minutes."""
+    asked = (str(scenario_in(tmp_path)), str(tmp_path / "c"), "duration_s", "0.5", "100000.0")
+    with subprocess.Popen(
+        [sys.executable, "-c", KILLED, *asked], stdout=subprocess.PIPE, text=True, cwd=ROOT
+    ) as process:
+        try:
+            assert process.stdout is not None
+            lines = iter(process.stdout)
+            assert [next(lines).strip() for _ in range(5)] == ["begins", *["piece"] * 4]
+            [worker] = psutil.Process(process.pid).children(recursive=True)
+            busy_s = worker.cpu_times().user + 0.2
+            until(lambda: worker.cpu_times().user > busy_s)
+        finally:
+            process.kill()
+        alive = psutil.wait_procs([worker], timeout=20)[1]
+        for one in alive:
+            one.kill()
+        assert alive == []

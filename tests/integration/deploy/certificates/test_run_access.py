@@ -1,0 +1,233 @@
+"""Rights at the endpoints of a run, on real links with mutual TLS: each name does its own, and nothing of another's."""
+
+import queue
+from collections.abc import Generator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.wire.keys import Keys, ObserverKeys
+from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.run_access import RunAccess, agents_access, observers_access, router_access
+from swarmwire.comms.wire.sessions import listens_at, open_observed, open_observer, open_router, open_runner, open_world
+from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
+from swarmwire.deploy.certificates.folder_access import network_in
+from swarmwire.deploy.certificates.wanted import wanted
+from tests.support.deploy.certificates.peers import WITHIN_S, at_once, wait_for_listeners
+from tests.support.waiting import until
+
+KEYS, SEEN = Keys("run1"), ObserverKeys("run1")
+ACCESS = RunAccess(("a", "b", "gone"), ("wall",), ("alice",), ("gate", "gate2"), ("gone",))
+NAMES = (*ACCESS.runners, *ACCESS.observers, *ACCESS.operators, *ACCESS.routers, *ACCESS.worlds, "robot-1")
+LISTEN = "tls/127.0.0.1:0"
+BLOCK = zenoh.CongestionControl.BLOCK
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("lab") / "ca"
+    begin_authority(folder, WallClock())
+    issue(folder, [wanted(name, ("127.0.0.1",)) for name in NAMES], 1, WallClock())
+    return folder
+
+
+@pytest.fixture(scope="module")
+def strangers(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Another CA, that has issued a certificate to the same name."""
+    folder = tmp_path_factory.mktemp("other") / "ca"
+    begin_authority(folder, WallClock())
+    issue(folder, [wanted("a", ("127.0.0.1",))], 1, WallClock())
+    return folder
+
+
+@pytest.fixture
+def opened() -> Generator[ExitStack]:
+    """Whatever a test opens is closed after it, last first."""
+    with ExitStack() as stack:
+        yield stack
+
+
+def as_name(folder: Path, name: str) -> Network:
+    return network_in(folder, "", name)
+
+
+class World:
+    """The agents' endpoint of a world: it answers to offer and join, and keeps what else it hears."""
+
+    def __init__(self, folder: Path, opened: ExitStack) -> None:
+        network = as_name(folder, "world")
+        self.session = opened.enter_context(
+            closed_after(open_world(LISTEN, 10.0, network, agents_access(KEYS, ACCESS)))
+        )
+        self.endpoint = listens_at(self.session)[0]
+        self.heard: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
+        self.asked: list[str] = []
+        self.alive: list[str] = []
+        for key in (KEYS.any_offer, KEYS.any_join):
+            self.session.declare_queryable(key, at_once(self._answer))
+        self.session.declare_subscriber(KEYS.any_answer, at_once(self._hear))
+        live = self.session.liveliness()
+        live.declare_subscriber(KEYS.any_alive, at_once(lambda token: self.alive.append(str(token.key_expr))))
+        self._token = live.declare_token(KEYS.world)
+
+    def _answer(self, query: zenoh.Query) -> None:
+        self.asked.append(str(query.key_expr))
+        with query:
+            query.reply(query.key_expr, b"yes")
+
+    def _hear(self, sample: zenoh.Sample) -> None:
+        self.heard.put((str(sample.key_expr), sample.payload.to_bytes()))
+
+
+@pytest.fixture
+def world(folder: Path, opened: ExitStack) -> World:
+    return World(folder, opened)
+
+
+@pytest.fixture(params=[0, 1, 2], ids=["direct", "one-router", "two-routers"])
+def endpoint(request: pytest.FixtureRequest, world: World, folder: Path, opened: ExitStack) -> str:
+    """Where a runner calls: the world, or a router before it."""
+    at = world.endpoint
+    for name in ("gate", "gate2")[: request.param]:
+        router = opened.enter_context(
+            closed_after(open_router(LISTEN, at, as_name(folder, name), router_access(ACCESS)))
+        )
+        at = listens_at(router)[0]
+    return at
+
+
+def runner(folder: Path, name: str, endpoint: str, opened: ExitStack) -> zenoh.Session:
+    return opened.enter_context(closed_after(open_runner(endpoint, 10.0, as_name(folder, name))))
+
+
+def replies(session: zenoh.Session, key: str) -> list[bytes]:
+    return [reply.ok.payload.to_bytes() for reply in session.get(key, payload=b"x", timeout=WITHIN_S) if reply.ok]
+
+
+def test_a_runner_does_its_own_and_nothing_of_anothers(folder, world, endpoint, opened):
+    """What is refused is sent first on the same link, so it would have arrived before what is let through."""
+    a = runner(folder, "a", endpoint, opened)
+    until(lambda: [str(token.ok.key_expr) for token in a.liveliness().get("swarmwire/*/world") if token.ok])
+    forged = (KEYS.answer("b"), KEYS.answer("*"), "swarmwire/*/answer/a", "**", KEYS.frame("a"), KEYS.alive("a"))
+    wait_for_listeners(a, KEYS.answer("a"))
+    for key in forged:
+        a.put(key, b"forged", congestion_control=BLOCK)
+    tokens = [a.liveliness().declare_token(key) for key in (KEYS.alive("b"), KEYS.world, KEYS.alive("a"))]
+    until(lambda: world.alive)
+    for key in (KEYS.join("b"), KEYS.offer("b"), KEYS.join("*"), "swarmwire/**", KEYS.alive("b")):
+        assert replies(a, key) == []
+    assert replies(a, KEYS.offer("a")) == replies(a, KEYS.join("a")) == [b"yes"]
+    a.put(KEYS.answer("a"), b"own", congestion_control=BLOCK)
+    assert world.heard.get(timeout=WITHIN_S) == (KEYS.answer("a"), b"own")
+    assert world.heard.empty()
+    assert world.asked == [KEYS.offer("a"), KEYS.join("a")]
+    assert world.alive == [KEYS.alive("a")]
+    del tokens
+
+
+def test_nobody_reads_anothers_frames_or_answers_or_poses_as_the_world(folder, world, endpoint, opened):
+    a, b = (runner(folder, name, endpoint, opened) for name in "ab")
+    spied, own = list[bytes](), queue.SimpleQueue[bytes]()
+    for key in ("**", KEYS.frame("a"), KEYS.any_answer, "@/**"):
+        b.declare_subscriber(key, at_once(lambda sample: spied.append(sample.payload.to_bytes())))
+    b.declare_queryable(KEYS.any_join, lambda query: query.reply(query.key_expr, b"forged"))
+    for session, name in ((a, "a"), (b, "b")):
+        session.declare_subscriber(KEYS.frame(name), at_once(lambda sample: own.put(sample.payload.to_bytes())))
+        wait_for_listeners(world.session, KEYS.frame(name))
+    wait_for_listeners(a, KEYS.answer("a"))
+    a.put(KEYS.answer("a"), b"of a", congestion_control=BLOCK)
+    assert world.heard.get(timeout=WITHIN_S) == (KEYS.answer("a"), b"of a")
+    wait_for_listeners(b, KEYS.answer("b"))
+    b.put(KEYS.frame("a"), b"forged", congestion_control=BLOCK)
+    spied.clear()  # what it puts itself, it hears
+    for name in "ab":
+        world.session.put(KEYS.frame(name), name.encode(), congestion_control=BLOCK)
+        assert own.get(timeout=WITHIN_S) == name.encode()
+    assert own.empty()
+    assert set(spied) <= {b"b"}
+    assert replies(a, KEYS.join("a")) == [b"yes"]
+    assert replies(b, f"@/{world.session.zid()}/**") == []
+
+
+@pytest.mark.parametrize("name", ["gone", "robot-1", "wall", "alice"])
+def test_who_is_revoked_or_no_runner_has_a_link_and_nothing_else(folder, world, name, opened):
+    session = runner(folder, name, world.endpoint, opened)
+    until(lambda: [link for link in world.session.info.links() if link.auth_identifier == name])
+    for key in (KEYS.offer(name), KEYS.join(name)):
+        assert replies(session, key) == []
+    assert [token for token in session.liveliness().get(KEYS.world) if token.ok] == []
+    session.put(KEYS.answer(name), b"x", congestion_control=BLOCK)
+    a = runner(folder, "a", world.endpoint, opened)
+    wait_for_listeners(a, KEYS.answer("a"))
+    a.put(KEYS.answer("a"), b"own", congestion_control=BLOCK)
+    assert world.heard.get(timeout=WITHIN_S) == (KEYS.answer("a"), b"own")
+    assert not world.asked
+
+
+def test_without_a_certificate_of_this_ca_there_is_no_link(folder, strangers, world):
+    foreign = as_name(strangers, "a")
+    swapped = Network(ca=folder / "ca.pem", certificate=foreign.certificate, key=foreign.key)
+    for network in (foreign, swapped):
+        with pytest.raises(zenoh.ZError):
+            open_runner(world.endpoint, 0.5, network)
+    with pytest.raises(zenoh.ZError):
+        open_runner(world.endpoint.replace("tls/", "tcp/"), 0.5)
+    assert not world.session.info.links()
+
+
+def test_observers_look_on_and_operators_control(folder, opened):
+    network, access = as_name(folder, "world"), observers_access(SEEN, ACCESS)
+    world = opened.enter_context(closed_after(open_observed(LISTEN, network, access)))
+    for key in (SEEN.scene, SEEN.status, SEEN.control):
+        world.declare_queryable(key, at_once(lambda query: query.reply(query.key_expr, b"yes")))
+    token = world.liveliness().declare_token(SEEN.published)
+    endpoint = listens_at(world)[0]
+    may = {"wall": (SEEN.scene, SEEN.status), "alice": (SEEN.scene, SEEN.status, SEEN.control), "a": (), "gone": ()}
+    for name, keys in may.items():
+        session = opened.enter_context(closed_after(open_observer(endpoint, as_name(folder, name))))
+        for key in (SEEN.scene, SEEN.status, SEEN.control):
+            assert replies(session, key) == ([b"yes"] if key in keys else []), (name, key)
+        assert bool([t for t in session.liveliness().get("swarmwire/*/published") if t.ok]) == bool(keys)
+    del token
+
+
+def test_observers_see_the_truth(folder, opened):
+    world = opened.enter_context(
+        closed_after(open_observed(LISTEN, as_name(folder, "world"), observers_access(SEEN, ACCESS)))
+    )
+    endpoint = listens_at(world)[0]
+    seen: queue.SimpleQueue[str] = queue.SimpleQueue()
+    for name in ("a", "wall"):
+        session = opened.enter_context(closed_after(open_observer(endpoint, as_name(folder, name))))
+        session.declare_subscriber(SEEN.truth, at_once(lambda _, name=name: seen.put(name)))
+    wait_for_listeners(world, SEEN.truth)
+    world.put(SEEN.truth, b"glimpse", congestion_control=BLOCK)
+    assert seen.get(timeout=WITHIN_S) == "wall"
+    assert seen.empty()
+
+
+@pytest.mark.parametrize(
+    "access",
+    [RunAccess(("*",)), RunAccess(("a",), ("a",)), RunAccess(("world",)), RunAccess(("a/b",)), RunAccess(("",))],
+)
+def test_names_that_would_have_others_rights_are_refused(access):
+    for made in (
+        lambda: agents_access(KEYS, access),
+        lambda: observers_access(SEEN, access),
+        lambda: router_access(access),
+    ):
+        with pytest.raises(BadInput):
+            made()
+
+
+def test_nobody_named_is_nobody_let_in():
+    access = agents_access(KEYS, RunAccess())
+    assert [subject["id"] for subject in access["subjects"]] == ["local"]
+    assert all("cert_common_names" in subject or "link_protocols" in subject for subject in access["subjects"])
+    for subject in router_access(ACCESS)["subjects"]:
+        assert subject["cert_common_names"] == [subject["id"]]

@@ -1,0 +1,290 @@
+"""Pushes to real SSH servers: what robots have afterwards, and what they have if something fails in the middle."""
+
+import stat
+
+import pytest
+
+from swarmwire.deploy.fleet import push as push_module
+from tests.support.deploy.fleet.fake_host import new_key, write_key
+from tests.support.deploy.fleet.small_fleet import AGENT
+
+STUMBLES = AGENT + "# stumbles on robots\n"
+SLOW_TO_WRITE = "ulimit -f 100"  # blocks of half a kilobyte that a file may have: a disk that fills up on the way
+
+
+def other(number: int) -> str:
+    """An agent that differs from others."""
+    return f"{AGENT}# {number}\n"
+
+
+def test_a_push_leaves_a_release_with_its_packages_that_is_current(fleet, robots):
+    host = fleet.add("flock-0")
+    code, lines = robots("push")
+    assert code == 0, lines
+    release = host.current("flock-0")
+    assert lines == [f"flock-0 pushed {release} and 0.1 MB of packages"]
+    folder = host.root / "flock-0" / "current"
+    assert {path.name for path in folder.iterdir()} == {
+        "robot.toml", "still.py", "packages-0", "packages-1", "swarmwire-flock-0.service",
+    }  # fmt: skip
+    assert (folder / "packages-1" / "other" / "large.bin").stat().st_size == 100_000
+    assert (host.home / ".config/systemd/user/swarmwire-flock-0.service").exists()
+    assert host.parts() == []
+
+
+def test_what_is_pushed_again_is_up_to_date_and_changes_nothing(fleet, robots):
+    host = fleet.add("flock-0")
+    robots("push")
+    before = host.files()
+    code, lines = robots("push")
+    assert (code, lines) == (0, [f"flock-0 up to date: {host.current('flock-0')}"])
+    assert host.files() == before
+
+
+def test_packages_that_a_host_has_are_not_sent_again(fleet, robots, packages):
+    host = fleet.add("flock-0")
+    robots("push")
+    fleet.agent(other(1))
+    _, lines = robots("push")
+    assert lines == [f"flock-0 pushed {host.current('flock-0')}"]
+    packages.version = "2"
+    _, lines = robots("push")
+    assert lines == [f"flock-0 pushed {host.current('flock-0')} and 0.1 MB of packages"]
+
+
+def test_the_last_three_releases_and_their_packages_are_kept(fleet, robots, packages):
+    host = fleet.add("flock-0")
+    pushed = []
+    for number in range(5):
+        packages.version = str(number)
+        fleet.agent(other(number))
+        robots("push")
+        pushed.append(host.current("flock-0"))
+    assert host.releases("flock-0") == sorted(pushed[2:])
+    assert len(host.environments()) == 1 + 3  # the agent's program, and three versions of others
+
+
+def test_robots_on_one_host_share_its_packages_and_nothing_else(fleet, robots, packages):
+    host = fleet.add("flock-0")
+    fleet.add("flock-1", host, driver={"address": "127.0.0.1:2"})
+    code, lines = robots("push")
+    assert code == 0, lines
+    assert [line.split()[:2] for line in lines] == [["flock-0", "pushed"], ["flock-1", "pushed"]]
+    assert "packages" not in lines[1]
+    assert host.current("flock-0") != host.current("flock-1")
+    assert len(host.environments()) == 2
+    assert len(host.commands) == 1  # one connection, one program
+
+
+def test_groups_and_names_say_who_is_meant_and_what_they_get(fleet, robots):
+    fleet.table["groups"] = {"red": {"rate_hz": 20}, "blue": {}}
+    hosts = {name: fleet.add(name, groups=groups) for name, groups in (("a", ["red"]), ("b", ["blue"]), ("c", []))}
+    assert [line.split()[0] for line in robots("push", "--group", "red")[1]] == ["a"]
+    assert [line.split()[0] for line in robots("push", "--robots", "c", "--group", "blue")[1]] == ["b", "c"]
+    settings = {name: (host.root / name / "current" / "robot.toml").read_text() for name, host in hosts.items()}
+    assert "rate_hz = 20" in settings["a"]
+    assert "rate_hz" not in settings["b"]
+    code, lines = robots("push", "--group", "rad")
+    assert (code, lines) == (2, ["error: --group: expected one of red, blue (did you mean red?); got 'rad'"])
+
+
+def test_keys_are_for_their_owner_alone(fleet, robots, lab_certificates):
+    host = fleet.add("flock-0")
+    lab_certificates("flock-0", "operator")
+    code, lines = robots("push")
+    assert code == 0, lines
+    folder = host.root / "flock-0" / "current"
+    assert stat.S_IMODE((folder / "flock-0.key").stat().st_mode) == 0o600
+    assert (folder / "ca.pem").exists()
+    assert 'listen = [\n    "tls/0.0.0.0:7557",\n]' in (folder / "robot.toml").read_text()
+
+
+def test_what_is_wrong_with_settings_is_told_before_anything_is_sent(fleet, robots):
+    host = fleet.add("flock-0", params={"speed": 3})
+    code, lines = robots("push")
+    assert code == 2
+    assert lines[0].startswith(f"error: {fleet.file}: robots.flock-0.params.speed: ")
+    assert host.commands == []
+
+
+def fails(robots, name: str) -> str:
+    """Push to all; the line of the one robot for which it fails, while it works for the others."""
+    code, lines = robots("push")
+    assert code == 1, lines
+    assert lines[-1] == f"1 of {len(lines) - 1} failed"
+    bad = [line for line in lines[:-1] if " failed: " in line]
+    assert [line.split()[0] for line in bad] == [name], lines
+    assert all(" pushed " in line or " up to date" in line for line in lines[:-1] if line not in bad), lines
+    return bad[0]
+
+
+def test_on_a_full_disk_nothing_is_left_of_it(fleet, robots):
+    good, full = fleet.add("good"), fleet.add("full")
+    python = full.python
+    full.set_python(f"{SLOW_TO_WRITE}\n{python}")
+    line = fails(robots, "full")
+    assert line.startswith("full failed: the disk is full (File too large")
+    assert line.endswith("make room: df -h; old logs lie in ~/swarmwire/*/log")
+    assert full.current("full") is None
+    assert (full.environments(), full.releases("full"), full.parts()) == (full.environments()[:1], [], [])
+    full.set_python(python)
+    assert robots("push")[0] == 0
+    assert (good.current("good"), full.current("full")) != (None, None)
+
+
+def test_a_disk_without_room_is_refused_before_anything_is_sent(fleet, robots, monkeypatch):
+    host = fleet.add("flock-0")
+    monkeypatch.setattr(push_module, "SPARE_BYTES", 10**18)
+    code, lines = robots("push")
+    assert code == 1
+    assert "the disk is full: " in lines[0]
+    assert "1000000000000 MB are needed" in lines[0]
+    assert host.environments() == []
+
+
+@pytest.mark.parametrize("after", [70_000, 135_000])
+def test_a_connection_that_is_cut_leaves_the_robot_as_it_was(fleet, robots, packages, after):
+    packages.size = 400_000
+    cut = fleet.add("cut")
+    robots("push")
+    before, release = cut.files(), cut.current("cut")
+    fleet.add("good")
+    packages.version, packages.size = "2", 500_000
+    cut.cut_after = after
+    line = fails(robots, "cut")
+    assert line.startswith("cut failed: the connection was lost")
+    assert cut.current("cut") == release
+    assert before <= cut.files()
+    cut.cut_after = None
+    code, lines = robots("push")
+    assert code == 0, lines
+    assert cut.parts() == []
+    assert cut.current("cut") != release
+
+
+def test_what_a_cut_push_left_behind_is_removed_by_the_next(fleet, robots):
+    host = fleet.add("flock-0")
+    left = host.root / "flock-0" / "releases" / "0123456789ab.part"
+    left.mkdir(parents=True)
+    (left / "robot.toml").touch()
+    (host.root / "env" / "ba9876543210.part").mkdir(parents=True)
+    assert robots("push")[0] == 0
+    assert host.parts() == []
+
+
+def test_an_old_python_is_named_with_its_version(fleet, robots):
+    fleet.add("good")
+    old = fleet.add("old")
+    old.set_python("""test "$1" = -c && echo '{"refused": "python", "text": "3.9.2"}'""")
+    line = fails(robots, "old")
+    assert line == 'old failed: python3 is Python 3.9.2, expected 3.11 or newer; say a newer one by python = "…"'
+
+
+def test_a_host_without_python_is_told(fleet, robots):
+    fleet.add("good")
+    fleet.add("none", python="python-that-is-not-there")
+    assert "has no python-that-is-not-there; install Python" in fails(robots, "none")
+
+
+def test_a_python_that_breaks_is_told_with_its_last_words(fleet, robots):
+    fleet.add("good")
+    broken = fleet.add("broken")
+    broken.set_python("echo 'Fatal Python error: no home' >&2; exit 1")
+    assert "ended on pi@127.0.0.1" in (line := fails(robots, "broken"))
+    assert line.endswith("Fatal Python error: no home")
+
+
+def test_a_changed_host_key_is_refused_and_nothing_is_sent(fleet, robots):
+    fleet.add("good")
+    changed = fleet.add("changed")
+    fleet.servers.change_key(changed)
+    line = fails(robots, "changed")
+    assert "is another machine than it was, or was set up anew" in line
+    assert "swarmwire robots check --trust" in line
+    assert changed.commands == []
+
+
+def test_a_host_whose_key_is_not_known_is_refused(fleet, robots):
+    good, new = fleet.add("good"), fleet.add("new")
+    fleet.know(good)
+    assert "swarmwire robots check --trust shows and adds it" in fails(robots, "new")
+    assert new.commands == []
+
+
+def test_a_host_that_is_switched_off_is_told(fleet, robots):
+    fleet.add("good")
+    fleet.servers.close(fleet.add("off"))
+    assert "cannot be reached: " in fails(robots, "off")
+
+
+def test_a_key_that_a_host_does_not_let_in_is_told(fleet, robots, tmp_path):
+    fleet.add("good")
+    fleet.add("shut", key=str(tmp_path / "other"))
+    write_key(new_key(), tmp_path / "other")
+    assert "lets no key of ours in; ssh-copy-id -p" in fails(robots, "shut")
+
+
+def test_a_key_with_a_passphrase_is_told_and_holds_up_no_other(fleet, robots, tmp_path):
+    fleet.add("good")
+    fleet.add("shut", key=str(tmp_path / "locked"))
+    new_key().write_private_key(str(tmp_path / "locked"), "pkcs8-pem", passphrase="secret")
+    assert f"the key {tmp_path}/locked cannot be used: " in fails(robots, "shut")
+
+
+def test_a_failed_trial_run_leaves_the_release_before(fleet, robots):
+    host = fleet.add("flock-0")
+    robots("push")
+    before, files = host.current("flock-0"), host.files()
+    fleet.agent(STUMBLES)
+    code, lines = robots("push")
+    assert code == 1
+    assert lines[0] == "flock-0 failed: the trial run on the robot failed: ImportError: it stumbles; Traceback"
+    assert host.current("flock-0") == before
+    assert host.files() == files
+
+
+def test_a_package_that_was_not_pushed_is_told_with_its_cure(fleet, robots):
+    fleet.add("flock-0")
+    fleet.agent(AGENT + "# lacks a package on robots\n")
+    assert robots("push")[1][0] == (
+        "flock-0 failed: the trial run on the robot failed: ModuleNotFoundError: No module named 'scipy.spatial'; "
+        'packages = ["scipy"] in fleet.toml pushes what the agent imports'
+    )
+
+
+def test_a_trial_run_that_fails_holds_up_no_other_robot(fleet, robots):
+    host = fleet.add("good")
+    fleet.add("bad", host, agent="bad.py:Still")
+    fleet.add("other")
+    (fleet.folder / "bad.py").write_text(STUMBLES)
+    fails(robots, "bad")
+
+
+def test_two_pushes_to_one_host_do_not_meet(fleet, robots):
+    import fcntl
+
+    host = fleet.add("flock-0")
+    host.root.mkdir()
+    with (host.root / "lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        code, lines = robots("push")
+    assert (code, lines[0]) == (
+        1,
+        "flock-0 failed: another push to this host is under way; wait for it, then do it again",
+    )
+
+
+def test_a_shell_that_chatters_is_told(fleet, robots):
+    host = fleet.add("flock-0")
+    host.set_python("echo Welcome!")
+    _, lines = robots("push")
+    assert "says 'Welcome!'; let its login files print nothing" in lines[0]
+
+
+def test_a_host_without_systemd_is_refused_before_anything_is_sent(fleet, robots):
+    host = fleet.add("flock-0")
+    (host.bin / "systemctl").write_text("#!/bin/sh\necho 'Failed to connect to bus' >&2; exit 1\n")
+    code, lines = robots("push")
+    assert code == 1
+    assert "has no systemd for its user" in lines[0]
+    assert host.environments() == []

@@ -1,0 +1,124 @@
+"""The same agents, emulated and through protocols of real robots, come to the same within the spread of seeds."""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.deploy import Result, run
+from tests.support.deploy.commands import ROOT
+from tests.support.deploy.gateways.driven import driven
+from tests.support.deploy.gateways.measured import Speeds, measured, outside
+
+SEEDS = range(1, 21)
+SEED = 2  # of runs through gateways
+PACES = (4.0, 2.0, 1.0)  # times real time
+MOST_MISSED = 0.1  # of the ticks: a machine that did not keep up tells nothing of the robots
+KINDS = {"epuck2": "epuck2", "ros2": "turtlebot"}  # gateway and driver: the body in the scenarios' names
+TOUCHES = ("collisions", "wall_contacts")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A behaviour, in how it is tried and judged."""
+
+    group: str
+    duration_s: float
+    judged: tuple[str, ...]  # by these numbers
+
+    def overrides(self, robots: int) -> tuple[str, ...]:
+        return f"duration_s={self.duration_s}", f"robots.{self.group}.count={robots}"
+
+
+CASES = {
+    "avoidance": Case("wanderers", 20.0, ("speed", "min_gap", *TOUCHES)),
+    "flocking": Case("flock", 20.0, ("speed", "order", "min_gap", *TOUCHES)),
+    "pso": Case("particles", 30.0, ("speed", "target_best", "target_mean", *TOUCHES)),
+}
+BOTH = [(behaviour, kind) for behaviour in CASES for kind in KINDS]
+ALWAYS = {("flocking", "epuck2"), ("avoidance", "ros2"), ("pso", "epuck2")}  # not only in slow tests
+QUICK, WHOLE = 5, 6  # robots
+
+
+def scenario(behaviour: str, kind: str) -> Path:
+    return ROOT / "scenarios" / "robots" / f"{behaviour}-{KINDS[kind]}.toml"
+
+
+@cache
+def spread(behaviour: str, kind: str, robots: int, factor: float = 1.0) -> dict[str, FloatArray]:
+    """What runs with all agents in this process come to, by name, a number for each seed."""
+    speeds, case = Speeds(), stretched(CASES[behaviour], factor)
+    arenas = run(scenario(behaviour, kind), seeds=SEEDS, overrides=case.overrides(robots), observers=[speeds]).arenas
+    found = [measured(arena, speeds.of(place)) for place, arena in enumerate(arenas)]
+    return {name: np.array([of[name] for of in found]) for name in found[0]}
+
+
+def stretched(case: Case, factor: float) -> Case:
+    return Case(case.group, factor * case.duration_s, case.judged)
+
+
+def through_gateway(
+    behaviour: str,
+    kind: str,
+    folder: Path,
+    *,
+    robots: int = QUICK,
+    factor: float = 1.0,
+    broken: bool = False,
+    radio: str | None = None,
+) -> tuple[dict[str, float], Result]:
+    """What a run with its robots behind gateways comes to; tried once more at a lower pace if the machine lagged."""
+    case = stretched(CASES[behaviour], factor)
+    overrides = (*case.overrides(robots), f"seed={SEED}")
+    more = {"overrides": overrides, "radio": radio, "broken": broken}
+    for pace in PACES:
+        speeds = Speeds()
+        out = folder / f"at-{pace:g}"
+        result = driven(scenario(behaviour, kind), kind, out, pace=pace, observers=[speeds], **more)
+        assert result.realtime is not None
+        if result.realtime.missed_ticks <= MOST_MISSED * result.ticks:
+            return measured(result.arenas[0], speeds.of(0)), result
+    pytest.skip(
+        f"more than {MOST_MISSED:.0%} of the ticks missed at every pace: that tells of this machine, not of robots"
+    )
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "kind"),
+    [pytest.param(*case, marks=() if case in ALWAYS else pytest.mark.slow) for case in BOTH],
+)
+def test_agents_through_a_gateway_come_to_what_emulated_ones_do(behaviour, kind, tmp_path) -> None:
+    expected = spread(behaviour, kind, QUICK)
+    found, result = through_gateway(behaviour, kind, tmp_path)
+    assert not outside(found, expected, CASES[behaviour].judged), (found, result.realtime, result.counts)
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "kind"),
+    [pytest.param(*case, marks=() if case == ("flocking", "epuck2") else pytest.mark.slow) for case in BOTH],
+)
+def test_a_driver_that_turns_the_wrong_way_is_found_out(behaviour, kind, tmp_path) -> None:
+    expected = spread(behaviour, kind, QUICK)
+    found, _ = through_gateway(behaviour, kind, tmp_path, broken=True)
+    assert outside(found, expected, CASES[behaviour].judged), found
+
+
+def test_a_flock_whose_robots_speak_over_their_own_network_comes_to_what_an_emulated_one_does(tmp_path) -> None:
+    """Range and bearing are from poses that the run tells as a tracker would."""
+    expected = spread("flocking", "epuck2", QUICK)
+    found, result = through_gateway("flocking", "epuck2", tmp_path, radio="zenoh")
+    assert not outside(found, expected, CASES["flocking"].judged), (found, result.realtime, result.counts)
+    assert result.radio is not None
+    assert result.radio.sent == 0, "the air of the run carried nothing"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(("behaviour", "kind"), BOTH)
+def test_longer_runs_through_a_gateway_come_to_what_emulated_ones_do(behaviour, kind, tmp_path) -> None:
+    expected = spread(behaviour, kind, WHOLE, 3.0)
+    found, result = through_gateway(behaviour, kind, tmp_path, robots=WHOLE, factor=3.0)
+    assert not outside(found, expected, CASES[behaviour].judged), (found, result.realtime, result.counts)

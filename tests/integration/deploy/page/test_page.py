@@ -1,0 +1,279 @@
+"""The page lets in whoever has its token, asks the run for what people ask it for, and tells what the run tells."""
+
+import asyncio
+import contextlib
+import http.client
+import json
+import urllib.error
+import urllib.request
+from urllib.parse import urlsplit
+
+import pytest
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.deploy.page.news import KEPT, NewsThread
+from tests.support.deploy.page.stand_in import StandIn
+from tests.support.waiting import until
+
+pytest.importorskip("fastapi", reason="needs the extra [ui]")
+
+from fastapi.testclient import TestClient
+
+from swarmwire.deploy.page.app import FILES, Shown, page_app
+from swarmwire.deploy.page.serving import serving
+
+PORT = 12345
+HOST = f"127.0.0.1:{PORT}"
+SHOWN = Shown("http://127.0.0.1:9", "rerun+http://127.0.0.1:8/proxy", {"name": "a flock"})
+
+
+@pytest.fixture
+def control():
+    return StandIn()
+
+
+@pytest.fixture
+def news(control):
+    thread = NewsThread(control, lambda: {"pdr": 0.25}, WallClock())
+    yield thread
+    thread.close()
+
+
+@pytest.fixture
+def client(control, news):
+    with TestClient(page_app(control, news, SHOWN, "secret", PORT), base_url=f"http://{HOST}") as client:
+        yield client
+
+
+@pytest.mark.parametrize("file", sorted(path.name for path in FILES.iterdir()))
+def test_every_file_of_the_page_is_served_to_whoever_has_the_token(client, file):
+    answer = client.get(f"/secret/{file}")
+    assert answer.status_code == 200
+    assert answer.content == (FILES / file).read_bytes()
+    assert client.get("/secret/").content == (FILES / "index.html").read_bytes()
+
+
+@pytest.mark.parametrize("path", ["/", "/status", "/secre/status", "/secrets/", "//secret/status", "/news"])
+def test_without_the_token_everything_is_refused(client, path):
+    answer = client.get(path)
+    assert answer.status_code == 403
+    assert "token" in answer.text
+
+
+def test_what_names_no_path_is_refused_too(control, news):
+    with serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address:
+        asked = http.client.HTTPConnection(urlsplit(address).netloc, timeout=10)
+        with contextlib.closing(asked):
+            asked.request("OPTIONS", "*")
+            assert asked.getresponse().status == 403
+
+
+def test_the_folder_of_the_page_is_found_without_its_last_stroke(client):
+    assert client.get("/secret", follow_redirects=False).headers["location"] == "/secret/"
+
+
+@pytest.mark.parametrize("token", ["", "secre", "secrets", "SECRET", "sécret"])
+def test_another_token_gives_no_control(client, control, token):
+    assert client.post(f"/{token}/do", json={"do": "stop"}).status_code == 403
+    assert not control.asked
+
+
+@pytest.mark.parametrize(
+    "host", ["swarm.example", "127.0.0.1", f"127.0.0.1:{PORT + 1}", f"0.0.0.0:{PORT}", "", f"[::1]:{PORT}"]
+)
+def test_the_page_is_served_under_no_other_name(client, control, host):
+    """A stranger's name may be made to lead to this machine, after which its pages are of the same origin."""
+    answer = client.post("/secret/do", json={"do": "stop"}, headers={"Host": host})
+    assert answer.status_code == 403
+    assert not control.asked
+
+
+@pytest.mark.parametrize("origin", ["https://swarm.example", "null", f"http://{HOST}.swarm.example", f"https://{HOST}"])
+def test_another_site_is_refused_even_with_the_token(client, control, origin):
+    answer = client.post("/secret/do", json={"do": "stop"}, headers={"Origin": origin})
+    assert (answer.status_code, answer.text) == (403, "refused: asked for by another site")
+    assert not control.asked
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
+def test_the_page_itself_may_ask(client, control, host):
+    own = {"Host": f"{host}:{PORT}", "Origin": f"http://{host}:{PORT}"}
+    assert client.post("/secret/do", json={"do": "stop"}, headers=own).status_code == 200
+    assert control.asked == [("stop", None)]
+
+
+def test_a_browser_is_told_to_load_nothing_from_elsewhere_and_to_let_nobody_show_the_page(client):
+    for answer in (client.get("/secret/"), client.get("/elsewhere")):
+        policy = answer.headers["content-security-policy"]
+        assert "default-src 'none'" in policy
+        assert "frame-ancestors 'none'" in policy
+        assert "frame-src http://127.0.0.1:9;" in policy
+        assert answer.headers["referrer-policy"] == "same-origin"
+        assert answer.headers["cache-control"] == "no-store"
+
+
+def test_the_page_names_nothing_that_is_elsewhere():
+    for path in FILES.iterdir():
+        text = path.read_text("utf-8").replace("http://www.w3.org/", "")
+        assert "//" not in text.replace("// ", "") or path.suffix == ".js", path
+        assert "http:" not in text, path
+        assert "https:" not in text, path
+
+
+@pytest.mark.parametrize(
+    ("order", "asked"),
+    [
+        ({"do": "pause"}, ("pause", None)),
+        ({"do": "resume"}, ("resume", None)),
+        ({"do": "step"}, ("step", 1)),
+        ({"do": "step", "n": 10}, ("step", 10)),
+        ({"do": "speed", "factor": 0.1}, ("speed", 0.1)),
+        ({"do": "speed", "factor": None}, ("speed", None)),
+        ({"do": "end", "number": 3}, ("end", 3)),
+    ],
+)
+def test_orders_reach_the_run(client, control, order, asked):
+    answer = client.post("/secret/do", json=order)
+    assert (answer.status_code, answer.json()) == (200, {"event": None})
+    assert control.asked == [asked]
+
+
+def test_an_event_is_handed_on_as_it_is_and_answered_with_its_number(client, control):
+    table = {"do": "kill", "robots": {"names": ["flock-1"]}}
+    assert client.post("/secret/do", json={"do": "event", "event": table}).json() == {"event": 7}
+    assert control.asked == [("event", table)]
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        {},
+        [],
+        {"do": "format"},
+        {"do": "step", "n": 0},
+        {"do": "step", "n": 1.5},
+        {"do": "speed", "factor": -1},
+        {"do": "speed"},
+        {"do": "pause", "now": True},
+        {"do": "event", "event": "kill"},
+        {"do": "end", "number": -1},
+    ],
+)
+def test_what_is_no_order_is_refused_and_does_nothing(client, control, order):
+    assert client.post("/secret/do", json=order).status_code == 422
+    assert not control.asked
+
+
+def test_what_the_run_refuses_is_told_in_its_own_line(client, control):
+    answer = client.post("/secret/do", json={"do": "event", "event": {"do": "dance"}})
+    assert (answer.status_code, answer.json()) == (409, {"detail": "do: expected something that can happen"})
+
+
+def test_an_order_that_is_too_long_is_refused(client, control):
+    answer = client.post("/secret/do", json={"do": "event", "event": {"do": "kill", "why": "x" * 100_000}})
+    assert answer.status_code == 413
+    assert not control.asked
+
+
+def test_the_status_is_what_the_run_told_last_and_what_was_seen(client, control, news):
+    assert client.get("/secret/status").json() == {}
+    news.start()
+    until(lambda: client.get("/secret/status").json().get("tick") == 0)
+    control.tick = 3
+    news.look()
+    told = until(lambda: client.get("/secret/status").json(), lambda told: told["tick"] == 3)
+    assert told["pdr"] == 0.25
+    assert told["metrics"] == {"order": 0.5, "rejoin_median": None}
+
+
+def test_values_are_kept_for_pages_that_are_opened_later_one_a_tick(control, news):
+    for tick in range(KEPT + 5):
+        control.tick = tick
+        for _ in range(2):  # the second tells of no other tick
+            news._tell(control.status())
+    assert len(news.history) == KEPT
+    assert news.history[-1] == {"pdr": 0.25, "alive": 3, "tick_ms": 1.5, "order": 0.5, "rejoin_median": None}
+
+
+def events(answer):
+    """The events of a stream as they come: their name and what they say."""
+    name = None
+    for line in answer:
+        text = line.decode().strip()
+        if text.startswith("event: "):
+            name = text.removeprefix("event: ")
+        if text.startswith("data: "):
+            yield name, json.loads(text.removeprefix("data: "))
+
+
+def test_news_reach_a_page_until_the_run_is_gone(control, news):
+    """Through the real server: at a port that the system chose, on loopback."""
+    with (
+        serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address,
+        contextlib.closing(news),
+    ):
+        assert address.startswith("http://127.0.0.1:")
+        news.start()
+        with urllib.request.urlopen(f"{address}news", timeout=20) as answer:
+            told = events(answer)
+            name, facts = next(told)
+            assert (name, facts["name"], facts["viewer"]) == ("facts", "a flock", SHOWN.viewer)
+            name, status = next(told)
+            assert (name, status["state"]) == ("status", "running")
+            control.gone = True
+            over = next(status for _, status in told if status["state"] == "over")
+            assert (over["tick"], over["gone"]) == (0, "nobody answers")
+    with pytest.raises(urllib.error.URLError):
+        urllib.request.urlopen(address, timeout=5)
+
+
+def test_a_run_that_is_frozen_is_silent_until_it_answers_again(control):
+    news = NewsThread(control, dict, WallClock(), over=lambda: False)
+    with contextlib.closing(news):
+        news.start()
+        for gone, state in ((False, "running"), (True, "silent"), (False, "running")):
+            control.gone = gone
+            until(lambda state=state: news.latest.get("state") == state)
+
+
+def test_a_page_that_does_not_read_keeps_but_the_newest(control, news):
+    """However long a browser's tab sleeps, it costs the server one status."""
+
+    async def slow() -> list[int]:
+        reading = news.read()
+        got = []
+        for ticks in (1, 50):
+            for _ in range(ticks):
+                control.tick += 1
+                news._tell(control.status())
+            got.append((await anext(reading))["tick"])
+        await reading.aclose()
+        return got
+
+    assert asyncio.run(slow()) == [1, 51]
+    assert not news._readers
+
+
+def test_a_server_that_ends_lets_no_page_wait(control, news):
+    with serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address:
+        news.start()
+        answer = urllib.request.urlopen(f"{address}news", timeout=20)
+        told = events(answer)
+        assert [next(told)[0], next(told)[0]] == ["facts", "status"]
+        news.close()
+        assert [status for _, status in told if status["state"] != "running"] == []  # it ends
+        answer.close()
+
+
+def test_each_page_has_a_token_of_its_own():
+    taken = []
+
+    def app(token, port):
+        taken.append((token, port))
+
+    for _ in range(2):
+        with serving(app, WallClock()) as address:
+            token, port = taken[-1]
+            assert address == f"http://127.0.0.1:{port}/{token}/"
+            assert len(token) >= 32
+    assert taken[0][0] != taken[1][0]

@@ -1,0 +1,296 @@
+"""What people ask of a run holds it up or ends it, at once, and never changes what it does."""
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.deploy import Result, run
+from swarmwire.deploy.controls import LOOK_NS, Controls
+from swarmwire.deploy.running import finished
+from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.terminal.bindings import BINDINGS, press
+from swarmwire.world.crews.pace import Pace
+from tests.support.clocks import MS, FakeClock
+from tests.support.deploy.commands import LOSSY
+
+RATE_HZ = 10
+TICK_NS = NS_PER_S // RATE_HZ
+
+
+class Asking:
+    """A clock on which people ask for things at set times."""
+
+    def __init__(self, clock: FakeClock, controls: Controls) -> None:
+        self.clock = clock
+        self.asks: list[tuple[int, Callable[[], object]]] = []
+        controls.on_wait = self.look
+
+    def at_ms(self, ms: int, ask: Callable[[], object]) -> None:
+        self.asks.append((self.clock.time_ns + ms * MS, ask))
+
+    def look(self) -> None:
+        while self.asks and self.clock.time_ns >= self.asks[0][0]:
+            self.asks.pop(0)[1]()
+
+
+def controlled(factor: float | None = None) -> tuple[FakeClock, Controls, Asking, Pace | None]:
+    clock = FakeClock()
+    pace = None if factor is None else Pace(clock, RATE_HZ, factor, lambda _: None)
+    controls = Controls(clock, RATE_HZ, pace)
+    return clock, controls, Asking(clock, controls), pace
+
+
+def never() -> bool:
+    return False
+
+
+def test_a_run_of_which_nothing_is_asked_is_not_held() -> None:
+    clock, controls, _, _ = controlled()
+    controls.hold(0, never)
+    clock.now_ns = lambda: pytest.fail("it reads the clock, in every tick")
+    for tick in range(1, 5):
+        controls.hold(tick, lambda: pytest.fail("it asks, in every tick"))
+    assert not clock.slept_until
+
+
+def test_a_pause_lasts_until_somebody_lets_the_run_go_on() -> None:
+    clock, controls, asking, _ = controlled()
+    controls.hold(0, never)
+    controls.toggle_pause()
+    began_ns = clock.time_ns
+    asking.at_ms(5000, controls.toggle_pause)
+    controls.hold(1, never)
+    assert 5000 * MS <= clock.time_ns - began_ns <= 5000 * MS + 2 * LOOK_NS
+    assert controls.paused_ns == clock.time_ns - began_ns
+    sleeps = len(clock.slept_until)
+    controls.hold(2, never)
+    assert len(clock.slept_until) == sleeps
+
+
+def test_a_step_lets_one_tick_begin_and_pauses_a_run_that_goes() -> None:
+    clock, controls, asking, _ = controlled()
+    controls.step()
+    assert controls.paused
+    asking.at_ms(100, controls.step)
+    asking.at_ms(100, controls.step)
+    asking.at_ms(1000, controls.step)
+    began_ms = []
+    for tick in range(3):
+        controls.hold(tick, never)
+        began_ms.append((clock.time_ns - 77) // MS)
+    assert began_ms == [120, 120, 1020]
+    assert controls.paused
+
+
+@pytest.mark.parametrize("ask", ["quit", "interrupt"])
+def test_a_pause_ends_when_the_run_is_to_end(ask: str) -> None:
+    _, controls, asking, _ = controlled()
+    interrupted: list[bool] = []
+    controls.toggle_pause()
+    asking.at_ms(300, controls.quit if ask == "quit" else lambda: interrupted.append(True))
+    controls.hold(0, lambda: bool(interrupted))
+    assert controls.quit_asked == (ask == "quit")
+
+
+def test_a_limit_is_kept_and_lifted() -> None:
+    clock, controls, _, _ = controlled()
+    controls.hold(0, never)
+    clock.time_ns += 10 * TICK_NS // 4  # ten ticks at 4 x real time
+    controls.hold(10, never)
+    controls.slower()
+    assert controls.speed == 2.0
+    began_ns = []
+    for tick in range(11, 21):
+        controls.hold(tick, never)
+        began_ns.append(clock.time_ns)
+        clock.time_ns += 7 * MS
+    gaps = [after - before for before, after in pairwise(began_ns)]
+    assert gaps == [TICK_NS // 2] * 9
+    controls.faster()  # 5 is more than the run ever did
+    assert controls.speed is None
+    sleeps = len(clock.slept_until)
+    controls.hold(21, never)
+    controls.hold(22, never)
+    assert len(clock.slept_until) == sleeps
+
+
+def test_a_run_slower_than_its_limit_is_not_held_and_does_not_rush_after() -> None:
+    clock, controls, _, _ = controlled()
+    controls.speed = 1.0
+    controls._asked = True
+    for tick in range(4):
+        controls.hold(tick, never)
+        clock.time_ns += 3 * TICK_NS
+    assert not clock.slept_until
+    began_ns = []
+    for tick in range(4, 9):
+        controls.hold(tick, never)
+        began_ns.append(clock.time_ns)
+    assert began_ns[-1] - began_ns[0] >= 3 * TICK_NS
+
+
+def test_speeds_go_down_to_a_tenth_and_up_to_no_limit() -> None:
+    _, controls, _, _ = controlled()
+    for _ in range(30):
+        controls.slower()
+    assert controls.speed == 0.1
+    for _ in range(30):
+        controls.faster()
+    assert controls.speed is None
+
+
+def test_in_real_time_the_factor_changes_from_the_next_tick_on() -> None:
+    clock, controls, _, pace = controlled(1.0)
+    assert pace is not None
+    ends_ns = []
+    for tick in range(4):
+        if tick == 2:
+            controls.faster()
+        controls.hold(tick, never)
+        pace.begin()
+        pace.hold(tick)
+        ends_ns.append(clock.time_ns - 77)
+    assert ends_ns == [TICK_NS, 2 * TICK_NS, 2 * TICK_NS + TICK_NS // 2, 3 * TICK_NS]
+    assert pace.factor == controls.speed == 2.0
+    for _ in range(30):
+        controls.faster()
+    assert controls.speed == 1000.0
+
+
+def test_in_real_time_a_paused_run_misses_no_tick() -> None:
+    clock, controls, asking, pace = controlled(1.0)
+    assert pace is not None
+    asked_ns = []
+    for tick in range(4):
+        if tick == 2:
+            controls.toggle_pause()
+            asking.at_ms(60_000, controls.toggle_pause)
+        controls.hold(tick, never)
+        asked_ns.append(pace.begin() - 77)
+        pace.hold(tick)
+    assert asked_ns == [tick * TICK_NS for tick in range(4)]  # as if there had been no pause
+    assert clock.time_ns - 77 == 4 * TICK_NS + controls.paused_ns
+    assert (controls.missed_ticks, pace.worst_lag_ns) == (0, 0)
+
+
+def test_every_key_has_one_meaning_and_others_have_none() -> None:
+    _, controls, _, _ = controlled()
+    keys = "".join(binding.keys for binding in BINDINGS)
+    assert len(set(keys)) == len(keys)
+    for key in ("x", "\x03", "\r"):
+        press(controls, key)
+    assert (controls.paused, controls.quit_asked, controls.speed) == (False, False, None)
+    press(controls, " ")
+    press(controls, "q")
+    assert (controls.paused, controls.quit_asked) == (True, True)
+
+
+SHORT = ["duration_s=3"]
+
+
+@pytest.fixture(scope="module")
+def free() -> Result:
+    return run(LOSSY, overrides=SHORT)
+
+
+@pytest.mark.parametrize("runners", [None, 3])
+def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, runners: int | None) -> None:
+    simulation = Simulation(LOSSY, overrides=SHORT, runners=runners)
+    controls = simulation.controls
+    plan = [
+        controls.toggle_pause,
+        controls.step,
+        controls.step,
+        controls.toggle_pause,
+        controls.slower,
+        controls.slower,
+    ]
+    plan += [controls.toggle_pause, controls.step, controls.toggle_pause, *[controls.faster] * 20]
+    asker = Asker(plan)
+    controls.on_wait = asker.ask
+    simulation.watch(asker)
+    result = finished(simulation)
+    assert not plan
+    assert controls.paused_ns > 0
+    assert (result.ended, result.ticks) == ("duration", free.ticks)
+    assert result.trajectory_sha256 == free.trajectory_sha256
+    assert (result.radio, result.metrics) == (free.radio, free.metrics)
+
+
+class Asker:
+    """An observer that asks for one thing after each tick, and while the run is held."""
+
+    def __init__(self, plan: list[Callable[[], None]]) -> None:
+        self.plan = plan
+
+    def begin(self, static: Static) -> None:
+        """Nothing yet."""
+
+    def see(self, truth: Truth) -> None:
+        self.ask()
+
+    def ask(self) -> None:
+        if self.plan:
+            self.plan.pop(0)()
+
+    def end(self, last: Tally | None) -> dict[str, object]:
+        return {}
+
+
+def test_so_many_ticks_are_let_go_whether_the_run_is_paused_or_not() -> None:
+    clock, controls, asking, _ = controlled()
+    controls.step_by(2)
+    asking.at_ms(500, lambda: controls.step_by(3))
+    asking.at_ms(900, controls.resume)
+    began_ms = []
+    for tick in range(6):
+        controls.hold(tick, never)
+        began_ms.append((clock.time_ns - 77) // MS)
+    assert began_ms == [0, 0, 520, 520, 520, 920]
+    assert not controls.paused
+
+
+def test_a_pause_ends_steps_that_have_not_begun_and_stands_still_once_the_loop_is_held() -> None:
+    _, controls, asking, _ = controlled()
+    controls.step_by(5)
+    assert not controls.stands_still
+    controls.hold(0, never)
+    controls.pause()
+    assert not controls.stands_still  # the tick is under way
+    stood: list[bool] = []
+    asking.at_ms(100, lambda: stood.append(controls.stands_still))
+    asking.at_ms(200, controls.step)
+    asking.at_ms(200, lambda: stood.append(controls.stands_still))
+    controls.hold(1, never)
+    assert stood == [True, False]
+    controls.resume()
+    controls.hold(2, never)
+    assert not controls.stands_still
+
+
+def test_a_speed_that_is_asked_for_is_kept_or_refused() -> None:
+    clock, controls, _, _ = controlled()
+    controls.set_speed(4.0)
+    began_ns = []
+    for tick in range(5):
+        controls.hold(tick, never)
+        began_ns.append(clock.time_ns)
+    assert [after - before for before, after in pairwise(began_ns)] == [TICK_NS // 4] * 4
+    controls.set_speed(None)
+    sleeps = len(clock.slept_until)
+    controls.hold(5, never)
+    assert len(clock.slept_until) == sleeps
+    for wrong in (0.0, -1.0, 1e9):
+        with pytest.raises(BadInput, match="factor: expected 0.001 to 1e"):
+            controls.set_speed(wrong)
+    assert controls.speed is None
+    _, paced, _, _ = controlled(1.0)
+    with pytest.raises(BadInput, match="keeps to the wall clock"):
+        paced.set_speed(None)
+    fixed = Controls(clock, RATE_HZ, speed_fixed=True)
+    with pytest.raises(BadInput, match="programs elsewhere keep to that of the run"):
+        fixed.set_speed(2.0)

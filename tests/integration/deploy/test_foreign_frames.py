@@ -1,0 +1,99 @@
+"""Frames that are not what they should be are counted and named in the summary, and the run goes on, unchanged."""
+
+from typing import Any
+
+import numpy as np
+import zenoh
+
+from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
+from swarmwire.deploy import run
+from swarmwire.deploy.running import finished
+from swarmwire.deploy.simulation import Simulation
+from tests.support.deploy.commands import LOSSY
+
+
+class Vandal:
+    """An observer that speaks to the agents' endpoint as a stranger would, in the middle of a run."""
+
+    def __init__(self, path: str) -> None:
+        self._path, self.keys = path, Keys("unknown")
+
+    def begin(self, static: Static) -> None:
+        """Nothing yet."""
+
+    def see(self, truth: Truth) -> None:
+        """Every kind of bad frame, once."""
+        if truth.tick != 3:
+            return
+        with open_runner(unix_endpoint(self._path)) as session:
+            answer = self.keys.answer("r0")
+            rows = np.arange(7, dtype=np.int64)
+            nothing = {"rows": rows, "command": np.zeros((4, 7))}
+            for key, payload in (
+                (answer, b"\x00garbage"),
+                (answer, b""),
+                (answer, b"\x00" * (frames.MOST_BYTES + 1)),
+                (answer, frames.encode("dance", 4, {})),
+                (answer, frames.encode("actions", 1, nothing)),
+                (self.keys.answer("stranger"), frames.encode("actions", 4, {})),
+                (self.keys.frame("r1"), b"\x00garbage"),
+                (self.keys.frame("r1"), frames.encode("tick", 0, {})),
+                ("swarmwire/*/answer/r0", frames.encode("failed", 4, {}, {"robots": "all", "traceback": "lies"})),
+            ):
+                session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
+            # The loop, in whose thread this runs, can only answer afterwards.
+            list(session.get(self.keys.join("x"), payload=b"let me in", timeout=0.1))
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """No part of the summary."""
+        return {}
+
+
+def test_a_stranger_cannot_stop_or_change_a_run(tmp_path):
+    path = tmp_path / "s"
+    simulation = Simulation(LOSSY, overrides=["duration_s=2"], runners=3, socket=path)
+    vandal = Vandal(str(path))
+    vandal.keys = Keys(simulation.run_id)
+    simulation.watch(vandal)
+    result = finished(simulation)
+    assert result.ticks == 20
+    assert result.trajectory_sha256 == run(LOSSY, overrides=["duration_s=2"]).trajectory_sha256
+    counts = result.counts
+    assert counts["malformed_frames"] == 2
+    assert counts["oversized_frames"] == 1
+    assert counts["unexpected_kind_frames"] == 1
+    assert counts["wrong_tick_frames"] == 1
+    assert counts["unknown_runner_frames"] == 2
+    assert counts["frames_dropped_by_runners"] == 2
+    assert counts["bad_join"] == 1
+
+
+NAN = """
+import numpy as np
+from swarmwire.agent import Robots, State, VectorAgent
+
+class Nan(VectorAgent):
+    def step(self, robots: Robots, state: State) -> None:
+        robots.drive(np.nan, np.inf)
+
+class ToNobody(VectorAgent):
+    def step(self, robots: Robots, state: State) -> None:
+        robots.radio.send(Hello, to=77)
+
+from swarmwire.agent import Message
+class Hello(Message):
+    pass
+"""
+
+
+def test_commands_that_are_no_numbers_and_packets_to_nobody_are_counted(tmp_path):
+    (tmp_path / "odd.py").write_text(NAN)
+    for name, count in (("Nan", "nan_commands"), ("ToNobody", "packets_to_nobody")):
+        spec = [f"robots.flock.agent={tmp_path / 'odd.py'}:{name}", "robots.flock.params={}", "duration_s=1"]
+        for runners in (None, 2):
+            result = run(LOSSY, overrides=spec, runners=runners)
+            assert result.ticks == 10
+            assert result.counts[count] == 20 * 10

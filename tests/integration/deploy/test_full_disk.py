@@ -1,0 +1,62 @@
+"""A disk that is full: what it refuses is told in a line each, the run goes on, and what it came to is shown."""
+
+import errno
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from swarmwire.deploy.record import origin
+from swarmwire.deploy.result import Result
+from swarmwire.metrics.verify.finding import State
+from swarmwire.metrics.verify.verify import verify
+from tests.support.deploy.commands import LOSSY, called
+
+SHORT = ("--set", "duration_s=1", "--set", "robots.flock.count=4")
+FULL = OSError(errno.ENOSPC, "No space left on device")
+NO_ROOM = "No space left on device (make room: df -h)"
+IN_SMALL = (
+    'mount -t tmpfs -o size=40k none "$0" || exit 99; to=$1; shift; "$@"; code=$?; cp -r "$0/run" "$to"; exit $code'
+)
+
+
+def refuses(*_, **__):
+    raise FULL
+
+
+def test_a_run_on_a_disk_that_is_full_goes_on_and_its_folder_is_readable(tmp_path):
+    disk, left = tmp_path / "disk", tmp_path / "left"
+    disk.mkdir()
+    if shutil.which("unshare") is None:
+        pytest.skip("mount namespaces: there is no unshare")
+    command = [sys.executable, "-m", "swarmwire.deploy", "run", LOSSY, "--set", "duration_s=4", "--out", disk / "run"]
+    run = ["unshare", "--mount", "sh", "-c", IN_SMALL, disk, left, *command]
+    told = subprocess.run(list(map(str, run)), capture_output=True, text=True, timeout=100, check=False)
+    if not left.exists():
+        pytest.skip(f"mount namespaces: {told.stderr.strip()}")
+    assert told.returncode == 1
+    *before, last = told.stderr.splitlines()
+    assert last == f"error: {disk / 'run' / 'summary.json'} cannot be written: {NO_ROOM}"
+    assert before
+    assert all(line.startswith("observer ") and line.endswith("; the run goes on without it") for line in before)
+    assert "4 s in" in told.stdout
+    assert "observer_failed_TickRecorder" in told.stdout
+    states = {finding.part: finding.state for finding in verify(left)}
+    assert states["static.json"] is states["run.json"] is states["log.txt"] is State.WHOLE
+    assert State.DAMAGED not in states.values()
+
+
+def test_a_disk_without_room_for_the_summary_costs_nobody_the_result(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(Result, "write", refuses)
+    code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
+    assert (code, errors) == (1, f"error: {tmp_path}/run/summary.json cannot be written: {NO_ROOM}\n")
+    assert "trajectory" in out
+    assert (tmp_path / "run" / "ticks.parquet").exists()
+
+
+def test_a_disk_that_is_full_from_the_start_is_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(origin, "write_whole", refuses)
+    code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
+    assert (code, out, errors) == (1, "", f"error: {tmp_path}/run cannot be written: {NO_ROOM}\n")
+    assert f"failed to start: {tmp_path}/run cannot be written" in (tmp_path / "run" / "log.txt").read_text()

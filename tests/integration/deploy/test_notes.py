@@ -1,0 +1,42 @@
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.deploy import run
+
+PSO = Path(__file__).parents[3] / "scenarios" / "pso.toml"
+
+
+class StatesSeen:
+    """Observer that keeps the states of all ticks."""
+
+    def __init__(self) -> None:
+        self.ticks: list[list[str]] = []
+
+    def begin(self, static: Static) -> None: ...
+
+    def see(self, truth: Truth) -> None:
+        self.ticks.append([truth.states[code] for code in truth.state])
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        return {}
+
+
+def states(runners: int | str | None, seeds: Sequence[int]) -> list[list[str]]:
+    seen = StatesSeen()
+    run(PSO, seeds=seeds, runners=runners, overrides=["duration_s=15"], observers=[seen])
+    return seen.ticks
+
+
+@pytest.mark.parametrize("runners", [3, "per-robot"])
+def test_states_are_the_same_however_the_agents_are_spread(runners: int | str) -> None:
+    alone = states(None, [2])
+    assert states(runners, [2]) == alone
+    assert {"to its own best", "to the neighbours' best"} <= set(alone[-1])
+
+
+def test_states_of_an_arena_are_the_same_beside_others() -> None:
+    assert [tick[-10:] for tick in states(None, [5, 2])] == states(None, [2])

@@ -1,0 +1,180 @@
+"""`swarmwire parity` and `swarmwire radio fit` of robots' logs, in this process: what they print, write and refuse."""
+
+import csv
+import json
+import tomllib
+
+import numpy as np
+import pytest
+import tomli_w
+
+from swarmwire.deploy import run
+from swarmwire.deploy.campaign.sweeping import sweep
+from tests.support.deploy.commands import LOSSY, called
+from tests.support.metrics.real_log.as_logs import as_logs
+from tests.support.metrics.real_log.emulated import METRICS, SMALL, flock, watched
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """A run's folder, and the logs that its robots would have written."""
+    here = tmp_path_factory.mktemp("parity")
+    return here / "run", as_logs(watched(out=here / "run"), here / "logs")
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """Three seeds of the same scenario with two losses."""
+    to = tmp_path_factory.mktemp("campaigns") / "lab"
+    sweep(LOSSY, seeds=[1, 2, 3], vary={"radio.loss": [0.3, 0.6]}, overrides=[*SMALL, METRICS], out=to, workers=1)
+    return to
+
+
+def test_a_run_and_its_logs_side_by_side(folders, monkeypatch, capsys):
+    code, out, errors = called(monkeypatch, capsys, "parity", *folders)
+    assert (code, errors) == (0, "")
+    head = next(line for line in out.splitlines() if line.startswith("metric"))
+    assert head.split() == ["metric", "emulated", "log", "distance", "spread", "KS", "within"]
+    assert "note: different agent's file: sha256 " in out
+    assert "different robots" not in out
+    assert "not in the log: collisions, wall_contacts: contacts are not in the log" in out
+    assert out.splitlines()[-1].startswith("The means of ")
+
+
+def test_differences_of_settings_stand_before_the_numbers(folders, tmp_path, monkeypatch, capsys):
+    logs = as_logs(watched("robots.flock.count=5"), tmp_path / "logs")
+    for robot in logs.iterdir():
+        says = json.loads((robot / "robot.json").read_text())
+        says["body"]["radius_m"] = 0.04
+        (robot / "robot.json").write_text(json.dumps({**says, "rate_hz": 20, "params": {"alignment": 2.0}}))
+    code, out, _ = called(monkeypatch, capsys, "parity", folders[0], logs)
+    assert code == 0
+    told = [line for line in out.splitlines() if line.startswith("note: different ")]
+    assert told[:2] == [
+        "note: different robots: 6 emulated, 5 in the log",
+        "note: different steps of the agents: 10 Hz emulated, 20 Hz in the log",
+    ]
+    assert (
+        "note: different params: separation_m 0.8 emulated, 0.4 in the log; alignment 1.0 emulated, 2.0 in the log"
+    ) in told
+    assert "note: different body epuck: its sheet in the log differs from the emulated one" in told
+    assert out.splitlines()[0] == told[0]
+
+
+def test_another_agent_is_named(folders, tmp_path, monkeypatch, capsys):
+    logs = as_logs(flock(), tmp_path / "logs", about={"agent": "walk.py:Walk"})
+    out = called(monkeypatch, capsys, "parity", folders[0], logs)[1]
+    assert "different agent: swarmwire.agent.behaviours:Flocking emulated, walk.py:Walk in the log" in out
+
+
+def test_a_campaign_has_a_spread(campaign, folders, monkeypatch, capsys):
+    code, out, errors = called(monkeypatch, capsys, "parity", f"{campaign}@radio.loss=0.3", folders[1])
+    assert (code, errors) == (0, "")
+    assert "of the radio) lie within the spread over 3 runs" in out.splitlines()[-1]
+    order = next(line for line in out.splitlines() if line.startswith("order "))
+    assert order.endswith("yes")  # it is one of them
+    delivery = next(line for line in out.splitlines() if line.startswith("delivery "))
+    assert " to " in delivery
+
+
+def test_a_shorter_log_is_not_held_against_a_longer_runs_totals(folders, campaign, tmp_path, monkeypatch, capsys):
+    logs = as_logs(watched("duration_s=8"), tmp_path / "logs")
+    out = called(monkeypatch, capsys, "parity", f"{campaign}@radio.loss=0.3", logs)[1]
+    assert not [line for line in out.splitlines() if line.startswith(("delivery ", "packets sent", "latency p50"))]
+    told = next(line for line in out.splitlines() if line.startswith("not compared: packets sent, delivery, latency "))
+    assert "runs keep totals of all their 20 s" in told
+    out = called(monkeypatch, capsys, "parity", folders[0], logs)[1]  # a run folder has counts of each tick
+    assert [line for line in out.splitlines() if line.startswith("packets sent")]
+    assert "not compared: delivery, latency " in out or "not compared: latency " in out
+
+
+def test_numbers_and_a_page_are_written(folders, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("matplotlib", reason="needs the extra [report]")
+    page, table = tmp_path / "parity.html", tmp_path / "parity.csv"
+    code, out, _ = called(monkeypatch, capsys, "parity", *folders, "--to", page, "--csv", table)
+    assert (code, out.splitlines()[-2:]) == (0, [f"written: {page}", f"written: {table}"])
+    text = page.read_text()
+    assert "<svg" in text
+    assert "Side by side" in text
+    assert (tmp_path / "parity-figures" / "parity-order.svg").exists()
+    rows = {row["name"]: row for row in csv.DictReader(table.read_text().splitlines())}
+    assert float(rows["order"]["log"]) == pytest.approx(float(rows["order"]["emulated_q50"]), abs=0.01)
+    assert rows["collisions"]["what"] == "not in the log"
+    assert rows["collisions"]["log"] == ""
+    assert rows["delivery"]["what"] == "radio"
+
+
+def test_what_cannot_be_is_refused_in_one_line(folders, campaign, tmp_path, monkeypatch, capsys):
+    run, logs = folders
+    (tmp_path / "empty").mkdir()
+    for arguments, told in (
+        ((tmp_path / "empty", logs), "expected the folder of a run"),
+        ((run, tmp_path / "empty"), "expected robots' logs: it holds no folder with a robot.json"),
+        ((run, tmp_path / "none"), "expected a folder of robots' logs: there is none"),
+        ((campaign, logs), "expected one design point of 2"),
+        ((f"{campaign}@radio.loss=0.5", logs), "radio.loss: expected "),
+        ((run, logs, "--to", "parity.pdf"), "expected a file name that ends in .html"),
+        ((run, logs, "--csv", "parity.txt"), "expected a file name that ends in .csv"),
+    ):
+        code, out, errors = called(monkeypatch, capsys, "parity", *arguments)
+        assert (code, out) == (2, ""), arguments
+        assert errors.startswith("error: ")
+        assert told in errors
+        assert errors.count("\n") == 1
+
+
+def test_a_network_becomes_a_radio_that_a_scenario_takes(folders, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("matplotlib", reason="needs the extra [report]")
+    to = ["--to", tmp_path / "fit.png", "--write", tmp_path / "radio.toml", "--size", "400"]
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", folders[1], *to)
+    assert (code, errors) == (0, "")
+    for said in ("latency", "jitter", "delivery by link", "neighbours of flock-0: flock-1", "all losses count here"):
+        assert said in out
+    assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
+    table = tomllib.loads((tmp_path / "radio.toml").read_text())["radio"]
+    assert table["latency_s"] == pytest.approx(0.1, abs=0.002)
+    scenario = tomllib.loads(LOSSY.read_text())
+    refitted = tmp_path / "refitted.toml"
+    refitted.write_text(tomli_w.dumps({**scenario, "radio": table}))
+    assert run(refitted, overrides=["duration_s=0.2"]).ticks > 0  # whose agents need range and bearing
+
+
+def test_a_log_that_is_not_there_is_said_not_to_be(tmp_path, monkeypatch, capsys):
+    for name in ("lgos", "heard.csv"):
+        code, out, errors = called(monkeypatch, capsys, "radio", "fit", tmp_path / name)
+        assert (code, out) == (2, "")
+        assert errors == f"error: {tmp_path / name}: expected a log: there is no such file or folder\n"
+
+
+def test_one_robots_table_is_enough_for_a_fit(folders, monkeypatch, capsys):
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", folders[1] / "flock-0" / "heard.csv")
+    assert (code, errors) == (0, "")
+    assert "on 5 links" in out
+    assert tomllib.loads(out[out.index("# Fitted to heard.csv") :])["radio"]["loss"] == pytest.approx(0.3, abs=0.1)
+    code, _, errors = called(
+        monkeypatch, capsys, "radio", "fit", folders[1] / "flock-0" / "heard.csv", "--within", "0.01"
+    )
+    assert (code, errors) == (
+        2,
+        "error: --within: expected a distance within which there are packets, got 0.01 m\n",
+    )
+
+
+def test_latencies_that_are_not_uniform_are_drawn_and_become_a_table(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("matplotlib", reason="needs the extra [report]")
+    late_s = np.random.default_rng(4).lognormal(-4.0, 0.8, 1000)
+    rows = [f"{1000.0 + 0.1 * i:.6f},a,b,{i},{late:.6f}" for i, late in enumerate(late_s.tolist())]
+    log, picture = tmp_path / "heard.csv", tmp_path / "fit.png"
+    log.write_text("\n".join(["t_s,tx,rx,seq,latency_s", *rows]) + "\n")
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", log, "--to", picture, "--size", "400")
+    assert (code, errors) == (0, "")
+    assert "[radio.delays] is lognormal" in out
+    assert tomllib.loads(out[out.index("# Fitted to ") :])["radio"]["delays"]["distribution"] == "lognormal"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_too_little_to_fit_is_refused(tmp_path, monkeypatch, capsys):
+    (tmp_path / "heard.csv").write_text("t_s,tx,rx,seq\n1.0,a,b,1\n2.0,a,b,2\n")
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", tmp_path / "heard.csv")
+    assert (code, out) == (2, "")
+    assert "nothing could be fitted: range: needs 100 packets" in errors

@@ -1,0 +1,292 @@
+"""A run is published for observers, who cannot slow it, change it, or see what they should not."""
+
+import os
+import signal
+import threading
+from contextlib import ExitStack
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+import zenoh
+
+from swarmwire.comms.clock import NS_PER_S, WallClock, to_s
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.senses import GroupSenses
+from swarmwire.comms.truth import Happened
+from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpoint
+from swarmwire.comms.wire.truth_frames import encode_truth
+from swarmwire.deploy import run
+from swarmwire.deploy.live import published
+from swarmwire.deploy.live.following import RunGone, following
+from swarmwire.deploy.live.live_file import Live, read_live
+from swarmwire.deploy.live.published import Published
+from swarmwire.deploy.live.sampling import Sampling, Since
+from swarmwire.metrics.metrics import Metrics
+from tests.support.clocks import StillClock
+from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.watching import At, watcher
+from tests.support.metrics.truths import edges, finished, static, tally, truth
+from tests.support.waiting import until
+
+MANY = ["robots.flock.count=300", 'robots.flock.place={how="arena"}', "arena.size_m=[20,20]", "duration_s=6"]
+
+
+@pytest.fixture
+def every_tick(monkeypatch):
+    """Every tick is due."""
+    monkeypatch.setattr(published, "FRAMES_PER_S", NS_PER_S)
+
+
+def publish(folder, of, clock=None, arena=0):
+    """A published run of these, whose end the caller calls, and its metrics."""
+    metrics = Metrics()
+    observer = Published(folder, "r", metrics, clock or WallClock(), arena)
+    metrics.begin(of)
+    observer.begin(of)
+    return metrics, observer
+
+
+def live(folder):
+    """The run that goes on in this folder."""
+    found = read_live(folder)
+    assert found is not None
+    return found
+
+
+def next_of(run) -> Any:
+    found = until(run.next)
+    assert found is not None
+    return found
+
+
+def test_nobody_looks_on_and_nothing_is_encoded(tmp_path, monkeypatch, every_tick):
+    monkeypatch.setattr(published, "encode_truth", None)  # to call it would be an error
+    observers = [metrics := Metrics(), shown := Published(tmp_path, "r", metrics, WallClock())]
+    found = []
+    result = run(
+        LOSSY, overrides=["duration_s=2"], observers=[*observers, At(3, lambda: found.append(read_live(tmp_path)))]
+    )
+    assert (shown.frames, shown.left_out) == (0, 0)
+    assert "observer_failed_Published" not in result.counts
+    assert found[0].pid == os.getpid()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_who_looks_on_gets_scene_ticks_and_metrics(tmp_path, every_tick):
+    of = static(4, lights=[[]])
+    metrics, observer = publish(tmp_path, of)
+    try:
+        with following(read_live(tmp_path)) as seen:
+            assert seen.scene.static == of
+            assert [series.name for series in seen.metrics] == [metric.name for metric in metrics.metrics]
+            until(observer._is_watched)
+            for tick in range(5):
+                now = truth(of, tick, pose=np.full((4, 3), tick / 7), edges=edges((0, 3)))
+                metrics.see(now)
+                observer.see(now)
+                got = next_of(seen)
+                assert (got.truth.tick, got.serial, got.ticks) == (tick, tick, 1)
+                assert got.truth.pose.tolist() == now.pose.tolist()
+                assert got.truth.edges is not None
+                assert got.truth.edges.tolist() == [[0, 3]]
+                assert all(
+                    np.array_equal(seen.latest[name], metrics.latest[name], equal_nan=True) for name in seen.latest
+                )
+            observer.end(None)
+            until(lambda: seen.next() or seen.over)
+            assert seen.lost == seen.bad == 0
+    finally:
+        assert observer.end(None) == {"published": {"frames": 5, "left_out": 0}}
+
+
+def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tmp_path):
+    of, clock = static(2), StillClock()
+    metrics, observer = publish(tmp_path, of, clock)
+    try:
+        with following(read_live(tmp_path)) as seen:
+            until(observer._is_watched)
+            glimpses = []
+            for tick in range(100):  # a hundredth of a second each
+                kill = (Happened(tick, 0.0, "kill", False, np.ones(2, np.bool_)),) if tick == 50 else ()
+                now = truth(of, tick, tally=tally({Fate.HEARD: 2}), contact_onsets=np.array([[1, 0]]), events=kill)
+                metrics.see(now)
+                clock.time_ns += NS_PER_S // 100
+                before = observer.frames
+                observer.see(now)
+                if observer.frames > before:
+                    glimpses.append(next_of(seen))
+    finally:
+        observer.end(None)
+    last = glimpses[-1].truth.tick
+    assert len(glimpses) == 25  # every fourth tick is the first after a thirtieth of a second
+    assert sum(glimpse.ticks for glimpse in glimpses) == last + 1
+    assert sum(glimpse.truth.tally.fates[0, Fate.HEARD] for glimpse in glimpses) == 2 * (last + 1)
+    assert sum(glimpse.truth.contact_onsets[0, 0] for glimpse in glimpses) == last + 1
+    assert [event.serial for glimpse in glimpses for event in glimpse.truth.events] == [50]
+
+
+def test_ticks_that_find_the_sender_busy_are_left_out_and_counted(tmp_path, monkeypatch, every_tick):
+    of, go = static(2), threading.Event()
+    monkeypatch.setattr(published, "encode_truth", lambda glimpse: go.wait() and encode_truth(glimpse))
+    metrics, observer = publish(tmp_path, of)
+    try:
+        with following(read_live(tmp_path)) as seen:
+            until(observer._is_watched)
+            for tick in range(20):
+                metrics.see(now := truth(of, tick, tally=tally({Fate.HEARD: 1})))
+                observer.see(now)
+            go.set()
+            assert observer.frames + observer.left_out == 20
+            assert 1 <= observer.frames <= 2
+            got = [next_of(seen) for _ in range(observer.frames)]
+            until(observer._frames.empty)
+            metrics.see(now := truth(of, 20, tally=tally({Fate.HEARD: 1})))
+            observer.see(now)
+            got.append(next_of(seen))
+            assert sum(glimpse.truth.tally.fates[0, Fate.HEARD] for glimpse in got if glimpse.truth.tally) == 21
+    finally:
+        go.set()
+        observer.end(None)
+
+
+def test_an_error_of_the_sender_ends_the_publishing_not_the_run(tmp_path, monkeypatch, every_tick):
+    monkeypatch.setattr(published, "encode_truth", lambda _: 1 / 0)
+    metrics, observer = publish(tmp_path, of := static(2))
+    try:
+        with following(read_live(tmp_path)):
+            until(observer._is_watched)
+            metrics.see(truth(of))
+            observer.see(truth(of))
+            until(lambda: observer._fault)
+            with pytest.raises(ZeroDivisionError):
+                observer.see(truth(of, 1))
+    finally:
+        observer.end(None)
+    assert read_live(tmp_path) is None
+
+
+@pytest.mark.parametrize(("number", "stays"), [(signal.SIGSTOP, True), (signal.SIGKILL, False)])
+def test_a_run_is_the_same_beside_an_observer_that_is_frozen_or_killed(
+    tmp_path, monkeypatch, every_tick, number, stays
+):
+    puts, clock = [], WallClock()
+
+    def timed(glimpse):
+        puts.append(clock.now_ns())  # the put before this one is over
+        return encode_truth(glimpse)
+
+    alone = run(LOSSY, overrides=MANY)
+    monkeypatch.setattr(published, "encode_truth", timed)
+    metrics = Metrics()
+    shown = Published(tmp_path, "r", metrics, clock)
+    with ExitStack() as held:
+        watchers = []
+        start = At(2, lambda: watchers.append(held.enter_context(watcher(tmp_path))))
+        hit = At(5, lambda: watchers[0].send_signal(number))
+        beside = run(LOSSY, overrides=MANY, observers=[metrics, shown, start, hit])
+        state = psutil.Process(watchers[0].pid).status() if stays else psutil.STATUS_STOPPED
+        assert state == psutil.STATUS_STOPPED  # it looked on, frozen, to the end
+    assert beside.trajectory_sha256 == alone.trajectory_sha256
+    assert not [name for name in beside.counts if name.startswith("observer_failed")]
+    if stays:
+        # 1.3 MB and more: the socket and zenoh's queues hold less. A put that blocks would take 5 s.
+        assert shown.frames + shown.left_out >= 50
+        assert max(np.diff(puts)) < 2 * NS_PER_S, [to_s(int(gap)) for gap in np.diff(puts)]
+    else:
+        assert shown.frames < 50  # nothing is sent to the dead
+
+
+def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path):
+    metrics = Metrics()
+    shown, heard = Published(tmp_path, "r", metrics, WallClock()), {}
+    socket = tmp_path / "s"
+    with ExitStack() as held:
+
+        def listen():
+            sides = {
+                "runners": open_runner(unix_endpoint(str(socket))),
+                "observers": open_observer(live(tmp_path).endpoint),
+            }
+            for side, session in sides.items():
+                held.enter_context(session)
+                heard[side] = session.declare_subscriber("swarmwire/**", zenoh.handlers.RingChannel(500))
+
+        # A subscriber to everything is one to the truth, so the run is published.
+        result = run(
+            LOSSY, overrides=["duration_s=4"], runners=2, socket=socket, observers=[metrics, shown, At(1, listen)]
+        )
+        keys = {
+            side: {str(sample.key_expr).split("/")[2] for sample in of if sample}
+            for side, of in {side: [found.try_recv() for _ in range(500)] for side, found in heard.items()}.items()
+        }
+    assert result.ticks == 40
+    assert keys == {"runners": {"frame", "answer"}, "observers": {"truth"}}
+
+
+def test_a_published_run_listens_on_no_network(tmp_path):
+    def listening():
+        return [c for c in psutil.Process().net_connections("inet") if c.status == psutil.CONN_LISTEN]
+
+    before = listening()  # of the tests' own tools
+    _, observer = publish(tmp_path, static(2))
+    try:
+        assert live(tmp_path).endpoint.startswith("unixsock-stream/")
+        assert listening() == before
+    finally:
+        observer.end(None)
+
+
+def test_what_is_said_of_a_run_that_was_killed_is_not_believed(tmp_path):
+    Live("unixsock-stream//nowhere", "r", 2**22 + 1).write(tmp_path)  # more than Linux gives out
+    assert read_live(tmp_path) is None
+    Live(f"unixsock-stream/{tmp_path}/none", "r", os.getpid()).write(tmp_path)
+    with pytest.raises(RunGone, match="cannot be reached"), following(read_live(tmp_path)):
+        pass
+
+
+def test_large_swarms_show_fewer_links_the_senses_of_one_and_no_flood_of_packets():
+    of = static(300)
+    senses = {"flock": GroupSenses(np.arange(300), {"compass.heading_rad": np.arange(300.0)})}
+    full = truth(of, edges=edges((0, 1)), senses=senses, finished=finished([0] * 2001, [1] * 2001))
+    sampling, values = Sampling(of, 0, of.robot_names[7]), np.zeros((1, 1))
+    shown = [sampling.glimpse(full, 1, values, at * NS_PER_S // 30).truth for at in range(30)]
+    assert sum(glimpse.edges is not None for glimpse in shown) == 5
+    assert (
+        shown[0].senses["flock"].rows.tolist() == shown[0].senses["flock"].fields["compass.heading_rad"].tolist() == [7]
+    )
+    assert shown[0].finished is None
+    few = finished([0] * 2000, [1] * 2000)
+    assert sampling.glimpse(replace(full, finished=few), 1, values, 0).truth.finished == few
+
+
+def test_ticks_are_taken_once():
+    since = Since()
+    since.add(truth(of := static(2), 0))
+    since.add(truth(of, 1))
+    together, ticks = since.take()
+    assert (together.tick, ticks) == (1, 2)
+    with pytest.raises(ValueError, match="expected a tick"):
+        since.take()
+
+
+def test_a_run_that_is_paused_has_told_its_newest_tick_and_tells_it_to_who_begins_to_look_on(tmp_path):
+    metrics, found = Metrics(), []
+    shown = Published(tmp_path, "r", metrics, WallClock())
+
+    def looked(run):
+        shown.catch_up()  # as the loop does for as long as it is held
+        return run.next()
+
+    def pause():
+        for _ in range(2):  # the second begins to look on in the middle, after the first has gone
+            with following(read_live(tmp_path)) as run:
+                seen = until(lambda run=run: looked(run))
+                assert seen is not None
+                found.append(seen.truth.tick)
+            until(lambda: shown.catch_up() or not shown._watched)
+
+    run(LOSSY, overrides=["duration_s=1"], observers=[metrics, shown, At(5, pause)])
+    assert found == [5, 5]

@@ -1,0 +1,138 @@
+"""The recording of a real run holds what the run's own numbers say."""
+
+import numpy as np
+import polars as pl
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.deploy import run
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.record import table_writer
+from swarmwire.metrics.record.part_files import write_file
+from swarmwire.metrics.record.tick_recorder import TickRecorder
+from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.verify.verify import verify
+from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.recorded import hastily, record_run
+
+EVENTS = [
+    "duration_s=6",
+    'events=[{at_s=1.0, do="kill", robots={group="flock", share=0.2}, for_s=2.0},'
+    ' {at_s=2.0, do="blackout", robots={group="flock", share=0.1}, for_s=1.0}]',
+]
+STATING = """
+from swarmwire.agent import Agent, Message, f4
+
+class Beacon(Message):
+    heading_rad: f4
+
+class Stating(Agent):
+    needs = ("compass",)
+
+    def step(self, robot):
+        robot.note(state="east" if abs(robot.compass.heading_rad) < 1.5 else "west")
+        robot.radio.send(Beacon(heading_rad=robot.compass.heading_rad))
+        robot.drive(linear_mps=0.1, angular_radps=0.5)
+"""
+
+
+class Keeper:
+    """Keeps every truth."""
+
+    def __init__(self):
+        self.seen, self.metrics, self._metrics = [], [], Metrics()
+
+    def begin(self, static):
+        self._metrics.begin(static)
+
+    def see(self, truth):
+        self._metrics.see(truth)
+        self.seen.append(truth)
+        self.metrics.append({name: values.copy() for name, values in self._metrics.latest.items()})
+
+    def end(self, last):
+        return {}
+
+
+def test_what_was_recorded_is_what_an_observer_saw_and_what_the_summary_says(tmp_path):
+    (tmp_path / "stating.py").write_text(STATING)
+    folder, keeper = tmp_path / "run", Keeper()
+    scenario = tmp_path / "scenario.toml"
+    scenario.write_text(LOSSY.read_text())
+    agent = ["robots.flock.agent=stating.py:Stating", "robots.flock.params={}"]
+    with hastily():
+        result = record_run(folder, scenario, observers=[keeper], seeds=[3, 8], overrides=[*EVENTS, *agent])
+    recorded = RunFolder(folder)
+    assert all(finding.good for finding in verify(folder)), verify(folder)
+
+    for arena, of_arena in enumerate(result.arenas):
+        rows = slice(arena * 20, arena * 20 + 20)
+        ticks = recorded.ticks(arena)
+        pose = np.array([truth.pose[rows] for truth in keeper.seen], np.float32)
+        for place, column in enumerate(("x_m", "y_m", "heading_rad")):
+            assert np.array_equal(ticks[column].to_numpy(), pose[:, :, place])
+        assert ticks["alive"].to_list() == [truth.alive[rows].tolist() for truth in keeper.seen]
+        states = [[truth.states[code] for code in truth.state[rows]] for truth in keeper.seen]
+        assert ticks["state"].to_list() == states
+        assert {"east", "west"} <= {state for row in states for state in row}
+        for name, statistics in of_arena.metrics.items():
+            values = [measured[name][arena] for measured in keeper.metrics]
+            assert ticks[name].to_list() == [None if np.isnan(value) else value for value in values]
+            assert ticks[name].to_list()[-1] == statistics.final
+        counted = recorded.packets(arena).group_by("fate").agg(pl.col("receivers").sum()).rows()
+        radio = of_arena.radio
+        assert radio is not None
+        without_rows = (FATE_NAMES[Fate.OUT_OF_RANGE], FATE_NAMES[Fate.IN_FLIGHT])
+        assert dict(counted) == {f: n for f, n in radio.fates.items() if n and f not in without_rows}
+        assert {"heard", "lost", "blackout"} <= dict(counted).keys()
+        distance_m = recorded.packets(arena)["distance_m"].drop_nulls().to_numpy()
+        assert 0.0 < distance_m.min() < distance_m.max() <= 2.0  # of this scenario's radio
+        assert ticks["heard"].sum() == radio.fates["heard"]
+    happened = [(event.tick, event.do, event.ended, event.robots[0]) for event in result.events]
+    assert recorded.events(0).select("tick", "do", "ended", "robots").rows() == happened
+    assert len(happened) == 4
+
+
+def test_the_same_packets_are_sampled_in_every_layout(tmp_path):
+    tables = []
+    for name, options in {
+        "alone": {"seed": 3},
+        "in processes": {"seed": 3, "runners": 3},
+        "among others": {"seeds": [9, 3]},
+    }.items():
+        folder = tmp_path / name
+        record_run(folder, packets=0.1, overrides=["duration_s=3"], **options)
+        arena = 1 if "seeds" in options else 0
+        tables.append(RunFolder(folder).packets(arena).drop("arena"))
+        summary = RunFolder(folder).summary
+        assert summary is not None
+        assert summary["record"]["packets"]["share"] == 0.1
+    columns = ["sender", "sequence", "receiver"]
+    alone, *others = (table.sort(columns, maintain_order=True) for table in tables)
+    assert 0 < len(alone) < 2000
+    for other in others:
+        assert other.equals(alone)
+
+
+def test_a_full_disk_leaves_the_run_going_and_what_was_written_readable(tmp_path, monkeypatch, capfd):
+    left = iter(range(2))
+
+    def full(frame, path):
+        if next(left, None) is None:
+            raise OSError(28, "No space left on device")
+        write_file(frame, path)
+
+    monkeypatch.setattr(table_writer, "write_file", full)
+    metrics, keeper = Metrics(), Keeper()
+    with hastily():
+        recorder = TickRecorder(tmp_path, metrics, WallClock())
+        result = run(LOSSY, overrides=["duration_s=40"], observers=[metrics, recorder, keeper])
+    assert result.ended == "duration"
+    assert result.counts["observer_failed_TickRecorder"] == 1
+    assert len(keeper.seen) == result.ticks == 400
+    errors = capfd.readouterr().err
+    assert "what was written before stays; the run goes on without it" in errors
+    assert "No space left on device" in errors
+    ticks = RunFolder(tmp_path).ticks()
+    assert 0 < len(ticks) < 400
+    assert ticks["tick"].to_list() == list(range(len(ticks)))

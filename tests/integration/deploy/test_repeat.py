@@ -1,0 +1,275 @@
+"""A run can be repeated from its folder alone, and what stands in its way is named."""
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from swarmwire.comms.errors import AgentFailed, BadInput
+from swarmwire.deploy import Simulation, repeat, run
+from swarmwire.deploy.cli import app
+from swarmwire.deploy.record.modules import PARTS, module_digests
+from swarmwire.deploy.repetition import RepeatedRun
+from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS
+from swarmwire.world.scenario.as_mapping import same_content
+from swarmwire.world.scenario.scenario_file import load_scenario
+from tests.support.deploy.commands import LOSSY, ROOT, started
+
+SHORT = ["duration_s=2"]
+FILE_AGENT = """
+from swarmwire.agent import Robots, State, VectorAgent
+
+class Circler(VectorAgent):
+    speed_mps: float = 0.05
+
+    def step(self, robots: Robots, state: State) -> None:
+        robots.drive(self.speed_mps, 0.5)
+"""
+MINE = """
+format = 1
+name = "circles"
+seed = 4
+duration_s = 2
+[arena]
+size_m = [4, 4]
+[robots.left]
+body = "epuck"
+count = 3
+agent = "mine.py:Circler"
+[robots.right]
+body = "epuck"
+count = 3
+agent = "other/mine.py:Circler"
+params = { speed_mps = 0.02 }
+"""
+
+
+@pytest.fixture
+def mine(tmp_path) -> Path:
+    (tmp_path / "source" / "other").mkdir(parents=True)
+    (tmp_path / "source" / "mine.py").write_text(FILE_AGENT)
+    (tmp_path / "source" / "other" / "mine.py").write_text(FILE_AGENT.replace("0.5)", "-0.5)"))
+    (tmp_path / "source" / "mine.toml").write_text(MINE)
+    return tmp_path / "source" / "mine.toml"
+
+
+def copied(folder: Path) -> dict[str, str]:
+    return {file["path"]: file["what"] for file in json.loads((folder / "summary.json").read_text())["files"]}
+
+
+@pytest.mark.parametrize(("then", "now"), [(None, None), (None, 2), (3, None)])
+def test_a_run_is_the_same_again_in_whatever_layout(tmp_path, then, now):
+    disrupted = ROOT / "scenarios" / "flocking-disrupted.toml"
+    run(disrupted, overrides=["duration_s=3", "radio.loss=0.4"], seed=7, runners=then, out=tmp_path / "run")
+    repetition = repeat(tmp_path / "run", runners=now)
+    assert repetition.same
+    assert repetition.changes == ()
+    assert repetition.result.arenas[0].seed == 7
+    assert not (tmp_path / "run" / "inputs").exists()
+
+
+def test_several_seeds_are_repeated_side_by_side(tmp_path):
+    result = run(LOSSY, overrides=SHORT, seeds=[3, 5], out=tmp_path / "run")
+    repetition = repeat(tmp_path / "run")
+    assert repetition.before == tuple(result.trajectory_sha256)
+    assert repetition.same
+    assert [arena.seed for arena in repetition.result.arenas] == [3, 5]
+
+
+def test_the_run_folder_holds_the_scenario_as_run_without_what_was_left_out(tmp_path):
+    run(LOSSY, overrides=[*SHORT, "radio.loss=0.45"], seed=9, out=tmp_path / "run")
+    text = (tmp_path / "run" / "scenario.toml").read_text()
+    assert text.startswith("# As run by swarmwire ")
+    assert "flocking-lossy.toml" in text.splitlines()[0]
+    assert str(ROOT) not in text
+    assert "min_delivery" not in text
+    as_run = load_scenario(LOSSY, [*SHORT, "radio.loss=0.45", "seed=9"])
+    assert same_content(load_scenario(tmp_path / "run" / "scenario.toml"), as_run)
+
+
+@pytest.mark.parametrize("scenario", sorted((ROOT / "scenarios").glob("*.toml")), ids=lambda path: path.stem)
+def test_every_shipped_scenario_survives_being_made_in_python_and_written(tmp_path, scenario):
+    as_read = load_scenario(scenario)
+    changed = as_read.model_copy(update={"duration_s": 0.1})
+    run(changed, out=tmp_path / "run")
+    again = load_scenario(tmp_path / "run" / "scenario.toml")
+    assert again.duration_s == 0.1
+    if changed.radio is not None and changed.radio.trace is not None:  # it lies in the folder now
+        trace = replace(changed.radio.trace, file=f"files/{changed.radio.trace.file}")
+        changed = changed.model_copy(update={"radio": replace(changed.radio, trace=trace)})
+    if changed.arena.map is not None:
+        table = changed.arena.map.model_copy(update={"image": f"files/{changed.arena.map.image}"})
+        changed = changed.model_copy(update={"arena": changed.arena.model_copy(update={"map": table})})
+    robots = dict(changed.robots)
+    for name, table in robots.items():
+        if table.body.endswith(".toml"):
+            robots[name] = table.model_copy(update={"body": f"files/{Path(table.body).name}"})
+    assert same_content(again, changed.model_copy(update={"robots": robots}))
+    assert not same_content(again, as_read)
+
+
+def test_agent_files_are_copied_and_the_originals_are_not_needed(tmp_path, mine):
+    run(mine, out=tmp_path / "run")
+    assert copied(tmp_path / "run") == {
+        "scenario.toml": "scenario",
+        "files/mine.py": "agent",
+        "files/mine-2.py": "agent",
+    }
+    assert (tmp_path / "run" / "files" / "mine-2.py").read_text() == (mine.parent / "other" / "mine.py").read_text()
+    shutil.rmtree(mine.parent)
+    moved = (tmp_path / "run").rename(tmp_path / "moved")
+    for runners in (None, 2):
+        repetition = repeat(moved, runners=runners, out=tmp_path / f"again-{runners}")
+        assert repetition.same
+        assert repetition.changes == ()
+    assert repeat(tmp_path / "again-2").same
+
+
+def test_an_agent_file_that_was_edited_since_is_named_and_its_run_is_another(tmp_path, mine):
+    run(mine, out=tmp_path / "run")
+    path = tmp_path / "run" / "files" / "mine.py"
+    path.write_text(path.read_text().replace("0.5)", "0.6)"))  # of the same size, maybe within the same second
+    repetition = repeat(tmp_path / "run")
+    assert repetition.same is False
+    assert repetition.first_difference == 0
+    assert repetition.changes == ("files/mine.py is not as the run left it: its sha256 differs",)
+    path.unlink()
+    with pytest.raises(BadInput, match="there is no file"):
+        repeat(tmp_path / "run")
+
+
+def test_a_changed_installed_module_is_named(tmp_path, mine, monkeypatch):
+    package = tmp_path / "site" / "circling_agents"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("from circling_agents.circler import Circler as Circler\n")
+    (package / "circler.py").write_text(FILE_AGENT)
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    agents = [f"robots.{group}.agent=circling_agents:Circler" for group in ("left", "right")]
+    run(mine, overrides=agents, out=tmp_path / "run")
+    assert repeat(tmp_path / "run").changes == ()
+    (package / "circler.py").write_text(FILE_AGENT + "# a word more\n")
+    repetition = repeat(tmp_path / "run")
+    assert repetition.same
+    assert repetition.changes == ("module circling_agents has changed since",)
+
+
+def test_parts_of_swarmwire_are_named_once_and_a_lone_module_is_its_file(tmp_path, monkeypatch):
+    (tmp_path / "lone_circler.py").write_text(FILE_AGENT)
+    monkeypatch.syspath_prepend(tmp_path)
+    digests = module_digests(["swarmwire.agent.behaviours:Flocking", "lone_circler:Circler", "/some/where.py:Mine"])
+    assert set(digests) == {*PARTS, "lone_circler"}
+    (tmp_path / "beside.py").write_text("")
+    assert module_digests(["lone_circler:Circler"])["lone_circler"] == digests["lone_circler"]
+    (tmp_path / "lone_circler.py").write_text(FILE_AGENT + "#")
+    assert module_digests(["lone_circler:Circler"])["lone_circler"] != digests["lone_circler"]
+
+
+def test_what_the_run_ran_on_is_compared(tmp_path):
+    run(LOSSY, overrides=SHORT, out=tmp_path / "run")
+    path = tmp_path / "run" / "run.json"
+    origin = json.loads(path.read_text())
+    origin["cpu"], origin["versions"]["numpy"] = "Z80", "1.0"
+    origin["modules"]["swarmwire.world"] = "0" * 64
+    path.write_text(json.dumps(origin))
+    changes = repeat(tmp_path / "run").changes
+    assert changes[0] == "module swarmwire.world has changed since"
+    assert changes[1].startswith("numpy is ")
+    assert changes[1].endswith("; it was 1.0")
+    assert changes[2].endswith("; it was Z80")
+
+
+def called(*arguments: str | Path) -> Result:
+    """The command in this process, which has long imported all that it needs."""
+    return CliRunner().invoke(app, ["repeat", *map(str, arguments)])
+
+
+def test_the_command_says_same_or_different_and_names_what_changed(tmp_path, mine):
+    folder = tmp_path / "run"
+    run(mine, out=folder)
+    same = called(folder, "--out", tmp_path / "again")
+    assert same.exit_code == 0
+    assert "the same run, bit for bit: 20 ticks" in same.stdout
+    assert (tmp_path / "again" / "summary.json").exists()
+    assert called(folder, "--quiet").stdout == ""
+    path = folder / "files" / "mine.py"
+    path.write_text(path.read_text().replace("0.5)", "0.6)"))
+    other = called(folder)
+    assert other.exit_code == 1
+    assert "a different run from tick 0 on" in other.stdout
+    assert "files/mine.py is not as the run left it" in other.stdout
+
+
+def test_an_agent_that_draws_by_itself_is_suspected(tmp_path, mine):
+    path = mine.parent / "mine.py"
+    path.write_text("import random\n" + FILE_AGENT.replace("0.5)", "random.random())"))
+    run(mine, out=tmp_path / "run")
+    other = called(tmp_path / "run")
+    assert other.exit_code == 1
+    assert "does an agent draw or read the time by itself?" in other.stdout
+
+
+@pytest.mark.parametrize(
+    ("spoil", "expected"),
+    [
+        (shutil.rmtree, "there is none"),
+        (lambda run: (run / "run.json").unlink(), "run.json"),
+        (lambda run: (run / "run.json").write_text("{}"), "at the start of a run"),
+        (lambda run: (run / "summary.json").write_text("{"), "the summary of a run"),
+        (lambda run: (run / "scenario.toml").unlink(), "scenario.toml"),
+    ],
+)
+def test_what_is_no_run_folder_is_refused_in_one_line(tmp_path, mine, spoil, expected):
+    run(mine, out=tmp_path / "run")
+    spoil(tmp_path / "run")
+    with pytest.raises(BadInput, match=expected) as caught:
+        RepeatedRun(tmp_path / "run")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("logged", "kept", "ticks"), [(True, False, 7), (True, True, 20), (False, False, 20)])
+def test_a_run_that_was_killed_is_compared_as_far_as_it_came(tmp_path, mine, logged, kept, ticks):
+    """As SIGKILL leaves it: the folder of a run that was stepped, before it could write its summary."""
+    with Simulation(mine, out=tmp_path / "run") as simulation:
+        simulation.run(7)
+        shutil.copytree(tmp_path / "run", tmp_path / "killed")
+    assert (tmp_path / "killed" / DIGESTS).stat().st_size == 7 * DIGEST_BYTES
+    if not logged:
+        (tmp_path / "killed" / DIGESTS).unlink()
+    repetition = repeat(tmp_path / "killed", out=tmp_path / "again" if kept else None)
+    assert repetition.result.ticks == ticks
+    assert repetition.before is None
+    assert repetition.compared == (7 if logged else 0)
+    assert repetition.same is (True if logged else None)
+    assert repetition.why_not_all == "the run left no summary.json: it was killed, or still goes on"
+
+
+def test_a_process_that_was_killed_leaves_enough_to_repeat_its_run(tmp_path, mine):
+    process = started(mine, "--set", "duration_s=100", "--out", tmp_path / "run")
+    process.kill()
+    process.communicate()
+    assert not (tmp_path / "run" / "summary.json").exists()
+    ended = called(tmp_path / "run")
+    assert "the run left no summary.json: it was killed" in ended.stdout
+
+
+def test_a_run_that_an_agent_ended_is_repeated_up_to_there(tmp_path, mine):
+    path = mine.parent / "mine.py"
+    failing = "        if robots.time_s > 0.45:\n            raise ValueError('enough')\n        robots.drive"
+    path.write_text(FILE_AGENT.replace("        robots.drive", failing))
+    with pytest.raises(AgentFailed):
+        run(mine, out=tmp_path / "run")
+    repetition = repeat(tmp_path / "run")
+    assert repetition.same
+    assert repetition.result.ticks == 5
+    assert "the same run, bit for bit: 5 ticks, where it ended early: failed" in called(tmp_path / "run").stdout
+
+
+def test_the_first_tick_that_came_out_differently_is_named(tmp_path, mine):
+    run(mine, out=tmp_path / "run")
+    path = tmp_path / "run" / "files" / "mine.py"
+    path.write_text(FILE_AGENT.replace("0.5)", "0.5 if robots.time_s < 0.95 else 0.6)"))
+    repetition = repeat(tmp_path / "run")
+    assert (repetition.same, repetition.first_difference) == (False, 10)

@@ -1,0 +1,40 @@
+"""How the processes of runners share the cores of their machine."""
+
+import os
+from typing import Any
+
+import psutil
+import pytest
+
+from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.deploy import run
+from tests.integration.examples.test_examples import EXAMPLES
+
+SHORT = ["duration_s=0.5", "robots.flock.count=3"]
+
+
+class Policies:
+    """Observer that asks how the system schedules each runner."""
+
+    def __init__(self) -> None:
+        self.found = list[int]()
+
+    def begin(self, static: Static) -> None:
+        """Nothing to do."""
+
+    def see(self, truth: Truth) -> None:
+        """Ask, in every tick."""
+        nursery = [child for child in psutil.Process().children() if "swarmwire.agent.nursery" in child.cmdline()]
+        self.found = [os.sched_getscheduler(runner.pid) for process in nursery for runner in process.children()]
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        """No part of the summary."""
+        return {}
+
+
+@pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="the system has no scheduling in batches")
+@pytest.mark.parametrize(("realtime", "policy"), [(None, "SCHED_BATCH"), (2.0, "SCHED_OTHER")])
+def test_runners_take_turns_in_lockstep_and_start_at_once_in_real_time(realtime: float | None, policy: str) -> None:
+    policies = Policies()
+    run(EXAMPLES / "protocol" / "flock.toml", overrides=SHORT, runners=2, realtime=realtime, observers=[policies])
+    assert policies.found == [getattr(os, policy)] * 2

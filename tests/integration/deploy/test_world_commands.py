@@ -1,0 +1,163 @@
+"""`swarmwire world` and `swarmwire join`, as they are typed in two terminals: what each says, and with certificates."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from swarmwire.agent.joining import Joining, join
+from swarmwire.agent.runner import Inbox
+from swarmwire.comms.errors import RunnerLost
+from swarmwire.deploy import RunFolder, run
+from tests.support.deploy.commands import LOSSY, called, swarmwire
+from tests.support.deploy.pseudo_terminal import terminal
+
+SHORT = ("--set", "duration_s=2")
+
+
+@contextmanager
+def world(folder: Path, *arguments: str | Path) -> Generator["subprocess.Popen[str]"]:
+    """A world in a process of its own that is ended with the test."""
+    command = [sys.executable, "-m", "swarmwire.deploy", "world", LOSSY, *SHORT, "--out", folder, *arguments]
+    process = subprocess.Popen([*map(str, command)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        for stream in (process.stdout, process.stderr):
+            if stream is not None:
+                stream.close()
+
+
+def listens_at(process: "subprocess.Popen[str]") -> tuple[str, str]:
+    """Where a world listens, and what it says is to be typed elsewhere."""
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    while "listens at" not in line:
+        assert line, process.stderr and process.stderr.read()
+        line = process.stdout.readline()
+    found = re.search(r"listens at (\S+)[,;]", line)
+    assert found
+    return found[1], process.stdout.readline().strip()
+
+
+def test_two_terminals_make_the_same_run_as_one(tmp_path):
+    folder = tmp_path / "run"
+    with world(folder, "--listen", "tcp/127.0.0.1:0", "--observe", "tcp/127.0.0.1:0") as process:
+        endpoint, typed = listens_at(process)
+        assert typed == f"swarmwire join {endpoint} --robots 20"
+        first = subprocess.Popen(
+            [sys.executable, "-m", "swarmwire.agent.cli", "join", endpoint, "--robots", "5"],
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline().startswith("0 of 20 robots have agents; without: flock-0")
+            assert process.stdout.readline().startswith("5 of 20 robots have agents; without: flock-5")
+            second = swarmwire("join", endpoint, "--scenario", LOSSY)
+            assert (second.returncode, second.stderr.splitlines()[-1]) == (0, "the run is over")
+            out, errors = process.communicate(timeout=60.0)
+            assert first.wait(20.0) == 0
+        finally:
+            first.kill()
+            first.communicate()
+    assert process.returncode == 0
+    assert out.startswith("20 of 20 robots have agents\n")
+    assert len(re.findall(r" joined with .* before the first tick", errors)) == 2
+    summary = RunFolder(folder).summary
+    assert summary is not None
+    assert summary["trajectory_sha256"] == run(LOSSY, overrides=["duration_s=2"]).trajectory_sha256
+    assert [change["what"] for change in summary["runner_changes"]] == ["joined", "joined"]
+    assert swarmwire("repeat", folder).returncode == 0
+
+
+def test_a_run_that_cannot_be_observed_as_wanted_is_refused_before_anybody_joins(tmp_path):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        at = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        listening = ("--listen", "tcp/127.0.0.1:0", "--observe", at)
+        with world(tmp_path / "run", *listening) as process:
+            _, told = process.communicate()
+    assert process.returncode == 2
+    assert f"--observe: {at}: expected endpoints that are free" in told
+    assert "Traceback" not in told
+    assert not (tmp_path / "run").exists()
+
+
+def test_certificates_are_asked_for_beyond_this_machine(tmp_path, monkeypatch, capsys):
+    code, _, errors = called(monkeypatch, capsys, "world", LOSSY, "--listen", "tcp/0.0.0.0:0", "--out", tmp_path / "x")
+    assert code == 2
+    assert "reaches beyond this machine; expected ca, certificate and key, or insecure = true" in errors
+    assert not (tmp_path / "x").exists()
+    code, _, errors = called(monkeypatch, capsys, "join", "tcp/10.0.0.5:7447")
+    assert code == 2
+    assert "reaches beyond this machine" in errors
+
+
+@pytest.fixture
+def certs(tmp_path) -> Path:
+    folder = tmp_path / "certs"
+    assert swarmwire("certs", "init", folder).returncode == 0
+    for name, purpose in (("world", "world"), ("r1", "runner"), ("r2", "runner"), ("eye", "observer")):
+        done = swarmwire("certs", "issue", folder, name, "--for", purpose, "--host", "127.0.0.1")
+        assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_with_certificates_a_runner_is_who_its_own_says(tmp_path, certs):
+    with world(tmp_path / "run", "--listen", "tls/127.0.0.1:0", "--certs", certs, "--name", "world") as process:
+        endpoint, typed = listens_at(process)
+        assert typed == f"swarmwire join {endpoint} --robots 20 --certs DIR"
+        stranger = swarmwire("join", endpoint, "--certs", certs, "--name", "eye")
+        assert stranger.returncode == 1
+        assert "does not let eye in" in stranger.stderr
+        pem = ("--ca", certs / "ca.pem", "--certificate", certs / "r1.pem", "--key", certs / "r1.key")
+        liar = swarmwire("join", endpoint, *pem, "--name", "r2")
+        assert liar.returncode == 1
+        assert "may not let r2 in" in liar.stderr
+        played = swarmwire("join", endpoint, "--certs", certs, "--name", "r1")
+        assert (played.returncode, played.stderr.splitlines()[-1]) == (0, "the run is over")
+        _, errors = process.communicate(timeout=60.0)
+    assert "r1 joined with flock-0 … flock-19 (20 robots) before the first tick" in errors
+
+
+def test_in_a_terminal_it_shows_who_is_missing_and_ctrl_c_ends_the_waiting(tmp_path):
+    arguments = ("world", LOSSY, "--listen", "tcp/127.0.0.1:0", "--out", tmp_path / "run")
+    with terminal(*arguments) as window:
+        while "0 of 20 robots have agents" not in window.text:
+            assert window._read(), window.text
+        os.kill(window.process.pid, signal.SIGINT)
+        text = window.rest()
+    assert window.process.returncode == 130
+    assert "interrupted while it waited for its runners" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (("nonsense",), "expected endpoints such as"),
+        (("tcp/127.0.0.1:1", "--robots", "0"), "expected at least 1, got 0"),
+        (("tcp/127.0.0.1:1", "--robots", "1", "--names", "flock-0"), "expected only one of --robots and --names"),
+        (("tcp/127.0.0.1:1", "--name", "a/*"), "expected 1 to 63 letters"),
+        (("tcp/127.0.0.1:1", "--scenario", "no.toml"), "expected a file"),
+    ],
+)
+def test_what_cannot_be_joined_is_bad_input(monkeypatch, capsys, arguments, why):
+    code, _, errors = called(monkeypatch, capsys, "join", *arguments)
+    assert code == 2
+    assert why in errors
+
+
+def test_where_nobody_listens_it_says_so():
+    with pytest.raises(RunnerLost, match="runner a got no robots: nobody answers at tcp/127.0.0.1:1$"):
+        join(Joining("tcp/127.0.0.1:1", name="a", connect_s=0.2), Inbox(), print)

@@ -1,0 +1,66 @@
+"""What a robot tells reaches the agent in the units and with the signs of its body's sheet."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.sheets import SHEETS
+from tests.support.robots.made_up_readings import readings
+from tests.support.robots.properties import ON_ONE_RIG
+from tests.support.robots.rig import Rig
+from tests.support.robots.rigs import RIGS
+
+
+def with_sense(name: str) -> pytest.MarkDecorator:
+    """Only rigs that do not lack it."""
+    return pytest.mark.parametrize("rig", [rig for rig, kind in RIGS.items() if name not in kind.lacks], indirect=True)
+
+
+def test_a_driver_gives_all_senses_but_those_that_it_is_known_to_lack(connected: Rig) -> None:
+    assert connected.driver.gives == SHEETS.keys() - connected.lacks
+    assert connected.driver.gives <= connected.body.senses.keys()
+    assert connected.driver.gives <= connected.gateway.senses
+
+
+@ON_ONE_RIG
+@given(data=st.data())
+def test_a_reading_comes_back_as_exactly_as_the_wire_can_tell_it(connected: Rig, data: st.DataObject) -> None:
+    connected.come_back(data.draw(readings(connected.body, connected.driver.gives)))
+
+
+def test_only_senses_that_were_asked_for_are_read(connected: Rig) -> None:
+    for name in connected.driver.gives:
+        assert {field.partition(".")[0] for field in connected.driver.sense(frozenset({name}))} == {name}
+    assert connected.driver.sense(frozenset()) == {}
+
+
+@with_sense("proximity")
+def test_a_wall_on_the_left_is_read_on_the_left(connected: Rig) -> None:
+    proximity = connected.body.proximity
+    assert proximity is not None
+    on_the_left = proximity.angle_rad > 0.0
+    sensed = connected.come_back({"proximity.value": 0.5 * on_the_left[None, :]})
+    assert (sensed["proximity.value"][0, on_the_left] > 0.4).all()
+    assert (sensed["proximity.value"][0, ~on_the_left] < 0.1).all()
+
+
+@with_sense("compass")
+@pytest.mark.parametrize("heading_rad", [0.0, 0.5 * pi, -0.5 * pi, 3.0])
+def test_a_heading_is_counted_counter_clockwise_from_the_arenas_x(connected: Rig, heading_rad: float) -> None:
+    sensed = connected.come_back({"compass.heading_rad": np.array([heading_rad])})
+    assert sensed["compass.heading_rad"][0] == pytest.approx(heading_rad, abs=1e-5)
+
+
+@with_sense("odometry")
+@ON_ONE_RIG
+@given(gone=st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), min_size=1, max_size=20))
+def test_odometry_adds_up_however_far_the_wheels_roll(connected: Rig, gone: list[tuple[float, float]]) -> None:
+    left_m, right_m = (
+        float(connected.driver.sense(frozenset({"odometry"}))[f"odometry.{side}_m"][0]) for side in ("left", "right")
+    )
+    for left, right in gone:
+        left_m, right_m = left_m + left * connected.farthest_m, right_m + right * connected.farthest_m
+        connected.come_back({"odometry.left_m": np.array([left_m]), "odometry.right_m": np.array([right_m])})

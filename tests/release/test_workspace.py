@@ -1,0 +1,145 @@
+"""What holds for the five parts together: versions, arrows, and the laws that lint enforces."""
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PARTS = ("comms", "agent", "world", "metrics", "deploy")
+HEAVY = ("matplotlib", "numba", "pandas", "polars", "pyarrow", "pydantic", "pymunk", "rerun", "rich", "scipy", "typer")
+
+
+def project(folder: str) -> dict[str, Any]:
+    return tomllib.loads((ROOT / folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+def requirements(of: dict[str, Any]) -> list[str]:
+    extras = of.get("optional-dependencies", {})
+    return [*of.get("dependencies", []), *(line for lines in extras.values() for line in lines)]
+
+
+def distribution(requirement: str) -> str:
+    """The name in a requirement such as `swarmwire-comms[air]==0.1.0`."""
+    return requirement.split("==", maxsplit=1)[0].split(">=", maxsplit=1)[0].split("[", maxsplit=1)[0].strip()
+
+
+def run_python(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=100)
+
+
+def lint(code: str, path: str) -> str:
+    """What ruff, under the project's settings, says of this code if it stood at `path`."""
+    command = [sys.executable, "-m", "ruff", "check", "--no-cache", "--output-format=concise", "--stdin-filename"]
+    done = subprocess.run(
+        [*command, path, "-"], input=code, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode in {0, 1}, done.stderr
+    return done.stdout
+
+
+def test_one_version_number_everywhere() -> None:
+    versions = {folder: project(folder)["version"] for folder in (".", *PARTS)}
+    assert len(set(versions.values())) == 1, versions
+
+
+@pytest.mark.parametrize("folder", [".", *PARTS])
+def test_parts_pin_one_another_exactly(folder: str) -> None:
+    version = project(folder)["version"]
+    ours = [line for line in requirements(project(folder)) if distribution(line).startswith("swarmwire")]
+    assert all(line.endswith(f"=={version}") for line in ours), ours
+
+
+def test_the_root_distribution_brings_all_parts() -> None:
+    brought = {distribution(line) for line in project(".")["dependencies"]}
+    assert brought == {f"swarmwire-{part}" for part in PARTS}
+
+
+@pytest.mark.parametrize("folder", ["world", "metrics"])
+def test_world_and_metrics_depend_on_comms_alone_of_ours(folder: str) -> None:
+    ours = {distribution(line) for line in requirements(project(folder)) if "swarmwire" in line}
+    assert ours == {"swarmwire-comms"}
+
+
+def test_an_agent_depends_on_nothing_but_comms() -> None:
+    assert [distribution(line) for line in project("agent")["dependencies"]] == ["swarmwire-comms"]
+
+
+def test_comms_depends_on_none_of_ours() -> None:
+    assert not any("swarmwire" in line for line in requirements(project("comms")))
+
+
+def test_the_namespace_package_has_no_init() -> None:
+    assert not [str(path) for part in PARTS for path in (ROOT / part / "swarmwire").glob("__init__.py*")]
+
+
+def test_every_part_is_typed_for_its_users() -> None:
+    assert all((ROOT / part / "swarmwire" / part / "py.typed").is_file() for part in PARTS)
+
+
+def test_the_licence_is_the_whole_apache_licence() -> None:
+    text = (ROOT / "LICENSE").read_text(encoding="utf-8")
+    assert "Apache License" in text
+    assert "END OF TERMS AND CONDITIONS" in text
+    assert {project(folder)["license"] for folder in (".", *PARTS)} == {"Apache-2.0"}
+
+
+def test_the_lock_names_no_index_but_the_public_one() -> None:
+    packages = tomllib.loads((ROOT / "uv.lock").read_text(encoding="utf-8"))["package"]
+    registries = {package["source"].get("registry", "https://pypi.org/simple") for package in packages}
+    assert registries == {"https://pypi.org/simple"}
+
+
+def test_a_robot_needs_no_compiler_and_no_physics() -> None:
+    """All of agent, and of comms all but the kernels, loads where the heavy libraries are not installed."""
+    done = run_python(f"""
+import importlib, pkgutil, sys
+
+for heavy in {HEAVY}:
+    sys.modules[heavy] = None  # importing it raises ImportError
+import swarmwire.agent, swarmwire.comms
+
+compiled = "air borrowing cells draws_compiled geometry grid ground obstacle_cells"
+kernels = tuple("swarmwire.comms." + name for name in compiled.split())
+for package in (swarmwire.agent, swarmwire.comms):
+    for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
+        if not module.name.startswith(kernels):
+            importlib.import_module(module.name)
+""")
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import time\n\ntime.sleep(1)\n",
+        "from time import sleep as rest\n\nrest(1)\n",
+        "import time\n\nprint(time.monotonic_ns())\n",
+        "from time import perf_counter\n\nprint(perf_counter())\n",
+        "from datetime import UTC, datetime\n\nprint(datetime.now(UTC))\n",
+        "import random\n\nprint(random.random())\n",
+        "import numpy as np\n\nprint(np.random.default_rng(1))\n",
+        "import pickle\n\nprint(pickle)\n",
+    ],
+)
+@pytest.mark.parametrize("part", PARTS)
+def test_no_part_reads_the_time_sleeps_draws_unkeyed_or_unpickles(part: str, code: str) -> None:
+    assert "TID251" in lint(code, f"{part}/swarmwire/{part}/newcomer.py")
+
+
+def test_the_clock_alone_may_read_the_time() -> None:
+    assert "TID251" not in lint("import time\n\nprint(time.perf_counter_ns())\n", "comms/swarmwire/comms/clock.py")
+
+
+@pytest.mark.parametrize("folder", ["tests", "benchmarks"])
+def test_tests_and_benchmarks_use_a_seeded_generator_but_never_sleep(folder: str) -> None:
+    assert "TID251" not in lint("import numpy as np\n\nprint(np.random.default_rng(1))\n", f"{folder}/newcomer.py")
+    assert "TID251" in lint("import time\n\ntime.sleep(1)\n", f"{folder}/newcomer.py")
+
+
+@pytest.mark.parametrize("name", ["run", "sync", "uv"])
+def test_the_scripts_of_continuous_integration_are_executable(name: str) -> None:
+    assert (ROOT / ".ci" / name).stat().st_mode & 0o111

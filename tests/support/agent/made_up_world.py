@@ -1,0 +1,81 @@
+"""The agents' endpoint of a run that is played by hand: what it answers to runners is up to the test."""
+
+# pyright: reportMissingModuleSource=false
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from typing import Any
+
+import msgpack
+import zenoh
+from zenoh.handlers import Callback
+
+from swarmwire.agent.loading import agent_sha256, load_agent
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.wire.keys import Keys, runner_of
+from swarmwire.comms.wire.offer import Offer, OfferedGroup
+from swarmwire.comms.wire.sessions import listens_at, open_world
+from tests.support.agent.hosts import assignment, group, spec
+
+REFUSED = "refused by the test"
+NOTHING = b""  # an answer that is none
+ASSIGNED = assignment(group(spec("Counter"), [0, 1]))
+OFFERED = OfferedGroup("flock", spec("Counter"), agent_sha256(load_agent(spec("Counter"))), 2, ("flock-0", "flock-1"))
+OFFER = Offer("run1", "by hand", "", "1.2.3", 10, None, (OFFERED,)).encode()
+
+
+def given(**change: Any) -> bytes:
+    """The answer to a runner that joins."""
+    return msgpack.packb({"v": frames.VERSION, **ASSIGNED.as_mapping(), "memory": None, **change})
+
+
+class MadeUpWorld:
+    """Answers with the offer and the robots that it is told; None: it refuses. Frames follow once a runner is ready."""
+
+    def __init__(self, session: zenoh.Session, run: str, offer: bytes | None, join: bytes | None) -> None:
+        self.keys, self.endpoint = Keys(run), listens_at(session)[0]
+        self.asked: list[bytes] = []
+        self.answers: list[frames.Frame] = []
+        self.to_send: list[bytes] = []
+        self._session, self._replies = session, {self.keys.any_offer: offer, self.keys.any_join: join}
+        self._declared = (
+            session.declare_queryable(self.keys.any_offer, Callback(self._offer, indirect=False)),
+            session.declare_queryable(self.keys.any_join, Callback(self._join, indirect=False)),
+            session.declare_subscriber(self.keys.any_answer, Callback(self._answer, indirect=False)),
+            session.liveliness().declare_token(self.keys.world),
+        )
+
+    def _offer(self, query: zenoh.Query) -> None:
+        self._reply(query, self.keys.any_offer)
+
+    def _join(self, query: zenoh.Query) -> None:
+        assert query.payload is not None
+        self.asked.append(query.payload.to_bytes())
+        self._reply(query, self.keys.any_join)
+
+    def _reply(self, query: zenoh.Query, key: str) -> None:
+        answer = self._replies[key]
+        with query:
+            if answer is None:
+                query.reply_err(REFUSED)
+            elif answer != NOTHING:
+                query.reply(query.key_expr, answer)
+
+    def _answer(self, sample: zenoh.Sample) -> None:
+        frame = frames.decode(sample.payload.to_bytes())
+        self.answers.append(frame)
+        if self.to_send:
+            data = self.to_send.pop(-1 if frame.kind == "failed" else 0)  # after a failure nothing but the end
+            self._session.put(self.keys.frame(runner_of(str(sample.key_expr))), data)
+
+
+@contextmanager
+def made_up_world(
+    offer: bytes | None = OFFER,
+    join: bytes | None = given(),
+    run: str = "run1",
+) -> Generator[MadeUpWorld]:
+    """A world at a port that the system chooses."""
+    with closed_after(open_world("tcp/127.0.0.1:0", 10.0)) as session:
+        yield MadeUpWorld(session, run, offer, join)

@@ -1,0 +1,59 @@
+"""An agent backend in this process that encodes and decodes every frame, as runners behind zenoh do.
+
+The robots are split among `runners` parts. Each part is a runner's own protocol code fed with bytes, and the world's side
+is the real lockstep; only zenoh and the processes are missing. Answers arrive in another order in every tick.
+"""
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import numpy as np
+import zenoh
+
+from swarmwire.agent.runner import Inbox, answers, given_robots
+from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.world.crews.lockstep import Lockstep
+from swarmwire.world.crews.split_robots import split
+
+
+class EncodedCrew:
+    """A Crew of `runners` runners in this process."""
+
+    def __init__(self, assignment: Assignment, runners: int = 3, *, backwards: bool = False) -> None:
+        """`backwards` gives the first runner the last robots."""
+        parts = split(assignment, runners)
+        self._lockstep = Lockstep(parts[::-1] if backwards else parts)
+        self._runners: dict[str, tuple[Inbox, Iterator[bytes]]] = {}
+        self._order = np.random.default_rng(1)
+        self._parts = len(parts)
+
+    def start(self) -> None:
+        """Let each runner join, decode its robots and make its agents."""
+        for number in range(self._parts):
+            name, inbox = f"r{number}", Inbox()
+            assignment, memory = given_robots(self._lockstep.join(name, JoinRequest().encode()))
+            self._runners[name] = inbox, answers(assignment, memory, inbox)
+            self._lockstep.answer(name, next(self._runners[name][1]))
+
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+        """One frame to every runner, one answer from each, in a random order."""
+        answered: list[tuple[str, bytes]] = []
+        for name, data in self._lockstep.open_tick(tick, senses, heard, outcomes):
+            inbox, its = self._runners[name]
+            inbox.put_frame(SimpleNamespace(payload=zenoh.ZBytes(data)))
+            answered.append((name, next(its)))
+        for at in self._order.permutation(len(answered)):
+            self._lockstep.answer(*answered[at])
+        return self._lockstep.take()
+
+    def counts(self) -> dict[str, int]:
+        """Frames that were refused, by fault."""
+        return self._lockstep.counts()
+
+    def close(self) -> None:
+        """Forget the agents."""
+        self._runners.clear()

@@ -1,0 +1,5 @@
+"""What the example takes of sensor_msgs.msg."""
+
+from tests.support.comms.robots.ros2.independent import LaserScan
+
+__all__ = ["LaserScan"]

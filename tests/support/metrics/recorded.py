@@ -1,0 +1,58 @@
+"""Recorders fed by hand, and a clock that a test sets."""
+
+from pathlib import Path
+
+import numpy as np
+
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.truth import Finished
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.record.recorders import record_summary, recorders
+from tests.support.clocks import StillClock
+from tests.support.metrics.truths import truth
+
+
+def record(folder: Path, of, ticks, clock=None, **options):
+    """Feed these ticks to all recorders of a run folder; the summary's `record`."""
+    metrics = Metrics()
+    observers = [metrics, *recorders(folder, metrics, clock or StillClock(), **options)]
+    for observer in observers:
+        observer.begin(of)
+    for seen in ticks:
+        for observer in observers:
+            observer.see(seen)
+    parts = {}
+    for observer in observers:
+        parts.update(observer.end(None))
+    return record_summary(parts)
+
+
+def wandering(of, ticks, seed=5, **fields):
+    """Robots that are somewhere else in each tick, and named a state."""
+    rng = np.random.default_rng(seed)
+    rows = of.arenas * of.robots
+    states = ("", "search", "home")
+    for tick in range(ticks):
+        yield truth(
+            of,
+            tick,
+            pose=rng.uniform(-3.0, 3.0, (rows, 3)),
+            velocity=rng.normal(size=(rows, 3)),
+            command=rng.normal(size=(rows, 3)),
+            alive=rng.random(rows) < 0.8,
+            state=rng.integers(0, 3 if tick else 1, rows),
+            states=states if tick else states[:1],
+            **fields,
+        )
+
+
+def links(
+    sender, receiver, sequence, on_air_at_ns, fate=Fate.HEARD, arena=0, tag=0x1A2B, receivers=1, rssi_dbm=None, to=-1
+):
+    """Rows of `Finished`: lists or a number for all."""
+    columns = np.broadcast_arrays(arena, sender, receiver, receivers, to, sequence, on_air_at_ns, fate, tag)
+    arena, sender, receiver, receivers, to, sequence, on_air, fate, tag = (
+        np.array(c, np.int64).ravel() for c in columns
+    )
+    sent, final, size = on_air - 1, on_air + 1000, np.full(len(sender), 10)
+    return Finished(arena, sender, receiver, receivers, to, sequence, sent, on_air, final, fate, size, tag, rssi_dbm)

@@ -1,0 +1,105 @@
+"""Swarms to try metrics on, and the distances in them, worked out without the code under test."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from hypothesis import strategies as st
+
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.truth import Group, Static, Truth
+from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.metrics import Metrics
+from tests.support.metrics.truths import static, truth
+
+Array = np.ndarray[Any, Any]
+
+
+@dataclass(frozen=True)
+class Swarm:
+    of: Static
+    pose: Array  # (rows, 3)
+    alive: Array  # (rows,)
+
+    def seen(self, tick: int = 0, **fields: Any) -> Truth:
+        return truth(self.of, tick, pose=self.pose, alive=self.alive, **fields)
+
+    @property
+    def arenas(self) -> Iterator[tuple[Array, Array]]:
+        """Poses and radii of the robots alive of each arena."""
+        radius_m = np.concatenate([[g.body.radius_m] * (g.stop - g.start) for g in self.of.groups])
+        for own, living in zip(np.split(self.pose, self.of.arenas), np.split(self.alive, self.of.arenas), strict=True):
+            yield own[living], radius_m[living]
+
+    def shortest(self, away_m: Array) -> Array:
+        """The shortest of the images of displacements (..., 2), over the sides of a torus."""
+        if self.of.boundary != "torus":
+            return away_m
+        images = np.stack([away_m + turns * np.array(self.of.arena_size_m) for turns in (-2, -1, 0, 1, 2)])
+        return np.take_along_axis(images, np.abs(images).argmin(axis=0)[None], axis=0)[0]
+
+    def apart_m(self, pose: Array) -> Array:
+        """The distance of each to each, (n, n)."""
+        away = self.shortest(pose[None, :, :2] - pose[:, None, :2])
+        return np.hypot(away[..., 0], away[..., 1])
+
+
+def told(metric: Metric | str, *ticks: Truth, of: Static) -> list[float]:
+    """What the metric says of each arena in the last of these ticks."""
+    metrics = Metrics([metric])
+    metrics.begin(of)
+    for seen in ticks:
+        metrics.see(seen)
+    (latest,) = metrics.latest.values()
+    return latest.tolist()
+
+
+def said(metric: Metric | str, swarm: Swarm) -> list[float]:
+    return told(metric, swarm.seen(), of=swarm.of)
+
+
+def stand(*at: Any, boundary: str = "walls", arenas: int = 1) -> Swarm:
+    """Living e-pucks at these x, y or x, y, heading, in an arena of 8 x 6 m."""
+    of = replace(static(len(at) // arenas, arenas=arenas), boundary=boundary)
+    pose = np.zeros((len(at), 3))
+    pose[:, : len(at[0])] = at
+    return Swarm(of, pose, np.ones(len(at), np.bool_))
+
+
+def rolled(place_m: Array) -> Array:
+    """Places (..., 2) brought back into the arena of 8 x 6 m, as on a torus."""
+    half = np.array([4.0, 3.0])
+    return (place_m + half) % (2.0 * half) - half
+
+
+def mixed(of: Static, first: int) -> Static:
+    """The same, of which robots from `first` on are foot-bots."""
+    (flock,) = of.groups
+    larger = Group("larger", load_body("footbot"), first, flock.stop)
+    return replace(of, groups=(replace(flock, stop=first), larger))
+
+
+@st.composite
+def swarms(draw: st.DrawFn, least: int = 1, most: int = 14) -> Swarm:
+    """Several arenas with walls or on a torus, two kinds of bodies, some dead; spread out, in a heap, or on a grid."""
+    robots, arenas = draw(st.integers(least, most)), draw(st.integers(1, 3))
+    of = mixed(static(robots, arenas=arenas), draw(st.integers(1, robots)))
+    of = replace(of, boundary=draw(st.sampled_from(["walls", "torus"])))
+    rng = np.random.default_rng(draw(st.integers(0, 10**6)))
+    spread, grid_m = draw(st.sampled_from([1.0, 0.3, 0.05])), draw(st.sampled_from([0.0, 0.5]))
+    middle = rng.uniform(-0.5, 0.5, 2)
+    unit = (middle + spread * rng.uniform(-0.5, 0.5, (arenas * robots, 2)) + 0.5) % 1.0 - 0.5
+    place = unit * of.arena_size_m
+    if grid_m:  # some at one place, and some at a half of the side from each other
+        place = np.floor(place / grid_m) * grid_m
+    pose = np.column_stack([place, rng.uniform(-np.pi, np.pi, arenas * robots)])
+    return Swarm(of, pose, rng.random(arenas * robots) < draw(st.sampled_from([1.0, 0.7, 0.1])))
+
+
+def moved(swarm: Swarm, by_m: tuple[float, float], turn_rad: float = 0.0) -> Swarm:
+    """The swarm turned around the origin and moved; on a torus it must not be turned."""
+    c, s = np.cos(turn_rad), np.sin(turn_rad)
+    place = swarm.pose[:, :2] @ np.array([[c, s], [-s, c]]) + by_m
+    place = rolled(place) if swarm.of.boundary == "torus" else place
+    return replace(swarm, pose=np.column_stack([place, swarm.pose[:, 2] + turn_rad]))

@@ -1,0 +1,195 @@
+"""A rig: a driver opened against its gateway, with readings of the test's choice, and what the gateway was told.
+
+What holds for every driver is tried on all rigs. To add a driver: a subclass of `Rig` that says what of the wire a test
+must know (how finely readings come back, within which limits), which senses the driver `lacks`, and its line in `RIGS`
+of `rigs.py`. Faults of the link are tried on each `OwnWireRig`, whose driver counts `garbage`, `silences`,
+`hung_up` and `late_answers`.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from swarmwire.agent.drivers.driver import Driver, DriverLost
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.clock import NS_PER_S, WallClock
+from swarmwire.world.gateways.gateway import Gateway
+from tests.support.waiting import until
+
+Fields = dict[str, FloatArray]  # "sense.field" -> (1,) or (1, width): of the driver's robot
+
+NEIGHBOUR = 1  # the other robot of the gateway's group, whose readings are others
+
+
+@dataclass
+class Told:
+    """What the driver's robot was told, since somebody looked last."""
+
+    speeds: list[tuple[float, float]] = field(default_factory=list)  # m/s, rad/s to the left
+    leds: dict[int, int] = field(default_factory=dict)  # place -> 0xRRGGBB
+
+
+class Rig(ABC):
+    """A gateway of two robots and, once connected, the driver of the first.
+
+    Attributes:
+        lacks: senses of sheets that the driver does not give; all others it must.
+        resolution: by "sense.field", how far from the published one a reading may be.
+        limits: by "sense.field", the least and the greatest that the wire can tell; others have none.
+        speed_resolution: the same of commands, in m/s and rad/s.
+        farthest_m: how far a wheel may roll in a tick for the wire to tell it.
+        silent_s: the driver was told to call a robot lost that is silent for so long.
+        connect_s: drivers that are made wait so long for their robot.
+    """
+
+    lacks: ClassVar[frozenset[str]]
+    resolution: ClassVar[dict[str, float]]
+    limits: ClassVar[dict[str, tuple[float, float]]] = {}
+    speed_resolution: ClassVar[tuple[float, float]]
+    farthest_m: ClassVar[float] = 3.0
+    silent_s: ClassVar[float] = 0.3
+
+    def __init__(self) -> None:
+        self.connect_s = 10.0
+        self.clock, self.tick = WallClock(), 0
+        self.body = self.made_body()
+        self.gateway = self.made_gateway("")
+        self.address = self.gateway.open()[0]
+        self._drivers: list[Driver] = []
+        self.driver: Driver
+
+    @abstractmethod
+    def made_body(self) -> Body:
+        """The body of both robots."""
+
+    @abstractmethod
+    def made_gateway(self, address: str) -> Gateway:
+        """A gateway of two robots, not yet open; empty: at addresses of its own choice."""
+
+    @abstractmethod
+    def made_driver(self, address: str) -> Driver:
+        """A driver, not yet open."""
+
+    def reopen(self) -> None:
+        """A gateway at the addresses of the one that was closed."""
+        self.gateway = self.made_gateway(self.address)
+        assert self.gateway.open()[0] == self.address
+
+    def connect(self, address: str = "") -> Driver:
+        """Open a driver, of the gateway's first robot unless told otherwise."""
+        self.driver = self.made_driver(address or self.address)
+        self._drivers.append(self.driver)
+        self.driver.open()
+        return self.driver
+
+    def publish(self, fields: Fields, *, alive: bool = True) -> None:
+        """Readings of the driver's robot; its neighbour reads them upside down."""
+        both = {name: np.concatenate([value, -value]) for name, value in fields.items()}
+        self.tick += 1
+        self.gateway.publish(self.tick * NS_PER_S // 10, both, np.array([alive, True]))
+
+    def come_back(self, fields: Fields) -> Fields:
+        """What the driver senses of these readings once they have come; fails if they do not."""
+        expected = {name: self.expected(name, value) for name, value in fields.items()}
+        senses = frozenset(name.partition(".")[0] for name in fields)
+        sensed: Fields = {}
+
+        def came() -> bool:
+            self.publish(fields)  # anew, as a world does: a topic may drop one
+            try:
+                sensed.update(self.driver.sense(senses))
+            except DriverLost:  # a machine that is busy holds up both ends, and it is found again by the next
+                return False
+            return all(self.near(name, sensed[name], value) for name, value in expected.items())
+
+        try:
+            until(came)
+        except AssertionError:
+            raise AssertionError(f"published {expected}, sensed {sensed}") from None
+        return sensed
+
+    def expected(self, name: str, value: FloatArray) -> FloatArray:
+        """The nearest to a reading that the wire can tell."""
+        low, high = self.limits.get(name, (-np.inf, np.inf))
+        return np.where(np.isfinite(value), np.clip(value, low, high), value)
+
+    def near(self, name: str, sensed: FloatArray, expected: FloatArray) -> bool:
+        """Whether they are the same but for the wire's resolution."""
+        if sensed.shape != expected.shape or sensed.dtype != expected.dtype:
+            return False
+        ends = np.isinf(expected)
+        off = np.where(ends, 0.0, sensed) - np.where(ends, 0.0, expected)
+        if name == "compass.heading_rad":
+            off = np.arctan2(np.sin(off), np.cos(off))
+        return bool((np.where(ends, sensed == expected, np.abs(off) <= self.resolution[name])).all())
+
+    def told(self) -> Told:
+        """What the driver's robot was told since the last call."""
+        commands, told = self.gateway.take(), Told()
+        if commands.drive[0]:
+            told.speeds.append((float(commands.linear_mps[0]), float(commands.angular_radps[0])))
+        leds = commands.leds
+        told.leds.update({int(w): int(c) for r, w, c in zip(leds.rows, leds.which, leds.rgb, strict=True) if r == 0})
+        assert not commands.drive[NEIGHBOUR]
+        return told
+
+    def until_told(self, linear_mps: float, angular_radps: float) -> None:
+        """Wait until the robot was told these speeds last; fails if it is not."""
+        last: list[Any] = []
+
+        def is_told() -> bool:
+            last[:] = self.told().speeds or last
+            return bool(last) and self.same_speeds(last[0], (linear_mps, angular_radps))
+
+        try:
+            until(is_told)
+        except AssertionError:
+            raise AssertionError(f"expected {linear_mps, angular_radps}, told {last}") from None
+
+    def same_speeds(self, one: tuple[float, float], other: tuple[float, float]) -> bool:
+        """Whether they are the same but for the wire's resolution."""
+        return all(abs(a - b) <= off for a, b, off in zip(one, other, self.speed_resolution, strict=True))
+
+    def close(self) -> None:
+        """End whatever still runs."""
+        for driver in self._drivers:
+            driver.close()
+        self.gateway.close()
+
+
+class OwnWireRig(Rig):
+    """A rig on whose wire is this project's own to read, over TCP."""
+
+    @abstractmethod
+    def address_of_link(self) -> tuple[str, int]:
+        """Where a TCP proxy has to connect to."""
+
+
+def readings(travel_m: float) -> Fields:
+    """Odometry of wheels that rolled so far."""
+    return {"odometry.left_m": np.array([travel_m]), "odometry.right_m": np.array([travel_m])}
+
+
+def opened(driver: Driver) -> bool:
+    """Whether the driver could be opened."""
+    try:
+        driver.open()
+    except DriverLost:
+        return False
+    return True
+
+
+def sense_until_lost(rig: Rig) -> None:
+    """Read on until the driver says that its robot is lost."""
+
+    def lost() -> bool:
+        try:
+            rig.driver.sense(rig.driver.gives)
+        except DriverLost:
+            return True
+        return False
+
+    until(lost)

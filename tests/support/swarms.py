@@ -1,0 +1,124 @@
+"""Peers of a robots' network on this machine, with ports that the system chose, and radios that hear one another."""
+
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+import zenoh
+
+from swarmwire.agent.radios.radio_log import HeardPacket, NoRadioLog, SentPacket
+from swarmwire.agent.radios.zenoh_radio import ZenohRadio
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.messages import Message, f4
+from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.wire.closing import close_session
+from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.swarm_keys import SwarmKeys
+from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm
+from tests.support.waiting import until
+
+ANY_PORT = ("tcp/127.0.0.1:0",)
+ROBOTS = ("flock-0", "flock-1", "flock-2")
+KEYS = SwarmKeys("test")
+MOST_BYTES = 100
+PROBE = KEYS.radio("probe", 0)  # no robot of the swarm
+
+
+class Word(Message):
+    """A message of 6 bytes."""
+
+    number: f4
+
+
+class Wide(Message):
+    """Another message, of 10 bytes."""
+
+    x_m: f4
+    y_m: f4
+
+
+class KeptLog(NoRadioLog):
+    """What a radio told its log."""
+
+    def __init__(self) -> None:
+        self.heard_packets: list[HeardPacket] = []
+        self.sent_packets: list[SentPacket] = []
+
+    def heard(self, packet: HeardPacket) -> None:
+        self.heard_packets.append(packet)
+
+    def sent(self, packet: SentPacket) -> None:
+        self.sent_packets.append(packet)
+
+
+@contextmanager
+def peers(count: int) -> Generator[list[zenoh.Session]]:
+    """So many peers, each linked with all others, or about to be."""
+    sessions: list[zenoh.Session] = []
+    endpoints: tuple[str, ...] = ()
+    try:
+        for _ in range(count):
+            network = Network(listen=ANY_PORT, connect=endpoints)
+            sessions.append(open_swarm(network))
+            endpoints += endpoints_of(sessions[-1], network)
+        yield sessions
+    finally:
+        for session in sessions:
+            close_session(session)
+
+
+def radio(session: zenoh.Session, own: str, clock=None, robots: Sequence[str] = ROBOTS, **given) -> ZenohRadio:
+    """An open radio of a robot."""
+    made = ZenohRadio(session, KEYS, robots, own, MOST_BYTES, clock or WallClock(), **given)
+    made.open()
+    return made
+
+
+@contextmanager
+def radios(count: int = 2, **given) -> Generator[list[ZenohRadio]]:
+    """Radios of the first robots of the swarm, each of which hears all others."""
+    with peers(count) as sessions:
+        made = [radio(session, own, **given) for session, own in zip(sessions, ROBOTS, strict=False)]
+        for session, its in zip(sessions, made, strict=True):
+            meet(session, [other for other in made if other is not its])
+        yield made
+
+
+def meet(session: zenoh.Session, others: list[ZenohRadio]) -> None:
+    """Return once each of the others hears what this peer puts, and nothing of it is on its way any more."""
+
+    def reached() -> bool:
+        session.put(PROBE, b"")
+        for other in others:
+            other.heard(0)
+        return all(
+            other.counts().get("packets_of_unknown", 0) > its for other, its in zip(others, unknown, strict=True)
+        )
+
+    unknown = [other.counts().get("packets_of_unknown", 0) for other in others]
+    until(reached)
+    large = [other.counts().get("packets_oversized", 0) for other in others]
+    session.put(PROBE, bytes(2 * MOST_BYTES))  # counted as soon as it arrives, and last
+    for other, its in zip(others, large, strict=True):
+        until(lambda other=other, its=its: other.counts().get("packets_oversized", 0) > its)
+        other.heard(0)
+
+
+def words(*numbers: float, to: int = BROADCAST, row: int = 0) -> Sent:
+    """A packet with each of these numbers."""
+    payloads = Payloads.of([Word(number=number).encode() for number in numbers])
+    return Sent(np.full(len(numbers), row), np.full(len(numbers), to), payloads)
+
+
+def heard_by(of, packets: int, now_ns: int = 0) -> list[tuple[int, int, float]]:
+    """Sender, sequence and number of so many words that a radio hears."""
+    found: list[tuple[int, int, float]] = []
+
+    def all_there() -> bool:
+        heard, _ = of.heard(now_ns)
+        its = zip(heard.sender.tolist(), heard.sequence.tolist(), heard.payload.tolist(), strict=True)
+        found.extend((sender, number, Word.decode(heard.payloads.row(at)).number) for sender, number, at in its)
+        return len(found) >= packets
+
+    until(all_there)
+    return found

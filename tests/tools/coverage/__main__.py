@@ -1,0 +1,47 @@
+"""How much of comms, world and agent the tests run: `python -m tests.tools.coverage`, or `make coverage`.
+
+Twice: tests of kernels with these as plain Python, in which they can be looked at, and tests of all else as users run
+them. What both saw is put together. It fails if a test does, or if too few lines or branches were run.
+"""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.tools.coverage.counted import PARTS, Counted, counted
+
+DATA = Path(".coverage")
+ENOUGH = Counted(lines=0.95, branches=0.90)
+# A worker that is killed at a time-out takes along what it has seen: the limit is for those that hang for ever.
+PYTEST = ["-m", "pytest", "-q", "-m", "not slow", "-n", "2", "--dist", "worksteal", "--timeout", "900"]
+AGAIN = ["--reruns", "1", "--only-rerun", "ZError", "--only-rerun", "it did not come to hold"]  # as `make test`
+PLAIN = ["-p", "tests.tools.coverage.plain_kernels", "tests/unit/comms", "tests/unit/world"]
+NETWORKED = [f"tests/integration/{part}" for part in ("agent", "robots", "comms", "world")]
+THREADS = ["-p", "tests.tools.coverage.network_threads"]
+AS_USED = [*THREADS, "PLACEHOLDER]
+
+
+def main() -> int:
+    """Run, put together, and tell; 1 if a test failed or there was too little."""
+    shutil.rmtree(DATA, ignore_errors=True)
+    DATA.mkdir()
+    failed = _coverage("run", *PYTEST, *PLAIN) + _coverage("run", *PYTEST, *AGAIN, *AS_USED)
+    _coverage("combine", "-q")
+    _coverage("json", "-q", "-o", str(DATA / "all.json"))
+    _coverage("html", "-q", "-d", str(DATA / "pages"))
+    of_parts = counted(DATA / "all.json")
+    for name in (*PARTS, "together"):
+        print(f"{name:9} lines {of_parts[name].lines:6.1%}  branches {of_parts[name].branches:6.1%}")
+    enough = all(of.lines >= ENOUGH.lines and of.branches >= ENOUGH.branches for of in of_parts.values())
+    if not enough:
+        print(f"expected {ENOUGH.lines:.0%} of lines and {ENOUGH.branches:.0%} of branches of each; see {DATA}/pages")
+    return 0 if enough and not failed else 1
+
+
+def _coverage(*arguments: str) -> int:
+    return subprocess.run([sys.executable, "-m", "coverage", *arguments], check=False).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())

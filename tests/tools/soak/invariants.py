@@ -1,0 +1,154 @@
+"""What holds of every run, whatever happened to it: each a function that raises Broken, with what is wrong."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from swarmwire.deploy import repeat
+from swarmwire.deploy.record.interventions import read_interventions
+from swarmwire.deploy.record.origin import read_origin
+from swarmwire.deploy.replay import Replay
+from swarmwire.deploy.running import finished
+from swarmwire.deploy.simulation import Simulation
+from swarmwire.metrics.record.names import SCENARIO
+from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.verify.verify import verify
+from tests.tools.soak.supervised import family
+
+COMES = ("joined", "returned")
+GOES = ("left", "lost")
+SOMEBODY = "one of its own"
+
+
+class Broken(Exception):
+    """An invariant that does not hold."""
+
+
+def fates_add_up(summary: Mapping[str, Any]) -> str:
+    """Each packet has one fate for each receiver that it was meant for."""
+    radio = summary["radio"]
+    fates = sum(radio["fates"].values())
+    if fates != radio["intended"]:
+        raise Broken(f"the fates sum to {fates}, of {radio['intended']} intended receivers")
+    return f"{fates} fates of {radio['intended']} intended receivers"
+
+
+def owners_are_known(
+    summary: Mapping[str, Any], robots: Iterable[str], *, all_played: bool = True, own: bool = False
+) -> str:
+    """Each robot has one runner or, by `runner_changes`, none; nobody takes what another has, or loses what is not his.
+
+    `all_played` says that the run began with an agent for each robot, of which an open world tells. A run with `own`
+    runners does not tell who they were.
+    """
+    owner: dict[str, str | None] = dict.fromkeys(robots, SOMEBODY if own else None)
+    begun = False
+    for change in summary["runner_changes"]:
+        if change["tick"] >= 0 and not begun:
+            begun = True
+            if all_played and None in owner.values():
+                raise Broken("it began with robots that nobody played")
+        for robot in change["robots"]:
+            if robot not in owner:
+                raise Broken(f"{change['runner']} {change['what']} with {robot}, which is none")
+            expected = None if change["what"] in COMES else change["runner"]
+            if owner[robot] not in (expected, SOMEBODY):
+                raise Broken(f"{change['runner']} {change['what']} {robot}, which {owner[robot] or 'nobody'} played")
+            owner[robot] = change["runner"] if change["what"] in COMES else None
+    unowned = sum(runner is None for runner in owner.values())
+    gone = sum(change["what"] in GOES for change in summary["runner_changes"])
+    told = sum(summary["counts"].get(name, 0) for name in ("runners_lost", "runners_left"))
+    if gone != told:
+        raise Broken(f"{gone} runners left or were lost, the counts say {told}")
+    return f"{len(owner) - unowned} robots played at the end, {unowned} without, after {gone} losses"
+
+
+def folder_is_whole(folder: Path) -> str:
+    """All that the run recorded is there, can be read, and agrees with its summary."""
+    found = verify(folder)
+    bad = [f"{one.part}: {one.state}, {one.text}" for one in found if not one.good]
+    if bad:
+        raise Broken("; ".join(bad))
+    return f"{len(found)} parts of the folder whole"
+
+
+def repeats(folder: Path) -> str:
+    """From its folder alone it comes out the same, bit for bit: with what came from outside, as recorded."""
+    again = repeat(folder)
+    if again.same is not True:
+        raise Broken(f"repeat: same is {again.same}, first difference in tick {again.first_difference}")
+    return f"repeated {again.result.ticks} ticks, the same"
+
+
+def undisturbed(folder: Path) -> str:
+    """Where no fault matters, it is the run in which none happened: same orders, agents in one process."""
+    summary, origin = read_summary(folder), read_origin(folder)
+    interventions, _ = read_interventions(folder)
+    replay = Replay(summary["ticks"], None, interventions)
+    simulation = Simulation(folder / SCENARIO, seeds=origin.seeds, replay=replay)
+    got = finished(simulation).trajectory_sha256
+    if list(got) != list(summary["trajectory_sha256"]):
+        raise Broken("the trajectory is not that of the run without faults")
+    return f"{summary['ticks']} ticks as without faults"
+
+
+def nobody_is_left(temporary: Path, parent: int) -> str:
+    """No process of the run goes on, not even one that lost its parent."""
+    left = {one.pid: one for one in family(parent)}
+    for process in psutil.process_iter():
+        try:
+            if process.pid != parent and process.environ().get("TMPDIR") == str(temporary):
+                left[process.pid] = process
+        except psutil.Error:  # gone by now, or somebody else's
+            continue
+    named = [f"{pid} {' '.join(_command(one))[:80]}" for pid, one in left.items() if _goes_on(one)]
+    if named:
+        raise Broken(f"left: {'; '.join(named)}")
+    return "no process left"
+
+
+def nothing_is_left(temporary: Path, *, killed: bool = False) -> str:
+    """No socket and no temporary folder is left; of a world that was `killed` its sockets are, which the next takes."""
+    left = [
+        str(path.relative_to(temporary))
+        for path in temporary.rglob("*")
+        if not path.is_dir() or not any(path.iterdir())
+    ]
+    left = [path for path in left if path not in ("own", "own/swarmwire") and not (killed and path.startswith("sw-"))]
+    if left:
+        raise Broken(f"left among the temporary files: {', '.join(left[:5])} ({len(left)})")
+    return "no socket or temporary file left"
+
+
+def nobody_crashed(codes: Mapping[str, Mapping[str, int]]) -> str:
+    """Who ended did so by itself, was told why (1), was asked to (130; -2 while Python starts), or was killed."""
+    allowed = {"0", "1", "130", "-2", "-9"}
+    ends = [(who, code, times) for who, of in codes.items() for code, times in of.items()]
+    strange = [f"{who} {code} ({times} times)" for who, code, times in ends if code not in allowed]
+    if strange:
+        raise Broken(", ".join(strange))
+    return f"{sum(times for *_, times in ends)} processes ended, none by a crash"
+
+
+def read_summary(folder: Path) -> Mapping[str, Any]:
+    """The summary of a run that ended; Broken if there is none."""
+    summary = RunFolder(folder).summary
+    if summary is None:
+        raise Broken("there is no summary")
+    return summary
+
+
+def _goes_on(process: psutil.Process) -> bool:
+    try:
+        return process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
+def _command(process: psutil.Process) -> list[str]:
+    try:
+        return process.cmdline()
+    except psutil.NoSuchProcess:
+        return []

@@ -1,0 +1,141 @@
+"""A world of a soak with its runners, and those who look on: started as users start them, from the command line."""
+
+import os
+import re
+import signal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from swarmwire.deploy.live.live_file import Live, read_live
+from tests.support.deploy.commands import ROOT
+from tests.support.deploy.watching import WATCHER
+from tests.tools.soak.supervised import PYTHON, Supervised, family
+
+HERE = Path(__file__).parent
+SCENARIO = HERE / "soak.toml"
+AT_ONCE = 8  # runners that start at the same time
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What kind of run a world is for."""
+
+    name: str
+    robots: int  # each with a runner of its own
+    options: tuple[str, ...]  # of `swarmwire world`
+    speed: float | None = None  # that is asked for once it goes on
+
+
+class Place:
+    """A world, its runners, and who looks on.
+
+    Attributes:
+        kind: of run.
+        folder: of the run.
+        runners: a process for each robot, in their order; the first are never touched.
+        onlookers: observers, pages and browser tabs, by name; those whose name ends with "calm" are never touched.
+    """
+
+    def __init__(self, kind: Kind, folder: Path, env: Mapping[str, str]) -> None:
+        """`folder` is for all that this world, its runners and onlookers write."""
+        folder.mkdir(parents=True)
+        self.kind, self.folder, self._at, self.env = kind, folder / "run", folder, env
+        self.world = Supervised("world", self._world_command, folder / "world.log", env)
+        self.runners = [
+            Supervised(f"r{number}", partial(self._runner_command, number), folder / "runners.log", env)
+            for number in range(kind.robots)
+        ]
+        self.onlookers: dict[str, Supervised] = {}
+        self._started = 0
+        self._endpoint: str | None = None
+
+    @property
+    def said(self) -> str:
+        """What the world has said."""
+        path = self._at / "world.log"
+        return path.read_text(errors="replace") if path.exists() else ""
+
+    @property
+    def live(self) -> Live | None:
+        """Where the run can be looked at; None: not yet, or no more."""
+        return read_live(self.folder)
+
+    @property
+    def all(self) -> list[Supervised]:
+        """Every process but the world."""
+        return [*self.runners, *self.onlookers.values()]
+
+    def tend(self, now_ns: int) -> None:
+        """Start what is due. At first runners come a few at a time, as the world takes them in."""
+        if self.endpoint is None:
+            return
+        if self._started < len(self.runners):
+            joined = self.said.count(" joined with ")
+            self._started = max(self._started, min(len(self.runners), joined + AT_ONCE))
+        for runner in self.runners[: self._started]:
+            runner.tend(now_ns)
+        if self.live is not None:
+            for one in self.onlookers.values():
+                one.tend(now_ns)
+
+    def look_on(self, names: Sequence[str]) -> None:
+        """Have observers, pages and tabs come; a tab "tab-X" is of the page "page-X"."""
+        for name in names:
+            what = name.partition("-")[0]
+            command = {"observer": self._observer, "page": self._page, "tab": self._tab}[what]
+            self.onlookers[name] = Supervised(name, partial(command, name), self.log(name), self.env, 1.0)
+
+    def close(self) -> None:
+        """Kill what is left."""
+        for one in (*self.all, self.world):
+            one.send(signal.SIGCONT)
+            one.kill()
+            one.end()
+
+    def viewers_of(self, name: str) -> list[int]:
+        """The processes that a page has started: its viewer."""
+        pid = self.onlookers[name].pid
+        return [one.pid for one in family(pid)] if pid else []
+
+    def log(self, name: str) -> Path:
+        """Where somebody of this name writes what he says."""
+        return self._at / f"{name}.log"
+
+    @property
+    def endpoint(self) -> str | None:
+        """Where runners join; None: it has not said so yet."""
+        if self._endpoint is None and (found := re.search(r"listens at (\S+?)[;,]", self.said)):
+            self._endpoint = found[1]
+        return self._endpoint
+
+    def _world_command(self) -> Sequence[str]:
+        return (*PYTHON, "swarmwire.deploy", "world", str(SCENARIO), "--listen", "tcp/127.0.0.1:0", "--out",
+                str(self.folder), "--set", f"robots.swarm.count={self.kind.robots}", *self.kind.options)  # fmt: skip
+
+    def _runner_command(self, number: int) -> Sequence[str]:
+        return (*PYTHON, "swarmwire.agent.cli", "join", self.endpoint or "", "--name", f"r{number}", "--names",
+                f"swarm-{number}", "--scenario", str(SCENARIO))  # fmt: skip
+
+    def _observer(self, _: str) -> Sequence[str]:
+        return (PYTHON[0], "-c", WATCHER, str(self.folder))
+
+    def _page(self, _: str) -> Sequence[str]:
+        return (*PYTHON, "swarmwire.deploy", "ui", str(self.folder))
+
+    def _tab(self, name: str) -> Sequence[str]:
+        return (*PYTHON, "tests.tools.soak.tab", str(self.log(name.replace("tab", "page"))))
+
+
+def environment(temporary: Path) -> Mapping[str, str]:
+    """The environment of all processes of a soak: temporary files go to a folder that shall be empty at its end."""
+    own = temporary / "own"
+    own.mkdir(parents=True, mode=0o700)
+    return {
+        **os.environ,
+        "TMPDIR": str(temporary),
+        "XDG_RUNTIME_DIR": str(own),
+        "PYTHONPATH": str(ROOT),
+        "OPENBLAS_NUM_THREADS": "1",
+    }

@@ -1,0 +1,31 @@
+"""A browser's tab on the page of a run, without the browser: it reads the news and asks for the status, to the end."""
+
+import json
+import re
+import sys
+from pathlib import Path
+from urllib.request import ProxyHandler, build_opener
+
+from tests.support.waiting import until
+
+OPEN = build_opener(ProxyHandler({}))  # what is on this machine needs no proxy
+
+
+def addresses(log: Path) -> list[str]:
+    """The addresses that a page has said so far."""
+    return re.findall(r"open (http://127\.0\.0\.1:\d+/\S+/) in a browser", log.read_text() if log.exists() else "")
+
+
+def main(log: Path) -> None:
+    """Follow the page that says its address in this log, the newest if it was started more than once."""
+    address = until(lambda: addresses(log))[-1]
+    OPEN.open(f"{address}status", timeout=60).read()
+    with OPEN.open(f"{address}news", timeout=60) as news:
+        for line in news:
+            if line.startswith(b"data:") and b'"state"' in line and json.loads(line[5:]).get("state") == "over":
+                break
+    print("the run is over", flush=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,195 @@
+"""What happens to the processes of a soak: a trouble is a generator that acts, and yields how long it waits, in s."""
+
+import signal
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.errors import SwarmwireError
+from swarmwire.deploy.control.remote_control import RemoteControl, controlling
+from tests.tools.soak.agenda import Steps
+from tests.tools.soak.place import Place
+from tests.tools.soak.supervised import PYTHON, Supervised
+
+UNTOUCHED = 2  # runners, the first
+PART = 0.1  # of all runners that die at once, as with their machine
+
+
+class Troubles:
+    """Draws what happens next, and to whom.
+
+    Attributes:
+        told: how often each happened.
+        unanswered: orders that the run did not take, though it should have.
+    """
+
+    def __init__(self, place: Place, rng: np.random.Generator, tell: Callable[..., None], timeout_s: float) -> None:
+        """`timeout_s` is the world's patience with a runner."""
+        self._place, self._rng, self._tell, self._timeout_s = place, rng, tell, timeout_s
+        self.told: dict[str, int] = {}
+        self.unanswered: list[str] = []
+        self.events = 0
+        self._kinds: dict[Callable[[], Steps], float] = {
+            self.runner_killed: 5,
+            self.many_killed: 1,
+            self.runner_leaves: 2,
+            self.runner_frozen: 3,
+            self.runner_frozen_too_long: 1,
+            self.runner_slowed: 2,
+            self.world_frozen: 1,
+            self.stranger_refused: 1,
+            self.robots_killed: 2,
+            self.loss_set: 2,
+            self.parted: 1,
+            self.pushed: 1,
+            self.refused: 1,
+            self.paused: 1,
+        }
+        if place.onlookers:
+            self._kinds |= {
+                self.onlooker_killed: 4,
+                self.onlooker_frozen: 2,
+            }
+
+    def next(self) -> Steps:
+        """A trouble, drawn."""
+        weights = np.array(list(self._kinds.values()))
+        kind = list(self._kinds)[int(self._rng.choice(len(weights), p=weights / weights.sum()))]
+        self.told[kind.__name__] = self.told.get(kind.__name__, 0) + 1
+        return kind()
+
+    def runner_killed(self) -> Steps:
+        """SIGKILL, and back after a while."""
+        runner = self._runner()
+        yield from self._gone("killed", runner, signal.SIGKILL)
+
+    def many_killed(self) -> Steps:
+        """A machine is gone: a tenth of all runners at once."""
+        for runner in self._some(max(1, int(PART * len(self._place.runners)))):
+            yield from self._gone("killed with others", runner, signal.SIGKILL)
+
+    def runner_leaves(self) -> Steps:
+        """Ctrl-C at a runner, which comes back."""
+        yield from self._gone("leaves", self._runner(), signal.SIGINT)
+
+    def runner_frozen(self) -> Steps:
+        """For less than the world waits."""
+        yield from self._frozen(self._runner(), float(self._rng.uniform(0.1, 0.4 * self._timeout_s)))
+
+    def runner_frozen_too_long(self) -> Steps:
+        """For longer than the world waits: it is lost, told to leave when it thaws, and comes back."""
+        yield from self._frozen(self._runner(), self._timeout_s + float(self._rng.uniform(1.0, 4.0)))
+
+    def runner_slowed(self) -> Steps:
+        """It gets a third of its time, for a while."""
+        runner = self._runner()
+        self._tell("slowed", runner.name)
+        for _ in range(20):
+            if not runner.send(signal.SIGSTOP):
+                return
+            yield 0.2
+            runner.send(signal.SIGCONT)
+            yield 0.1
+
+    def world_frozen(self) -> Steps:
+        """SIGSTOP at the world, for a moment."""
+        yield from self._frozen(self._place.world, float(self._rng.uniform(0.2, 2.0)))
+
+    def onlooker_killed(self) -> Steps:
+        """An observer, a page or a tab dies, and comes back."""
+        one = self._onlooker()
+        yield from self._gone("killed", one, signal.SIGKILL)
+
+    def onlooker_frozen(self) -> Steps:
+        """An observer, a page or a tab hangs for a while: it reads nothing of what it is sent."""
+        yield from self._frozen(self._onlooker(), float(self._rng.uniform(1.0, 15.0)))
+
+    def stranger_refused(self) -> Steps:
+        """Somebody of a new name wants robots that are taken, and gets none."""
+        place, name = self._place, f"stranger-{self._rng.integers(10**9)}"
+        command = (*PYTHON, "swarmwire.agent.cli", "join", place.endpoint or "", "--name", name, "--names", "swarm-0")
+        stranger = Supervised(name, lambda: command, place.log("strangers"), place.env)
+        stranger.tend(0)
+        self._tell("stranger", name)
+        yield 30.0
+        stranger.end()
+
+    def robots_killed(self) -> Steps:
+        """Robots die, and live again."""
+        for_s = float(self._rng.uniform(2.0, 10.0))
+        self._order({"do": "kill", "robots": {"group": "swarm", "share": 0.1}, "for_s": round(for_s, 1)})
+        yield 0.0
+
+    def loss_set(self) -> Steps:
+        """The radio gets worse, or better, until it is undone."""
+        number = self._order({"do": "ramp", "what": "radio.loss", "to": round(float(self._rng.uniform(0.0, 0.9)), 2)})
+        yield float(self._rng.uniform(2.0, 20.0))
+        self._ask("end", lambda run: run.end(number or 0), may_refuse=True)
+
+    def parted(self) -> Steps:
+        """One half does not hear the other."""
+        self._order({"do": "partition", "halves": "x", "for_s": round(float(self._rng.uniform(2.0, 10.0)), 1)})
+        yield 0.0
+
+    def pushed(self) -> Steps:
+        """Robots are pushed."""
+        direction = round(float(self._rng.uniform(-3.0, 3.0)), 2)
+        self._order({"do": "push", "robots": {"count": 5}, "speed_mps": 0.3, "direction_rad": direction})
+        yield 0.0
+
+    def refused(self) -> Steps:
+        """An order that cannot be: it is refused, and changes nothing."""
+        self._order({"do": "kill", "robots": {"group": "nobody", "share": 2.0}}, may_refuse=True)
+        yield 0.0
+
+    def paused(self) -> Steps:
+        """The run stands still for a moment."""
+        self._ask("pause", lambda run: run.pause())
+        yield float(self._rng.uniform(0.2, 2.0))
+        self._ask("resume", lambda run: run.resume())
+
+    def _gone(self, how: str, one: Supervised, number: signal.Signals) -> Steps:
+        one.after(float(self._rng.uniform(0.2, 3.0)))
+        self._tell(how, one.name)
+        one.send(number)
+        if one.frozen:
+            one.send(signal.SIGCONT)
+        yield 0.0
+
+    def _frozen(self, one: Supervised, for_s: float) -> Steps:
+        self._tell("frozen", one.name, round(for_s, 2))
+        if one.send(signal.SIGSTOP):
+            yield for_s
+            one.send(signal.SIGCONT)
+
+    def _runner(self) -> Supervised:
+        return self._some(1)[0]
+
+    def _some(self, count: int) -> list[Supervised]:
+        touched = self._place.runners[UNTOUCHED:]
+        return [touched[int(i)] for i in self._rng.choice(len(touched), count, replace=False)]
+
+    def _onlooker(self) -> Supervised:
+        names = sorted(name for name in self._place.onlookers if not name.endswith("calm"))
+        return self._place.onlookers[names[int(self._rng.integers(len(names)))]]
+
+    def _order(self, table: Mapping[str, Any], *, may_refuse: bool = False) -> int | None:
+        number = self._ask(f"order {table}", lambda run: run.event(table), may_refuse=may_refuse)
+        self.events += number is not None
+        return number
+
+    def _ask(self, what: str, ask: Callable[[RemoteControl], Any], *, may_refuse: bool = False) -> Any:
+        """What the run answers; None, and kept among the unanswered, if it does not."""
+        live = self._place.live
+        if live is None or self._place.world.frozen:
+            return None
+        self._tell(what, "world")
+        try:
+            with controlling(live.endpoint, live.run) as run:
+                return ask(run)
+        except SwarmwireError as error:
+            if not may_refuse:
+                self.unanswered.append(f"{what}: {error}")
+                self._tell("unanswered", "world", str(error))
+            return None

@@ -1,0 +1,175 @@
+"""What goes over the wire: keys, the exchange by which a runner joins, and the arrays and values of every frame."""
+
+from typing import Any
+
+import msgpack
+import numpy as np
+
+from swarmwire.comms.actuations import Actuations
+from swarmwire.comms.assignment import Assignment, GroupAssignment
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.glimpse import Glimpse, Scene
+from swarmwire.comms.led_changes import LedChanges
+from swarmwire.comms.memory import GroupMemory, Memory
+from swarmwire.comms.messages import Message, f4, f8, i1, u2
+from swarmwire.comms.notes import Notes
+from swarmwire.comms.outcomes import Outcomes
+from swarmwire.comms.packets import Heard, Payloads, Sent
+from swarmwire.comms.senses import Actions, GroupSenses
+from swarmwire.comms.truth import Finished, Happened, Tally, Truth
+from swarmwire.comms.values import Values
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.in_time_frames import encode_packets, encode_sent
+from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.keys import Keys, ObserverKeys
+from swarmwire.comms.wire.offer import Offer, OfferedGroup
+from swarmwire.comms.wire.scene_frames import OBSERVED_VERSION, encode_scene
+from swarmwire.comms.wire.tick_frames import encode_actions, encode_tick
+from swarmwire.comms.wire.truth_frames import encode_truth
+from tests.tools.stable.samples import LEFT_OUT, joined, lines_of, paths_of, sample
+
+# Lengths of axes, each its own, so that a shape can be told in words.
+ARENAS, ROBOTS, TOLD_OF, HEARD, SENT, OUTCOMES, GIVES, BYTES, WIDE = 11, 13, 17, 19, 23, 29, 31, 37, 41
+SERIES, EDGES, LINKS, LEDS, MOVABLE, NOTED, SWITCHED, ACTUATED, TOLD = 43, 47, 53, 59, 61, 67, 71, 73, 79
+AXES = {
+    ARENAS: "arenas",
+    ARENAS * ROBOTS: "robots",
+    TOLD_OF: "robots told of",
+    HEARD: "heard",
+    SENT: "sent",
+    SENT + 1: "sent + 1",
+    OUTCOMES: "outcomes",
+    GIVES: "gives",
+    BYTES: "bytes",
+    WIDE: "numbers of the sense",
+    SERIES: "series",
+    EDGES: "edges",
+    LINKS: "links",
+    LEDS: "LEDs",
+    3 * MOVABLE: "3 x movable",
+    NOTED: "noted",
+    SWITCHED: "switched",
+    ACTUATED: "actuated",
+    TOLD: "told",
+    len(Fate): "fates",
+}
+
+
+class Told(Message):
+    """A message as it goes on air."""
+
+    x_m: f4
+    count: u2
+    place: f8
+    turns: i1
+
+
+def text() -> str:
+    """The keys, the exchange, and each frame, a line for each thing in it."""
+    parts = {
+        "keys of runners": _keys(Keys("RUN"), "RUNNER"),
+        "keys of observers": _keys(ObserverKeys("RUN")),
+        "every frame": lines_of(paths_of({"v": 1, "kind": "", "tick": 1, "arrays": {}, "values": {}})),
+        "join, asked": _map(JoinRequest(1, None, {"*": "a"}, "a").encode(), JoinRequest(None, ("a",)).encode()),
+        "join, answered": lines_of(paths_of({**_assignment().as_mapping(), "v": frames.VERSION, "memory": b""})),
+        "offer, answered": _map(_offer(1.0).encode(), _offer(None).encode()),
+        "tick": _frame(encode_tick(1, _senses(), _heard(), Outcomes(*_ints(3, OUTCOMES)))),
+        "actions": _frame(encode_actions(1, _actions(), dropped=1, memory=_memory())),
+        "packets": _frame(encode_packets(1, 1, 1, _heard(), Outcomes(*_ints(3, OUTCOMES)))),
+        "sent": _frame(encode_sent(1, _actions().sent, missed=1)),
+        f"scene, version {OBSERVED_VERSION}": _frame(*(encode_scene(sample(Scene, left)) for left in LEFT_OUT)),
+        "message, on air": f"{Told(x_m=1.5, count=3, place=-2.25, turns=-1).encode().hex(' ')}\n",
+        f"truth, version {OBSERVED_VERSION}": _frame(encode_truth(_glimpse())),
+    }
+    return f"# version {frames.VERSION}\n" + "".join(f"# {title}\n{lines}" for title, lines in parts.items())
+
+
+def _keys(keys: object, *of: str) -> str:
+    plain = {name: key for name, key in vars(keys).items() if name != "root"}
+    called = {name: getattr(keys, name)(*of) for name in vars(type(keys)) if not name.startswith("_")}
+    return "".join(f"{name}: {key}\n" for name, key in {**plain, **called}.items())
+
+
+def _map(*several: bytes) -> str:
+    return lines_of(joined(*(paths_of(msgpack.unpackb(data)) for data in several)))
+
+
+def _frame(*several: bytes) -> str:
+    frame = frames.decode(several[0])
+    arrays = [f"{name}: {array.dtype.str} {_shape(array.shape)}\n" for name, array in frame.arrays.items()]
+    return "".join(sorted(arrays)) + lines_of(joined(*(paths_of(frames.decode(data).values) for data in several)))
+
+
+def _shape(shape: tuple[int, ...]) -> str:
+    return f"({', '.join(AXES.get(length, str(length)) for length in shape)})"
+
+
+def _ints(*shape: int) -> Any:
+    return np.zeros(shape, np.int64)
+
+
+def _floats(*shape: int) -> Any:
+    return np.zeros(shape)
+
+
+def _senses() -> dict[str, GroupSenses]:
+    return {"GROUP": GroupSenses(_ints(TOLD_OF), {"SENSE.FIELD": _floats(TOLD_OF, WIDE)})}
+
+
+def _heard() -> Heard:
+    given = {f"given {i}": _floats(HEARD) for i in range(GIVES)}
+    return Heard(*_ints(4, HEARD), given, _ints(HEARD), Payloads(np.zeros(BYTES, np.uint8), _ints(SENT + 1)))
+
+
+def _actions() -> Actions:
+    payloads = Payloads(np.zeros(BYTES, np.uint8), _ints(SENT + 1))
+    return Actions(
+        _ints(TOLD_OF),
+        np.ones(TOLD_OF, np.bool_),
+        *_floats(3, TOLD_OF),
+        Sent(*_ints(2, SENT), payloads, _ints(SENT)),
+        Notes(*_ints(2, NOTED), ("",)),
+        LedChanges(*_ints(3, SWITCHED)),
+        Actuations(*_ints(2, ACTUATED), _floats(ACTUATED)),
+        Values(_ints(TOLD), _floats(TOLD)),
+    )
+
+
+def _assignment() -> Assignment:
+    keys = np.zeros(1, np.uint64)
+    group = GroupAssignment("g", "a", {"*": 0.5}, load_body("epuck"), _ints(1), ("g-0",), keys)
+    return Assignment((group,), 1, ("range_m",))
+
+
+def _memory() -> Memory:
+    return {"GROUP": GroupMemory(_ints(TOLD_OF), {"COLUMN": _floats(TOLD_OF, WIDE)})}
+
+
+def _offer(real_time: float | None) -> Offer:
+    return Offer("RUN", "s", "a", "1", 1, real_time, (OfferedGroup("g", "a", "a", 1, ("g-0",)),))
+
+
+def _glimpse() -> Glimpse:
+    rows = ARENAS * ROBOTS
+    flags = np.ones(rows, np.bool_)
+    truth = Truth(
+        tick=1,
+        time_ns=1,
+        running=np.ones(ARENAS, np.bool_),
+        alive=flags,
+        pose=_floats(rows, 3),
+        velocity=_floats(rows, 3),
+        command=_floats(rows, 3),
+        state=_ints(rows),
+        states=("",),
+        leds=_ints(rows, LEDS),
+        senses=_senses(),
+        contact_onsets=_ints(ARENAS, 2),
+        edges=_ints(EDGES, 2),
+        tally=Tally(*_ints(3, ARENAS), _ints(ARENAS, len(Fate))),
+        finished=Finished(*_ints(12, LINKS), rssi_dbm=_floats(LINKS)),
+        events=(Happened(1, 0.5, "", True, flags),),
+        movable=_floats(ARENAS, MOVABLE, 3),
+    )
+    return Glimpse(truth, 1, 1, _floats(SERIES, ARENAS))

@@ -1,0 +1,143 @@
+"""Particle swarm search: the rule itself, on one e-puck with positioning that stands where a test puts it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarmwire.agent.behaviours import PsoSearch, PsoSearchPositioned
+from swarmwire.agent.behaviours.pso.particle_swarm import ParticleSwarm
+from swarmwire.agent.behaviours.pso_search import BestVector
+from tests.support.agent.behaviours.one_particle import HERE, One, place
+
+FURTHEST_M = 0.1 * 10.0  # speed x time between two updates
+CALM = {"inertia": 0.0, "own_weight": 0.0, "neighbour_weight": 0.0}  # the robot stays where it is
+
+
+@pytest.mark.parametrize("pull", [0.0, 1.5, 100.0])
+def test_a_robot_never_aims_farther_than_it_can_drive_until_the_next_update(pull: float) -> None:
+    one = One(inertia=3.0, neighbour_weight=pull)
+    one.step(place(9.0, 4.0, 4.0))
+    for _ in range(4):
+        assert 0.0 < np.hypot(*one.vector("velocity")) <= FURTHEST_M + 1e-9
+        assert one.vector("target") == one.vector("velocity")
+        one.steps(100)
+
+
+def test_the_velocity_changes_once_in_an_update_period() -> None:
+    one, seen = One(), list[tuple[float, float]]()
+    for _ in range(201):
+        one.step()
+        seen.append(one.vector("velocity"))
+    assert [tick for tick in range(1, 201) if seen[tick] != seen[tick - 1]] == [100, 200]
+
+
+def test_the_rule_adds_inertia_and_a_pull_to_each_best_within_its_weight() -> None:
+    still = One(own_weight=0.0, neighbour_weight=0.0)
+    still.step()
+    first = np.array(still.vector("velocity"))
+    still.steps(100)
+    assert np.array(still.vector("velocity")) == pytest.approx(0.7298 * first)
+
+    pulled = One(inertia=0.0, own_weight=0.0, neighbour_weight=1.0)
+    pulled.step()
+    pulled.steps(99)
+    pulled.step(place(9.0, HERE[0] + 0.4, HERE[1] - 0.6))
+    x, y = pulled.vector("velocity")
+    assert 0.0 < x < 0.4
+    assert -0.6 < y < 0.0
+    assert x / 0.4 != pytest.approx(y / -0.6), "each axis has a draw of its own"
+
+
+def test_of_several_bests_heard_the_brightest_wins_and_a_darker_one_later_does_not_replace_it() -> None:
+    one = One()
+    one.step(place(0.5, 0.0, 0.0), place(0.75, 3.0, 1.0), place(0.625, -3.0, 0.0))
+    assert one.memory.best_brightness[0] == 0.75
+    assert one.vector("best") == pytest.approx((2.0, 3.0))
+    one.step(place(0.6875, 0.0, 0.0))
+    assert one.vector("best") == pytest.approx((2.0, 3.0))
+    one.step(place(0.75, 3.5, 1.0))
+    assert one.vector("best") == pytest.approx((2.5, 3.0)), "as bright, and told anew"
+
+
+def test_nobody_is_pulled_to_a_neighbours_best_that_is_darker_than_the_own() -> None:
+    one = One(inertia=0.0)
+    one.brightness = 2.0
+    one.steps(100)
+    one.step(place(1.0, 3.0, 3.0))
+    assert one.vector("velocity") == (0.0, 0.0)
+
+
+def test_the_own_best_is_where_it_was_brightest_and_stays_there_when_the_robot_moves() -> None:
+    one = One()
+    one.brightness = 0.8
+    one.step(place(0.9, 2.0, 2.0))
+    one.place, one.brightness = (1.5, -1.0), 0.7
+    one.step()
+    assert one.vector("own") == pytest.approx((-0.5, -1.0))
+    assert one.vector("best") == pytest.approx((0.5, 3.0))
+    one.brightness = 0.81
+    one.step()
+    assert one.vector("own") == (0.0, 0.0)
+
+
+def test_by_wheels_places_move_along_the_compass_heading_and_not_when_turning_on_the_spot() -> None:
+    one = One(PsoSearch)
+    one.step(BestVector(brightness=0.9, x_m=1.0, y_m=0.0))
+    one.heading_rad = np.pi / 2.0
+    one.wheels_m = [4.9, 6.1]
+    one.step()
+    assert one.vector("best") == pytest.approx((1.0, 0.0))
+    one.wheels_m = [5.1, 6.3]
+    one.step()
+    assert one.vector("best") == pytest.approx((1.0, -0.2))
+    assert one.vector("own") == pytest.approx((0.0, -0.2))
+
+
+def test_a_vector_from_a_sender_starts_where_the_sender_is_heard() -> None:
+    one = One(PsoSearch)
+    one.heading_rad = np.pi / 2.0
+    one.step(BestVector(brightness=0.9, x_m=1.0, y_m=0.5), range_m=2.0, bearing_rad=np.pi / 2.0)
+    assert one.vector("best") == pytest.approx((-1.0, 0.5)), "the sender stands 2 m to the left: at (-2, 0)"
+
+
+@pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned])
+def test_the_own_best_is_told_once_in_a_period_a_second_before_its_end(kind: type[ParticleSwarm[Any]]) -> None:
+    sent = [len(actions.sent) for actions in One(kind).steps(300)]
+    assert [tick for tick, packets in enumerate(sent) if packets] == [90, 190, 290]
+
+
+def test_what_is_told_is_the_place_of_the_own_best() -> None:
+    one = One(PsoSearchPositioned, update_every_ticks=3, tell_before_ticks=1)
+    one.brightness = 0.75
+    one.step()
+    one.place, one.brightness = (0.0, 0.0), 0.5
+    one.step()
+    (told,) = [actions.sent.payloads.row(0) for actions in one.steps(1)]
+    assert told == place(0.75, *HERE).encode()
+
+
+def test_a_robot_turns_to_its_target_and_waits_there() -> None:
+    one = One(**CALM)
+    one.step()
+    x, y = one.vector("target")
+    one.heading_rad = float(np.arctan2(y, x)) - 0.5
+    actions = one.step()
+    assert actions.angular_radps[0] == pytest.approx(1.5)
+    assert 0.0 < actions.linear_mps[0] < 0.1
+    one.place = (HERE[0] + x, HERE[1] + y)
+    assert one.step().linear_mps[0] == 0.0
+
+
+@pytest.mark.parametrize(("ray", "side"), [(0, 1.0), (7, -1.0)])
+def test_on_its_way_a_robot_turns_from_what_is_near_ahead(ray: int, side: float) -> None:
+    """Ray 0 looks 17 degrees to the left, ray 7 as far to the right."""
+    one = One()
+    one.step()
+    one.heading_rad = float(np.arctan2(*reversed(one.vector("target"))))
+    free = one.step()
+    assert free.angular_radps[0] == pytest.approx(0.0, abs=1e-9)
+    one.rays[ray] = 0.4
+    actions = one.step()
+    assert np.sign(actions.angular_radps[0]) == -side
+    assert actions.linear_mps[0] < free.linear_mps[0]

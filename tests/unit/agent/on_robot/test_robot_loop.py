@@ -1,0 +1,256 @@
+from itertools import pairwise
+
+import pytest
+
+from swarmwire.agent.drivers.driver import STOP, Command, DriverLost
+from swarmwire.agent.on_robot.control import STOPPED
+from swarmwire.agent.on_robot.limits import SpeedLimits
+from swarmwire.agent.on_robot.robot_loop import LOST, RUNNING
+from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.wire.poses import Pose
+from tests.support.agent.on_robot.robot_players import Count
+from tests.support.agent.on_robot.scripted import PERIOD_NS, UTC_NS, Rig, ScriptedRadio, lost
+from tests.support.clocks import MS, ORIGIN_NS
+
+
+def test_a_step_is_taken_at_every_tick_of_the_clock():
+    rig = Rig("Driving")
+    rows = rig.run(4)
+    assert [row.tick for row in rows] == [0, 1, 2, 3]
+    assert [row.utc_ns for row in rows] == [UTC_NS + ORIGIN_NS + tick * PERIOD_NS for tick in range(4)]
+    assert not any(row.late for row in rows)
+    assert rig.driver.commands == [Command(0.03, 0.5)] * 4
+
+
+def test_ticks_that_went_by_during_a_slow_step_are_skipped_and_counted_never_caught_up_with():
+    rig = Rig("Driving")
+    rig.driver.faults["sense"] = [None, rig.takes(350 * MS)]
+    rows = rig.run(4)
+    assert [(row.tick, row.late) for row in rows] == [(0, False), (1, False), (4, True), (5, False)]
+    status = rig.loop.status()
+    assert (status["late_ticks"], status["counts"]["skipped_ticks"]) == (1, 2)
+    assert rig.clock.slept_until[-1] == ORIGIN_NS + 5 * PERIOD_NS
+
+
+def test_a_step_that_ends_in_the_next_period_makes_no_tick_late():
+    rig = Rig("Driving")
+    rig.driver.faults["sense"] = [rig.takes(130 * MS)]
+    rows = rig.run(3)
+    assert [(row.tick, row.late) for row in rows] == [(0, False), (1, False), (2, False)]
+
+
+def test_the_radio_is_asked_with_the_time_since_the_first_tick():
+    rig = Rig("Driving")
+    rig.driver.faults["sense"] = [rig.takes(250 * MS)]
+    rig.run(2)
+    assert rig.radio.asked_ns == [250 * MS, 250 * MS]
+
+
+def test_the_last_command_holds_while_the_agent_gives_none_and_nan_is_none():
+    rig = Rig("Once")
+    rows = rig.run(4)
+    assert rig.driver.commands == [Command(0.02, 0.0)] * 4
+    assert [row.drive for row in rows] == [True, False, True, False]
+    assert rig.loop.status()["counts"]["nan_commands"] == 1
+
+
+def test_an_agent_begins_when_each_of_its_senses_was_read():
+    rig = Rig("Driving", gives=(), body="epuck-gps", tracked=("compass",))
+    rows = rig.run(3)
+    assert not any(row.drive for row in rows)
+    rig.pose = Pose(0.0, 0.0, 1.0)
+    assert [row.drive for row in rig.run(2)[3:]] == [True, True]
+    rig.pose = None  # once it has begun it is told that a reading is lost
+    assert rig.run(1)[-1].drive
+
+
+def test_an_agent_begins_after_three_seconds_even_if_a_sense_was_never_read():
+    rig = Rig("Driving", gives=(), body="epuck-gps", tracked=("compass",))
+    rows = rig.run(33)
+    assert [row.tick for row in rows if row.drive] == [31, 32]
+
+
+def test_a_command_above_the_limits_is_slowed_down_as_a_whole_and_counted():
+    rig = Rig("Driving", params={"linear_mps": 0.2, "angular_radps": 1.0}, limits=SpeedLimits(0.1, 2.0))
+    rows = rig.run(2)
+    assert rig.driver.commands == [Command(0.1, 0.5)] * 2
+    assert rows[0].command == Command(0.1, 0.5)
+    assert rig.loop.status()["counts"]["clipped_commands"] == 2
+
+
+def test_leds_notes_and_packets_reach_driver_log_and_radio():
+    radio = ScriptedRadio()
+    heard = Count(number=3).encode()
+    radio.brings = [[], [(1, 0, heard), (2, 5, heard)]]
+    rig = Rig("Telling", radio=radio)
+    rows = rig.run(3)
+    assert [command.leds for command in rig.driver.commands] == [{2: 0xFF0000}, {}, {}]
+    assert [(row.state, row.value) for row in rows] == [("first", 1.5)] * 3
+    assert [Count.decode(sent.payloads.row(0)).number for sent in radio.sent] == [0, 2, 0]
+    assert [(int(sent.sender[0]), int(sent.to[0])) for sent in radio.sent] == [(0, 1)] * 3
+    assert radio.sent[0].to[0] != BROADCAST
+
+
+def test_the_driver_is_asked_for_what_is_needed_and_the_battery_alone():
+    rig = Rig("Driving", gives=("proximity", "ground", "battery"), needs=("proximity",))
+    rows = rig.run(1)
+    assert rig.driver.asked == {"proximity", "battery"}
+    assert rows[0].charge == rig.loop.status()["charge"] == 0.75
+
+
+def test_position_and_heading_come_from_the_tracker_and_read_nan_while_it_sees_nothing():
+    rig = Rig("Knowing", needs=("positioning", "compass"), tracked=("positioning", "compass"))
+    rig.pose = Pose(2.0, 1.0, 0.25)
+    rows = rig.run(1)
+    assert rig.driver.commands == [Command(0.02, 0.25)]
+    rig.pose = None
+    rig.run(1)
+    assert [row.state for row in rows] == ["seen", "unseen"]
+    assert [row.pose for row in rows] == [(2.0, 1.0, 0.25), None]
+    assert rig.driver.commands[1] == Command(0.02, 0.25)  # nan is no command
+
+
+def test_a_lost_robot_is_stopped_first_when_it_answers_again_and_the_agent_stands_still_meanwhile():
+    rig = Rig("Once")
+    rig.driver.faults = {"sense": [None, lost], "open": [lost, lost]}
+    rows = rig.run(3)
+    assert rig.driver.deeds == [Command(0.02), "open", "stop", Command(0.02), Command(0.02)]
+    # 0.2 s, 0.4 s and 0.8 s of pauses after the loss at 0.1 s
+    assert [(row.tick, row.late) for row in rows] == [(0, False), (16, False), (17, False)]
+    counts = rig.loop.status()["counts"]
+    assert (counts["driver_lost"], counts["ticks_without_driver"]) == (1, 14)
+    assert "skipped_ticks" not in counts
+    assert [line.partition(":")[0] for line in rig.onlooker.lines] == [
+        "the robot is lost, and tried again",
+        "the robot answers again",
+    ]
+
+
+def test_pauses_between_trials_double_up_to_two_seconds():
+    rig = Rig("Driving")
+    rig.driver.faults = {"sense": [lost], "open": [lost] * 6}
+    trials: list[int] = []
+    rig.driver.faults["open"] = [lambda: trials.append(rig.clock.now_ns()) or lost()] * 6
+    rig.run(1)
+    assert [(later - earlier) // MS for earlier, later in pairwise(trials)] == [
+        400, 800, 1600, 2000, 2000,
+    ]  # fmt: skip
+
+
+def test_a_robot_that_may_have_been_switched_off_gets_its_leds_again():
+    rig = Rig("Telling")
+    rig.driver.faults = {"sense": [None, lost]}
+    rig.run(3)
+    assert [command.leds for command in rig.driver.commands] == [{2: 0xFF0000}, {2: 0xFF0000}, {}]
+
+
+def test_packets_are_still_sent_in_a_step_that_loses_the_driver_and_those_heard_meanwhile_are_counted():
+    radio = ScriptedRadio()
+    heard = Count(number=3).encode()
+    radio.brings = [[], [(1, 0, heard), (2, 5, heard)]]
+    rig = Rig("Telling", radio=radio)
+    rig.driver.faults = {"act": [lost]}
+    rig.run(1)
+    assert len(radio.sent) == 2
+    assert rig.loop.status()["counts"]["packets_without_driver"] == 2
+
+
+def test_the_end_is_not_held_up_by_a_robot_that_is_lost():
+    rig = Rig("Driving")
+
+    def wait() -> None:
+        rig.end.ask("SIGTERM")
+
+    rig.onlooker.wait = wait
+    rig.driver.faults = {"sense": [lost]}
+    rig.loop.run()
+    assert rig.driver.deeds == []
+    assert rig.loop.status()["state"] == LOST
+    (line,) = rig.onlooker.lines  # that it may go on is said once its driver is closed
+    assert "the robot is lost" in line
+
+
+def test_an_emergency_stop_is_at_once_and_for_good():
+    rig = Rig("Driving")
+    rig.run(2)
+    assert rig.loop.status()["state"] == RUNNING
+    rig.motors.control.estop()
+    assert rig.driver.deeds[-1] == "stop"
+    rows = rig.run(3)
+    assert rig.driver.commands == [Command(0.03, 0.5)] * 2
+    assert [row.command for row in rows[2:]] == [STOP] * 3
+    assert not any(row.drive for row in rows[2:])
+    assert rig.loop.status()["state"] == STOPPED
+
+
+def test_whoever_asks_a_robot_whose_agent_hangs_is_told_that_it_was_stopped():
+    control = Rig("Driving").motors.control
+    control.tell({"state": RUNNING, "tick": 3})
+    control.estop()
+    assert control.status() == {"state": STOPPED, "tick": 3}
+
+
+def test_an_emergency_stop_that_meets_a_command_on_its_way_wins():
+    rig = Rig("Driving")
+    rig.driver.faults = {"act": [None, rig.motors.control.estop]}
+    rig.run(2)
+    assert rig.driver.deeds == [Command(0.03, 0.5), "stop", Command(0.03, 0.5), "stop"]
+
+
+def test_an_emergency_stop_holds_over_a_loss_of_the_robot():
+    rig = Rig("Driving")
+    rig.driver.faults = {"sense": [None, lost]}
+    rig.onlooker.after_step = lambda _: rig.motors.control.estop()
+    rig.run(3)
+    assert len(rig.driver.commands) == 1
+
+
+@pytest.mark.parametrize("fails", [False, True], ids=["no connection", "a connection that breaks"])
+def test_an_emergency_stop_that_does_not_reach_the_robot_says_so_and_holds_once_it_does(fails):
+    rig = Rig("Driving")
+
+    def estop() -> None:
+        rig.onlooker.wait = lambda: None
+        rig.driver.faults = {"stop": [lost]} if fails else {}
+        with pytest.raises(DriverLost):
+            rig.motors.control.estop()
+
+    rig.onlooker.wait = estop
+    rig.driver.faults = {"sense": [None, lost]}
+    rig.run(3)
+    assert rig.driver.commands == [Command(0.03, 0.5)]
+    assert rig.driver.deeds[-4:] == ["open", "stop", "stop", "stop"]
+    rig.motors.control.estop()
+
+
+def test_an_agent_that_raises_ends_the_loop_with_its_traceback():
+    rig = Rig("Failing")
+    with pytest.raises(AgentFailed, match="the third step"):
+        rig.run(9)
+    assert len(rig.driver.commands) == 2
+
+
+def test_the_loop_ends_after_its_duration():
+    rig = Rig("Driving")
+    rig.run(99, duration_s=0.45)
+    assert [row.tick for row in rig.onlooker.rows] == [0, 1, 2, 3, 4]
+    assert rig.end.reason == "duration"
+
+
+def test_draws_belong_to_the_robot_and_its_seed():
+    speeds = [[command.linear_mps for command in _drawn().driver.commands] for _ in range(2)]
+    assert speeds[0] == speeds[1]
+    assert len(set(speeds[0])) == 5
+
+
+def _drawn() -> Rig:
+    rig = Rig("Drawing")
+    rig.run(5)
+    return rig
+
+
+def test_an_agent_that_writes_to_a_reading_fails_as_in_emulation():
+    rig = Rig("Scribbling", needs=("proximity",))
+    with pytest.raises(AgentFailed, match="read-only"):
+        rig.run(1)

@@ -1,0 +1,238 @@
+"""The behaviours that come with swarmwire do what their papers and sources say."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.agent.behaviours import Avoidance, Diffusion, Flocking
+from swarmwire.agent.behaviours.flocking import Heading
+from swarmwire.agent.host import hosted
+from swarmwire.agent.testing import Trial, assert_rows_independent
+from swarmwire.agent.vector_agent import VectorAgent
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.packets import Heard, Payloads
+from swarmwire.comms.senses import GroupSenses
+from tests.support.agent.hosts import group
+
+FOOTBOT = load_body("footbot")
+TURN_RADPS = 0.05 / 0.14  # one wheel at 5 cm/s on a base of 14 cm
+ANGLES = np.deg2rad(7.5 + 15.0 * np.arange(24))
+
+
+def rays_at_wall(gap_m: float, normal_rad: float) -> FloatArray:
+    """Ideal readings of a foot-bot whose rim is `gap_m` from an endless wall in direction `normal_rad` of its frame."""
+    radius = 0.085036758
+    towards = np.cos(ANGLES - normal_rad)
+    distance = np.where(towards > 0.0, (radius + gap_m) / np.maximum(towards, 1e-9) - radius, np.inf)
+    value = np.where(distance < 0.009889556, 1.0, 0.0100527 / (distance + 0.000163144))
+    return np.where(distance <= 0.1, value, 0.0)
+
+
+def command(
+    kind: type[VectorAgent],
+    value: FloatArray,
+    heading: float = 0.0,
+    neighbours: list[tuple[float, float, float]] | None = None,
+    **params: float,
+) -> tuple[float, float]:
+    """Forward speed and turn rate of one foot-bot; `neighbours` are range, bearing and heading."""
+    table = np.array(neighbours or [], np.float64).reshape(-1, 3)
+    k = len(table)
+    payloads = Payloads.of([Heading(heading_rad=float(h)).encode() for h in table[:, 2]])
+    zeros = np.zeros(k, np.int64)
+    given_columns = {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
+    heard = Heard(zeros, np.arange(1, k + 1), zeros, zeros, given_columns, np.arange(k), payloads)
+    fields = {"proximity.value": value[None, :], "compass.heading_rad": np.array([heading])}
+    host = hosted(group("", [0], body="footbot", params=dict(params)), kind)
+    actions = host.act((0, 0, 10**8), GroupSenses(np.zeros(1, np.int64), fields), heard)
+    assert actions.drive.all()
+    return float(actions.linear_mps[0]), float(actions.angular_radps[0])
+
+
+NOTHING = np.zeros(24)
+STRAIGHT, LEFT, RIGHT = (0.05, 0.0), (0.025, TURN_RADPS), (0.025, -TURN_RADPS)
+
+
+@pytest.mark.parametrize(
+    ("gap_m", "length"),
+    [
+        (0.09, 0.0091),
+        (0.08, 0.0184),
+        (0.06, 0.0310),
+        (0.05, 0.0366),
+        (0.04, 0.0446),
+        (0.03, 0.0572),
+        (0.02, 0.0861),
+        (0.015, 0.1074),
+        (0.01, 0.1448),
+        (0.005, 0.1755),
+    ],
+)
+def test_diffusion_head_on_drives_straight_until_the_mean_vector_is_long(gap_m: float, length: float) -> None:
+    value = rays_at_wall(gap_m, 0.0)
+    x, y = (value * np.cos(ANGLES)).mean(), (value * np.sin(ANGLES)).mean()
+    assert np.hypot(x, y) == pytest.approx(length, abs=6e-5)  # the vectors of the source, to their last digit
+    linear, angular = command(Diffusion, value)
+    # The angle is 0 but for the rays' last bits, so these choose the side; the source turns left at an exact 0.
+    expected = (0.05, 0.0) if length < 0.1 else (0.025, pytest.approx(TURN_RADPS))
+    assert (linear, abs(angular)) == expected
+
+
+def test_diffusion_reaches_the_threshold_at_1_65_cm() -> None:
+    assert command(Diffusion, rays_at_wall(0.0167, 0.0)) == STRAIGHT
+    assert command(Diffusion, rays_at_wall(0.0163, 0.0))[1] != 0.0
+
+
+@pytest.mark.parametrize(
+    ("off_deg", "gap_m", "angle_deg"),
+    [(15, 0.08, -15.0), (15, 0.02, -15.0), (10, 0.08, -7.7), (10, 0.05, -12.9), (10, 0.02, -9.1)],
+)
+def test_diffusion_turns_away_from_a_wall_that_is_not_dead_ahead(
+    off_deg: float, gap_m: float, angle_deg: float
+) -> None:
+    value = rays_at_wall(gap_m, np.deg2rad(-off_deg))
+    x, y = (value * np.cos(ANGLES)).mean(), (value * np.sin(ANGLES)).mean()
+    assert np.rad2deg(np.arctan2(y, x)) == pytest.approx(angle_deg, abs=0.06)
+    assert command(Diffusion, value) == pytest.approx(LEFT)  # the wall is to the right
+    assert command(Diffusion, value[::-1]) == pytest.approx(RIGHT)
+
+
+def test_diffusion_drives_straight_where_nothing_is_near() -> None:
+    assert command(Diffusion, NOTHING) == STRAIGHT
+
+
+@pytest.mark.parametrize("normal_deg", [30, 90, 150, 180, -30, -90, -150])
+def test_diffusion_turns_on_one_wheel_from_whatever_is_not_ahead(normal_deg: float) -> None:
+    linear, angular = command(Diffusion, rays_at_wall(0.05, np.deg2rad(normal_deg)))
+    assert linear == 0.025
+    if abs(normal_deg) < 180:
+        assert np.sign(angular) == -np.sign(normal_deg)
+
+
+def turn_of(neighbours: list[tuple[float, float, float]], value: FloatArray = NOTHING, **params: float) -> float:
+    return command(Flocking, value, 0.0, neighbours, **params)[1]
+
+
+ALONG = {"alignment": 0.0}
+
+
+@pytest.mark.parametrize("bearing_rad", [0.3, 1.5, 3.0, -0.3, -1.5, -3.0])
+def test_flocking_turns_towards_a_far_neighbour_and_away_from_a_too_near_one(bearing_rad: float) -> None:
+    side = np.sign(bearing_rad)
+    assert np.sign(turn_of([(0.9, bearing_rad, 0.0)], **ALONG)) == side
+    assert np.sign(turn_of([(0.1, bearing_rad, 0.0)], **ALONG)) == -side
+    assert turn_of([(0.4, bearing_rad, 0.0)], **ALONG) == 0.0
+
+
+@pytest.mark.parametrize("own_rad", [0.0, 2.0, 3.1, -3.1])
+@pytest.mark.parametrize("off_rad", [0.2, 1.0, 2.5, -0.2, -1.0, -2.5])
+def test_flocking_turns_to_the_neighbours_heading_whatever_the_compass_shows(own_rad: float, off_rad: float) -> None:
+    heading = (own_rad + off_rad + np.pi) % (2.0 * np.pi) - np.pi
+    linear, angular = command(Flocking, NOTHING, own_rad, [(0.4, 0.7, heading)])
+    assert np.sign(angular) == np.sign(off_rad)
+    same = command(Flocking, NOTHING, 0.0, [(0.4, 0.7, off_rad)])
+    assert (linear, angular) == pytest.approx(same, abs=1e-6)  # headings travel as f4
+
+
+def test_flocking_alone_drives_ahead() -> None:
+    assert command(Flocking, NOTHING) == (0.1, 0.0)
+
+
+def test_flocking_does_not_turn_more_for_more_neighbours_of_the_same_kind() -> None:
+    one = [(0.9, 0.8, 0.4)]
+    assert turn_of(one * 5) == pytest.approx(turn_of(one))
+
+
+@pytest.mark.parametrize("normal_deg", [10, 30, 80, -10, -30, -80])
+def test_flocking_turns_away_from_a_wall(normal_deg: float) -> None:
+    linear, angular = command(Flocking, rays_at_wall(0.02, np.deg2rad(normal_deg)))
+    assert np.sign(angular) == -np.sign(normal_deg)
+    assert 0.0 <= linear < 0.1
+
+
+def test_flocking_stops_and_turns_in_front_of_a_wall_dead_ahead() -> None:
+    linear, angular = command(Flocking, rays_at_wall(0.02, 0.0))
+    assert linear == 0.0
+    assert abs(angular) > 1.0
+
+
+neighbours_ = st.lists(
+    st.tuples(st.floats(0.05, 2.0), st.floats(-3.1, 3.1), st.floats(-3.0, 3.0, width=32)), min_size=1, max_size=4
+)
+
+
+@given(neighbours_, st.floats(0.03, 0.1), st.floats(-1.2, 1.2))
+def test_flocking_is_the_same_in_a_mirror(neighbours: list[tuple[float, float, float]], gap: float, off: float) -> None:
+    value = rays_at_wall(gap, off)
+    linear, angular = command(Flocking, value, 0.0, neighbours)
+    mirrored = [(r, -bearing, -heading) for r, bearing, heading in neighbours]
+    got = command(Flocking, value[::-1], 0.0, mirrored)
+    assert got[0] == pytest.approx(linear, abs=1e-6)
+    # Behind is both +pi and -pi: there a mirror image may turn either way.
+    assert got[1] == pytest.approx(-angular, abs=1e-6) or abs(angular) > 2.0 * np.pi - 1e-3
+
+
+AHEAD, AWAY_RADPS = (0.05, 0.0), 1.5
+
+
+def one_ray(angle_deg: float, distance_m: float) -> FloatArray:
+    """The foot-bot's ray nearest to an angle sees something, the others nothing."""
+    value = np.zeros(24)
+    assert FOOTBOT.proximity is not None
+    turned = (ANGLES - np.deg2rad(angle_deg) + np.pi) % (2.0 * np.pi) - np.pi
+    value[np.argmin(np.abs(turned))] = FOOTBOT.proximity.response.value(np.array(distance_m))
+    return value
+
+
+@pytest.mark.parametrize(
+    ("angle_deg", "distance_m", "turns"),
+    [
+        (37.5, 0.05, False),  # ahead, and far
+        (37.5, 0.02, True),  # ahead, and near
+        (52.5, 0.09, True),  # at the side, however far
+        (142.5, 0.09, True),
+        (142.5, 0.01, True),
+        (157.5, 0.01, False),  # behind, however near
+        (172.5, 0.01, False),
+    ],
+)
+def test_avoidance_turns_from_what_is_near_ahead_or_at_a_side(angle_deg: float, distance_m: float, turns: bool) -> None:
+    for side in (1.0, -1.0):
+        expected = (0.0, -side * AWAY_RADPS) if turns else AHEAD
+        assert command(Avoidance, one_ray(side * angle_deg, distance_m)) == expected
+
+
+def test_avoidance_goes_by_the_sum_of_all_rays() -> None:
+    """Two things at 60 degrees to the left and to the right add up to one ahead, as far as the nearest of them."""
+    both = one_ray(60.0, 0.05) + one_ray(-60.0, 0.06)
+    assert command(Avoidance, both) == AHEAD
+    assert command(Avoidance, both, safe_m=0.055) == (0.0, -AWAY_RADPS)
+
+
+def test_avoidance_takes_faint_answers_for_noise() -> None:
+    noise = 0.09 * one_ray(60.0, 0.005)
+    assert command(Avoidance, noise) == command(Avoidance, NOTHING) == AHEAD
+    assert command(Avoidance, noise, faint=0.05) == (0.0, -AWAY_RADPS)
+
+
+def test_avoidance_turns_on_an_arc_if_asked_to() -> None:
+    assert command(Avoidance, one_ray(60.0, 0.05), turn_mps=0.02, turn_radps=0.5) == (0.02, -0.5)
+
+
+@given(st.lists(st.sampled_from([0.0, 0.0, 0.3, 0.6, 1.0]), min_size=24, max_size=24), st.floats(0.0, 0.1))
+def test_avoidance_is_the_same_in_a_mirror(value: list[float], safe_m: float) -> None:
+    rays = np.array(value)
+    x, y = np.sum(rays * np.cos(ANGLES)), np.sum(rays * np.sin(ANGLES))
+    degrees = abs(np.rad2deg(np.arctan2(y, x)))
+    # On a border of the rule the last bits decide.
+    if abs(y) > 1e-9 and min(abs(degrees - 45.0), abs(degrees - 150.0)) > 1e-6:
+        linear, angular = command(Avoidance, rays, safe_m=safe_m)
+        assert command(Avoidance, rays[::-1], safe_m=safe_m) == (linear, -angular)
+
+
+@pytest.mark.parametrize("body", ["epuck", "footbot"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_avoidance_decides_for_each_robot_alone(body: str, seed: int) -> None:
+    assert_rows_independent(Avoidance, Trial(seed=seed, body=body))

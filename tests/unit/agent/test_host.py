@@ -1,0 +1,405 @@
+"""What an agent sees through its handle, and what becomes of its memory, its commands and its errors."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
+from swarmwire.agent.host import Host, Hosted, hosted
+from swarmwire.agent.loading import AgentClass
+from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.messages import encode_dict
+from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Heard, Payloads, Sent
+from swarmwire.comms.senses import Actions
+from tests.support.agent.hosts import GIVES, assignment, group, heard_from, one_group, plain, senses, spec
+from tests.support.agent.players import Chatter, Counter, Failing, Other, Unmade, VectorCounter, Word
+
+PERIOD_NS = 100_000_000
+SILENCE = Heard.none(GIVES)
+
+
+def host_of(kind: AgentClass, rows: list[int]) -> Hosted:
+    return hosted(group("", rows), kind)
+
+
+def step(host: Hosted, tick: int, rows: list[int], heard: Heard = SILENCE) -> Actions:
+    return host.act((tick, tick * PERIOD_NS, PERIOD_NS), senses(tick, rows), heard)
+
+
+def once(kind: AgentClass, rows: list[int], heard: Heard = SILENCE, tick: int = 0) -> Actions:
+    return step(host_of(kind, rows), tick, rows, heard)
+
+
+def failure(kind: AgentClass, heard: Heard = SILENCE) -> AgentFailed:
+    with pytest.raises(AgentFailed) as caught:
+        once(kind, [2, 5], heard)
+    return caught.value
+
+
+def words(*senders: int) -> Sent:
+    payloads = [Word(number=float(s)).encode() for s in senders]
+    return Sent(np.array(senders), np.full(len(senders), BROADCAST), Payloads.of(payloads))
+
+
+READS = {
+    "proximity": lambda robot: robot.proximity.value,
+    "compass": lambda robot: robot.compass.heading_rad,
+    "odometry": lambda robot: robot.odometry.left_m,
+}
+
+
+@pytest.mark.parametrize("sense", sorted(READS))
+def test_a_sense_that_was_not_declared_cannot_be_read(sense: str) -> None:
+    class Reads(Agent):
+        needs = tuple(READS.keys() - {sense})
+
+        def step(self, robot: Robot) -> None:
+            READS[sense](robot)
+
+    class Rows(VectorAgent):
+        needs = Reads.needs
+
+        def step(self, robots: Robots, state: State) -> None:
+            READS[sense](robots)
+
+    single, vector = failure(Reads), failure(Rows)
+    assert single.robots == "flock-2"
+    assert vector.robots == "flock-2, flock-5"
+    for error in (single, vector):
+        assert f"NotDeclared: reads '{sense}', which its needs do not name" in error.traceback
+        assert re.search(r"test_host\.py.*in step", error.traceback)
+
+
+def test_declared_senses_are_those_of_the_robot_itself() -> None:
+    seen: list[tuple[float, ...]] = []
+
+    class Reads(Agent):
+        needs = ("proximity", "compass", "odometry")
+
+        def step(self, robot: Robot) -> None:
+            ray = float(robot.proximity.value[3])
+            seen.append((ray, robot.compass.heading_rad, robot.odometry.left_m, robot.odometry.right_m))
+            assert robot.proximity.angle_rad.shape == robot.proximity.distance_m.shape == (8,)
+            assert (robot.time_s, robot.period_s, robot.body.name) == (0.4, 0.1, "epuck")
+
+    once(Reads, [2, 5], tick=4)
+    fields = senses(4, [2, 5]).fields
+    columns = (fields["proximity.value"][:, 3], *(fields[n] for n in list(fields)[1:]))
+    assert seen == list(zip(*(column.tolist() for column in columns), strict=True))
+
+
+@pytest.mark.parametrize(("name", "need"), [("range_m", "range"), ("bearing_rad", "bearing"), ("rssi_dbm", "rssi")])
+def test_what_the_radio_tells_of_a_packet_must_be_declared(name: str, need: str) -> None:
+    class Reads(Agent):
+        needs = tuple({"radio.range", "radio.bearing", "radio.rssi"} - {f"radio.{need}"})
+
+        def step(self, robot: Robot) -> None:
+            for packet in robot.radio.heard(Word):
+                getattr(packet, name)
+
+    class Rows(VectorAgent):
+        needs = Reads.needs
+
+        def step(self, robots: Robots, state: State) -> None:
+            getattr(robots.radio.heard(Word), name)
+
+    for kind in (Reads, Rows):
+        assert f"NotDeclared: reads 'radio.{need}' of a packet" in failure(kind, heard_from(words(0), [2, 5])).traceback
+
+
+def test_packets_come_with_sender_sequence_time_range_and_bearing_to_those_who_heard_them() -> None:
+    seen: list[list[tuple[float, ...]]] = []
+
+    class Reads(Agent):
+        needs = ("radio.range", "radio.bearing")
+
+        def step(self, robot: Robot) -> None:
+            packets = robot.radio.heard(Word)
+            seen.append([(p.message.number, p.sender, p.sequence, p.heard_at_ns, p.range_m) for p in packets])
+            assert all(-1.0 <= p.bearing_rad <= 1.0 for p in packets)
+
+    heard = heard_from(words(0, 2, 7), [2, 3, 5])  # robot 3 belongs to another group
+    once(Reads, [2, 5], heard)
+    mine = [np.flatnonzero(heard.receiver == row) for row in (2, 5)]
+    expected = [
+        [
+            (
+                float(heard.sender[i]),
+                heard.sender[i],
+                heard.sequence[i],
+                heard.heard_at_ns[i],
+                heard.given["range_m"][i],
+            )
+            for i in at
+        ]
+        for at in mine
+    ]
+    assert seen == expected
+    assert [len(packets) for packets in seen] == [2, 3]
+
+
+def test_a_message_of_another_class_or_length_or_none_is_not_heard() -> None:
+    found: list[tuple[int, int]] = []
+
+    class Listens(Agent):
+        def step(self, robot: Robot) -> None:
+            found.append((len(robot.radio.heard(Word)), len(robot.radio.heard(Other))))
+
+    word = Word(number=1.0).encode()
+    payloads = [Other(number=3).encode(), word, word + b"\0", word[:-1], word[:2], b"", b"\x01"]
+    sent = Sent(np.zeros(7, np.int64), np.full(7, BROADCAST), Payloads.of(payloads))
+    once(Listens, [2], heard_from(sent, [2]))
+    assert found == [(1, 1)]
+
+
+def test_a_dict_is_a_message_too() -> None:
+    found: list[object] = []
+
+    class Prototype(Agent):
+        def step(self, robot: Robot) -> None:
+            found.extend(packet.message for packet in robot.radio.heard(dict))
+            robot.radio.send({"state": "search", "at": [1, 2.5]})
+
+    host = host_of(Prototype, [2, 5])
+    sent = step(host, 0, [2, 5]).sent
+    step(host, 1, [2, 5], heard_from(sent, [2, 5]))
+    assert found == [{"state": "search", "at": [1, 2.5]}] * 2
+
+
+@pytest.mark.parametrize("junk", [b"", b"\x05", b"\x81", b"\x81\x80\x01", b"\xc1", b"\x91" * 2000])
+def test_bytes_that_hold_no_dict_are_not_heard_as_one(junk: bytes) -> None:
+    found: list[object] = []
+
+    class Prototype(Agent):
+        def step(self, robot: Robot) -> None:
+            found.extend(packet.message for packet in robot.radio.heard(dict))
+
+    dict_tag = bytes(TAG_BYTES)
+    payloads = Payloads.of([dict_tag + junk, encode_dict({"x": 1}), dict_tag + junk])
+    once(Prototype, [2], heard_from(Sent(np.zeros(3, np.int64), np.full(3, BROADCAST), payloads), [2]))
+    assert found == [{"x": 1}]
+
+
+def test_packet_ids_count_per_robot_and_go_on_after_an_absence() -> None:
+    ids: list[int] = []
+
+    class Sends(Agent):
+        def step(self, robot: Robot) -> None:
+            ids.extend((robot.radio.send(Word(number=0.0)), robot.radio.send({"x": 1}, to=3)))
+
+    class Rows(VectorAgent):
+        def step(self, robots: Robots, state: State) -> None:
+            first = robots.radio.send(Word, number=0.0)
+            ids.extend(np.stack([first, robots.radio.send(Word, to=3, number=1.0)], 1).ravel().tolist())
+
+    for kind in (Sends, Rows):
+        host = host_of(kind, [2, 5])
+        ids.clear()
+        for tick, rows in enumerate(([2, 5], [5], [2, 5])):
+            step(host, tick, rows)
+        assert ids == [0, 1, 0, 1, 2, 3, 2, 3, 4, 5]
+
+
+def test_a_packet_may_be_addressed_to_an_index_of_the_arena_and_to_no_other() -> None:
+    class Rows(VectorAgent):
+        def step(self, robots: Robots, state: State) -> None:
+            robots.radio.send(Word, rows=np.array([True, False, True]), to=np.array([7, 8, 9]), number=np.arange(3.0))
+
+    sent = once(Rows, [1, 4, 6]).sent
+    assert (sent.sender.tolist(), sent.to.tolist()) == ([1, 6], [7, 9])
+    assert [Word.decode(sent.payloads.row(i)).number for i in range(2)] == [0.0, 2.0]
+
+    class Wrong(Agent):
+        def step(self, robot: Robot) -> None:
+            robot.radio.send({"x": 1}, to=-2)
+
+    assert "expected the index of a robot" in failure(Wrong).traceback
+
+
+def test_only_a_robot_that_drives_has_a_command() -> None:
+    class Once(Agent):
+        def step(self, robot: Robot) -> None:
+            if robot.time_s < 0.05:
+                robot.drive(0.1, -0.2)
+
+    class Rows(VectorAgent):
+        def step(self, robots: Robots, state: State) -> None:
+            robots.drive(0.3, np.arange(3.0), rows=np.array([False, True, True]))
+            robots.drive(np.full(3, 0.5), 9.0, rows=np.array([False, True, False]))
+
+    host = host_of(Once, [2, 5])
+    first, second = step(host, 0, [2, 5]), step(host, 1, [2, 5])
+    assert (first.drive.tolist(), first.linear_mps.tolist(), first.angular_radps.tolist()) == (
+        [True, True],
+        [0.1, 0.1],
+        [-0.2, -0.2],
+    )
+    assert second.drive.tolist() == [False, False]
+    rows = once(Rows, [1, 2, 3])
+    assert rows.drive.tolist() == [False, True, True]
+    assert rows.linear_mps[1:].tolist() == [0.5, 0.3]
+    assert rows.angular_radps[1:].tolist() == [9.0, 2.0]
+
+
+@pytest.mark.parametrize("kind", [Counter, VectorCounter])
+def test_a_robot_that_comes_back_starts_afresh_and_the_others_keep_their_memory(kind: AgentClass) -> None:
+    host = host_of(kind, [2, 5, 6])
+    steps: list[list[float]] = []
+    for tick, rows in enumerate(([2, 5, 6], [2, 5, 6], [2, 6], [2, 5, 6], [], [2, 6])):
+        steps.append(step(host, tick, rows).linear_mps.tolist())
+    assert steps == [[1, 1, 1], [2, 2, 2], [3, 3], [4, 1, 4], [], [1, 1]]
+
+
+@pytest.mark.parametrize("kind", ["Counter", "VectorCounter"])
+def test_memory_does_not_depend_on_who_shares_the_process(kind: str) -> None:
+    together = Host(assignment(group(spec(kind), [2, 5])))
+    alone = [Host(assignment(group(spec(kind), [row]))) for row in (2, 5)]
+    for tick, rows in enumerate(([2, 5], [2], [2, 5], [], [5], [2, 5])):
+        at_once = together.act(tick, one_group(tick, rows), SILENCE)
+        each = [
+            host.act(tick, one_group(tick, [row] if row in rows else []), SILENCE)
+            for host, row in zip(alone, (2, 5), strict=True)
+        ]
+        assert plain(at_once) == plain(Actions.joined(each))
+
+
+def test_nobody_makes_no_step() -> None:
+    class Mean(VectorAgent):
+        def step(self, robots: Robots, state: State) -> None:
+            assert robots.n
+
+    assert len(step(host_of(Mean, [2]), 0, []).rows) == 0
+
+
+def test_an_agent_that_fails_is_named_with_its_own_traceback() -> None:
+    host = host_of(Failing, [0, 1, 2, 3])
+    step(host, 1, [0, 1, 2, 3])
+    with pytest.raises(AgentFailed) as caught:
+        step(host, 2, [1, 0, 3][1:])
+    assert caught.value.robots == "flock-0"
+    assert "players.py" in caught.value.traceback
+
+
+def test_an_agent_that_cannot_be_made_is_named_with_its_own_traceback() -> None:
+    with pytest.raises(AgentFailed) as caught:
+        host_of(Unmade, [2, 5])
+    assert caught.value.robots == "flock-2, flock-5"
+    assert "no memory left" in caught.value.traceback
+
+
+def test_a_local_crew_acts_between_start_and_close_only() -> None:
+    crew = LocalCrew(assignment(group(spec("Counter"), [0])))
+    with pytest.raises(RuntimeError, match="not been started"):
+        crew.act(0, one_group(0, [0]), SILENCE)
+    crew.start()
+    assert crew.act(0, one_group(0, [0]), SILENCE).linear_mps.tolist() == [1.0]
+    assert crew.counts() == {}
+    crew.close()
+    crew.close()
+    with pytest.raises(RuntimeError):
+        crew.act(1, one_group(1, [0]), SILENCE)
+
+
+def test_draws_belong_to_robot_tick_and_purpose() -> None:
+    drawn: list[tuple[float, ...]] = []
+
+    class Draws(Agent):
+        def step(self, robot: Robot) -> None:
+            draw = robot.draw
+            drawn.append((draw.uniform("a"), draw.uniform("b"), draw.uniform("a"), draw.normal("a"), draw.normal("c")))
+
+    def of(rows: list[int], tick: int) -> list[tuple[float, ...]]:
+        drawn.clear()
+        once(Draws, rows, tick=tick)
+        return list(drawn)
+
+    whole = of([1, 2, 7], 3)
+    assert of([7], 3) + of([1], 3) == [whole[2], whole[0]]  # whoever else draws
+    assert of([1, 2, 7], 3) == whole
+    values = [value for tick in range(4) for row in of([1, 2, 7], tick) for value in row]
+    assert len(set(values)) == len(values)
+
+
+@given(st.lists(st.integers(0, 50), min_size=1, max_size=6, unique=True).map(sorted), st.integers(0, 2**40))
+def test_a_row_draws_what_the_robot_alone_would_draw(rows: list[int], tick: int) -> None:
+    class Single(Agent):
+        def step(self, robot: Robot) -> None:
+            robot.draw.normal("turn")
+            robot.drive(robot.draw.uniform("speed", -1.0, 3.0), robot.draw.normal("turn", 5.0, 2.0))
+
+    class Rows(VectorAgent):
+        def step(self, robots: Robots, state: State) -> None:
+            robots.draw.normal("turn")
+            robots.drive(robots.draw.uniform("speed", -1.0, 3.0), robots.draw.normal("turn", 5.0, 2.0))
+
+    one, other = once(Single, rows, tick=tick), once(Rows, rows, tick=tick)
+    assert plain(one) == plain(other)
+    assert np.all((one.linear_mps >= -1.0) & (one.linear_mps < 3.0))
+
+
+def test_a_group_that_is_split_does_what_it_does_as_a_whole() -> None:
+    whole, first, second = (host_of(Chatter, rows) for rows in ([0, 1, 2, 3], [0, 3], [1, 2]))
+    sent = Sent.none()
+    for tick in range(5):
+        heard = heard_from(sent, [0, 1, 2, 3])
+        expected = step(whole, tick, [0, 1, 2, 3], heard)
+        assert plain(Actions.joined([step(second, tick, [1, 2], heard), step(first, tick, [0, 3], heard)])) == plain(
+            expected
+        )
+        sent = expected.sent
+
+
+def test_the_last_state_that_a_robot_names_in_a_tick_counts() -> None:
+    class Rows(VectorAgent):
+        def step(self, robots: Robots, state: State) -> None:
+            robots.note("search")
+            robots.note("wait", rows=np.array([False, True, False]))
+
+    class One(Agent):
+        def step(self, robot: Robot) -> None:
+            if robot.time_s == 0.0:
+                robot.note(state="search")
+
+    notes = once(Rows, [1, 4, 6]).notes
+    assert [notes.names[code] for code in notes.code] == ["search", "wait", "search"]
+    host = host_of(One, [2, 5])
+    assert [len(step(host, tick, [2, 5]).notes) for tick in (0, 1)] == [2, 0]
+
+
+def test_the_last_number_that_a_robot_tells_in_a_tick_counts() -> None:
+    class Rows(VectorAgent):
+        def step(self, robots: Robots, state: State) -> None:
+            robots.note("search", value=np.array([1.0, 2.0, 3.0]))
+            robots.note(value=np.array([np.nan, 5.0, np.inf]), rows=np.array([False, True, False]))
+
+    class One(Agent):
+        def step(self, robot: Robot) -> None:
+            if robot.time_s == 0.0:
+                robot.note(value=0.5)
+                robot.note("search", value=1.25)
+
+    class Same(VectorAgent):
+        def step(self, robots: Robots, state: State) -> None:
+            robots.note(value=4, rows=np.array([True, False, True]))
+
+    actions = once(Rows, [1, 4, 6])
+    assert (actions.values.rows.tolist(), actions.values.value.tolist()) == ([1, 4, 6], [1.0, 5.0, 3.0])
+    assert len(actions.notes) == 3
+    same = once(Same, [1, 4, 6])
+    assert (same.values.rows.tolist(), same.values.value.tolist(), len(same.notes)) == ([1, 6], [4.0, 4.0], 0)
+    host = host_of(One, [2, 5])
+    first, second = (step(host, tick, [2, 5]) for tick in (0, 1))
+    assert (first.values.value.tolist(), len(first.notes), len(second.values)) == ([1.25, 1.25], 2, 0)
+
+
+@pytest.mark.parametrize("state", ["", "x" * 65, 3], ids=repr)
+def test_a_state_is_a_short_text(state: object) -> None:
+    class Wrong(Agent):
+        def step(self, robot: Robot) -> None:
+            robot.note(state)
+
+    assert "expected a text of 1 to 64 characters" in failure(Wrong).traceback

@@ -1,0 +1,131 @@
+"""Each fate over signals is told beforehand by its draws, written out here once more: what they are keyed by."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.air.parameters.bursts import Bursts
+from swarmwire.comms.air.signal.frame_fate import lone_deliveries
+from swarmwire.comms.air.signal.losses import passing_share
+from swarmwire.comms.air.signal.rules import rules_of
+from swarmwire.comms.draws import derive_key, purpose, uniform
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.outcomes import SendResult
+from swarmwire.comms.packets import Sent
+from tests.support.comms.air.runs import Run, at, everybody, make_air, packets, run
+from tests.support.comms.air.signal.radios import with_access
+
+SEEDS = (3, 8)
+ROBOTS = 3
+KEYS = np.array([derive_key(seed, "air") for seed in SEEDS], np.uint64)
+
+
+def on_air(told: Run, name: str) -> np.ndarray:
+    """A column of the links of packets that went on air, out of range or not."""
+    return told.on_air(name)
+
+
+def draws_of(told: Run, what: str) -> np.ndarray:
+    arena = on_air(told, "arena")
+    columns = (on_air(told, name) for name in ("sender", "receiver", "sequence"))
+    return uniform(KEYS[arena], *columns, purpose(what))
+
+
+def test_a_weak_frame_is_right_if_its_draw_is_below_the_probability():
+    """Two robots in each arena, too far apart for every frame to be right; what is not counts as out of range."""
+    radio = replace(with_access("none"), send_offset="tick")
+    pose, ticks = np.concatenate([at((0, 0), (112, 0)), at((0, 0), (116, 0))]), 40
+    told = run(make_air(radio, 2, SEEDS), pose, everybody(4), ticks, 1)
+    arena, sender, sequence = (of.ravel() for of in np.meshgrid(range(2), range(2), range(ticks), indexing="ij"))
+    rssi_dbm = [on_air(told, "rssi_dbm")[on_air(told, "arena") == of][0] for of in range(2)]
+    likely = lone_deliveries(rules_of(radio, 2), np.array(rssi_dbm), 8.0 * (10 + radio.overhead_bytes))
+    is_right = uniform(KEYS[arena], sender, 1 - sender, sequence, purpose("reception")) < likely[arena]
+    assert 0 < np.count_nonzero(is_right) < len(is_right)
+    heard = zip(*(on_air(told, name).tolist() for name in ("arena", "sender", "sequence")), strict=True)
+    expected = zip(arena[is_right].tolist(), sender[is_right].tolist(), sequence[is_right].tolist(), strict=True)
+    assert sorted(heard) == sorted(expected)
+
+
+def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
+    """A packet is sent up to three times, until an answer to it is right; it is heard if one of its frames is."""
+    radio = with_access("csma-802154")
+    radio = replace(radio, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
+    rules, ticks, frame_bits = rules_of(radio, 2), 80, 8.0 * (10 + radio.overhead_bytes)
+    told = run(make_air(radio, 2, SEEDS), np.tile(at((0, 0), (122, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    rssi_dbm = on_air(told, "rssi_dbm")[:1]
+    frame, answer = (lone_deliveries(rules, rssi_dbm, bits)[0] for bits in (frame_bits, rules.acknowledgement_bits))
+    keys, sequence, tries = KEYS[:, None, None], np.arange(ticks)[:, None], np.arange(3)
+    right = uniform(keys, 0, 1, sequence, purpose("reception") + tries) < frame
+    is_answered = right & (uniform(keys, 1, 0, sequence, purpose("reception of an acknowledgement") + tries) < answer)
+    heard = sorted(zip(on_air(told, "arena").tolist(), on_air(told, "sequence").tolist(), strict=True))
+    assert heard == [tuple(of) for of in np.argwhere(right.any(axis=2)).tolist()]
+    acknowledged = sorted((row // 2, i) for i, row, result in learned(told) if result == int(SendResult.ACKNOWLEDGED))
+    assert acknowledged == [tuple(of) for of in np.argwhere(is_answered.any(axis=2)).tolist()]
+    assert 20 < len(acknowledged) < len(heard) < 2 * ticks - 20
+
+
+@pytest.mark.parametrize("loss", [0.3, 1.0])
+def test_a_frame_is_lost_if_its_draw_is_below_the_loss(loss: float):
+    radio = replace(with_access("none"), send_offset="tick", loss=loss)
+    pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
+    told = run(make_air(radio, ROBOTS, SEEDS), pose, everybody(2 * ROBOTS), 10, 1)
+    fate = np.where(draws_of(told, "fixed loss") < loss, Fate.LOST, Fate.HEARD)
+    assert on_air(told, "fate").tolist() == fate.tolist()
+
+
+def asking(senders: list[int]) -> Callable[[int], Sent]:
+    """A packet in each tick from each of these to robot 1 of its arena, whose outcome it asks for, by the tick."""
+    sent = packets(senders, 1)
+    return lambda tick: Sent(sent.sender, sent.to, sent.payloads, np.full(len(senders), tick))
+
+
+def learned(told: Run) -> list[tuple[int, int, int]]:
+    """Outcomes that senders were told, sorted: (id, row, result)."""
+    found = (
+        zip(one.outcomes.id.tolist(), one.outcomes.row.tolist(), one.outcomes.result.tolist(), strict=True)
+        for one in told.news
+    )
+    return sorted(chain.from_iterable(found))
+
+
+def told_beforehand(key: np.uint64, sequence: int, loss: float, attempts: int) -> tuple[Fate, SendResult]:
+    """The fate of a packet from robot 0 to 1, and what its sender learns: frames and answers are lost by draws."""
+    fate = Fate.LOST
+    for attempt in range(attempts):
+        if uniform(key, 0, 1, sequence, purpose("fixed loss") + attempt) < loss:
+            continue
+        fate = Fate.HEARD
+        if uniform(key, 1, 0, sequence, purpose("fixed loss of an acknowledgement") + attempt) >= loss:
+            return fate, SendResult.ACKNOWLEDGED
+    return fate, SendResult.NO_ACKNOWLEDGEMENT
+
+
+@pytest.mark.parametrize("method", ["csma-802154", "dcf"])
+def test_attempts_and_their_answers_have_draws_of_their_own(method: str):
+    radio = with_access(method)
+    radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
+    ticks = 60
+    told = run(make_air(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    expected = [told_beforehand(key, tick, 0.6, 3) for tick in range(ticks) for key in KEYS]
+    assert [result for _, _, result in learned(told)] == [result for _, result in expected]
+    order = np.lexsort((on_air(told, "arena"), on_air(told, "sequence")))
+    assert on_air(told, "fate")[order].tolist() == [fate for fate, _ in expected]
+    assert len(set(expected)) == 3
+
+
+@pytest.mark.parametrize("method", ["none", "aloha"])
+def test_bursts_alone_take_frames_that_nothing_else_could(method: str):
+    radio = replace(with_access(method), send_offset="tick", bursts=Bursts(0.3, 0.3))
+    pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
+    fates = run(make_air(radio, ROBOTS, SEEDS), pose, lambda _: packets([0, ROBOTS]), 60, 1).fates()
+    assert set(fates) == {"HEARD", "BURST"}
+    assert min(fates.values()) > 50
+
+
+def test_losses_of_all_kinds_leave_a_share():
+    radio = replace(with_access("none"), loss=0.25)
+    assert passing_share(radio) == 0.75
+    assert passing_share(replace(radio, bursts=Bursts(0.1, 0.2))) == 0.75 * (1.0 - Bursts(0.1, 0.2).loss) < 0.75

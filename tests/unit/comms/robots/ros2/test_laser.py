@@ -1,0 +1,167 @@
+"""What a laser scanner's returns mean, whatever the scanner."""
+
+from math import cos, hypot, inf, nan, pi, sin
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarmwire.comms.bodies.body import Body, body_from, load_body
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.robots.ros2.kinds import LASER_SCAN
+from swarmwire.comms.robots.ros2.laser import laser_scan, returns_m
+from swarmwire.comms.robots.ros2.laser_as_proximity import LaserAsProximity
+from swarmwire.comms.robots.ros2.laser_as_scan import LaserAsScan
+from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.robots.ros2.nearest_angle import nearest_angle
+from swarmwire.comms.sheets import Proximity, Scan
+from tests.support.comms.robots.ros2 import independent
+
+MESSAGES = Messages("jazzy")
+LINEAR = {"kind": "quadratic", "a": 0.0, "b": -2.0, "c": 1.0, "reach_m": 0.5}
+
+
+def received(message: independent.LaserScan):
+    return MESSAGES.decode(LASER_SCAN, message.serialize())
+
+
+def body(at_m: float = 0.0) -> Body:
+    angles_deg = [0, 30, -30, 90, -90, 180]
+    proximity = {"angles_deg": angles_deg, "range_m": 0.4, "response": LINEAR}
+    return body_from({"like": "turtlebot3-burger", "senses": {"proximity": proximity, "scan": {"at_m": at_m}}}, "b")
+
+
+def proximity_of(of: Body) -> Proximity:
+    assert of.proximity
+    return of.proximity
+
+
+ANGLES = st.floats(-10.0, 10.0)
+
+
+@given(st.lists(ANGLES, min_size=1, max_size=20), st.lists(ANGLES, min_size=1, max_size=20))
+def test_the_nearest_angle_is_that_of_a_brute_force_search(of, among):
+    of, among = np.array(of), np.array(among)
+    apart = np.abs(np.remainder(of[:, None] - among[None] + pi, 2 * pi) - pi)
+    place, apart_rad = nearest_angle(of, among)
+    assert apart_rad == pytest.approx(apart.min(axis=1), abs=1e-9)
+    assert apart[np.arange(len(of)), place] == pytest.approx(apart.min(axis=1), abs=1e-9)
+
+
+def scans():
+    sheet = st.builds(
+        Scan,
+        rays=st.integers(1, 90),
+        range_m=st.just(3.5),
+        range_min_m=st.just(0.12),
+        first_deg=st.floats(-180, 180),
+        span_deg=st.sampled_from([30.0, 180.0, 270.0, 360.0]),
+    )
+    return sheet.flatmap(
+        lambda of: st.tuples(
+            st.just(of), st.lists(st.floats(0.12, 3.5) | st.just(inf), min_size=of.rays, max_size=of.rays)
+        )
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(scans())
+def test_what_an_emulated_scanner_sends_a_driver_of_the_same_sheet_reads(drawn):
+    sheet, range_m = drawn
+    range_m = np.array(range_m)
+    message = MESSAGES.decode(LASER_SCAN, MESSAGES.encode(LASER_SCAN, laser_scan(MESSAGES, sheet, range_m, 0)))
+    assert LaserAsScan(sheet, 0.0).range_m(message) == pytest.approx(range_m, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("told_m", "reads_m"),
+    [(1.0, 1.0), (inf, inf), (nan, inf), (0.0, inf), (-inf, 0.12), (0.05, 0.12), (11.0, inf), (5.0, inf), (3.5, 3.5)],
+)
+def test_a_return_that_is_none_reads_inf_and_one_too_near_the_least(told_m, reads_m):
+    sheet = load_body("turtlebot3-burger").scan
+    assert sheet
+    message = received(independent.laser_scan([told_m] * 8, range_min=0.1))
+    assert LaserAsScan(sheet, 0.0).range_m(message)[0] == pytest.approx(reads_m)
+
+
+def test_a_scanner_of_other_rays_is_read_at_the_nearest_ones():
+    message = received(independent.laser_scan([1.0, 2.0, 3.0, 4.0], first_rad=-pi))  # back, right, ahead, left
+    assert LaserAsScan(Scan(rays=4, range_m=9.0), 0.0).range_m(message).tolist() == [3.0, 4.0, 1.0, 2.0]
+    coarse = LaserAsScan(Scan(rays=8, range_m=9.0, first_deg=1.0), 0.0).range_m(message)
+    assert coarse.tolist() == [3.0, 4.0, 4.0, 1.0, 1.0, 2.0, 2.0, 3.0]
+
+
+def test_a_scanner_that_turns_clockwise_or_is_mounted_turned_is_read_where_it_looks():
+    clockwise = received(independent.laser_scan([1.0, 2.0, 3.0, 4.0], step_rad=-pi / 2))  # ahead, right, back, left
+    sheet = Scan(rays=4, range_m=9.0)
+    assert LaserAsScan(sheet, 0.0).range_m(clockwise).tolist() == [1.0, 4.0, 3.0, 2.0]
+    assert LaserAsScan(sheet, pi / 2).range_m(clockwise).tolist() == [2.0, 1.0, 4.0, 3.0]
+
+
+def test_where_a_scanner_does_not_look_nothing_is_met():
+    ahead = received(independent.laser_scan([1.0] * 91, first_rad=-pi / 4, step_rad=pi / 180))
+    range_m = LaserAsScan(Scan(rays=8, range_m=9.0), 0.0).range_m(ahead)
+    assert range_m.tolist() == [1.0, 1.0, inf, inf, inf, inf, inf, 1.0]
+
+
+@pytest.mark.parametrize("broken", [{"first_rad": nan}, {"step_rad": inf}])
+def test_rays_that_cannot_lie_so_are_a_bad_frame(broken):
+    message = received(independent.laser_scan([1.0] * 4, **{"first_rad": 0.0, "step_rad": 0.1, **broken}))
+    for reader in (LaserAsScan(Scan(rays=4, range_m=9.0), 0.0).range_m, near().value):
+        with pytest.raises(BadFrame):
+            reader(message)
+
+
+def test_a_message_without_rays_is_a_bad_frame():
+    with pytest.raises(BadFrame):
+        near().value(received(independent.laser_scan([], step_rad=0.1)))
+
+
+def near(at_m: float = 0.0, scanner_rad: float = 0.0) -> LaserAsProximity:
+    of = body(at_m)
+    return LaserAsProximity(proximity_of(of), of.radius_m, at_m, scanner_rad)
+
+
+def test_each_sensor_answers_to_the_nearest_return_of_its_sector_from_the_rim():
+    ranges = np.full(360, inf)
+    ranges[10], ranges[14] = 0.305, 0.405  # both nearest to the sensor ahead
+    ranges[20] = 0.205  # to the one at 30 degrees
+    ranges[-100] = 0.105  # to the one at -90 degrees: at the rim
+    ranges[135 + 3] = 0.2  # between 90 and 180 degrees, nearer to 180, more than 45 degrees off neither
+    value = near().value(received(independent.laser_scan(ranges)))
+    assert value == pytest.approx([1 - 2 * 0.2, 1 - 2 * 0.1, 0.0, 0.0, 1.0, 1 - 2 * 0.095], abs=1e-6)
+
+
+def test_beyond_the_sheets_range_or_further_off_than_45_degrees_a_sensor_answers_nothing():
+    far = np.full(360, 0.105 + 0.41)
+    assert not near().value(received(independent.laser_scan(far))).any()
+    sheet = Proximity(angles_deg=(0.0,), range_m=0.4, response=proximity_of(body()).response)
+    alone = LaserAsProximity(sheet, 0.105, 0.0, 0.0)
+    ranges = np.full(360, inf)
+    ranges[46:315] = 0.2
+    assert alone.value(received(independent.laser_scan(ranges))) == pytest.approx([0.0])
+    ranges[44] = 0.2
+    assert alone.value(received(independent.laser_scan(ranges))) == pytest.approx([1 - 2 * 0.095], abs=1e-6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(-0.1, 0.1), st.floats(-pi, pi), st.floats(0.0, 0.3), st.floats(-pi, pi))
+def test_the_way_from_scanner_to_rim_is_that_of_geometry(at_m, angle_rad, away_m, mounted_rad):
+    """A thing `away_m` from the rim along a ray of a scanner that stands `at_m` ahead of the centre."""
+    low, high = 0.0, 1.0
+    for _ in range(60):  # where the ray leaves the disc, by halving
+        half = 0.5 * (low + high)
+        inside = hypot(at_m + half * cos(angle_rad), half * sin(angle_rad)) < 0.105
+        low, high = (half, high) if inside else (low, half)
+    sheet = Proximity(angles_deg=(np.rad2deg(angle_rad),), range_m=0.4, response=proximity_of(body()).response)
+    message = received(independent.laser_scan([low + away_m], angle_rad - mounted_rad, 0.1, range_min=0.0))
+    value = LaserAsProximity(sheet, 0.105, at_m, mounted_rad).value(message)
+    assert value == pytest.approx([1.0 - 2.0 * away_m], abs=1e-5)
+
+
+def test_a_nan_that_signals_is_no_return_and_no_warning():
+    signalling = np.frombuffer(bytes.fromhex("0100807f"), np.float32)
+    told = SimpleNamespace(ranges=signalling, range_min=0.1, range_max=3.0)
+    assert returns_m(told).tolist() == [inf]

@@ -1,0 +1,145 @@
+"""A campaign's folder that a power cut or a person has damaged: one line that says which file, and how to go on."""
+
+import json
+from shutil import copytree
+
+import polars as pl
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy import resume, sweep
+from swarmwire.deploy.campaign import sweeping
+from swarmwire.deploy.campaign.run_again import CampaignRun
+from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from tests.integration.deploy.campaign.test_resume import ASKED, Killed, dying_at
+from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    """A folder with a campaign that is `whole`, and with one of which two of four pieces are done, `half`."""
+    folder = tmp_path_factory.mktemp("sound")
+    scenario = scenario_in(folder)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
+        sweep(scenario, out=folder / "whole", **ASKED)
+        dying_at(patched, 4, Killed())
+        with pytest.raises(Killed):
+            sweep(scenario, out=folder / "half", **ASKED)
+    return folder
+
+
+@pytest.fixture
+def whole(sound, tmp_path, here):
+    """A copy, for one test to damage."""
+    return copytree(sound / "whole", tmp_path / "whole")
+
+
+@pytest.fixture
+def half(sound, tmp_path, here):
+    """A copy, for one test to damage."""
+    return copytree(sound / "half", tmp_path / "half")
+
+
+def refused(call, *arguments):
+    with pytest.raises(BadInput) as told:
+        call(*arguments)
+    assert "\n" not in str(told.value)
+    return str(told.value)
+
+
+@pytest.mark.parametrize("data", [b"", b"PAR1", b"PAR1" + b"x" * 400 + b"PAR1"])
+def test_a_damaged_part_is_told_by_its_name_and_without_it_its_runs_are_run_again(half, whole, data):
+    part = half / "parts" / "part-00000001.parquet"
+    part.write_bytes(data)
+    for call in (resume, lambda folder: CampaignRun(folder, 1).again()):
+        assert refused(call, half).startswith(f"{part}: expected a whole Parquet file: ")
+    part.unlink()
+    assert resume(half).is_over
+    assert rows_in(half) == rows_in(whole)
+    assert series_in(half).equals(series_in(whole), null_equal=True)
+
+
+def test_a_damaged_series_is_told_by_its_name_and_without_it_the_table_is_whole(half, whole):
+    part = next((half / "series").glob("part-*"))
+    part.write_bytes(b"")
+    assert "without the file their tables stay, but not their series" in refused(resume, half)
+    part.unlink()
+    assert resume(half).is_over
+    assert rows_in(half) == rows_in(whole)
+
+
+def test_a_table_of_another_campaign_is_told_by_the_first_strange_column(half):
+    part = half / "parts" / "part-00000000.parquet"
+    rows = pl.read_parquet(part)
+    for frame, told in (
+        (rows.drop("order.mean"), "order.mean: expected this column of the campaign's table, as Float64"),
+        (rows.with_columns(pl.col("seed").cast(pl.String)), "seed: expected this column of the campaign's table, as I"),
+        (rows.with_columns(run=pl.col("run") + 8), "run: expected runs from 0 to 7"),
+    ):
+        frame.write_parquet(part)
+        assert refused(resume, half).startswith(f"{part}: {told}")
+
+
+def test_files_of_others_in_the_folder_are_left_alone(half, whole):
+    for stray in ("parts/.nfs0001", "parts/part-mine.parquet", "series/part-mine.parquet"):
+        (half / stray).write_text("mine")
+    assert resume(half).is_over
+    assert (half / "parts" / "part-mine.parquet").read_text() == "mine"
+    assert rows_in(half) == rows_in(whole)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("seeds", []),
+        ("seeds", [1, 1, 2, 3]),
+        ("seeds", ["a", "b", "c", "d"]),
+        ("points", []),
+        ("points", [{"a": 0.0}, {"a": 1.0}]),
+        ("point_overrides", [["radio.loss=0"]]),
+        ("point_overrides", [[1], [2]]),
+        ("robots", 0),
+        ("robots", "two"),
+        ("pack", "few"),
+        ("record_seeds", [77]),
+        ("versions", []),
+        ("outcomes", [{"column": "order.final", "unit": "", "kind": "tome", "help": ""}]),
+    ],
+)
+def test_what_campaigns_never_say_is_refused_by_its_key(whole, key, value):
+    about = whole / "campaign.json"
+    about.write_text(json.dumps({**json.loads(about.read_text()), key: value}))
+    assert refused(resume, whole).startswith(f"{about}: {key}")
+    assert refused(CampaignRun, whole, 0).startswith(f"{about}: {key}")
+
+
+def test_a_campaign_that_ended_before_its_first_run_says_what_to_do(half):
+    (half / "campaign.json").unlink()
+    assert "take the folder away and begin again" in refused(resume, half)
+
+
+def test_a_summary_beside_unreadable_others_is_kept(whole):
+    before = (whole / "summary.parquet").read_bytes()
+    (whole / "parts").mkdir()
+    (whole / "parts" / "part-00000000.parquet").write_bytes(b"")
+    refused(resume, whole)
+    assert (whole / "summary.parquet").read_bytes() == before
+
+
+def test_a_package_that_is_no_more_has_changed(whole):
+    about = whole / "campaign.json"
+    found = json.loads(about.read_text())
+    about.write_text(json.dumps({**found, "modules": {**found["modules"], "gone_away": "0"}}))
+    assert "module gone_away has changed since" in refused(resume, whole)
+    assert CampaignRun(whole, 0).again().changes == ("module gone_away has changed since",)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [("order.final", "much", "expected a column of numbers"), ("ended", None, "expected how each run ended")],
+)
+def test_reports_refuse_a_table_of_other_types_by_its_column(whole, name, value, told):
+    table = whole / "summary.parquet"
+    pl.read_parquet(table).with_columns(pl.lit(value, pl.String).alias(name)).write_parquet(table)
+    assert refused(lambda: CampaignFolder(whole).runs) == f"{table}: {name}: {told}"

@@ -1,0 +1,61 @@
+"""A full disk is one line; what is done stays readable, and the campaign can be gone on with."""
+
+import errno
+
+import pytest
+
+from swarmwire.deploy import resume, sweep
+from swarmwire.deploy.campaign.storage import StorageFailed
+from tests.integration.deploy.campaign.test_resume import ASKED, WRITES, dying_at, same
+from tests.support.deploy.campaign.small import rows_in
+from tests.support.deploy.commands import called
+
+FULL = OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.mark.parametrize("count", [0, 3, WRITES - 1])
+def test_a_disk_that_is_full_at_some_time_loses_nothing_that_is_done(tmp_path, scenario, here, monkeypatch, count):
+    folder = tmp_path / "c"
+    with monkeypatch.context() as patched:
+        dying_at(patched, count, FULL)
+        with pytest.raises(StorageFailed) as told:
+            sweep(scenario, out=folder, **ASKED)
+    assert str(told.value) == (
+        f"{folder}: cannot be written: No space left on device; what is done stays: swarmwire sweep --resume {folder}"
+    )
+    assert len(rows_in(folder)) == 2 * (count // 2)
+    assert here[0].closed
+    assert resume(folder).is_over
+    sweep(scenario, out=tmp_path / "whole", **ASKED)
+    same(folder, tmp_path / "whole")
+
+
+def test_the_command_line_says_so_in_one_line(tmp_path, scenario, here, monkeypatch, capsys):
+    with monkeypatch.context() as patched:
+        dying_at(patched, 2, FULL)
+        code, _, errors = called(
+            patched, capsys, "sweep", scenario, "--seeds", "2", "--pack", "1", "--out", tmp_path / "c"
+        )
+    assert code == 1
+    assert errors.startswith(f"error: {tmp_path / 'c'}: cannot be written: No space left on device; what is done stays")
+    assert errors.count("\n") == 1
+
+
+def test_series_that_cannot_be_joined_are_no_loss_either(tmp_path, scenario, here, monkeypatch):
+    import polars as pl
+
+    sink = pl.LazyFrame.sink_parquet
+
+    def full(frame, path, **options):
+        if "worker-" in str(path):
+            raise pl.exceptions.ComputeError("No space left on device (os error 28)")
+        return sink(frame, path, **options)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(pl.LazyFrame, "sink_parquet", full)
+        with pytest.raises(StorageFailed, match="No space left"):
+            sweep(scenario, out=tmp_path / "c", **ASKED)
+    assert len(rows_in(tmp_path / "c")) == 8
+    assert not list((tmp_path / "c" / "series").glob("worker-*"))
+    assert resume(tmp_path / "c").is_over
+    assert "series" in [path.name for path in (tmp_path / "c").iterdir()]

@@ -1,0 +1,174 @@
+"""`swarmwire sweep` and `swarmwire repeat --run`, as people type them."""
+
+import json
+import os
+import re
+import signal
+
+import pytest
+
+from swarmwire.deploy import RunFolder
+from swarmwire.deploy.terminal import sweep_progress
+from tests.support.deploy.campaign.small import rows_in
+from tests.support.deploy.commands import called
+
+CAMPAIGN = """
+format = 1
+scenario = "two.toml"
+name = "losses"
+seeds = 2
+overrides = ["duration_s=0.3"]
+[vary]
+"radio.loss" = { from = 0.0, to = 0.5, count = 2 }
+robots.pair.count = [2, 3]
+"""
+
+
+@pytest.fixture
+def typed(monkeypatch, capsys, here):
+    return lambda *arguments: called(monkeypatch, capsys, *arguments)
+
+
+def test_a_sweep_says_what_it_did_and_what_to_do_next(tmp_path, scenario, typed):
+    folder = tmp_path / "c"
+    code, out, errors = typed(
+        "sweep", scenario, "--vary", "radio.loss=0:0.5:2", "--seeds", "3", "--set", "duration_s=0.3", "--out", folder
+    )  # fmt: skip
+    assert (code, errors) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == "two robots: 2 points x 3 seeds = 6 runs"
+    assert any(line.startswith("6/6 runs, ") for line in lines)
+    assert lines[-3:] == [
+        f"written: {folder}",
+        f"look at it: swarmwire report {folder}",
+        f"again: swarmwire repeat {folder} --run 5",
+    ]
+    found = json.loads((folder / "campaign.json").read_text())
+    assert found["command"].startswith(f"swarmwire sweep {scenario} --vary radio.loss=0:0.5:2 --seeds 3")
+    assert found["overrides"] == ["duration_s=0.3"]
+    assert {row["ticks"] for row in rows_in(folder)} == {3}
+
+
+def test_a_campaigns_file_says_the_same_as_options_which_go_first(tmp_path, scenario, typed):
+    (tmp_path / "losses.toml").write_text(CAMPAIGN)
+    assert typed("sweep", tmp_path / "losses.toml", "--out", tmp_path / "a")[0] == 0
+    options = ("--vary", "radio.loss=0:0.5:2", "--vary", "robots.pair.count=2,3", "--seeds", "2")
+    assert typed("sweep", scenario, *options, "--set", "duration_s=0.3", "--out", tmp_path / "b")[0] == 0
+    assert rows_in(tmp_path / "a") == rows_in(tmp_path / "b")
+    assert json.loads((tmp_path / "a" / "campaign.json").read_text())["name"] == "losses"
+    assert (
+        typed("sweep", tmp_path / "losses.toml", "--seeds", "1", "--vary", "radio.loss=0.1", "--out", tmp_path / "c")[0]
+        == 0
+    )
+    assert [row["radio.loss"] for row in rows_in(tmp_path / "c")] == [0.1, 0.1]
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("secnario = 'two.toml'", "secnario: unknown key; expected .*did you mean scenario"),
+        ("scenario = 3", "scenario: expected a text, got 3"),
+        ("format = 2", "format: expected 1, got 2"),
+        ("seeds = 0", "seeds: expected how many"),
+        ("design = 'gird'", "--design: "),
+        ("vary = { 'radio.loss' = 3 }", r"vary\.radio\.loss: expected a list"),
+        ("vary = { 'radio.loss' = [] }", r"vary\.radio\.loss: expected 1 to"),
+        ("vary = { 'radio.lss' = [1] }", r"vary\.radio\.lss: radio\.lss: unknown key"),
+        ("overrides = [3]", "overrides: expected texts"),
+    ],
+)
+def test_a_campaigns_file_is_refused_by_its_key(tmp_path, scenario, typed, line, told):
+    keys = {"format": "1", "scenario": "'two.toml'", "seeds": "2"} | dict([line.split(" = ", 1)])
+    file = tmp_path / "campaign.toml"
+    file.write_text("\n".join(f"{key} = {value}" for key, value in keys.items()))
+    code, _, errors = typed("sweep", file, "--out", tmp_path / "c")
+    assert code == 2
+    assert re.match(f"error: (.*campaign.toml: )?{told}", errors), errors
+    assert errors.count("\n") == 1
+    assert not (tmp_path / "c").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ([], "SCENARIO: is missing"),
+        (["two.toml"], "--seeds: is missing"),
+        (["two.toml", "--seeds", "0"], "--seeds: expected how many"),
+        (["two.toml", "--seeds", "2", "--vary", "radio.losss=0,1"], "--vary radio.losss=0,1: radio.losss: unknown key"),
+        (["two.toml", "--seeds", "2", "--design", "list"], "--design: .*empty"),
+        (["no.toml", "--seeds", "2"], "no.toml: expected a readable file"),
+        (["--resume", "nowhere"], "nowhere: expected a campaign's folder"),
+        (
+            ["--resume", "nowhere", "--seeds", "3"],
+            "SCENARIO: expected the scenario of --vary, --seeds and --set; a --resume takes none of these",
+        ),
+        (["two.toml", "--seeds", "2", "--record-seeds", "9"], "--record-seeds: expected seeds of the campaign"),
+    ],
+)
+def test_what_cannot_be_run_is_refused_in_a_line_before_anything_is(
+    tmp_path, scenario, typed, monkeypatch, arguments, told
+):
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    code, out, errors = typed("sweep", *arguments)
+    assert (code, out) == (2, "")
+    assert re.match(f"error: {told}", errors), errors
+    assert errors.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_resume_takes_the_same_campaign_alone(tmp_path, scenario, typed):
+    folder, vary = tmp_path / "c", ("--vary", "radio.loss=0,0.5")
+    assert typed("sweep", scenario, *vary, "--seeds", "2", "--out", folder)[0] == 0
+    assert typed("sweep", scenario, *vary, "--seeds", "2", "--resume", folder)[0] == 0
+    for arguments, told in (
+        (("--seeds", "3", *vary), "other seeds"),
+        (("--seeds", "2", "--vary", "radio.loss=0,0.6"), "other vary"),
+        (("--seeds", "2", *vary, "--set", "duration_s=0.2"), "another scenario"),
+    ):
+        code, _, errors = typed("sweep", scenario, *arguments, "--resume", folder)
+        assert code == 2
+        assert f"the campaign in the folder has {told}" in errors
+
+
+def test_a_run_is_repeated_by_its_number(tmp_path, scenario, typed):
+    folder = tmp_path / "c"
+    typed("sweep", scenario, "--vary", "radio.loss=0,0.5", "--seeds", "4:6", "--out", folder)
+    code, out, errors = typed("repeat", folder, "--run", "3", "--out", tmp_path / "again")
+    row, again = rows_in(folder)[3], RunFolder(tmp_path / "again")
+    assert (code, errors) == (0, "")
+    assert f"seed 5: trajectory {row['trajectory_sha256'][:16]}…" in out
+    assert "the same run, bit for bit" in out
+    assert again.summary is not None
+    assert again.summary["trajectory_sha256"] == [row["trajectory_sha256"]]
+    (folder / "summary.parquet").unlink()
+    code, out, _ = typed("repeat", folder, "--run", "3")
+    assert (code, out.splitlines()[-1]) == (1, "nothing to compare with: the campaign has not come to this run")
+    assert typed("repeat", folder, "--run", "4")[2] == "error: --run: expected a run from 0 to 3, got 4\n"
+    assert "expected --run NUMBER" in typed("repeat", folder)[2]
+    assert typed("repeat", tmp_path / "again", "--run", "0")[0] == 2
+
+
+class Interrupting:
+    """Looks on, and presses Ctrl-C after the first piece."""
+
+    def begin(self, campaign, done, failed):
+        self.pieces = done
+
+    def see(self, result):
+        self.pieces += 1
+        if self.pieces == 1:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    def end(self):
+        pass
+
+
+def test_ctrl_c_ends_it_with_a_word_how_to_go_on(tmp_path, scenario, typed, monkeypatch):
+    folder = tmp_path / "c"
+    monkeypatch.setattr(sweep_progress, "sweep_progress", lambda _: Interrupting())
+    code, out, errors = typed("sweep", scenario, "--seeds", "5", "--pack", "1", "--out", folder)
+    assert (code, errors) == (130, "")
+    assert out.splitlines() == ["interrupted: 3 of 5 runs are done", f"go on: swarmwire sweep --resume {folder}"]
+    assert typed("sweep", "--resume", folder)[0] == 0
+    assert len(rows_in(folder)) == 5

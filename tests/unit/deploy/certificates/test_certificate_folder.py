@@ -1,0 +1,184 @@
+"""A CA's folder: what it issues holds as it should, keys stay private and whole, revoked names never come back."""
+
+from pathlib import Path
+
+import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import serialization
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.certificates import certificate_folder
+from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue, renew_authority, revoke
+from swarmwire.deploy.certificates.dates import date_now
+from swarmwire.deploy.certificates.files import REGISTER, REPLACED, REVOKED
+from swarmwire.deploy.certificates.register import Register
+from swarmwire.deploy.certificates.wanted import wanted
+from tests.support.deploy.certificates.dated import DatedFakeClock
+from tests.support.deploy.certificates.made import certificate, issued
+
+
+def refusal(folder: Path, clock: DatedFakeClock, *names: str) -> str:
+    """What is said when these are asked for, which changes nothing."""
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    with pytest.raises(BadInput) as refused:
+        issued(folder, clock, *names)
+    assert before == {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return str(refused.value)
+
+
+def test_a_good_certificate_is_replaced_only_where_that_is_asked_for(folder: Path, clock: DatedFakeClock):
+    issue(folder, [wanted("flock-0", ("10.0.0.5",))], 365, clock)
+    old = (folder / "flock-0.key").read_bytes()
+    assert "has a certificate until 2027-06-01T12:00:00Z" in refusal(folder, clock, "flock-0")
+    (again,) = issued(folder, clock, "flock-0", renew=True)
+    assert again.hosts == ("10.0.0.5",)
+    assert (folder / REPLACED / "flock-0.1.key").read_bytes() == old != (folder / "flock-0.key").read_bytes()
+    issued(folder, clock, "flock-0", renew=True)
+    assert (folder / REPLACED / "flock-0.1.key").read_bytes() == old
+    register = Register.read(folder)
+    states = [register.state_of(of, date_now(clock)) for of in register.certificates]
+    assert states == ["replaced", "replaced", "valid"]
+
+
+def test_a_certificate_that_ends_within_a_month_may_be_renewed(folder: Path, clock: DatedFakeClock):
+    issued(folder, clock, "flock-0")
+    clock.pass_days(334)
+    assert "has a certificate" in refusal(folder, clock, "flock-0")
+    clock.pass_days(2)
+    register = Register.read(folder)
+    assert register.state_of(register.certificates[0], date_now(clock)) == "ends soon"
+    (again,) = issued(folder, clock, "flock-0")
+    assert again.valid_until > register.certificates[0].valid_until
+
+
+def test_a_certificate_ends_with_its_ca_at_the_latest(folder: Path, clock: DatedFakeClock):
+    clock.pass_days(3652 - 100)
+    issued(folder, clock, "flock-0")
+    assert certificate(folder, "flock-0").not_valid_after_utc == certificate(folder, "ca").not_valid_after_utc
+
+
+def test_a_revoked_name_is_listed_and_never_issued_again(folder: Path, clock: DatedFakeClock):
+    issued(folder, clock, "flock-0", "flock-1")
+    issued(folder, clock, "flock-0", renew=True)
+    revoke(folder, "flock-0", clock)
+    revoke(folder, "flock-0", clock)
+    register = Register.read(folder)
+    assert register.revoked() == ["flock-0"]
+    listed = x509.load_pem_x509_crl((folder / REVOKED).read_bytes())
+    assert listed.is_signature_valid(certificate(folder, "ca").public_key())
+    serials = {of.serial_number for of in listed}
+    assert serials == {int(of.serial, 16) for of in register.certificates if of.name == "flock-0"}
+    clock.pass_days(400)  # nor when all its certificates have ended
+    said = refusal(folder, clock, "flock-2", "flock-0")
+    assert "flock-0 is revoked" in said
+    assert f"swarmwire certs init --renew {folder}" in said
+
+
+def test_a_name_without_certificate_cannot_be_revoked(folder: Path, clock: DatedFakeClock):
+    with pytest.raises(BadInput, match="flock-9: has no certificate"):
+        revoke(folder, "flock-9", clock)
+
+
+def test_a_renewed_ca_knows_no_names_and_the_old_one_is_kept(folder: Path, clock: DatedFakeClock):
+    issued(folder, clock, "flock-0")
+    revoke(folder, "flock-0", clock)
+    old = (folder / "ca.key").read_bytes()
+    kept = renew_authority(folder, clock)
+    assert kept.name == "ca-until-20260601T120000Z"
+    assert (kept / "ca.key").read_bytes() == old != (folder / "ca.key").read_bytes()
+    assert [of.name for of in issued(folder, clock, "flock-0")] == ["flock-0"]
+
+
+def test_a_ca_is_begun_in_no_folder_that_has_something(folder: Path, clock: DatedFakeClock):
+    with pytest.raises(BadInput, match="expected a new or empty folder"):
+        begin_authority(folder, clock)
+
+
+def test_what_a_killed_process_left_behind_is_put_aside_and_kept(
+    folder: Path, clock: DatedFakeClock, monkeypatch: pytest.MonkeyPatch
+):
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(certificate_folder, "write_whole", killed)
+    with pytest.raises(KeyboardInterrupt):
+        issued(folder, clock, "flock-0")
+    monkeypatch.undo()
+    assert Register.read(folder).last("flock-0") is None
+    half = (folder / "flock-0.key").read_bytes()
+    issued(folder, clock, "flock-0")
+    assert (folder / REPLACED / "flock-0.1.key").read_bytes() == half
+    key = serialization.load_pem_private_key((folder / "flock-0.key").read_bytes(), None)
+    assert key.public_key() == certificate(folder, "flock-0").public_key()
+
+
+def test_a_key_that_others_may_read_is_refused_with_the_cure(folder: Path, clock: DatedFakeClock):
+    (folder / "ca.key").chmod(0o640)
+    assert refusal(folder, clock, "flock-0").endswith(f"chmod 600 {folder / 'ca.key'}")
+
+
+def test_a_ca_that_has_ended_or_not_begun_issues_nothing(folder: Path, clock: DatedFakeClock):
+    clock.pass_days(-2)
+    assert "before the CA began, 2026-05-31T12:00:00Z: set the clock" in refusal(folder, clock, "flock-0")
+    clock.pass_days(2 + 3652)
+    assert f"the CA ended on 2036-05-31T12:00:00Z: swarmwire certs init --renew {folder}" in refusal(
+        folder, clock, "flock-0"
+    )
+
+
+def test_a_clock_that_was_never_set_dates_nothing(tmp_path: Path):
+    with pytest.raises(BadInput, match="the clock of this machine: shows 1970-01-01T00:00:05Z: set it first"):
+        begin_authority(tmp_path / "ca", DatedFakeClock("1970-01-01T00:00:05Z"))
+    assert not (tmp_path / "ca").exists()
+
+
+@pytest.mark.parametrize(
+    ("damage", "expected"),
+    [
+        ("remove", "expected a CA's folder: swarmwire certs init"),
+        ("remove-key", "ca.key: expected a readable key: No such file"),
+        ("other-key", "ca.key: expected the key of ca.pem"),
+        ("no-pem", "expected PEM in ca.pem and ca.key"),
+        ("no-register", "expected a CA's folder: swarmwire certs init"),
+        ("half-register", f"{REGISTER}: expected the register that `swarmwire certs` keeps"),
+        ("later-register", f"{REGISTER}: format: expected 1, got 2"),
+    ],
+)
+def test_a_folder_that_is_damaged_is_told_as_such(
+    folder: Path, clock: DatedFakeClock, tmp_path: Path, damage: str, expected: str
+):
+    register, key = folder / REGISTER, folder / "ca.key"
+    if damage == "remove":
+        folder.rename(tmp_path / "elsewhere")
+    elif damage == "remove-key":
+        key.unlink()
+    elif damage == "other-key":
+        begin_authority(tmp_path / "other", clock)
+        key.write_bytes((tmp_path / "other" / "ca.key").read_bytes())
+    elif damage == "no-pem":
+        key.write_bytes(b"a key")
+    elif damage == "no-register":
+        register.unlink()
+    elif damage == "half-register":
+        register.write_text(register.read_text()[:-20])
+    else:
+        register.write_text(register.read_text().replace('"format": 1', '"format": 2'))
+    assert expected in refusal(folder, clock, "flock-0")
+
+
+@pytest.mark.parametrize("name", ["", "radio/*", "a b", "-a", "a-", "0", "ä", "a" * 64, "a\n", "ca", "CA", "../x"])
+def test_a_bad_name_is_refused(name: str):
+    with pytest.raises(BadInput, match="NAME: expected"):
+        wanted(name)
+
+
+@pytest.mark.parametrize("host", ["", "tls/10.0.0.5", "10.0.0.5:7447", "10.0.0.256", "10.0", "a b", "*.lab"])
+def test_a_bad_host_is_refused(host: str):
+    with pytest.raises(BadInput, match="--host: expected an IP address or the name of a host"):
+        wanted("flock-0", (host,))
+
+
+def test_names_that_one_file_might_hold_are_refused(folder: Path, clock: DatedFakeClock):
+    assert "expected each name once" in refusal(folder, clock, "flock-0", "Flock-0")
+    issued(folder, clock, "flock-0")
+    assert "differs from flock-0 in more than capital letters" in refusal(folder, clock, "FLOCK-0")

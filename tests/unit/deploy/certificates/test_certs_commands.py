@@ -1,0 +1,116 @@
+"""`swarmwire certs` as it is called: one line for each thing done, and one for each refusal."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
+from swarmwire.deploy.certificates.wanted import wanted
+from tests.support.deploy.certificates.dated import DatedFakeClock
+from tests.support.deploy.commands import called
+
+FLEET = """
+format = 1
+swarm = "lab"
+certificates = "ca"
+operator = "alice"
+[defaults]
+user = "pi"
+agent = "flocking.py:Flock"
+driver = { name = "epuck2" }
+[robots.flock-0]
+address = "10.0.0.10"
+[robots.flock-1]
+address = "ADDRESS"
+"""
+
+
+class Certs:
+    """Calls of the command in this process."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+        self._monkeypatch, self._capsys, self.folder = monkeypatch, capsys, folder
+
+    def __call__(self, command: str, *arguments: str | Path) -> tuple[str, str]:
+        """What it prints; `errors` of a call that fails begin with the exit code."""
+        code, out, errors = called(self._monkeypatch, self._capsys, "certs", command, self.folder, *arguments)
+        return out, errors if code in (0, None) else f"{code} {errors}"
+
+
+@pytest.fixture
+def certs(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Certs:
+    monkeypatch.setenv("COLUMNS", "160")
+    return Certs(monkeypatch, capsys, tmp_path / "ca")
+
+
+def test_a_ca_is_begun_issues_revokes_and_lists(certs: Certs):
+    assert certs("init")[1] == ""
+    out, errors = certs("issue", "flock-0", "flock-1", "--host", "10.0.0.5", "--days", "100")
+    assert (out.count("written: "), errors) == (2, "")
+    assert 'revoked = ["flock-1"]' in certs("revoke", "flock-1")[0]
+    out, errors = certs("list")
+    assert errors == ""
+    rows = [line.split() for line in out.splitlines()]
+    assert [(row[0], row[1], row[-1]) for row in rows[1:]] == [
+        ("ca", "CA", "valid"),
+        ("flock-0", "robot", "valid"),
+        ("flock-1", "robot", "revoked"),
+    ]
+    assert [of["state"] for of in json.loads(certs("list", "--json")[0])] == ["valid", "valid", "revoked"]
+
+
+def test_it_warns_of_certificates_that_are_about_to_end(certs: Certs):
+    past = DatedFakeClock("2026-02-01T00:00:00Z")
+    begin_authority(certs.folder, past)
+    issue(certs.folder, [wanted("old")], 1, past)
+    issue(certs.folder, [wanted("gone")], 1, past)
+    certs("revoke", "gone")
+    assert certs("list")[1] == f"warning: to be renewed: swarmwire certs issue {certs.folder} old\n"
+    certs("issue", "old")
+    assert certs("list")[1] == ""
+
+
+def test_a_ca_that_is_about_to_end_is_warned_of_too(certs: Certs):
+    begin_authority(certs.folder, DatedFakeClock("2026-02-01T00:00:00Z"))
+    register = certs.folder / "certs.json"
+    register.write_text(register.read_text().replace('"2036-', '"2026-'))
+    assert f"swarmwire certs init --renew {certs.folder}" in certs("list")[1]
+
+
+def test_a_fleet_gets_what_it_lacks(certs: Certs, tmp_path: Path):
+    fleet = tmp_path / "fleet.toml"
+    fleet.write_text(FLEET.replace("ADDRESS", "10.0.0.11"))
+    begin_authority(certs.folder, WallClock())
+    issue(certs.folder, [wanted("flock-0", ("10.0.0.10",))], 365, WallClock())
+    assert names_written(certs("issue", "--fleet", fleet)[0]) == ["flock-1", "tracker", "alice"]
+    assert certs("issue", "--fleet", fleet) == ("every member of the fleet has a good certificate\n", "")
+    fleet.write_text(FLEET.replace("ADDRESS", "fe80::1"))  # a robot that has moved
+    assert names_written(certs("issue", "--fleet", fleet)[0]) == ["flock-1"]
+    assert json.loads(certs("list", "--json")[0])[-1]["hosts"] == ["fe80::1"]
+    certs("revoke", "flock-0")
+    assert certs("issue", "--fleet", fleet)[1].startswith(f"2 error: {fleet}: flock-0: is revoked for good")
+
+
+def names_written(out: str) -> list[str]:
+    return [Path(line.split()[1]).stem for line in out.splitlines()]
+
+
+def test_a_bad_call_is_one_line(certs: Certs):
+    assert (
+        certs("issue", "a")[1]
+        == f"2 error: {certs.folder}: expected a CA's folder: swarmwire certs init {certs.folder}\n"
+    )
+    certs("init")
+    for arguments in ((), ("a/b",), ("a", "--host", "b/c"), ("--fleet", "none.toml"), ("a", "--fleet", "none.toml")):
+        errors = certs("issue", *arguments)[1]
+        assert errors.startswith("2 error: ")
+        assert errors.count("\n") == 1
+
+
+def test_what_to_install_is_said_in_one_line(certs: Certs, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("swarmwire.deploy.commands.certs.needed.find_spec", lambda _: None)
+    expected = '1 error: certs needs cryptography, which is not installed: pip install "swarmwire[fleet]"\n'
+    assert certs("init")[1] == expected
+    assert not certs.folder.exists()

@@ -1,0 +1,109 @@
+"""`swarmwire radio probe`: the figures by which radios are compared, and the coverage of a scenario's radio."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.cli import app
+from tests.support.deploy.commands import LOSSY, ROOT
+
+WALLED = ROOT / "scenarios" / "flocking-802154.toml"
+REPLAYED = ROOT / "scenarios" / "replayed-links.toml"
+
+
+def said(*arguments: str | Path) -> str:
+    done = CliRunner().invoke(app, ["radio", "probe", *map(str, arguments)])
+    if done.exception is not None:
+        raise done.exception
+    return done.stdout
+
+
+def contention(*arguments: str) -> dict[str, float]:
+    return json.loads(said(*arguments, "--runs", "2", "--measured-s", "0.5"))
+
+
+def coverage(*arguments: str | Path) -> dict[str, Any]:
+    return json.loads(said(*arguments, "--json"))
+
+
+def test_contention_costs_delivery_and_time():
+    few, many = (contention("ieee802154", "--contention", f"{nodes},20,0.1") for nodes in (2, 40))
+    assert few["delivery_ratio"] > 0.95 > many["delivery_ratio"]
+    assert few["mean_delay_s"] < many["mean_delay_s"]
+
+
+def test_values_of_the_radio_may_be_set():
+    assert contention("ideal", "--contention", "3,20,0.1", "--set", "radio.loss=1.0")["delivery_ratio"] == 0.0
+
+
+def test_a_disk_covers_its_circle_from_the_place_or_the_robot():
+    found = coverage(LOSSY, "--at", "-1,0", "--seed", "4")
+    assert (found["seed"], found["range_m"], found["sensitivity_dbm"], found["map"]["mean_dbm"]) == (4, 2.0, None, None)
+    assert found["map"]["at_m"] == [-1.0, 0.0]
+    assert 0.15 < found["in_range_share"] < 3.15 * 2.0**2 / 64
+    assert found["by_distance"]["delivery"]["high"][0] == 0.7
+    assert found["by_distance"]["delivery"]["high"][-1] == 0.0
+    robots = [coverage(LOSSY, *which)["map"]["at_m"] for which in ((), ("--from", "flock-0"), ("--from", "flock-19"))]
+    assert robots[0] == robots[1] != robots[2]
+
+
+def test_signals_have_a_strength_that_walls_and_distance_take():
+    found = coverage(WALLED, "--at", "0,1", "--bytes", "20", "--set", "radio.walls.crossing_db=60")
+    x_m, y_m, mean_dbm = (found["map"][name] for name in ("x_m", "y_m", "mean_dbm"))
+    column = min(range(len(x_m)), key=lambda i: abs(x_m[i]))
+    below, above = (mean_dbm[min(range(len(y_m)), key=lambda i: abs(y_m[i] - y))][column] for y in (2.5, 3.5))
+    assert above < below - 55.0
+    assert found["payload_bytes"] == 20
+    strength = found["by_distance"]["mean_dbm"]["mean"]
+    assert strength[0] > strength[-1]
+
+
+def test_a_robot_that_sends_does_so_with_the_power_of_its_group():
+    jammed = ROOT / "scenarios" / "jammed.toml"
+    base, strong = (
+        coverage(jammed, "--from", "lead-0", "--set", f"robots.lead.radio.power_dbm={dbm}") for dbm in (-25.0, -5.0)
+    )
+    assert base["map"]["at_m"] == strong["map"]["at_m"]
+    by_distance = [found["by_distance"]["mean_dbm"]["mean"] for found in (base, strong)]
+    assert by_distance[1][5] == pytest.approx(by_distance[0][5] + 20.0)
+
+
+def test_people_get_a_table_and_a_picture(tmp_path):
+    text = said(WALLED, "--to", tmp_path / "coverage.png", "--size", "400")
+    assert "sensitivity -101.0 dBm" in text
+    assert "% of the arena in range" in text
+    assert max(len(line) for line in text.splitlines() if "│" in line) <= 80
+    assert text.splitlines()[-1] == f"written: {tmp_path / 'coverage.png'}"
+    assert (tmp_path / "coverage.png").read_bytes().startswith(b"\x89PNG")
+    json.loads(said(LOSSY, "--json", "--to", tmp_path / "disk.svg").splitlines()[0])
+    assert "</svg>" in (tmp_path / "disk.svg").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("x", "--contention", "2,20,0.1"), "radio: expected one of ideal"),
+        (("disk", "--contention", "1,20,0.1"), "--contention: expected nodes"),
+        (("disk",), "--contention: expected nodes"),
+        (("disk", "--at", "0,0"), "--at: expected a scenario's .toml with it, got disk"),
+        (("ideal", "--contention", "2,20,0.1", "--set", "radio.trace.file=a.csv"), "radio: radio.trace: expected none"),
+        ((LOSSY, "--contention", "2,20,0.1"), "--contention: expected a preset"),
+        ((LOSSY, "--at", "0,9"), "--at: expected a place in the arena of 8 x 8 m"),
+        ((LOSSY, "--at", "nan,0"), "--at: expected a place in the arena of 8 x 8 m"),
+        ((LOSSY, "--at", "1"), "--at: expected x and y in m"),
+        ((LOSSY, "--at", "1,1", "--from", "flock-0"), "--from: expected either"),
+        ((LOSSY, "--from", "flock-20"), "--from: expected a robot of the scenario, flock-0 … flock-19, got flock-20"),
+        ((LOSSY, "--bytes", "101"), "--bytes: expected 0 to 100"),
+        ((LOSSY, "--to", "a.txt"), "a.txt: expected a file name that ends in .png"),
+        ((ROOT / "scenarios" / "avoidance.toml",), "radio: is missing; expected a scenario with a radio"),
+        ((REPLAYED,), 'radio.trace.others: expected "model"'),
+    ],
+)
+def test_what_makes_no_probe_is_refused(arguments, told):
+    with pytest.raises(BadInput) as error:
+        said(*arguments)
+    assert told in str(error.value)

@@ -1,0 +1,163 @@
+"""`swarmwire radio fit`, in this process: what it prints, draws and writes, and what it refuses."""
+
+import math
+import tomllib
+
+import pytest
+
+from swarmwire.comms.air.parameters.bursts import Bursts
+from swarmwire.comms.air.parameters.propagation import Shadowing
+from swarmwire.world.scenario.scenario_file import scenario_from
+from tests.support.deploy.commands import ROOT, called
+from tests.support.metrics.radio_fit.synthetic import csv_of, made
+
+HEAD = "t_s,tx,rx,seq,rssi_dbm,distance_m\n"
+SMALL = HEAD + "".join(f"{i},a,b,{i},{-50 - i},{1 + i}\n" for i in range(20))
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_log_becomes_a_table_a_picture_and_what_stands_in_a_scenario(here, monkeypatch, capsys):
+    pytest.importorskip("matplotlib", reason="needs the extra [report]")
+    (here / "log.csv").write_text(csv_of(made(1, Shadowing(4.0, 5.0), Bursts(0.5, 5.0), packets=60)))
+    to = ["--to", "fit.png", "--write", "radio.toml", "--power-dbm", "4", "--size", "400"]
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", *to)
+    assert (code, errors) == (0, "")
+    for said in ("path loss exponent", "standard error", "correlation distance", "bursts: mean", "root mean square"):
+        assert said in out
+    assert out.endswith("written: fit.png\nwritten: radio.toml\n")
+    assert (here / "fit.png").read_bytes().startswith(b"\x89PNG")
+    radio = tomllib.loads((here / "radio.toml").read_text())["radio"]
+    assert sorted(radio) == ["antenna", "bursts", "log_distance", "model", "shadowing"]
+    assert 42.0 < radio["log_distance"]["reference_loss_db"] < 46.0
+
+
+def test_without_a_file_the_table_is_printed_and_what_is_left_out_is_named(here, monkeypatch, capsys):
+    (here / "log.csv").write_text(SMALL)
+    code, out, _ = called(monkeypatch, capsys, "radio", "fit", "log.csv")
+    assert code == 0
+    assert "left out: shadowing: needs positions" in out
+    assert "left out: losses: needs 100 packets, got 20" in out
+    assert "log_distance" in tomllib.loads(out[out.index("# Fitted to") :])["radio"]
+
+
+def rows(count, rssi_dbm, distance_m, received=lambda _: True):
+    lines = (f"{i},a,b,{i},{rssi_dbm(i) if received(i) else ''},{distance_m(i)}\n" for i in range(count))
+    return HEAD + "".join(lines)
+
+
+def falling(i):
+    return -50.0 - 30.0 * math.log10(1 + i % 20)
+
+
+LOGS = {
+    "falls": rows(200, falling, lambda i: 1 + i % 20),
+    "strong": rows(200, lambda i: 90.0 + falling(i), lambda i: 1 + i % 20),
+    "rises": rows(200, lambda i: -60 + i % 20, lambda i: 1 + i % 20),
+    "one-place": rows(200, lambda _: -60, lambda _: 2, lambda i: i % 7),
+    "bursts": rows(2000, lambda _: -60, lambda _: 2, lambda i: i % 50 > 9),
+    "far": rows(200, falling, lambda i: 10.0 ** (i % 20)),
+}
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_whatever_is_written_a_scenario_takes(here, monkeypatch, capsys, name):
+    (here / "log.csv").write_text(LOGS[name])
+    code, _, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--write", "radio.toml")
+    assert (code, errors) == (0, "")
+    text = (here / "radio.toml").read_text()
+    radio = tomllib.loads(text)["radio"]
+    scenario = tomllib.loads((ROOT / "scenarios" / "flocking-lossy.toml").read_text())
+    whole = "model" in radio
+    assert whole == (name in ("falls", "strong"))
+    assert ("# Without path loss this is no radio yet" in text) == ("# Left out: path loss: " in text) == (not whole)
+    kept = {} if whole else {"range_m": 2.0}
+    taken = scenario_from({**scenario, "radio": {**kept, **radio}}, "radio.toml").radio
+    assert taken is not None
+    assert ("bursts" in radio) == (name == "bursts")
+
+
+@pytest.mark.parametrize(
+    ("text", "reasons"),
+    [
+        (f"{HEAD}0,a,b,0,-50,1\n", ("path loss: needs 10 received packets, got 1", "losses: needs 100 packets, got 1")),
+        (
+            rows(150, falling, lambda _: 2, lambda _: False),
+            ("got 0", "losses: needs packets that were received; all 150"),
+        ),
+        (rows(50, lambda _: -60, lambda _: 2), ("path loss: needs distances that span", "losses: needs 100 packets")),
+        (rows(50, lambda _: -60, lambda i: 1 + i), ("path loss: RSSI does not fall", "losses: needs 100 packets")),
+    ],
+)
+def test_a_log_that_tells_nothing_is_refused_with_the_reasons_and_nothing_is_written(
+    here, monkeypatch, capsys, text, reasons
+):
+    (here / "log.csv").write_text(text)
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--write", "radio.toml")
+    assert (code, out) == (2, "")
+    assert errors.startswith("error: log.csv: nothing could be fitted: ")
+    assert errors.count("\n") == 1
+    assert all(reason in errors for reason in reasons)
+    assert not (here / "radio.toml").exists()
+
+
+def test_a_fit_beyond_what_a_scenario_takes_is_refused_with_the_key(here, monkeypatch, capsys):
+    slow = (f"{i * 1e6},a,b,{i},{-60 if i % 50 > 9 else ''},2\n" for i in range(2000))
+    (here / "log.csv").write_text(HEAD + "".join(slow))
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv")
+    assert (code, out) == (2, "")
+    assert errors.startswith("error: log.csv: fitted radio.bursts.")
+    assert errors.endswith("which no scenario takes\n")
+
+
+def test_one_packet_is_no_packets(here, monkeypatch, capsys):
+    (here / "log.csv").write_text(SMALL)
+    assert "20 packets on 1 link, 20 received" in called(monkeypatch, capsys, "radio", "fit", "log.csv")[1]
+
+
+@pytest.mark.parametrize("farthest_m", [2.0, 9.0, 15.5, 400.0, 1e6])
+def test_the_picture_has_distances_to_read_off(here, monkeypatch, capsys, farthest_m):
+    pytest.importorskip("matplotlib", reason="needs the extra [report]")
+    from swarmwire.metrics.drawing import canvas, radio_fit_sheet
+
+    drawn = []
+    monkeypatch.setattr(radio_fit_sheet, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
+    step = math.log10(farthest_m / 1.2) / 19
+    (here / "log.csv").write_text(rows(20, lambda i: -50 - 30 * step * i, lambda i: 1.2 * 10.0 ** (step * i)))
+    code, _, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--to", "fit.png", "--size", "400")
+    assert (code, errors) == (0, "")
+    axis, (low, high) = drawn[0].axes[0].xaxis, drawn[0].axes[0].get_xlim()
+    shown = [label.get_text() for label in axis.get_ticklabels() if low <= label.get_position()[0] <= high]
+    assert 2 <= len([text for text in shown if text]) <= 20
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["log.csv", "--power-dbm", "nan"], "--power-dbm: expected at least -100 dBm, got nan"),
+        (["log.csv", "--gain-dbi", "nan"], "--gain-dbi: expected at least -100 dBi, got nan"),
+        (["log.csv", "--power-dbm", "inf"], "--power-dbm: expected at most 100 dBm, got inf"),
+        (["absent.csv"], "absent.csv: expected a log: there is no such file or folder"),
+        (["log.csv", "--write", "radio.json"], "radio.json: expected a file name that ends in .toml"),
+        (["log.csv", "--write", "absent/radio.toml"], "absent/radio.toml: expected a path in a folder that exists"),
+        (["log.csv", "--to", "fit.bmp"], "fit.bmp: expected a file name that ends in .png or .svg or .pdf"),
+        (["log.csv", "--within", "0.5"], "--within: expected a distance within which there are packets, got 0.5 m"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(here, monkeypatch, capsys, arguments, told):
+    (here / "log.csv").write_text(SMALL)
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", *arguments)
+    assert (code, out, errors) == (2, "", f"error: {told}\n")
+
+
+def test_brackets_in_notes_are_printed_as_they_are(here, monkeypatch, capsys):
+    rows = [f"{0.1 * i},a,b,{i},{0.9 if i % 4 == 0 else 0.01 + 1e-5 * i}\n" for i in range(200)]
+    (here / "heard[1].csv").write_text("t_s,tx,rx,seq,latency_s\n" + "".join(rows))
+    code, out, _ = called(monkeypatch, capsys, "radio", "fit", "heard[1].csv")
+    assert code == 0
+    assert out.startswith("heard[1].csv: 200 packets")
+    assert "no distribution of [radio.delays] fits" in " ".join(out.split())

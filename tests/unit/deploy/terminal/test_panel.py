@@ -1,0 +1,214 @@
+"""The panel fits the terminal, shows the run's figures, and is drawn seldom enough to cost nothing."""
+
+import io
+
+import numpy as np
+import pytest
+from rich.cells import cell_len
+from rich.console import Console
+
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.truth import Happened, Static, Truth
+from swarmwire.deploy.controls import Controls
+from swarmwire.deploy.terminal.figures import Figures
+from swarmwire.deploy.terminal.panel import Panel
+from swarmwire.deploy.terminal.panel_view import panel_view
+from swarmwire.deploy.terminal.sparkline import sparkline
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.world.crews.pace import Pace
+from swarmwire.world.crews.runner_health import RunnerHealth
+from tests.support.clocks import MS, FakeClock
+from tests.support.metrics.truths import edges, poses, static, tally, truth
+
+TICKS = 1000
+HEALTH = RunnerHealth(ready=1000, lost=3, late_answers=123456, frames_dropped=7890, watchdog_stops=12)
+
+
+def seen(of: Static, ticks: int, clock: FakeClock, tick_ms: int = 20) -> Figures:
+    """The figures of a run whose packets meet every fate and whose events concern everybody."""
+    metrics = Metrics(["order", "components", "largest_component"])
+    figures = Figures(TICKS, metrics, clock)
+    metrics.begin(of)
+    figures.begin(of)
+    counts = tally(*[{fate: 1 + int(fate) for fate in Fate}] * of.arenas)
+    rows = of.arenas * of.robots
+    for tick in range(ticks):
+        event = Happened(0, 1.0, "blackout", bool(tick % 2), np.ones(rows, np.bool_))
+        radio = {"tally": counts, "edges": edges((0, 1))} if of.range_m else {}
+        moment = truth(of, tick, pose=poses([0.1 * tick * row for row in range(rows)]), events=(event,), **radio)
+        metrics.see(moment)
+        clock.time_ns += tick_ms * MS
+        figures.see(moment)
+    return figures
+
+
+def shown(figures: Figures, controls: Controls, health: RunnerHealth | None, columns: int, rows: int) -> list[str]:
+    console = Console(width=columns, height=rows, file=io.StringIO(), force_terminal=True, color_system=None)
+    console.print(panel_view(figures, controls, health, columns, keys=True))
+    return console.file.getvalue().splitlines()
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(80, 24), (120, 40), (60, 24)])
+@pytest.mark.parametrize("radio", [True, False])
+@pytest.mark.parametrize("arenas", [1, 8])
+@pytest.mark.parametrize("health", [HEALTH, None])
+@pytest.mark.parametrize("factor", [None, 1.5])
+def test_the_panel_is_as_wide_as_the_terminal_and_as_high_all_the_time(columns, rows, radio, arenas, health, factor):
+    clock = FakeClock()
+    pace = None if factor is None else Pace(clock, 10, factor, lambda _: None)
+    controls = Controls(clock, 10, pace)
+    of = static(20, arenas, radio)
+    heights = set()
+    for ticks in (0, 1, 15, 900):
+        figures = seen(of, ticks, clock)
+        for ask in (controls.toggle_help, controls.toggle_pause, controls.toggle_help, controls.toggle_pause):
+            lines = shown(figures, controls, health, columns, rows)
+            assert {cell_len(line) for line in lines} == {columns}
+            heights.add(len(lines))
+            ask()
+    assert len(heights) == 1
+    assert max(heights) < rows
+
+
+def test_a_long_name_and_many_fates_are_cut_not_wrapped():
+    clock = FakeClock()
+    of = static(4)
+    figures = seen(of, 20, clock)
+    object.__setattr__(of, "name", "a name [bold]that has no end " * 9)
+    lines = shown(figures, Controls(clock, 10), HEALTH, 60, 24)
+    assert "[bold]" in lines[0]
+    assert {cell_len(line) for line in lines} == {60}
+    assert len(lines) == len(shown(figures, Controls(clock, 10), HEALTH, 200, 24))
+
+
+def test_figures_are_those_of_the_last_second_and_of_the_whole_run():
+    clock, of = FakeClock(), static(4)
+    metrics = Metrics(["order", "components"])
+    figures = Figures(TICKS, metrics, clock)
+    metrics.begin(of)
+    figures.begin(of)
+    assert np.isnan([figures.pdr, figures.pdr_of_second, figures.speed(1.0)]).all()
+    for tick in range(40):
+        fates = {Fate.HEARD: 1, Fate.LOST: 3} if tick < 20 else {Fate.HEARD: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 5}
+        moment = truth(of, tick, tally=tally(fates), edges=edges((0, 1), (1, 2)) if tick < 20 else edges())
+        metrics.see(moment)
+        clock.time_ns += (50 if tick < 20 else 200) * MS
+        figures.see(moment)
+    assert (figures.done, figures.time_s, figures.duration_s) == (40, 4.0, 100.0)
+    assert (figures.pdr, figures.pdr_of_second) == (0.5, 0.75)
+    assert figures.fates[Fate.OUT_OF_RANGE] == 100
+    assert (figures.level("components"), figures.history("components", 1)) == (4.0, [2.0, 2.0, 4.0, 4.0])
+    assert figures.history("components", 3) == [pytest.approx(8 / 3), 4.0]
+    assert figures.speed(1.0) == pytest.approx(0.5)
+    assert figures.speed(10.0) == pytest.approx(4.0 / 5.0, rel=0.02)
+    assert figures.levels == ("order", "components")
+
+
+def test_what_is_averaged_together_stays_so_as_the_minute_moves_on():
+    clock, of = FakeClock(), static(4)
+    figures = seen(of, 800, clock)
+    before = figures.history("order", 2)
+    after = seen(of, 820, clock).history("order", 2)
+    assert len(before) == 30
+    assert after[:29] == before[1:]
+
+
+@pytest.mark.parametrize("tick_ms", [1, 20, 3000])
+def test_the_speed_is_right_whatever_a_tick_takes(tick_ms):
+    figures = seen(static(4), 900, FakeClock(), tick_ms)
+    assert figures.speed(1.0) == pytest.approx(100 / tick_ms, rel=0.01)
+
+
+def test_events_are_the_newest_three_and_name_a_few_robots():
+    alone = seen(static(6), 5, FakeClock()).events
+    assert list(alone) == [
+        "0.2 s  blackout: flock-0, flock-1, flock-2, flock-3 and 2 more",
+        "0.3 s  blackout ended: flock-0, flock-1, flock-2, flock-3 and 2 more",
+        "0.4 s  blackout: flock-0, flock-1, flock-2, flock-3 and 2 more",
+    ]
+    assert seen(static(6, arenas=3), 1, FakeClock()).events[0] == "0.0 s  blackout: 18 robots"
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [([], ""), ([0.0, 0.5, 1.0], "▁▄▇"), ([-5.0, 7.0], "▁▇"), ([float("nan"), 1.0], " ▇")],
+)
+def test_a_curve_has_a_character_per_value(values, expected):
+    assert sparkline(values, 0.0, 1.0) == expected
+    assert sparkline([1.0], 1.0, 1.0) == "▁"
+
+
+class SlowFile(io.StringIO):
+    """A terminal that takes some time for each picture, or is gone."""
+
+    def __init__(self, clock: FakeClock, takes_ns: int) -> None:
+        super().__init__()
+        self.clock, self.takes_ns, self.gone, self.at_ns = clock, takes_ns, False, []
+
+    def write(self, text: str) -> int:
+        if self.gone:
+            raise OSError("the terminal is gone")
+        if "order" in text:
+            self.at_ns.append(self.clock.time_ns)
+            self.clock.time_ns += self.takes_ns
+        return super().write(text)
+
+
+@pytest.fixture
+def drawn():
+    panels: list[Panel] = []
+
+    def begin(takes_ns: int) -> tuple[FakeClock, SlowFile, Controls, Panel, Metrics, Static]:
+        clock, of, metrics = FakeClock(), static(4), Metrics()
+        file, controls = SlowFile(clock, takes_ns), Controls(clock, 10)
+        console = Console(width=80, height=24, file=file, force_terminal=True)
+        panel = Panel(TICKS, metrics, controls, lambda: None, clock, console)
+        metrics.begin(of)
+        panel.begin(of)
+        panels.append(panel)
+        return clock, file, controls, panel, metrics, of
+
+    yield begin
+    for panel in panels:
+        panel.end(None)
+
+
+def tick_by(moment: Truth, metrics: Metrics, panel: Panel) -> None:
+    metrics.see(moment)
+    panel.see(moment)
+
+
+def test_there_are_ten_pictures_a_second_at_most_and_they_take_a_hundredth_of_the_run(drawn):
+    for takes_ns, most in ((0, 10), (MS, 7), (3 * MS, 3)):
+        clock, file, _, panel, metrics, of = drawn(takes_ns)
+        began_ns = clock.time_ns
+        file.at_ns.clear()
+        for tick in range(1000):
+            clock.time_ns += 10 * MS
+            tick_by(truth(of, tick), metrics, panel)
+        pictures = len(file.at_ns)
+        assert pictures <= most * (clock.time_ns - began_ns) / NS_PER_S + 1
+        assert pictures >= 2 * (clock.time_ns - began_ns) / NS_PER_S - 1
+        assert pictures * takes_ns <= 0.01 * (clock.time_ns - began_ns)
+
+
+def test_a_paused_run_is_still_drawn(drawn):
+    clock, file, controls, panel, metrics, of = drawn(0)
+    tick_by(truth(of), metrics, panel)
+    controls.toggle_pause()
+    until_ns, before = clock.time_ns + NS_PER_S, len(file.at_ns)
+    controls.hold(1, lambda: clock.time_ns >= until_ns)
+    assert 8 <= len(file.at_ns) - before <= 11
+    assert "paused" in file.getvalue()
+
+
+def test_a_terminal_that_goes_away_in_a_pause_is_told_with_the_next_tick(drawn):
+    clock, file, controls, panel, metrics, of = drawn(0)
+    controls.toggle_pause()
+    file.gone = True
+    until_ns = clock.time_ns + NS_PER_S
+    controls.hold(0, lambda: clock.time_ns >= until_ns)
+    with pytest.raises(OSError, match="the terminal is gone"):
+        tick_by(truth(of), metrics, panel)
+    file.gone = False

@@ -1,0 +1,101 @@
+"""The table that a run ends with: what its numbers say, in words."""
+
+from dataclasses import replace
+from io import StringIO
+
+import pytest
+from rich.console import Console
+
+from swarmwire.comms.fates import FATE_NAMES
+from swarmwire.deploy import Result, run
+from swarmwire.deploy.result import Statistics
+from swarmwire.deploy.terminal.report import print_result
+from swarmwire.metrics.registry import METRICS
+from swarmwire.world.crews.realtime_crew import RealTimeReport
+from tests.support.deploy.commands import LOSSY
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    return run(LOSSY, overrides=["duration_s=1"])
+
+
+def shown(result: Result, **changes: object) -> str:
+    """The table, of a run whose one arena is changed so."""
+    out = StringIO()
+    console = Console(file=out, width=160, color_system=None)
+    arena = replace(result.arenas[0], **changes)  # pyright: ignore[reportArgumentType] - of any field
+    print_result(replace(result, arenas=(arena,)), METRICS.values(), console)
+    return out.getvalue()
+
+
+def row(text: str, name: str) -> str:
+    return next(line for line in text.splitlines() if line.startswith(f"│ {name} ")).strip("│ ").split("│")[1].strip()
+
+
+def test_a_count_is_shown_as_its_total_and_a_level_by_its_course(result):
+    numbers = Statistics(final=3.0, mean=0.25, min=0.0, max=1.0)
+    text = shown(result, metrics={"collisions": numbers, "min_gap": numbers})
+    assert row(text, "collisions") == "total 3"
+    assert row(text, "min_gap") == "final 3, mean 0.25, min 0 (m)"
+
+
+def test_a_time_is_told_also_if_it_did_not_come(result):
+    never, came = Statistics(None, None, None, None), Statistics(12.5, 12.5, 12.5, 12.5)
+    assert row(shown(result, metrics={"aggregation_time_s": came}), "aggregation_time_s") == "at 12.5 s"
+    assert row(shown(result, metrics={"aggregation_time_s": never}), "aggregation_time_s") == "not in 1 s"
+
+
+def test_who_has_an_obstacle_in_between_does_not_count_as_in_range(result):
+    radio = result.radio
+    assert radio is not None
+    fates = dict.fromkeys(FATE_NAMES, 0) | {"heard": 60, "lost": 20, "out_of_range": 10}
+    told = replace(radio, sent=10, intended=100, in_range=80, pdr=0.75, fates=fates)
+    assert row(shown(result, radio=told), "radio").endswith("80 in range; 75.0% of these heard it")
+    told = replace(told, fates=fates | {"blocked": 10})
+    assert row(shown(result, radio=told), "radio").endswith("80 in range and sight; 75.0% of these heard it")
+
+
+def test_where_nobody_was_in_range_there_is_no_share(result):
+    told = replace(result.radio, sent=1, intended=19, in_range=0, pdr=None)
+    assert row(shown(result, radio=told), "radio") == "1 packets, 19 intended receivers, 0 in range"
+
+
+def test_arenas_that_stopped_are_told_with_when_and_by_what_and_those_that_did_not(result):
+    early, late = "order at least 0.9 for 5 s", "target_best below 0.1"
+    [arena] = result.arenas
+    stopped = {3: (early, 1.5), 5: (late, 0.0)}
+    of = [
+        replace(
+            arena, seed=seed, stopped_by=stopped.get(seed, (None, None))[0], stop_time_s=stopped.get(seed, (0, None))[1]
+        )
+        for seed in range(1, 11)
+    ]
+    out = StringIO()
+    told = replace(result, arenas=tuple(of), stop=(early, late), ended="duration")
+    print_result(told, METRICS.values(), Console(file=out, width=160, color_system=None))
+    rows = [line.strip("│ ") for line in out.getvalue().splitlines() if "stopped" in line]
+    assert [" ".join(row.split()) for row in rows] == [
+        f"stopped │ {early}: seed 3 since 1.5 s",
+        f"stopped │ {late}: seed 5 since 0 s",
+        f"not stopped │ seed 1, seed 2, seed 4, seed 6, seed 7, seed 8 and 2 more in 1 s: {early} or {late}",
+    ]
+    assert "stopped" not in shown(result)
+
+
+def test_what_real_time_was_asked_for_and_what_came_of_it_agree(result):
+    def rows(gateways: dict[str, str]) -> tuple[str, str]:
+        out = StringIO()
+        late = RealTimeReport(1.0, 2, 9.9924)
+        run = replace(
+            result, ticks=600, sim_time_s=60.0, wall_time_s=80.64, mode="realtime", realtime=late, gateways=gateways
+        )
+        print_result(run, METRICS.values(), Console(file=out, width=160, color_system=None))
+        return row(out.getvalue(), "simulated").partition(" (")[0], row(out.getvalue(), "real time")
+
+    speed = "60 s in 80.64 s: 0.74 x real time"
+    assert rows({"flock": "epuck2"}) == (
+        speed,
+        "asked for x 1, took 20.64 s longer; 2 of 600 ticks missed, worst lag 9.99 s",
+    )
+    assert rows({}) == (speed, "asked for x 1; 2 of 600 ticks missed, worst lag 9.99 s")

@@ -1,0 +1,109 @@
+"""`swarmwire draw`, in this process: its pictures, and what it refuses."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from swarmwire.comms.bodies.body import body_names
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.cli import app
+from tests.support.deploy.commands import LOSSY, ROOT, swarmwire
+
+pytest.importorskip("matplotlib", reason="needs the extra [report]")
+SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
+E_PUCK_BLUE = (86, 180, 233)
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def draw(*arguments) -> str:
+    ended = CliRunner().invoke(app, ["draw", *map(str, arguments)], catch_exceptions=False)
+    assert ended.exit_code == 0, ended.output
+    return ended.output
+
+
+def pixels(path):
+    from PIL import Image
+
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda path: path.stem)
+def test_every_scenario_can_be_drawn(here, scenario):
+    assert draw(scenario, "--size", "400") == f"written: {scenario.stem}.png\n"
+    image = pixels(here / f"{scenario.stem}.png")
+    assert max(image.shape) == 400
+    assert (image == E_PUCK_BLUE).all(axis=2).any()
+
+
+def test_the_floor_is_drawn_in_greys(here):
+    draw(ROOT / "scenarios" / "maze.toml", "--to", "maze.png", "--size", "800")
+    spot = (pixels(here / "maze.png") == round(255 * (0.45 + 0.55 * 0.2))).all(axis=2)
+    assert spot.sum() > 1000
+    (here / "half.pgm").write_text("P2 2 1 255 0 255")
+    arena = "arena.size_m=[2, 2]", "arena.obstacles=[]", "arena.boundary='open'", "arena.ground.image='half.pgm'"
+    (here / "own.toml").write_text((ROOT / "scenarios" / "avoidance.toml").read_text())
+    draw("own.toml", "--to", "half.png", "--size", "800", *(part for one in arena for part in ("--set", one)))
+    drawn = pixels(here / "half.png")
+    black, white = ((drawn == round(255 * bright)).all(axis=2) for bright in (0.45, 1.0))
+    left, right = np.flatnonzero(black.sum(axis=0) > 100)[[0, -1]]
+    assert white[:, right + 20].sum() > 100  # the right half, as bright as the page
+    assert black[:, left : right + 1].mean() > 0.5
+    assert right - left == pytest.approx(black.sum(axis=0).max() / 2, abs=20)
+
+
+def test_another_seed_or_setting_is_another_picture(here):
+    draw(LOSSY, "--to", "a.png", "--size", "400")
+    draw(LOSSY, "--to", "b.png", "--size", "400", "--seed", "2")
+    draw(LOSSY, "--to", "c.png", "--size", "400", "--set", "radio.range_m=1")
+    draw(LOSSY, "--to", "d.png", "--size", "400")
+    a, b, c, d = (pixels(here / f"{name}.png") for name in "abcd")
+    assert (a == d).all()
+    assert (a != b).any()
+    assert (a != c).any()
+
+
+def test_bodies_are_drawn_by_name_and_by_data_sheet(here):
+    assert draw("epuck", "--size", "300") == "written: epuck.png\n"
+    (here / "wide.toml").write_text('like = "epuck"\nname = "wide"\nsource = "a test"\nradius_m = 0.05\n')
+    assert draw("wide.toml", "--size", "300") == "written: wide.png\n"
+    assert pixels(here / "wide.png").shape[1] == 300
+
+
+def test_a_picture_may_be_of_lines(here):
+    draw("footbot", "--to", "a.svg")
+    assert "</svg>" in (here / "a.svg").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["blimp"], f"blimp: expected a scenario's or a body's .toml, or one of {', '.join(body_names())}"),
+        (["absent.toml"], "absent.toml: expected a readable file: No such file or directory"),
+        (["epuck", "--seed", "2"], "--seed: expected a scenario; a body has nothing to set"),
+        (["epuck", "--set", "mass_kg=2"], "--set: expected a scenario; a body has nothing to set"),
+        (["epuck", "--to", "a.bmp"], "a.bmp: expected a file name that ends in .png or .svg or .pdf"),
+        (["epuck", "--to", "absent/a.png"], "absent/a.png: expected a path in a folder that exists"),
+        ([LOSSY, "--size", "9"], "--size: expected 100 to 8000 pixels, got 9"),
+        ([LOSSY, "--seed", "-1"], "seeds: expected different whole numbers of at least 0, got [-1]"),
+        (["thin.toml"], "thin.toml: radius_m: expected more than 0 m, got -1.0"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(here, arguments, told):
+    (here / "thin.toml").write_text('like = "epuck"\nradius_m = -1\n')
+    with pytest.raises(BadInput) as error:
+        draw(*arguments)
+    assert str(error.value) == told
+
+
+def test_the_program_says_it_in_one_line_and_exits_with_2(here):
+    ended = swarmwire("draw", "blimp", cwd=here)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert ended.stderr.startswith("error: blimp: expected ")
+    assert ended.stderr.count("\n") == 1
+    assert not (here / "blimp.png").exists()

@@ -1,0 +1,132 @@
+"""`swarmwire export`, in this process, of run folders made by hand."""
+
+import sys
+from types import ModuleType
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.cli import app
+from tests.support.metrics.films import Folder, film, ticks_frame
+
+pytest.importorskip("matplotlib", reason="needs the extra [report]")
+SMALL = ("--size", "200")
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    """A run folder of three seconds at 10 Hz."""
+    reader = ModuleType("swarmwire.metrics.run_folder")
+    reader.RunFolder = Folder
+    monkeypatch.setitem(sys.modules, reader.__name__, reader)
+    folder = tmp_path / "run"
+    folder.mkdir()
+    ticks_frame(film(ticks=30)).write_parquet(folder / "ticks.parquet")
+    return folder
+
+
+def export(*arguments) -> str:
+    ended = CliRunner().invoke(app, ["export", *map(str, arguments)], catch_exceptions=False)
+    assert ended.exit_code == 0, ended.output
+    return ended.output
+
+
+def pixels(path):
+    from PIL import Image
+
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+def test_a_picture_is_of_the_end_unless_a_time_is_named(run, tmp_path):
+    assert export(run, *SMALL).startswith(f"written: {run}/picture.png (")
+    end = pixels(run / "picture.png")
+    assert max(end.shape) == 200
+    for name, time in (("bare", []), ("end", ["end"]), ("last", ["2.9"]), ("first", ["0"])):
+        export(run, *SMALL, "--to", tmp_path / f"{name}.png", "--png", *time)
+    for name, same in (("bare", True), ("end", True), ("last", True), ("first", False)):
+        assert np.array_equal(pixels(tmp_path / f"{name}.png"), end) == same
+
+
+def test_a_bare_png_may_stand_before_the_run_folder(run):
+    export("--png", run, *SMALL)
+    assert (run / "picture.png").exists()
+
+
+def test_a_gif_lasts_as_long_as_the_run_and_says_what_it_is(run):
+    from PIL import Image
+
+    told = export(run, "--gif", *SMALL)
+    assert told.splitlines()[0] == "30 frames, 10 a second, 1 x real time"
+    assert told.splitlines()[1].startswith(f"written: {run}/film.gif (")
+    with Image.open(run / "film.gif") as gif:
+        assert gif.n_frames == 30
+        assert gif.info["duration"] == 100
+
+
+def test_an_mp4_is_of_the_time_and_speed_asked_for(run, tmp_path):
+    import imageio_ffmpeg
+
+    to = tmp_path / "a.mp4"
+    told = export(run, "--mp4", "--to", to, "--from", "1", "--until", "2", "--fps", "5", "--speed", "0.5", *SMALL)
+    assert told.splitlines()[0] == "11 frames, 5 a second, 0.5 x real time"
+    assert imageio_ffmpeg.count_frames_and_secs(str(to)) == (11, pytest.approx(2.2))
+
+
+def test_a_run_that_was_killed_is_exported_up_to_its_last_part(run):
+    from PIL import Image
+
+    whole = run / "ticks.parquet"
+    whole.unlink()
+    (run / "ticks").mkdir()
+    ticks_frame(film(ticks=12)).write_parquet(run / "ticks" / "part-0.parquet")
+    export(run, "--gif", *SMALL)
+    with Image.open(run / "film.gif") as gif:
+        assert gif.n_frames == 12
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--gif", "--mp4"], "export: expected one of --png, --gif, --mp4 and --pdr at a time"),
+        (["--png", "3", "--gif"], "export: expected one of --png, --gif, --mp4 and --pdr at a time"),
+        (["--png", "7"], "--png: expected a time that was recorded, 0 to 2.9 s, or end; got 7"),
+        (["--png", "nan"], "--png: expected a time that was recorded, 0 to 2.9 s, or end; got nan"),
+        (["--fps", "5"], "--fps: expected --gif or --mp4 with it; a picture is of one moment, --png T"),
+        (["--gif", "--until", "9"], "--until: expected a time that was recorded, 0 to 2.9 s; got 9"),
+        (["--arena", "1"], "RUN: arena: expected 0 to 0, got 1"),
+        (
+            ["--metric", "ordr"],
+            "--metric: ordr: was not recorded; expected one of order, min_gap (did you mean order?)",
+        ),
+        (["--mp4", "--to", "a.gif"], "a.gif: expected a file name that ends in .mp4"),
+        (["--gif", "--size", "5"], "--size: expected 100 to 8000 pixels, got 5"),
+    ],
+)
+def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run, monkeypatch, arguments, told):
+    monkeypatch.chdir(run)
+    with pytest.raises(BadInput) as error:
+        export(run, *arguments)
+    assert str(error.value) == told.replace("RUN", str(run))
+    assert [path.name for path in run.iterdir()] == ["ticks.parquet"]
+
+
+def test_a_film_that_fails_half_way_leaves_the_one_before(run, monkeypatch):
+    from swarmwire.metrics.drawing.film_figure import FilmFigure
+
+    export(run, "--mp4", *SMALL)
+    before = (run / "film.mp4").read_bytes()
+    frame = FilmFigure.frame
+
+    def failing(self, index):
+        if index == 20:
+            raise RuntimeError("half way")
+        return frame(self, index)
+
+    monkeypatch.setattr(FilmFigure, "frame", failing)
+    with pytest.raises(RuntimeError, match="half way"):
+        export(run, "--mp4", *SMALL)
+    assert (run / "film.mp4").read_bytes() == before
+    assert {path.name for path in run.iterdir()} == {"ticks.parquet", "film.mp4"}

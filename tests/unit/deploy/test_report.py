@@ -1,0 +1,84 @@
+"""`swarmwire report`, in this process: of a campaign, of a run, and of what is neither."""
+
+import pytest
+
+from tests.support.deploy.commands import called
+from tests.support.metrics.campaign.campaigns import write_campaign
+from tests.support.metrics.recorded import wandering
+from tests.support.metrics.report.run_folders import run_folder
+from tests.support.metrics.truths import static
+
+pytest.importorskip("matplotlib", reason="needs the extra [report]")
+
+
+@pytest.fixture
+def report(monkeypatch, capsys):
+    def call(*arguments):
+        return called(monkeypatch, capsys, "report", *arguments)
+
+    return call
+
+
+@pytest.fixture
+def campaign(tmp_path):
+    return write_campaign(tmp_path / "campaign", {"radio.loss": [0.0, 0.4]}, (1, 2, 3))
+
+
+def test_a_campaigns_report_lies_in_its_folder_with_its_figures(report, campaign):
+    code, out, errors = report(campaign, "--outcome", "order", "--outcome", "aggregation_time_s.")
+    assert (code, errors.startswith("error: --outcome: aggregation_time_s.: expected one of")) == (2, True)
+    assert not (campaign / "report.html").exists()
+    code, out, _ = report(campaign, "--outcome", "order")
+    figures = sorted(path.name for path in (campaign / "figures").iterdir())
+    assert code == 0
+    assert out.splitlines() == [f"written: {campaign}/report.html", f"written: {campaign}/figures (2 figures)"]
+    assert figures == ["distribution-order.final-radio.loss.svg", "response-order.final-radio.loss.svg"]
+    assert "made-up order.final" in (campaign / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_page_of_another_name_has_figures_of_its_own(report, campaign, tmp_path):
+    code, out, _ = report(campaign, "--outcome", "order", "--to", tmp_path / "order.html")
+    assert code == 0
+    assert out.splitlines()[1] == f"written: {tmp_path}/order-figures (2 figures)"
+    assert not (campaign / "report.html").exists()
+
+
+def test_a_runs_report_lies_in_its_folder(report, tmp_path):
+    of = static(3)
+    (tmp_path / "run").mkdir()
+    run_folder(tmp_path / "run", of, wandering(of, 12))
+    code, out, _ = report(tmp_path / "run")
+    assert code == 0
+    assert out.splitlines()[0] == f"written: {tmp_path}/run/report.html"
+    code, _, errors = report(tmp_path / "run", "--outcome", "order")
+    assert (code, errors) == (
+        2,
+        "error: --outcome: order: expected a campaign: a run has all its metrics in its report\n",
+    )
+
+
+@pytest.mark.parametrize(
+    ("to", "says"),
+    [
+        ("report.pdf", "expected a file name that ends in .html or .htm"),
+        ("nowhere/report.html", "expected a path in a folder that exists"),
+        ("taken/report.html", "expected a folder that can be made"),
+    ],
+)
+def test_a_page_that_cannot_be_written_is_refused_in_one_line(report, campaign, tmp_path, to, says):
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "figures").write_text("in the way")
+    code, _, errors = report(campaign, "--outcome", "order", "--to", tmp_path / to)
+    assert code == 2
+    assert says in errors
+    assert errors.count("\n") == 1
+
+
+@pytest.mark.parametrize("folder", ["nothing", "empty"])
+def test_what_is_neither_a_campaign_nor_a_run_is_refused(report, tmp_path, folder):
+    (tmp_path / "empty").mkdir()
+    code, _, errors = report(tmp_path / folder)
+    assert (code, errors) == (
+        2,
+        f"error: {tmp_path / folder}: expected the folder of a campaign (campaign.json) or of a run (static.json)\n",
+    )

@@ -1,0 +1,118 @@
+"""Measured links from file to fates: replayed, copied into the run folder, repeated from there alone, or refused."""
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.fates import Fate
+from swarmwire.deploy import Simulation, repeat, run
+from swarmwire.world.scenario.scenario_file import load_scenario
+from tests.support.deploy.commands import LOSSY, ROOT
+
+WALLED = ROOT / "scenarios" / "flocking-802154.toml"
+REPLAYED = ROOT / "scenarios" / "replayed-links.toml"
+
+
+def test_the_shipped_links_are_cut_between_the_halves_for_as_long_as_the_file_says():
+    """From 20 s to 40 s, between the first three and the last three."""
+    across: dict[bool, list[bool]] = {False: [], True: []}
+    beside: list[bool] = []
+    with Simulation(REPLAYED) as simulation:
+        while simulation.tick < 450:
+            finished = simulation.step().finished
+            assert finished is not None
+            is_across = (finished.sender < 3) != (finished.receiver < 3)
+            during = (finished.on_air_at_ns >= 20 * NS_PER_S) & (finished.on_air_at_ns < 40 * NS_PER_S)
+            is_heard = finished.fate == Fate.HEARD
+            for cut in (False, True):
+                across[cut] += is_heard[is_across & (during == cut)].tolist()
+            beside += is_heard[~is_across].tolist()
+    assert not any(across[True])
+    assert len(across[True]) == 200 * 18
+    assert sum(across[False]) / len(across[False]) > 0.6
+    assert sum(beside) / len(beside) > 0.85
+
+
+def test_a_run_is_repeated_from_its_folder_alone(tmp_path: Path):
+    there = tmp_path / "there"
+    there.mkdir()
+    for file in (REPLAYED, REPLAYED.with_suffix(".csv")):
+        shutil.copy(file, there)
+    result = run(there / REPLAYED.name, overrides=["duration_s=3"], out=tmp_path / "run")
+    assert result.radio is not None
+    assert 0.7 < (result.radio.pdr or 0.0) < 0.99
+    shutil.rmtree(there)
+    copy = tmp_path / "run" / "files" / "replayed-links.csv"
+    assert copy.read_bytes() == REPLAYED.with_suffix(".csv").read_bytes()
+    [file] = [
+        file for file in json.loads((tmp_path / "run" / "run.json").read_text())["files"] if file["what"] == "trace"
+    ]
+    assert file == {
+        "path": "files/replayed-links.csv",
+        "sha256": hashlib.sha256(copy.read_bytes()).hexdigest(),
+        "what": "trace",
+    }
+    moved = (tmp_path / "run").rename(tmp_path / "moved")
+    repetition = repeat(moved)
+    assert (repetition.same, repetition.changes) == (True, ())
+    (moved / "files" / "replayed-links.csv").write_text("t_s,tx,rx,delivery_ratio\n0,flock-0,flock-1,1\n")
+    repetition = repeat(moved)
+    assert repetition.same is False
+    assert repetition.changes == ("files/replayed-links.csv is not as the run left it: its sha256 differs",)
+
+
+def test_signals_have_the_strengths_of_the_file(tmp_path: Path):
+    """Of one link; the others are out of range, although the robots stand side by side."""
+    pl.DataFrame(
+        {"t_s": [0.0, 1.0], "tx": ["flock-1"] * 2, "rx": ["flock-4"] * 2, "rssi_dbm": [-70, -80]}
+    ).write_parquet(tmp_path / "links.parquet")
+    shutil.copy(WALLED, tmp_path / "walled.toml")
+    radio = ["radio.trace.file='links.parquet'", "radio.fading={distribution='rician', k=1e6}"]
+    strengths: dict[bool, set[int]] = {False: set(), True: set()}
+    with Simulation(tmp_path / "walled.toml", overrides=radio) as simulation:
+        while simulation.tick < 25:
+            finished = simulation.step().finished
+            assert finished is not None
+            assert finished.rssi_dbm is not None
+            assert set(zip(finished.sender.tolist(), finished.receiver.tolist(), strict=True)) <= {(1, 4)}
+            for on_air_ns, rssi_dbm in zip(finished.on_air_at_ns, finished.rssi_dbm, strict=True):
+                strengths[bool(on_air_ns >= NS_PER_S)].add(round(float(rssi_dbm)))
+    assert strengths == {False: {-70}, True: {-80}}
+
+
+def test_a_scenario_made_in_python_brings_its_links_too(tmp_path: Path):
+    scenario = load_scenario(REPLAYED, ["duration_s=1"])
+    renamed = scenario.model_copy(update={"name": "renamed"}).with_source(scenario.source)
+    run(renamed, out=tmp_path / "run")
+    assert repeat(tmp_path / "run").same
+
+
+def lossy_with(tmp_path: Path, text: str, *settings: str) -> str:
+    """What is said of the lossy flock with links of this text."""
+    (tmp_path / "links.csv").write_text(text)
+    shutil.copy(LOSSY, tmp_path / "lossy.toml")
+    with pytest.raises(BadInput) as error:
+        Simulation(tmp_path / "lossy.toml", overrides=["radio.trace.file='links.csv'", *settings])
+    return str(error.value).replace(f"{tmp_path}/", "")
+
+
+def test_links_that_cannot_be_replayed_are_refused_before_anything_runs(tmp_path: Path):
+    head = "t_s,tx,rx,delivery_ratio"
+    assert lossy_with(tmp_path, f"{head}\n0,flock-0,flock-20,1\n") == (
+        "links.csv: row 1, rx: expected a robot of the scenario, flock-0 … flock-19, got flock-20"
+    )
+    assert lossy_with(tmp_path, "t_s,tx,rx,rssi_dbm\n0,flock-0,flock-1,-70\n") == (
+        "links.csv: rssi_dbm: expected a radio with signals: a disk knows no strength"
+    )
+    assert lossy_with(tmp_path, head, "radio.trace.file='nowhere.csv'") == (
+        "lossy.toml: radio.trace.file: expected a file beside the scenario: there is no nowhere.csv"
+    )
+    assert lossy_with(tmp_path, head, "radio.trace.others='all'").startswith(
+        "--set radio.trace.others='all': radio.trace.others: expected one of none, model"
+    )

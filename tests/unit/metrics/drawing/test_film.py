@@ -1,0 +1,91 @@
+from types import SimpleNamespace
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.drawing.film import NO_STATE, film_of, states
+from tests.support.metrics.films import Folder, film, ticks_frame, two_groups
+
+
+def test_a_film_holds_what_the_run_folder_does(tmp_path):
+    of = film()
+    ticks_frame(of).write_parquet(tmp_path / "ticks.parquet")
+    read = film_of(Folder(tmp_path), 0, "run")
+    np.testing.assert_array_equal(read.time_s, of.time_s)
+    np.testing.assert_array_equal(read.pose, of.pose)
+    np.testing.assert_array_equal(read.alive, of.alive)
+    np.testing.assert_array_equal(read.metrics["order"], of.metrics["order"])
+    assert np.isnan(read.metrics["min_gap"]).all()
+    assert (read.state, read.state_names) == (None, ())
+
+
+def test_the_parts_of_a_run_that_was_killed_are_put_together_in_order(tmp_path):
+    of = film()
+    (tmp_path / "ticks").mkdir()
+    for name, rows in (("part-1", slice(20, 31)), ("part-0", slice(0, 20))):
+        ticks_frame(of)[rows].write_parquet(tmp_path / "ticks" / f"{name}.parquet")
+    np.testing.assert_array_equal(film_of(Folder(tmp_path), 0, "run").pose, of.pose)
+
+
+def test_a_film_is_of_one_arena(tmp_path):
+    of, moved = film(), film(pose=film().pose + 1)
+    both = pl.concat([ticks_frame(of), ticks_frame(moved, arena=1)])
+    both.write_parquet(tmp_path / "ticks.parquet")
+    folder = Folder(tmp_path, two_groups(arenas=2))
+    np.testing.assert_array_equal(film_of(folder, 1, "run").pose, moved.pose)
+    with pytest.raises(BadInput, match="run: arena: expected 0 to 1, got 2"):
+        film_of(folder, 2, "run")
+
+
+def test_a_run_without_a_tick_yet_is_refused():
+    empty = SimpleNamespace(static=two_groups(), measured={}, ticks=lambda _: ticks_frame(film())[:0])
+    with pytest.raises(BadInput, match="run: holds no tick yet"):
+        film_of(empty, 0, "run")
+
+
+@pytest.mark.parametrize(
+    ("noted", "names", "places"),
+    [
+        ([["", "go", ""], ["stop", "go", None]], ("go", "stop"), [[-1, 0, -1], [1, 0, -1]]),
+        ([[0, 3, 0], [7, 3, 0]], ("3", "7"), [[-1, 0, -1], [1, 0, -1]]),
+    ],
+)
+def test_states_are_numbered_in_the_order_in_which_they_came_up(noted, names, places):
+    found, place = states(ticks_frame(film(ticks=2), states=noted))
+    assert found == names
+    assert place is not None
+    assert place.tolist() == places
+    assert NO_STATE == -1
+
+
+def test_there_are_no_states_where_no_robot_noted_any():
+    assert states(ticks_frame(film(ticks=2), states=[["", "", None]] * 2)) == ((), None)
+
+
+def test_the_tick_of_a_time_is_the_last_that_had_begun():
+    of = film()
+    assert [of.index_at(time_s) for time_s in (0.0, 0.05, 0.1, 0.3, 2.99, 99.0)] == [0, 0, 1, 3, 29, 30]
+
+
+def test_delivery_is_what_was_heard_of_what_was_in_range_within_the_last_second():
+    ticks = 31
+    heard, in_range = np.full(ticks, 3), np.full(ticks, 4)
+    heard[:15], in_range[0] = 0, 0
+    counts = {"heard": pl.Series(heard), "in_range": pl.Series(in_range)}
+    frame = ticks_frame(film(ticks)).with_columns(**counts)
+    found = film_of(SimpleNamespace(static=two_groups(), measured={}, ticks=lambda _: frame), 0, "run").metrics[
+        "delivery"
+    ]
+    assert np.isnan(found[0])
+    np.testing.assert_allclose(found[[14, 15, 19, 24, 30]], [0.0, 0.075, 0.375, 0.75, 0.75])
+
+
+def test_without_a_radio_there_is_no_delivery():
+    none = pl.Series([None] * 31, dtype=pl.Int64)
+    frame = ticks_frame(film()).with_columns(heard=none, in_range=none)
+    found = film_of(SimpleNamespace(static=two_groups(), measured={}, ticks=lambda _: frame), 0, "run").metrics[
+        "delivery"
+    ]
+    assert np.isnan(found).all()

@@ -1,0 +1,128 @@
+from statistics import median
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.network.fragmentation_count import Fragmentations
+from swarmwire.metrics.network.fragmented import Fragmented
+from swarmwire.metrics.network.rejoin import RejoinMedian, RejoinWorst
+from swarmwire.metrics.network.unrejoined import Unrejoined
+from tests.support.metrics.truths import edges, static, truth
+
+NAMES = ("fragmentations", "rejoin_median", "rejoin_worst", "unrejoined")
+KINDS = (Fragmentations, RejoinMedian, RejoinWorst, Unrejoined)
+WHOLE, SPLIT = edges((0, 1)), edges()
+
+
+def events_of(ticks, hold):
+    """Of a string as `finals` takes it the length of each event in ticks, by its whole ticks; None: open at the end."""
+    whole = [tick for tick, shown in enumerate(ticks) if shown == "+"]
+    found = []
+    for this, following in zip(whole, [*whole[1:], None], strict=False):
+        apart = [tick for tick in range(this, following or len(ticks)) if ticks[tick] == "-"]
+        if apart and apart[-1] - apart[0] >= hold:
+            found.append(following - apart[0] if following else None)
+    return found
+
+
+def finals(ticks, hold_s=None, of=None, alive=None):
+    """Of one arena with two robots: + joined, - apart, 0 all dead; at 10 ticks per second."""
+    of = of or static(2)
+    metrics = Metrics(list(NAMES) if hold_s is None else [kind(hold_s=hold_s) for kind in KINDS])
+    metrics.begin(of)
+    for tick, shown in enumerate(ticks):
+        alive = np.full(2, shown != "0")
+        metrics.see(truth(of, tick, edges=WHOLE if shown == "+" else SPLIT, alive=alive))
+    [found] = metrics.end(None)["metrics"]
+    return tuple(found[name]["final"] for name in NAMES)
+
+
+def test_a_swarm_that_stays_whole_has_no_event():
+    assert finals("+" * 30) == (0.0, None, None, None)
+
+
+def test_a_split_shorter_than_the_hold_is_no_event():
+    assert finals("++" + "-" * 10 + "++") == (0.0, None, None, None)
+
+
+def test_a_split_of_the_hold_is_an_event_and_its_length_counts_from_its_start():
+    assert finals("++" + "-" * 11 + "++") == (1.0, 1.1, 1.1, 0.0)
+
+
+def test_the_median_and_the_worst_are_over_events_that_re_joined():
+    lengths = (12, 30, 15, 5)
+    assert finals("+" + "".join("-" * n + "+" for n in lengths)) == (3.0, 1.5, 3.0, 0.0)
+
+
+def test_what_has_not_re_joined_by_the_end_is_censored():
+    assert finals("+" + "-" * 20 + "+" + "-" * 40) == (2.0, 2.0, 2.0, 0.5)
+    assert finals("+" + "-" * 40) == (1.0, None, None, 1.0)
+
+
+def test_the_hold_is_a_parameter():
+    assert finals("+-+--+---", hold_s=0.0) == (3.0, pytest.approx(0.15), 0.2, pytest.approx(1 / 3))
+    assert finals("+" + "-" * 30 + "+", hold_s=3.1)[0] == 0.0
+
+
+def test_a_swarm_that_starts_in_pieces_has_not_fallen_apart():
+    assert finals("-" * 30 + "+" * 5) == (0.0, None, None, None)
+    assert finals("-" * 30 + "+" + "-" * 12 + "+") == (1.0, 1.2, 1.2, 0.0)
+
+
+def test_a_swarm_that_died_has_not_re_joined():
+    assert finals("+" + "-" * 15 + "0" * 10) == (1.0, None, None, 1.0)
+
+
+@given(st.text("+-0", max_size=60) | st.text("++----0", max_size=60), st.integers(0, 4))
+def test_events_are_those_read_off_the_ticks(ticks, hold):
+    lengths = events_of(ticks, hold)
+    over = [length / 10 for length in lengths if length is not None]
+    expected = (
+        len(lengths) if ticks else None,
+        pytest.approx(median(over)) if over else None,
+        max(over) if over else None,
+        pytest.approx(1 - len(over) / len(lengths)) if lengths else None,
+    )
+    assert finals(ticks, hold_s=hold / 10) == expected
+
+
+@given(st.text("+++-----0", min_size=1, max_size=60), st.integers(0, 4))
+def test_fragmented_is_the_share_of_the_time_in_events_without_their_holds(ticks, hold):
+    of, metrics = static(2), Metrics([Fragmented(hold_s=hold / 10)])
+    metrics.begin(of)
+    found = []
+    for tick, shown in enumerate(ticks):
+        alive = np.full(2, shown != "0")
+        metrics.see(truth(of, tick, edges=WHOLE if shown == "+" else SPLIT, alive=alive))
+        found += metrics.latest["fragmented"].tolist()
+    assert set(found) <= {0.0, 1.0}
+    starts = [tick for tick, (before, now) in enumerate(zip([0.0, *found], found, strict=False)) if now > before]
+    lengths = events_of(ticks, hold)
+    assert len(starts) == len(lengths)
+    closed = sum(length - hold for length in lengths if length is not None)
+    still_open = len(ticks) - starts[-1] if lengths and lengths[-1] is None else 0
+    # Who all died within the hold is counted at the first split tick after it, which is later than the hold.
+    assert sum(found) == closed + still_open if "0" not in ticks else sum(found) <= closed + still_open
+
+
+def test_without_a_radio_there_are_no_events():
+    metrics, of = Metrics([*NAMES, "fragmented"]), static(2, arenas=2, radio=False)
+    metrics.begin(of)
+    for tick in range(20):
+        metrics.see(truth(of, tick))
+    for arena in metrics.end(None)["metrics"]:
+        assert all(value is None for name in (*NAMES, "fragmented") for value in arena[name].values())
+
+
+def test_arenas_have_events_of_their_own():
+    of, metrics = static(2, arenas=2), Metrics(["fragmentations", "rejoin_worst"])
+    metrics.begin(of)
+    for tick in range(40):
+        pairs = ([] if 5 <= tick < 20 else [(0, 1)]) + ([] if 10 <= tick < 35 else [(2, 3)])
+        metrics.see(truth(of, tick, edges=edges(*pairs)))
+    found = metrics.end(None)["metrics"]
+    assert [arena["rejoin_worst"]["final"] for arena in found] == [1.5, 2.5]
+    assert [arena["fragmentations"]["final"] for arena in found] == [1.0, 1.0]

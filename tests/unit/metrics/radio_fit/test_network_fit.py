@@ -1,0 +1,252 @@
+"""What an emulated network was made with is found again in its robots' logs. Seeds are fixed; tolerances are four
+standard errors as the fit states them (false alarm 1 in 16 000 each), and those are held to what such logs can tell.
+"""
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.radio_fit.latency_fit import LatencyFit, fit_latency
+from swarmwire.metrics.radio_fit.loss_fit import LossFit
+from swarmwire.metrics.radio_fit.network_fit import NetworkFit, deliveries, fit_network
+from swarmwire.metrics.radio_fit.network_log import (
+    NetworkLog,
+    is_network_table,
+    network_log_of_robots,
+    network_log_of_table,
+)
+from swarmwire.metrics.radio_fit.network_rows import network_rows
+from swarmwire.metrics.radio_fit.network_table import network_comments, network_table
+from swarmwire.metrics.radio_fit.range_fit import RangeFit, fit_range
+from swarmwire.metrics.real_log.real_logs import read_real_logs
+from tests.support.metrics.real_log.as_logs import as_logs
+from tests.support.metrics.real_log.emulated import flock, watched
+from tests.unit.metrics.radio_fit.test_radio_fit import is_found
+
+AIRTIME_S = 14 * 8 / 250_000  # of a beacon, which the radio adds to its latency
+HEAD = "t_s,tx,rx,seq,to,size_bytes,tag,latency_s,distance_m,given\n"
+
+
+def logged(of, folder, **how) -> NetworkLog:
+    return network_log_of_robots(read_real_logs(as_logs(of, folder, **how)))
+
+
+def fitted(of, folder, **how) -> NetworkFit:
+    return fit_network(logged(of, folder, **how))
+
+
+@pytest.fixture(scope="module")
+def bursty():
+    """Bursts of half a second that lose all, every two seconds; robots start all over the place."""
+    bursts = "radio.bursts={ bad_s = 0.5, good_s = 2.0 }"
+    place = 'robots.flock.place={ how = "arena" }'
+    return watched("radio.loss=0.0", bursts, place, "duration_s=40", seed=3)
+
+
+@pytest.fixture(scope="module")
+def fit(bursty, tmp_path_factory):
+    return fitted(bursty, tmp_path_factory.mktemp("bursty"), phase_s=(0.03, 0.0, 0.09, 0.05, 0.01, 0.07))
+
+
+@pytest.fixture(scope="module")
+def steady(tmp_path_factory):
+    """Single losses, and nobody out of range."""
+    return fitted(flock(), tmp_path_factory.mktemp("steady"))
+
+
+def test_single_losses_latency_and_jitter_are_found_again(steady):
+    of = steady
+    assert isinstance(of.losses, LossFit)
+    assert isinstance(of.latency, LatencyFit)
+    assert is_found(of.losses.loss, 0.3, 0.05)
+    assert of.losses.chosen.bursts is None
+    latency_s, error_s = of.latency.latency_s
+    assert abs(latency_s - 0.1 - AIRTIME_S) < 4.0 * error_s < 0.001
+    assert is_found(of.latency.jitter_s, 0.02, 0.05)
+    assert of.latency.apart < 0.05
+
+
+def test_every_parameter_has_a_row_and_what_the_table_cannot_say_a_comment(steady):
+    rows = {row.parameter: row for row in network_rows(steady)}
+    assert {"range, at least", "latency", "jitter"} <= rows.keys()
+    assert rows["latency"].unit == "s"
+    assert all(bool(row.left_out) == (row.estimate is None) for row in rows.values())
+    assert any(comment.startswith("range_m is the farthest") for comment in network_comments(steady))
+
+
+def test_bursts_are_found_again(fit):
+    assert isinstance(fit.losses, LossFit)
+    bursts, errors = fit.losses.chosen.bursts, fit.losses.chosen.errors
+    assert fit.losses.chosen.name == "bursts that lose all"
+    assert bursts is not None
+    assert is_found((bursts.bad_s, errors["bad_s"]), 0.5, 0.2)
+    assert is_found((bursts.good_s, errors["good_s"]), 2.0, 0.2)
+
+
+def test_the_range_is_found_where_packets_were_sent_from_beyond(fit):
+    assert isinstance(fit.range, RangeFit)
+    assert fit.range.reached
+    assert fit.range.range_m.value == pytest.approx(2.0, abs=0.05)
+    assert any("from beyond the range count as out of range" in note for note in fit.notes)
+
+
+def test_where_nobody_went_far_the_range_is_at_least_what_was_heard(steady):
+    of = steady
+    assert isinstance(of.range, RangeFit)
+    assert not of.range.reached
+    assert of.range.range_m.value == pytest.approx(np.nanmax(of.log.distance_m), rel=0.02)
+    assert network_table(of)["radio"]["range_m"] == pytest.approx(of.range.range_m.value, rel=1e-3)
+
+
+def test_without_distances_everybody_is_within_reach(tmp_path):
+    of = fitted(flock(), tmp_path, tracker=False)
+    assert of.range == "needs 100 packets with a distance, got 0"
+    table = network_table(of)["radio"]
+    assert table["range_m"] == 1000.0
+    assert table["loss"] == pytest.approx(0.3, abs=0.03)
+
+
+def test_each_link_has_its_delivery_and_each_robot_its_neighbours(steady):
+    of = steady
+    assert len(of.links) == 30
+    assert sum(link.packets for link in of.links) == len(of.log.lost)
+    assert all(0.5 < link.pdr < 0.9 for link in of.links)
+    assert of.neighbours["flock-0"] == tuple(f"flock-{i}" for i in range(1, 6))
+
+
+def test_of_one_robots_log_those_that_it_heard_are_its_neighbours(tmp_path):
+    of = fit_network(network_log_of_robots(read_real_logs(as_logs(flock(), tmp_path) / "flock-0")))
+    assert of.neighbours["flock-0"] == tuple(f"flock-{i}" for i in range(1, 6))
+    assert of.neighbours["flock-1"] == ("flock-0",)  # of the others nothing is known
+
+
+def test_a_link_that_delivers_one_way_alone_makes_no_neighbours(tmp_path):
+    folder = as_logs(flock(), tmp_path)
+    (folder / "flock-1" / "heard.csv").write_text(HEAD)  # it is there, and heard nobody
+    assert "flock-1" not in fit_network(network_log_of_robots(read_real_logs(folder))).neighbours["flock-0"]
+
+
+def test_with_a_tracker_the_table_gives_range_and_bearing(steady, tmp_path):
+    assert network_table(steady)["radio"]["gives"] == {"range": {}, "bearing": {}}
+    assert any(comment.startswith("gives: ") for comment in network_comments(steady))
+    blind = fitted(flock(), tmp_path, tracker=False)
+    assert "gives" not in network_table(blind)["radio"]
+    assert not any(comment.startswith("gives: ") for comment in network_comments(blind))
+
+
+def test_clocks_that_are_apart_are_set_right_before_latencies_are_fitted(tmp_path):
+    log = logged(flock(), tmp_path, ahead_s={"flock-1": 0.3, "flock-4": -0.05})
+    assert "clocks up to 0.35 s apart" in log.notes[0]
+    of = fit_latency(log.packets.latency_s)
+    assert isinstance(of, LatencyFit)
+    assert of.latency_s.value == pytest.approx(0.1 + AIRTIME_S, abs=0.003)
+    assert of.jitter_s.value == pytest.approx(0.02, abs=0.004)
+
+
+def test_latencies_that_are_not_uniform_become_a_table_of_delays(tmp_path):
+    draws = np.random.default_rng(4).lognormal(-4.0, 0.8, 2000)
+    rows = [f"{1000.0 + 0.1 * i:.9f},a,b,{i},,14,say,{late_s:.9f},1.0,1\n" for i, late_s in enumerate(draws)]
+    path = tmp_path / "heard.csv"
+    path.write_text(HEAD + "".join(rows))
+    of = fit_network(network_log_of_table(path))
+    table = network_table(of)["radio"]
+    assert table["delays"]["distribution"] == "lognormal"
+    whole_s = table["latency_s"] + table["delays"]["mean_s"]
+    assert (whole_s, table["jitter_s"]) == (pytest.approx(float(draws.mean()), rel=0.05), 0.0)
+    assert any("[radio.delays] is lognormal" in note for note in of.notes)
+    assert "lognormal delay, mean" in {row.parameter for row in network_rows(of)}
+
+
+def test_negative_latencies_that_nothing_explains_are_told():
+    of = fit_latency(np.linspace(-0.31, -0.29, 200))
+    assert isinstance(of, LatencyFit)
+    assert (of.latency_s.value, of.negative) == (0.0, 1.0)
+
+
+def test_a_few_late_packets_do_not_move_the_fit():
+    draws = np.random.default_rng(2).uniform(0.01, 0.03, 4000)
+    draws[::40] += 2.0
+    of = fit_latency(draws)
+    assert isinstance(of, LatencyFit)
+    assert of.latency_s.value == pytest.approx(0.01, abs=0.001)
+    assert of.jitter_s.value == pytest.approx(0.02, abs=0.0015)
+    assert of.percentiles_s[2] > 1.0
+
+
+def test_a_robot_whose_log_is_missing_still_has_links_to_others(tmp_path):
+    folder = as_logs(flock(), tmp_path / "logs")
+    (folder / "flock-4").rename(tmp_path / "away")
+    links = deliveries(network_log_of_robots(read_real_logs(folder)))
+    from_there = [link for link in links if link.sender == "flock-4"]
+    assert {link.receiver for link in from_there} == {f"flock-{i}" for i in (0, 1, 2, 3, 5)}
+    assert not [link for link in links if link.receiver == "flock-4"]
+    assert all(0.5 < link.pdr < 0.9 for link in from_there)
+
+
+def test_packets_before_the_first_and_after_the_last_that_was_heard_count_where_the_sender_logged_them(tmp_path):
+    folder = as_logs(flock(), tmp_path)
+    path = folder / "flock-1" / "heard.csv"
+    head, *rows = path.read_text().splitlines(keepends=True)
+    middle = [row for row in rows if 30 <= int(row.split(",")[3]) < 60]
+    path.write_text("".join([head, *middle]))
+    links = deliveries(network_log_of_robots(read_real_logs(folder)))
+    into = [link for link in links if link.receiver == "flock-1"]
+    assert all(190 <= link.packets <= 200 and 10 <= link.heard <= 30 for link in into)
+    (table,) = [network_log_of_table(path)]
+    assert max(np.bincount(table.packets.sender)) <= 30  # the table alone tells nothing of the others
+
+
+def test_an_agent_that_was_started_again_loses_nothing(tmp_path):
+    """Its numbers fall to 0: the packets before and after are counted, none between."""
+    rows = [f"{1000.0 + 0.1 * i:.9f},a,b,{i if i < 200 else i - 200},,14,say,0.01,1.0,1\n" for i in range(400)]
+    path = tmp_path / "heard.csv"
+    path.write_text(HEAD + "".join(rows))
+    log = network_log_of_table(path)
+    assert (len(log.lost), int(log.lost.sum())) == (400, 0)
+
+
+def test_rows_may_come_late_and_twice(tmp_path):
+    sent = [*range(150), 7, 3]
+    rows = [f"{1000.0 + 0.1 * i + (0.35 if i % 50 == 9 else 0.01):.9f},a,b,{i}\n" for i in sent if i % 10]
+    path = tmp_path / "heard.csv"
+    path.write_text("t_s,tx,rx,seq\n" + "".join(rows) + "9")
+    log = network_log_of_table(path)
+    assert len(log.lost) == 149  # from the first that was heard to the last
+    assert int(log.lost.sum()) == 14
+    assert log.notes == ("half a line at the end was dropped",)
+    assert np.isnan(log.distance_m).all()
+
+
+def test_ranges_are_steps_of_delivery():
+    distance_m = np.linspace(0.1, 4.0, 2000)
+    lost = (distance_m > 2.5) | (np.arange(2000) % 3 == 0)
+    found = fit_range(distance_m, lost)
+    assert isinstance(found, RangeFit)
+    assert found.range_m.value == pytest.approx(2.5, abs=0.01)
+    lost[1900] = False  # one from afar
+    stray = fit_range(distance_m, lost)
+    assert isinstance(stray, RangeFit)
+    assert stray.range_m.value == found.range_m.value
+    assert fit_range(distance_m, np.ones(2000, np.bool_)) == "needs packets that were received"
+
+
+def test_tables_are_told_apart_by_their_columns(tmp_path):
+    for name, head, is_network in (
+        ("a.csv", HEAD, True),
+        ("b.csv", "t_s,tx,rx,seq\n", True),
+        ("c.csv", "t_s,tx,rx,seq,rssi_dbm,distance_m\n", False),
+        ("d.csv", "t_s,tx,rx\n", False),
+    ):
+        (tmp_path / name).write_text(head)
+        assert is_network_table(tmp_path / name) == is_network
+    assert not is_network_table(tmp_path / "absent.csv")
+
+
+def test_more_lost_packets_than_can_be_are_refused(tmp_path):
+    path = tmp_path / "heard.csv"
+    path.write_text("t_s,tx,rx,seq\n1.0,a,b,1\n2.0,a,b,900000000\n")
+    with pytest.raises(BadInput, match="leaves 899999998 packets out"):
+        network_log_of_table(path)
+    path.write_text("t_s,tx,rx,seq\n1.0,a,a,1\n")
+    with pytest.raises(BadInput, match="expected another robot than tx"):
+        network_log_of_table(path)

@@ -1,0 +1,251 @@
+"""Fits find again what logs were made with. Keys are fixed; tolerances are standard errors as the fit itself states
+them, at most four of them (false alarm 1 in 16 000 each), and those are held to what such a log can tell.
+"""
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.air.parameters.bursts import Bursts, bursts_from_steps
+from swarmwire.comms.air.parameters.propagation import Antenna, Shadowing
+from swarmwire.metrics.radio_fit.expected_runs import expected_runs
+from swarmwire.metrics.radio_fit.fit_rows import Row, parameter_rows, residual_rows
+from swarmwire.metrics.radio_fit.link_field import link_covariance
+from swarmwire.metrics.radio_fit.loss_fit import LossFit, fit_losses
+from swarmwire.metrics.radio_fit.loss_sequences import loss_sequences
+from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit
+from swarmwire.metrics.radio_fit.radio_fit import fit_radio
+from swarmwire.metrics.radio_fit.radio_table import radio_table
+from swarmwire.metrics.radio_fit.read_log import read_log
+from swarmwire.metrics.radio_fit.shadowing_fit import ShadowingFit
+from tests.support.metrics.radio_fit.synthetic import (
+    EXPONENT,
+    NOISE_DB,
+    RSSI_AT_1_M_DBM,
+    csv_of,
+    losses,
+    made,
+    sequences,
+)
+
+STANDARD_ERRORS = 4.0
+SHADOWING = Shadowing(4.0, 5.0)
+BURSTS = Bursts(0.5, 5.0, 0.8, 0.02)
+
+
+def is_found(estimate, true: float, surely: float) -> bool:
+    """Whether a value is right by its own standard error, which is at most such a share of it."""
+    value, error = estimate
+    return bool(abs(value - true) < STANDARD_ERRORS * error and error < surely * abs(true))
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    path = tmp_path_factory.mktemp("logs") / "log.csv"
+    path.write_text(csv_of(made(1, SHADOWING, BURSTS)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def fit(written):
+    return fit_radio(read_log(written))
+
+
+def test_path_loss_is_found_again(fit):
+    assert isinstance(fit.path_loss, PathLossFit)
+    assert is_found(fit.path_loss.exponent, EXPONENT, 0.05)
+    assert is_found(fit.path_loss.rssi_at_1_m_dbm, RSSI_AT_1_M_DBM, 0.02)
+
+
+def test_shadowing_and_noise_are_told_apart_and_found_again(fit):
+    assert isinstance(fit.shadowing, ShadowingFit)
+    assert is_found(fit.shadowing.deviation_db, SHADOWING.deviation_db, 0.25)
+    assert is_found(fit.shadowing.correlation_m, SHADOWING.correlation_m, 0.5)
+    assert is_found(fit.shadowing.noise_db, NOISE_DB, 0.3)
+
+
+def test_bursts_are_found_again_from_gaps(fit):
+    assert isinstance(fit.losses, LossFit)
+    chosen = fit.losses.chosen
+    assert chosen.name == "bursts, and single losses between"
+    for name, surely in (("bad_s", 0.2), ("good_s", 0.2), ("loss_bad", 0.1), ("loss_good", 0.2)):
+        assert is_found((getattr(chosen.bursts, name), chosen.errors[name]), getattr(BURSTS, name), surely)
+
+
+def test_residuals_are_those_of_the_line(fit):
+    rssi_dbm = fit.path_loss.rssi_dbm(fit.distance_m) + fit.residual_db
+    assert rssi_dbm == pytest.approx(fit.rssi_dbm)
+    assert abs(fit.residual_db.mean()) < 1e-9
+
+
+def test_the_table_has_the_scenarios_keys_and_what_the_antenna_took_part_in(fit):
+    table = radio_table(fit, Antenna(power_dbm=3.0, gain_dbi=2.0))["radio"]
+    assert table["model"] == "log-distance"
+    assert table["antenna"] == {"power_dbm": 3.0, "gain_dbi": 2.0}
+    told_dbm = 3.0 + 2 * 2.0 - table["log_distance"]["reference_loss_db"]
+    assert told_dbm == pytest.approx(fit.path_loss.rssi_at_1_m_dbm.value, abs=0.01)
+    assert Shadowing(**table["shadowing"]).correlation_m == pytest.approx(fit.shadowing.correlation_m.value, rel=1e-3)
+    assert Bursts(**table["bursts"]).bad_s == pytest.approx(fit.losses.chosen.bursts.bad_s, rel=1e-3)
+
+
+def test_people_read_every_parameter_with_its_error_and_what_the_line_leaves(fit):
+    rows: dict[str, Row] = {row.parameter: row for row in parameter_rows(fit)}
+    assert rows["path loss exponent"].estimate == fit.path_loss.exponent
+    assert (rows["shadowing: sigma"].unit, rows["bursts: mean duration"].unit) == ("dB", "s")
+    assert not any(row.left_out for row in rows.values())
+    assert dict(residual_rows(fit))["root mean square"] == f"{np.sqrt(np.mean(fit.residual_db**2)):.2f} dB"
+
+
+@pytest.mark.parametrize(
+    ("bursts", "name"),
+    [(Bursts(0.5, 5.0), "bursts that lose all"), (Bursts(0.5, 5.0, 0.6), "bursts that lose a share")],
+)
+def test_the_simplest_kind_of_bursts_that_tells_the_losses_is_chosen(bursts, name):
+    found = fit_losses(sequences(3, bursts))
+    assert isinstance(found, LossFit)
+    assert found.chosen.name == name
+    for key in found.chosen.errors:
+        assert is_found((getattr(found.chosen.bursts, key), found.chosen.errors[key]), getattr(bursts, key), 0.2)
+
+
+def test_of_too_many_packets_stretches_are_taken_that_say_the_same():
+    bursts = Bursts(0.5, 5.0, 0.7, 0.02)
+    whole = sequences(4, bursts, packets=3000)
+    some = whole.thinned(20_000)
+    assert len(some.lost) == 20_000
+    assert some.lost.tolist() == whole.lost.reshape(20, 3, 1000)[:, 0].ravel().tolist()
+    assert np.isinf(some.since_s[::1000]).all()
+    found = fit_losses(some)
+    assert isinstance(found, LossFit)
+    assert found.chosen.bursts is not None
+    assert is_found((found.chosen.bursts.bad_s, found.chosen.errors["bad_s"]), bursts.bad_s, 0.2)
+
+
+@pytest.mark.parametrize("key", range(4))
+def test_single_losses_are_recognised_as_such(key):
+    found = fit_losses(sequences(key, Bursts(1.0, 1.0, 0.1, 0.1)))
+    assert isinstance(found, LossFit)
+    assert found.chosen.name == "single losses"
+    assert is_found(found.loss, 0.1, 0.1)
+    assert abs(found.runs_z) < STANDARD_ERRORS
+
+
+def test_links_that_lose_different_shares_are_no_bursts():
+    """A chain with one loss for all would have it that links are in bursts for good."""
+    many, few = (sequences(5, Bursts(1.0, 1.0, loss, loss)) for loss in (0.4, 0.02))
+    apart = int(many.link.max()) + 1
+    both = type(many)(
+        np.append(many.link, few.link + apart), np.append(many.since_s, few.since_s), np.append(many.lost, few.lost)
+    )
+    found = fit_losses(both)
+    assert isinstance(found, LossFit)
+    assert found.chosen.bursts is None
+    assert min(found.models, key=lambda model: model.aic).name == "single losses, each link its own share"
+
+
+def test_residuals_that_only_vary_from_packet_to_packet_are_no_shadowing(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(csv_of(made(2, Shadowing(1e-9, 5.0), None, packets=6)))
+    found = fit_radio(read_log(path))
+    assert found.shadowing == "links that are near each other are no more alike than by chance"
+    assert is_found(found.path_loss.exponent, EXPONENT, 0.05)
+    assert "shadowing" not in radio_table(found, Antenna())["radio"]
+
+
+def test_rows_without_rssi_and_gaps_say_the_same(tmp_path, fit):
+    path = tmp_path / "rows.csv"
+    path.write_text(csv_of(made(1, SHADOWING, BURSTS), gaps=False))
+    log = read_log(path)
+    assert log.rssi_dbm[log.received].tolist() == fit.rssi_dbm.tolist()
+    found = fit_losses(loss_sequences(log))
+    assert isinstance(found, LossFit)
+    assert found.chosen.bursts is not None
+    # Times of lost packets are known here, and so are losses at the ends of links.
+    assert found.loss.value == pytest.approx(fit.losses.loss.value, rel=0.1)
+    assert found.chosen.bursts.bad_s == pytest.approx(fit.losses.chosen.bursts.bad_s, rel=0.2)
+
+
+def test_what_a_log_is_too_small_for_is_left_out_and_named(tmp_path):
+    path = tmp_path / "few.csv"
+    path.write_text(
+        "t_s,tx,rx,seq,rssi_dbm,distance_m\n" + "".join(f"{i},a,b,{i},{-50 - i},{1 + i}\n" for i in range(20))
+    )
+    found = fit_radio(read_log(path))
+    assert isinstance(found.path_loss, PathLossFit)
+    assert found.shadowing == "needs positions of sender and receiver, of which distance_m tells too little"
+    assert found.losses == "needs 100 packets, got 20"
+    assert sorted(radio_table(found, Antenna())["radio"]) == ["antenna", "log_distance", "model"]
+
+
+def test_weak_packets_that_are_missing_bias_the_line_which_is_said_and_near_ones_do_not(tmp_path):
+    draws = np.random.default_rng(8)
+    rows = ["t_s,tx,rx,seq,rssi_dbm,distance_m"]
+    for i in range(6000):
+        distance_m = float(np.exp(draws.uniform(0.0, np.log(60.0))))
+        rssi_dbm = -50.0 - 27.0 * np.log10(distance_m) + 4.0 * draws.standard_normal()
+        if rssi_dbm > -90.0:
+            rows.append(f"{i},a-{i % 15},b,{i // 15},{rssi_dbm:.3f},{distance_m:.4f}")
+    path = tmp_path / "weak.csv"
+    path.write_text("\n".join(rows) + "\n")
+    log = read_log(path)
+    far, near = fit_radio(log), fit_radio(log.within(12.0))
+    assert far.path_loss.exponent.value < 2.6
+    assert "exponent, sigma and the RSSI far out are biased" in far.notes[0]
+    assert is_found(near.path_loss.exponent, 2.7, 0.05)
+
+
+def test_covariance_of_links_is_that_of_the_emulators_field():
+    """On the diagonal 1 - delta/d (1 - exp(-d/delta)); beside it the definition's double integral."""
+    delta_m = 5.0
+    ends_m = np.array([(0.0, 0.0, 10.0, 0.0), (0.0, 5.0, 10.0, 5.0), (5.0, -5.0, 5.0, 5.0), (0.0, 0.0, 2.0, 0.0)])
+    share = (np.arange(400) + 0.5)[:, None] / 400
+    along = [row[:2] + share * (row[2:] - row[:2]) for row in ends_m]
+    length = [float(np.hypot(*(row[2:] - row[:2]))) for row in ends_m]
+    exact = [
+        [
+            np.sqrt(length[i] * length[j])
+            * np.exp(-np.hypot(*(p[:, None] - q[None]).transpose(2, 0, 1)) / delta_m).mean()
+            / (2.0 * delta_m)
+            for j, q in enumerate(along)
+        ]
+        for i, p in enumerate(along)
+    ]
+    assert link_covariance(ends_m, delta_m) == pytest.approx(np.array(exact), abs=0.02)
+
+
+def test_runs_of_lost_packets_are_geometric_where_bursts_lose_all():
+    p, r = 0.02, 0.2
+    shares = expected_runs(bursts_from_steps(p, r, 1.0, 0.0, 0.1), 0.1, 30)
+    assert shares == pytest.approx(r * (1.0 - r) ** np.arange(30))
+
+
+def test_runs_of_lost_packets_are_as_long_as_those_that_the_emulator_makes():
+    """Their mean, over links, within four standard errors: false alarm 1 in 16 000."""
+    bursts = Bursts(0.5, 2.0, 0.7, 0.05)
+    t_s = np.repeat(0.1 * np.arange(2000.0)[:, None], 20, axis=1)
+    lost = losses(7, bursts, t_s)
+    runs = np.count_nonzero(lost[1:] & ~lost[:-1], axis=0)
+    means = lost.sum(axis=0) / runs
+    expected = float((expected_runs(bursts, 0.1, 200) * np.arange(1, 201)).sum())
+    assert abs(means.mean() - expected) < STANDARD_ERRORS * means.std() / np.sqrt(len(means))
+
+
+@pytest.mark.parametrize(
+    ("slope_db", "way"),
+    [
+        (0.0, "does not fall"),
+        (1.0, "does not fall"),
+        (-1e-6, "does not fall"),
+        (-3.0, "falls too little"),
+        (-400.0, "falls too fast"),
+    ],
+)
+def test_a_line_that_no_medium_has_is_left_out(tmp_path, slope_db, way):
+    path = tmp_path / "flat.csv"
+    rows = [f"{i},a,b,{i},{-50 + slope_db * np.log10(1 + i)},{1 + i}\n" for i in range(20)]
+    path.write_text("t_s,tx,rx,seq,rssi_dbm,distance_m\n" + "".join(rows))
+    found = fit_radio(read_log(path))
+    assert isinstance(found.path_loss, str)
+    assert found.path_loss.startswith(f"RSSI {way} with distance: expected an exponent of 0.5 to 20, got ")
+    assert found.shadowing == "needs a fit of path loss"
+    assert not len(found.residual_db)
+    assert radio_table(found, Antenna()) == {"radio": {}}

@@ -1,0 +1,90 @@
+"""What the robots' own code writes is read back, and measured as the run was."""
+
+import numpy as np
+import pytest
+
+from swarmwire.agent.behaviours import Flocking
+from swarmwire.agent.drivers.driver import Command
+from swarmwire.agent.on_robot.limits import SpeedLimits
+from swarmwire.agent.on_robot.plan import Plan
+from swarmwire.agent.on_robot.robot_log import TickRow, new_log
+from swarmwire.agent.on_robot.run import robot_facts
+from swarmwire.agent.on_robot.settings import DriverSettings, RobotSettings
+from swarmwire.agent.radios.radio_log import HeardPacket, SentPacket
+from swarmwire.comms.clock import NS_PER_S, to_ns
+from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.wire.poses import Pose
+from swarmwire.metrics.real_log.measured_log import measured_log
+from swarmwire.metrics.real_log.real_logs import read_real_logs
+from swarmwire.metrics.real_log.robot_log import read_robot_log
+from swarmwire.metrics.registry import METRICS
+from tests.support.agent.on_robot.scripted import UTC_NS, DatedFakeClock, ScriptedDriver
+from tests.support.metrics.real_log.as_logs import as_logs
+from tests.support.metrics.real_log.emulated import flock
+
+MEASURES = [METRICS[name]() for name in ("order", "speed", "cohesion", "min_gap", "throughput", "pdr", "latency_air")]
+
+
+@pytest.fixture
+def folders(tmp_path):
+    """The run's truth, by the code of the robots and by that of the tests."""
+    return by_robots(tmp_path / "robots"), as_logs(flock(), tmp_path / "tests")
+
+
+def by_robots(folder):
+    static, clock = flock().static, DatedFakeClock()
+    made_up = as_logs(flock(), folder.with_name("made-up"))
+    for robot, name in enumerate(static.robot_names):
+        settings = RobotSettings(
+            agent="swarmwire.agent.behaviours:Flocking",
+            driver=DriverSettings("epuck2"),
+            name=name,
+            swarm="lab",
+            robots=static.robot_names,
+        )
+        log = new_log(folder, static.robot_names, name, "20261121T120000Z", "robot.toml")
+        body = static.groups[0].body
+        plan = Plan(settings, "robot.toml", Flocking, {}, body, ScriptedDriver(clock), SpeedLimits(0.1, 2.0))
+        log.begin(robot_facts(plan, clock))
+        for truth in flock().truths:
+            x_m, y_m, heading_rad = truth.pose[robot].tolist()
+            command = Command(*truth.command[robot, :2].tolist())
+            pose = Pose(x_m, y_m, heading_rad)
+            log.tick(TickRow(truth.tick, UTC_NS + truth.time_ns, False, pose, True, command, 'say "a, b"', 1.5, None))
+        told = read_robot_log(made_up / name)
+        begin_s = told.steps.time_s[0]
+        for at_s, sequence, size in zip(told.sent.time_s, told.sent.sequence, told.sent.size_bytes, strict=True):
+            log.sent(SentPacket(UTC_NS + to_ns(at_s - begin_s), int(sequence), BROADCAST, int(size), 7, "sent"))
+        heard = told.heard
+        for row in range(len(heard.sequence)):
+            at_ns = UTC_NS + to_ns(heard.time_s[row] - begin_s)
+            sender, latency_ns = static.robot_names.index(heard.sender[row]), to_ns(heard.latency_s[row])
+            log.heard(
+                HeardPacket(at_ns, sender, int(heard.sequence[row]), BROADCAST, 14, 7, latency_ns, None, given=True)
+            )
+            if row == len(heard.sequence) // 2:
+                log.flush()
+        log.end({"ended": "stopped", "ticks": len(flock().truths)})
+    return folder
+
+
+def test_what_robots_write_is_read_back(folders):
+    logs = read_real_logs(folders[0])
+    assert logs.notes == ()
+    assert logs.names == flock().static.robot_names
+    steps = logs.robots[2].steps
+    assert steps.time_s[0] == UTC_NS / NS_PER_S
+    assert steps.state[0] == 'say "a, b"'
+    assert steps.value[0] == 1.5
+    np.testing.assert_allclose(steps.pose[:, 0], [truth.pose[2, 0] for truth in flock().truths])
+    assert np.isnan(logs.robots[2].heard.distance_m).all()
+    assert set(logs.robots[2].heard.to.tolist()) == {""}
+    assert logs.robots[0].about.agent_sha256 != ""
+    assert logs.robots[0].ended == "stopped"
+
+
+def test_it_is_measured_as_what_tests_write(folders):
+    by_robots_, by_tests = (measured_log(read_real_logs(folder), MEASURES, flock().static) for folder in folders)
+    for name, series in by_robots_.series.items():
+        np.testing.assert_allclose(series, by_tests.series[name], rtol=1e-4, atol=1e-4, err_msg=name)
+    assert by_robots_.radio["fates"] == by_tests.radio["fates"]

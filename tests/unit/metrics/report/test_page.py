@@ -1,0 +1,92 @@
+"""The page shows all that a report holds, needs nothing else, and takes texts for texts."""
+
+import pytest
+
+from swarmwire.metrics.report.page import page
+from swarmwire.metrics.report.section import Figure, Listing, Report, Section, Table
+from swarmwire.metrics.report.svg import COLUMN_IN, as_svg, blank_figure
+from tests.support.metrics.report.pages import Page, check_alone
+
+pytest.importorskip("matplotlib", reason="needs the extra [report]")
+
+
+def drawn(name):
+    figure = blank_figure(COLUMN_IN, 1.0)
+    axes = figure.add_axes((0.1, 0.2, 0.8, 0.7))
+    axes.plot([1, 2, 3], [1, 3, 2], "o-")
+    axes.fill_between([1, 2], [1, 2])
+    return as_svg(figure, name)
+
+
+def report(*parts, title="A report", about=""):
+    return Page(page(Report(title, (Section("Part", parts), Section("Another", ("Words.",))), about)))
+
+
+def test_everything_stands_in_the_page_once():
+    shown = report(
+        "A text with `code` in it.",
+        Listing("swarmwire sweep"),
+        Table(("a", "b"), (("x", "> 1"),), "An open table"),
+        Table(("c", "d"), (("y", "2"),), "A folded table", folded=True),
+        Figure("first", drawn("first"), "The first figure"),
+        Figure("second", drawn("second"), "The second figure"),
+        about="In one line",
+    )
+    for text in ("A report", "In one line", "swarmwire sweep", "An open table", "A folded table", "The first figure"):
+        assert text in shown.said, text
+    assert shown.tables == [[["a", "b"], ["x", "> 1"]], [["c", "d"], ["y", "2"]]]
+    counts = {tag: shown.tags.count(tag) for tag in ("h1", "h2", "figure", "svg", "details", "pre", "code", "nav")}
+    assert counts == {"h1": 1, "h2": 2, "figure": 2, "svg": 2, "details": 1, "pre": 1, "code": 1, "nav": 1}
+    check_alone(shown)
+
+
+def test_the_contents_lead_to_each_section():
+    assert report("Words.").fetched == ["#part-1", "#part-2"]
+
+
+def test_texts_are_no_markup():
+    evil = '<script>alert("1")</script> & `<b>`'
+    shown = report(
+        evil,
+        Listing(evil),
+        Table((evil, "b"), ((evil, "1"),), evil),
+        Figure("a", drawn("a"), evil),
+        title=evil,
+        about=evil,
+    )
+    assert "script" not in shown.tags
+    assert "b" not in shown.tags
+    assert shown.said.count(evil) >= 3
+    assert shown.tables[0][0][0] == evil
+
+
+def test_figures_that_share_a_name_are_refused():
+    with pytest.raises(ValueError, match="one name: \\['a'\\]"):
+        report(Figure("a", drawn("a"), ""), "Words.", Figure("a", drawn("a"), ""))
+
+
+def test_columns_of_numbers_stand_at_the_right():
+    rows = (("x", "1.5", "> 12 s", "−3"), ("2 y", "–", "4 %", "1,000"))
+    text = report(Table(("a", "b", "c", "d"), rows, "")).text
+    assert text.count('<th scope="col" class="number">') == 3
+    assert text.count('<td class="number">') == 6
+
+
+def test_a_table_without_names_of_columns_has_no_head():
+    shown = report(Table(("", ""), (("a", "b"),), ""))
+    assert "thead" not in shown.tags
+    assert shown.tables == [[["a", "b"]]]
+
+
+def test_equal_figures_are_equal_texts_and_different_names_never_meet():
+    assert drawn("a") == drawn("a")
+    assert drawn("a") != drawn("b")
+    assert drawn("a").replace('"a-', '"b-').replace("#a-", "#b-") == drawn("b")
+
+
+def test_a_figure_is_an_element_alone_without_date_or_style_sheet():
+    text = drawn("a")
+    assert text.startswith("<svg ")
+    assert text.endswith("</svg>")
+    for unwanted in ("<style", "<metadata", "dc:date", "<!--", "font-family"):
+        assert unwanted not in text, unwanted

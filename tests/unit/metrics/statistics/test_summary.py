@@ -1,0 +1,107 @@
+"""A sample in a few numbers, with intervals that cover what they say."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.metrics.statistics.bootstrap import (
+    drawn,
+    percentile_interval,
+    resampled_means,
+    resampled_medians,
+)
+from swarmwire.metrics.statistics.summary import summary
+from tests.support.metrics.statistics.samples import number_samples, numbers, placebo, time_samples, times, treated
+
+
+def test_quartiles_and_mean_of_numbers_are_numpys():
+    found = summary(numbers([1.0, 2.0, 4.0, 10.0, np.nan]))
+    assert (found.n, found.undefined, found.censored) == (4, 1, 0.0)
+    assert (found.q25, found.q50, found.q75, found.mean) == (1.75, 3.0, 5.5, 4.25)
+
+
+def test_times_have_quartiles_of_survival_and_those_beyond_the_limit_are_none():
+    found = summary(treated())
+    assert (found.n, found.q25, found.q50, found.limit) == (21, 13.0, 23.0, 35.0)
+    assert found.censored == pytest.approx(12 / 21)
+    assert math.isnan(found.q75)
+    assert found.q50_interval == (13.0, math.inf)
+    assert summary(placebo()).mean == pytest.approx(182 / 21)
+
+
+@pytest.mark.parametrize("sample", [numbers([]), times([])])
+def test_of_nothing_nothing_is_told(sample):
+    found = summary(sample)
+    assert found.n == 0
+    assert all(math.isnan(value) for value in (found.q50, found.mean, found.censored, *found.mean_interval))
+
+
+def test_one_value_has_no_interval():
+    found = summary(numbers([3.0]))
+    assert (found.q25, found.q50, found.mean) == (3.0, 3.0, 3.0)
+    assert all(math.isnan(end) for end in (*found.q50_interval, *found.mean_interval))
+
+
+@given(number_samples)
+def test_the_same_sample_has_the_same_summary_whatever_the_order_of_its_values(sample):
+    once, again, turned = summary(sample), summary(sample), summary(numbers(sample.value[::-1]))
+    assert repr(once) == repr(again)
+    assert (once.q25, once.q50, once.q50_interval) == (turned.q25, turned.q50, turned.q50_interval)
+
+
+@given(time_samples)
+def test_quartiles_of_times_rise(sample):
+    found = summary(sample)
+    known = [value for value in (found.q25, found.q50, found.q75) if not math.isnan(value)]
+    assert known == sorted(known)
+    assert known == [found.q25, found.q50, found.q75][: len(known)]
+
+
+@pytest.mark.parametrize("n", [2, 3, 10, 51])
+def test_every_resample_draws_n_and_every_value_about_equally_often(n):
+    """A value's mean over 2000 resamples has a standard error of 0.022; five of them fail once in 1e5 lists."""
+    counts = drawn(n)
+    assert (counts.sum(axis=1) == n).all()
+    assert np.abs(counts.mean(axis=0) - 1.0).max() < 0.115
+    assert not np.array_equal(counts, drawn(n, 1))
+
+
+@given(st.lists(st.floats(-5.0, 5.0), min_size=1, max_size=12))
+def test_means_and_medians_of_resamples_are_those_of_the_values_drawn(values):
+    value = np.array(values)
+    means, medians = resampled_means(value), resampled_medians(value)
+    for resample in range(5):
+        # The n-th place of a median is that in rising order: each resample of places is a resample of values.
+        counts = drawn(len(value))[resample].astype(np.int64)
+        assert means[resample] == pytest.approx(np.repeat(value, counts).mean(), abs=1e-6)
+        assert medians[resample] == pytest.approx(np.median(np.repeat(np.sort(value), counts)))
+
+
+def test_means_of_rows_are_resampled_alike():
+    rows = np.random.default_rng(1).normal(size=(3, 8))
+    np.testing.assert_allclose(resampled_means(rows)[:, 1], resampled_means(rows[1]), atol=1e-6)
+
+
+def test_an_interval_of_what_may_be_infinite_is_open_and_of_what_is_unknown_unknown():
+    resampled = np.array([1.0] * 50 + [math.inf] * 50)
+    assert percentile_interval(resampled, 30) == (1.0, math.inf)
+    assert math.isnan(percentile_interval(np.array([1.0, math.nan]), 30).low)
+
+
+@pytest.mark.parametrize("n", [8, 30])
+def test_intervals_cover_as_often_as_they_say(n):
+    """Of 500 samples 95 % (1 % around) should; beyond 91.5 and 99.5 % they are by chance once in 1000 lists of seeds.
+
+    The median's resamples are few values, so that its interval covers more rather than less.
+    """
+    rng = np.random.default_rng(n)
+    mean = median = 0
+    for _ in range(500):
+        found = summary(numbers(rng.normal(3.0, 2.0, n)))
+        mean += found.mean_interval.low <= 3.0 <= found.mean_interval.high
+        median += found.q50_interval.low <= 3.0 <= found.q50_interval.high
+    assert 0.915 <= mean / 500 <= 0.985
+    assert 0.915 <= median / 500 <= 0.995

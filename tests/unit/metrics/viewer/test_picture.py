@@ -1,0 +1,68 @@
+import struct
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.viewer.picture import NoGraphics, render_png
+from swarmwire.metrics.viewer.recording import RerunRecording
+from tests.support.clocks import StillClock
+from tests.support.metrics.truths import static, truth
+
+pytest.importorskip("rerun", reason="needs the extra [view]")
+
+
+@pytest.fixture
+def rrd(tmp_path):
+    of, metrics = static(3), Metrics()
+    recording = RerunRecording(tmp_path / "run.rrd", metrics, StillClock())
+    for observer in (metrics, recording):
+        observer.begin(of)
+    for tick in range(20):
+        pose = np.column_stack([np.linspace(-2, 2, 3), np.full(3, 0.1 * tick), np.zeros(3)])
+        for observer in (metrics, recording):
+            observer.see(truth(of, tick, pose=pose))
+    recording.end(None)
+    return tmp_path / "run.rrd"
+
+
+def picture(rrd, name, tick=None):
+    png = rrd.with_name(name)
+    try:
+        render_png(rrd, png, tick, size=(640, 360))
+    except NoGraphics as fault:
+        pytest.skip(str(fault))
+    return png.read_bytes()
+
+
+def test_a_picture_has_the_size_asked_for_and_shows_the_tick_asked_for(rrd):
+    first, last, end = picture(rrd, "0.png", 0), picture(rrd, "19.png", 19), picture(rrd, "end.png")
+    assert struct.unpack(">II", first[16:24]) == (640, 360)
+    assert first != last
+    assert last == end
+
+
+def test_a_machine_without_a_driver_is_told_what_it_lacks(rrd, monkeypatch):
+    monkeypatch.setenv("VK_ICD_FILENAMES", "/dev/null")
+    monkeypatch.setenv("VK_DRIVER_FILES", "/dev/null")
+    with pytest.raises(NoGraphics, match="mesa-vulkan-drivers"):
+        render_png(rrd, rrd.with_name("none.png"))
+
+
+@pytest.mark.parametrize("tick", [-1, 20])
+def test_a_tick_that_was_not_recorded_is_refused(rrd, tick):
+    with pytest.raises(BadInput, match="tick: expected 0 to 19"):
+        picture(rrd, "none.png", tick)
+
+
+def test_a_recording_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(BadInput, match=r"none\.rrd: there is no such recording"):
+        render_png(tmp_path / "none.rrd", tmp_path / "none.png")
+
+
+@pytest.mark.parametrize("name", ["x.txt", "x", "x.jpg"])
+def test_what_is_no_png_by_name_is_refused(rrd, name):
+    with pytest.raises(BadInput, match=rf"{name}: expected a file name that ends in \.png$"):
+        render_png(rrd, rrd.with_name(name))
+    assert not rrd.with_name(name).exists()

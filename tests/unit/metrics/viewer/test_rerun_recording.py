@@ -1,0 +1,402 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.geometry.floor import Floor, Patch
+from swarmwire.comms.truth import Finished, Group, Happened, Light, Obstacle
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.verify.finding import State
+from swarmwire.metrics.verify.recording_check import check_recording
+from swarmwire.metrics.viewer.colors import DEAD, FATES, packed
+from swarmwire.metrics.viewer.recording import RerunRecording
+from tests.support.clocks import StillClock
+from tests.support.metrics.truths import edges, static, tally, truth
+
+rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
+
+OBSTACLES = (Obstacle("cylinder", 1.0, 1.0, radius_m=0.2), Obstacle("box", -1.0, 0.0, 0.5, size_m=(0.6, 0.2)))
+
+
+@pytest.fixture(autouse=True)
+def strict():
+    """Rerun only warns of bad data unless it is told otherwise."""
+    rerun.set_strict_mode(True)
+    yield
+    rerun.set_strict_mode(False)
+
+
+def record(path: Path, of, ticks, arena=0):
+    metrics = Metrics()
+    recording = RerunRecording(path, metrics, StillClock(), arena)
+    observers = (metrics, recording)
+    for observer in observers:
+        observer.begin(of)
+    for seen in ticks:
+        for observer in observers:
+            observer.see(seen)
+    assert recording.end(None)["record_rrd"]["dropped"] == 0
+
+
+def moving(of, ticks, **fields):
+    rng = np.random.default_rng(5)
+    for tick in range(ticks):
+        pose = rng.uniform(-3.0, 3.0, (of.arenas * of.robots, 3))
+        yield truth(of, tick, pose=pose, **fields)
+
+
+def column(path, entity, component):
+    """What was logged of a component, by tick (None: once for the run): an array per row."""
+    found = {}
+    for chunk in rerun.chunk.RrdReader(str(path)).stream().filter(content=entity):
+        batch = chunk.to_record_batch()
+        if component in batch.schema.names:
+            ticks = batch["tick"].to_pylist() if "tick" in batch.schema.names else [None] * batch.num_rows
+            rows = batch[component].to_pylist()
+            found.update({tick: row for tick, row in zip(ticks, rows, strict=True) if row is not None})
+    return dict(sorted(found.items(), key=lambda item: -1 if item[0] is None else item[0]))
+
+
+@pytest.mark.parametrize("arena", [0, 1])
+def test_a_recording_holds_the_positions_and_headings_of_its_arena(tmp_path, arena):
+    of = static(3, arenas=2, obstacles=OBSTACLES)
+    ticks = list(moving(of, 40, edges=edges((0, 1), (4, 5))))
+    record(tmp_path / "run.rrd", of, ticks, arena)
+    positions = column(tmp_path / "run.rrd", "/world/robots", "Points2D:positions")
+    vectors = column(tmp_path / "run.rrd", "/world/headings", "Arrows2D:vectors")
+    assert list(positions) == list(vectors) == list(range(40))
+    for seen in ticks:
+        pose = seen.pose[3 * arena : 3 * arena + 3]
+        assert positions[seen.tick] == pose[:, :2].astype(np.float32).tolist()
+        x, y = np.array(vectors[seen.tick]).T
+        np.testing.assert_allclose(np.arctan2(y, x), pose[:, 2], atol=1e-5)
+
+
+def test_lit_leds_are_drawn_where_they_sit_until_they_are_dark(tmp_path):
+    of = static(2)
+    leds = np.zeros((2, 8), np.int64)
+    leds[1, 2] = 0x0080FF  # the one to the left
+    pose = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, np.pi / 2]])
+    dark = truth(of, 3, pose=pose), truth(of, 4, pose=pose)
+    lit = truth(of, 1, pose=pose, leds=leds), truth(of, 2, pose=pose, leds=leds)
+    record(tmp_path / "run.rrd", of, [truth(of, 0, pose=pose), *lit, *dark])
+    positions = column(tmp_path / "run.rrd", "/world/leds", "Points2D:positions")
+    np.testing.assert_allclose(positions.pop(1), [[1.0 - 0.042, 2.0]], atol=1e-6)
+    np.testing.assert_allclose(positions.pop(2), [[1.0 - 0.042, 2.0]], atol=1e-6)
+    assert positions == {3: []}
+    assert column(tmp_path / "run.rrd", "/world/leds", "Points2D:colors")[1] == [0x0080FFFF]
+
+
+def test_links_join_the_positions_of_the_robots_that_an_edge_names(tmp_path):
+    of = static(3, arenas=2)
+    [seen] = moving(of, 1, edges=edges((0, 1), (3, 5)))
+    record(tmp_path / "run.rrd", of, [seen], arena=1)
+    strips = column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips")
+    assert strips == {0: [seen.pose[[3, 5], :2].astype(np.float32).tolist()]}
+
+
+@pytest.mark.parametrize(("robots", "expected"), [(200, list(range(12))), (201, [0, 10])])
+def test_links_of_large_swarms_are_thinned(tmp_path, robots, expected):
+    of = static(robots)
+    record(tmp_path / "run.rrd", of, moving(of, 12, edges=edges((0, 1))))
+    assert list(column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips")) == expected
+
+
+def series(path, plot):
+    """Every line of a plot: {name: {tick: value}}, of the ticks in which it was drawn."""
+    found = {}
+    for before in range(20):
+        entity = f"/plots/{plot}/since_{before}"
+        for names in column(path, entity, "SeriesLines:names").values():
+            rows = column(path, entity, "Scalars:scalars").items()
+            found |= {name: {tick: row[i] for tick, row in rows} for i, name in enumerate(names)}
+    return found
+
+
+def test_plots_hold_what_the_metrics_measured_in_each_tick(tmp_path):
+    of, metrics = static(4), Metrics()
+    expected = {metric.name: {} for metric in metrics.metrics}
+    ticks = list(moving(of, 30, edges=edges((0, 1)), contact_onsets=np.array([[1, 0]])))
+    metrics.begin(of)
+    for seen in ticks:
+        metrics.see(seen)
+        for name, value in metrics.latest.items():
+            expected[name][seen.tick] = value[0]
+    record(tmp_path / "run.rrd", of, ticks)
+    drawn = {}
+    for plot in ("shares", "distances", "times", "numbers"):
+        drawn |= series(tmp_path / "run.rrd", plot)
+    valued = {name for name, values in expected.items() if not all(map(np.isnan, values.values()))}
+    assert drawn.keys() == valued
+    assert {"order", "components", "collisions", "min_gap"} <= valued
+    assert not {"target_best", "rejoin_median"} & valued
+    for name, values in drawn.items():
+        assert values == {tick: pytest.approx(expected[name][tick], nan_ok=True) for tick in values}
+        assert all(np.isnan(expected[name][tick]) for tick in expected[name].keys() - values.keys())
+
+
+def test_packets_are_drawn_by_fate_as_receivers_per_second_once_a_fate_occurs(tmp_path):
+    of = static(4)
+    counts = [{Fate.HEARD: tick % 3, Fate.LOST: 2 if tick >= 12 else 0, Fate.OUT_OF_RANGE: 9} for tick in range(40)]
+    record(tmp_path / "run.rrd", of, [truth(of, tick, tally=tally(count)) for tick, count in enumerate(counts)])
+    drawn = series(tmp_path / "run.rrd", "packets")
+    assert drawn.keys() == {"heard", "lost"}
+    assert min(drawn["lost"]) == 12
+    for fate, name in ((Fate.HEARD, "heard"), (Fate.LOST, "lost")):
+        for tick, value in drawn[name].items():
+            last = [count[fate] for count in counts[max(0, tick - 9) : tick + 1]]
+            assert value == pytest.approx(10 * sum(last) / len(last))
+    delivery = series(tmp_path / "run.rrd", "shares")["delivery"]
+    heard, in_range = (
+        sum(sum(count[f] for f in fates) for count in counts[-10:]) for fates in ([Fate.HEARD], [Fate.HEARD, Fate.LOST])
+    )
+    assert delivery[39] == pytest.approx(heard / in_range)
+
+
+def class_names(path):
+    """{class: (name, colour)} of the robots."""
+    (context,) = column(path, "/world", "AnnotationContext:context").values()
+    infos = [item["class_description"]["info"] for item in context[0]]
+    return {info["id"]: (info["label"], info["color"]) for info in infos}
+
+
+def test_robots_are_told_apart_by_group_and_state_and_the_dead_are_grey(tmp_path):
+    of = static(3)
+    of = replace(of, groups=(replace(of.groups[0], stop=2), Group("b", of.groups[0].body, 2, 3)))
+    states = ("", "search", "carry")
+    alive = [[True, True, True], [True, True, True], [True, False, True], [True, True, True], [True, True, True]]
+    at = [[0, 0, 0], [1, 0, 0], [1, 0, 2], [1, 1, 2], [1, 1, 2]]
+    ticks = [
+        truth(of, tick, alive=np.array(living), state=np.array(state), states=states)
+        for tick, (living, state) in enumerate(zip(alive, at, strict=True))
+    ]
+    record(tmp_path / "run.rrd", of, ticks)
+    named = class_names(tmp_path / "run.rrd")
+    for entity, archetype in (("robots", "Points2D"), ("headings", "Arrows2D")):
+        classes = column(tmp_path / "run.rrd", f"/world/{entity}", f"{archetype}:class_ids")
+        assert {tick: [named[one][0] for one in row] for tick, row in classes.items()} == {
+            0: ["flock", "flock", "b"],
+            1: ["flock: search", "flock", "b"],
+            2: ["flock: search", "dead", "b: carry"],
+            3: ["flock: search", "flock: search", "b: carry"],
+        }
+    grey = named[0][1]
+    assert grey == packed(DEAD, 255)
+    assert len({color for _, color in named.values()}) == len(named)
+    (legend,) = column(tmp_path / "run.rrd", "/legend", "Points2D:labels").values()
+    (colors,) = column(tmp_path / "run.rrd", "/legend", "Points2D:colors").values()
+    assert dict(zip(legend, colors, strict=True)) == dict(named.values())
+
+
+def test_a_legend_says_how_many_classes_it_has_no_line_for_and_has_letters_for_all(tmp_path):
+    of, states = static(3), ("", "\u2192 caf\u00e9", *(f"state {i}" for i in range(20)))
+    ticks = [truth(of, tick, state=np.full(3, tick + 1), states=states) for tick in range(10)]
+    record(tmp_path / "run.rrd", of, ticks)
+    (legend,) = column(tmp_path / "run.rrd", "/legend", "Points2D:labels").values()
+    assert legend == ["? caf\u00e9", "state 0", "state 1", "state 2", "state 3", "... and 5 more"]
+
+
+def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_path):
+    of = static(3, arenas=2)
+    own = Finished(
+        arena=np.array([1, 1, 1, 0, 1]),
+        sender=np.array([0, 1, 2, 0, 0]),
+        receiver=np.array([1, 2, 0, 1, -1]),
+        receivers=np.array([1, 1, 1, 1, 2]),
+        **dict.fromkeys(
+            ("to", "sequence", "sent_at_ns", "on_air_at_ns", "final_at_ns", "size_bytes", "tag"), np.zeros(5, int)
+        ),
+        fate=np.array([Fate.LOST, Fate.HEARD, Fate.BLOCKED, Fate.LOST, Fate.QUEUE_FULL]),
+    )
+    first, second = moving(of, 2)
+    record(tmp_path / "run.rrd", of, [replace(first, finished=own), second], arena=1)
+    lines = column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:strips")
+    position_m = first.pose[3:, :2].astype(np.float32)
+    assert lines == {0: [position_m[[0, 1]].tolist(), position_m[[2, 0]].tolist()]}
+    colors = column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:colors")[0]
+    assert [color >> 8 for color in colors] == [packed(FATES[fate], 0) >> 8 for fate in (Fate.LOST, Fate.BLOCKED)]
+
+
+def test_events_are_told_and_marked_where_they_take_effect(tmp_path):
+    of = static(2)
+    kill = Happened(0, 0.15, "kill", False, np.array([False, True]))
+    record(tmp_path / "run.rrd", of, [truth(of), truth(of, 1), truth(of, 2, events=(kill,))])
+    told = column(tmp_path / "run.rrd", "/events", "TextLog:text")
+    assert told == {0: ["the run begins: 2 robots"], 2: ["kill: flock-1"]}
+    assert list(column(tmp_path / "run.rrd", "/plots/shares/event", "Scalars:scalars")) == [2]
+
+
+def test_an_entity_is_sent_at_once_for_all_ticks_of_two_seconds_of_the_clock(tmp_path, monkeypatch):
+    calls = []
+    for name in ("log", "send_columns"):
+        original = getattr(rerun.RecordingStream, name)
+        monkeypatch.setattr(
+            rerun.RecordingStream,
+            name,
+            lambda *args, original=original, **more: (calls.append(args[1]), original(*args, **more)),
+        )
+    of, metrics, clock = static(150), Metrics(), StillClock()
+    recording = RerunRecording(tmp_path / "run.rrd", metrics, clock)
+    for observer in (metrics, recording):
+        observer.begin(of)
+    sent = []
+    for seen in moving(of, 9, edges=edges((0, 1), (1, 2)), tally=tally({Fate.HEARD: 150})):
+        calls.clear()
+        clock.time_ns += 7 * NS_PER_S // 10
+        for observer in (metrics, recording):
+            observer.see(seen)
+        sent.append([call for call in calls if call.startswith("world/")])
+    assert [bool(names) for names in sent] == [False, False, True] * 3
+    assert set(sent[5]) == set(sent[8]) >= {"world/robots", "world/headings", "world/links", "world/selected"}
+    assert len(set(sent[5])) == len(sent[5]) < 10
+    recording.end(None)
+
+
+def test_what_is_much_is_sent_before(tmp_path, monkeypatch):
+    monkeypatch.setattr("swarmwire.metrics.viewer.recording.RerunRecording._send_bytes", 10_000)
+    record(tmp_path / "run.rrd", static(100), moving(static(100), 20))
+    chunks = rerun.chunk.RrdReader(str(tmp_path / "run.rrd")).stream().filter(content="/world/headings")
+    rows = [
+        len(batch)
+        for batch in (chunk.to_record_batch() for chunk in chunks)
+        if "Arrows2D:vectors" in batch.schema.names
+    ]
+    assert sum(rows) == 20
+    assert len(rows) > 3
+
+
+def test_a_recording_is_closed_also_where_an_entity_fails_at_its_end(tmp_path, monkeypatch):
+    of, metrics = static(3), Metrics()
+    recording = RerunRecording(tmp_path / "run.rrd", metrics, StillClock())
+    for observer in (metrics, recording):
+        observer.begin(of)
+    for seen in moving(of, 4):
+        for observer in (metrics, recording):
+            observer.see(seen)
+    monkeypatch.setattr(rerun.TextLog, "columns", refuse)
+    recording._rows.add("events", rerun.TextLog.columns, text=["cannot be sent"])
+    with pytest.raises(ValueError, match="refused"):
+        recording.end(None)
+    assert check_recording(tmp_path / "run.rrd")[0] is State.WHOLE
+    assert list(column(tmp_path / "run.rrd", "/world/robots", "Points2D:positions")) == [0, 1, 2, 3]
+
+
+def test_a_recording_that_failed_while_it_began_is_closed(tmp_path, monkeypatch):
+    recording = RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
+    monkeypatch.setattr("swarmwire.metrics.viewer.recording.about", refuse)
+    with pytest.raises(ValueError, match="refused"):
+        recording.begin(static(3))
+    recording.end(None)
+    state, told = check_recording(tmp_path / "run.rrd")
+    assert state is State.PARTIAL
+    assert told.endswith(" MB, no tick in it")  # and not that it was never closed
+
+
+def refuse(*_, **__):
+    raise ValueError("refused")
+
+
+def view_names(path):
+    [blueprint] = rerun.chunk.RrdReader(str(path)).blueprints()
+    batches = [chunk.to_record_batch() for chunk in rerun.chunk.RrdReader(str(path)).stream(store=blueprint)]
+    names = "ViewBlueprint:display_name"
+    return {name for batch in batches if names in batch.schema.names for [name] in batch[names].to_pylist()}
+
+
+@pytest.mark.parametrize(("radio", "size_m"), [(True, (8.0, 6.0)), (True, (2.0, 9.0)), (False, (8.0, 6.0))])
+def test_it_opens_with_named_views_of_all_that_was_recorded(tmp_path, radio, size_m):
+    of = replace(static(2, radio=radio), arena_size_m=size_m)
+    record(tmp_path / "run.rrd", of, moving(of, 1))
+    views = {"Robots", "Robot flock-0", "About", "Arena", "Events", "Distances in m", "Counts"}
+    views.add("Order and connectivity, as shares")
+    with_radio = {"Receivers per second, by a packet's fate", "Times in s", "Rates in bit/s"}
+    assert view_names(tmp_path / "run.rrd") == (views | with_radio if radio else views)
+
+
+def test_a_recording_has_no_wall_clock_time_and_equal_runs_have_equal_contents(tmp_path):
+    of = static(3, obstacles=OBSTACLES)
+    contents = []
+    for path in (tmp_path / "a.rrd", tmp_path / "b.rrd"):
+        record(path, of, moving(of, 5, edges=edges((0, 1)), tally=tally({Fate.HEARD: 2})))
+        chunks = list(rerun.chunk.RrdReader(str(path)).stream())
+        assert {name for chunk in chunks for name in chunk.timeline_names} == {"tick", "sim_time"}
+        columns = {(chunk.entity_path, name) for chunk in chunks for name in chunk.to_record_batch().schema.names}
+        logged = {key for key in columns if key[1] not in {"rerun.controls.RowId", "tick", "sim_time"}}
+        contents.append({key: repr(column(path, *key)) for key in logged})  # NaN is no NaN's equal
+    assert contents[0] == contents[1]
+    assert len(contents[0]) > 20
+
+
+def test_a_run_without_a_radio_has_no_links_and_no_plot_of_packets(tmp_path):
+    of = static(3, radio=False)
+    record(tmp_path / "run.rrd", of, moving(of, 3))
+    assert column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips") == {}
+    assert column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:strips") == {}
+    assert series(tmp_path / "run.rrd", "packets") == {}
+    assert series(tmp_path / "run.rrd", "shares").keys() == {"order", "order_velocity"}
+
+
+def test_obstacles_and_lights_are_drawn_once_where_they_are(tmp_path):
+    triangle = Obstacle("polygon", 1.0, -1.0, np.pi / 2, points_m=((0.0, 0.0), (1.0, 0.0), (0.0, 0.5)))
+    of = static(2, obstacles=(*OBSTACLES, triangle), lights=((Light(0.5, -0.25, 2.0), Light(1.0, 1.5, 1.0)),))
+    record(tmp_path / "run.rrd", of, moving(of, 2))
+    (outlines,) = column(tmp_path / "run.rrd", "/world/obstacles", "LineStrips2D:strips").values()
+    assert [len(outline) for outline in outlines] == [49, 5, 4]
+    assert np.allclose(outlines[2], [[1.0, -1.0], [1.0, 0.0], [0.5, -1.0], [1.0, -1.0]], atol=1e-6)
+    assert column(tmp_path / "run.rrd", "/world/lights", "Points2D:positions") == {None: [[0.5, -0.25], [1.0, 1.5]]}
+    dark = static(2)
+    record(tmp_path / "dark.rrd", dark, moving(dark, 2))
+    assert column(tmp_path / "dark.rrd", "/world/lights", "Points2D:positions") == {}
+
+
+def test_movable_obstacles_are_drawn_where_they_are_in_each_tick(tmp_path):
+    pushed = Obstacle("box", 0.0, 0.0, size_m=(2.0, 1.0), mass_kg=1.0)
+    of = static(2, obstacles=(*OBSTACLES, pushed))
+    ticks = (truth(of, tick, movable=np.array([[[tick, 1.0, tick * np.pi / 2]]])) for tick in range(2))
+    record(tmp_path / "run.rrd", of, ticks)
+    (fixed,) = column(tmp_path / "run.rrd", "/world/obstacles", "LineStrips2D:strips").values()
+    assert len(fixed) == len(OBSTACLES)
+    found = column(tmp_path / "run.rrd", "/world/movable", "LineStrips2D:strips")
+    assert np.allclose(found[0], [[[-1.0, 0.5], [1.0, 0.5], [1.0, 1.5], [-1.0, 1.5], [-1.0, 0.5]]])
+    assert np.allclose(found[1], [[[1.5, 0.0], [1.5, 2.0], [0.5, 2.0], [0.5, 0.0], [1.5, 0.0]]])
+
+
+def test_the_floor_is_one_picture_below_all_else(tmp_path):
+    of = replace(static(2), floor=Floor(1.0, (Patch("disc", 4.0, 3.0, 0.0, radius_m=1.0),)))
+    record(tmp_path / "run.rrd", of, moving(of, 2))
+    (buffer,) = column(tmp_path / "run.rrd", "/world/floor", "Image:buffer").values()
+    grey = np.array(buffer).reshape(384, 512)
+    assert (grey[0, 0], grey[-1, -1], grey.min(), grey.max()) == (90, 30, 30, 90)  # the first row is the lowest
+    assert np.mean(grey == 30) == pytest.approx(np.pi / 4 / 48, rel=0.02)
+    bare = static(2)
+    record(tmp_path / "bare.rrd", bare, moving(bare, 2))
+    assert column(tmp_path / "bare.rrd", "/world/floor", "Image:buffer") == {}
+
+
+def test_an_arena_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(BadInput, match=r"run\.rrd: arena: expected 0 to 1"):
+        record(tmp_path / "run.rrd", static(2, arenas=2), [], arena=2)
+
+
+def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("swarmwire.metrics.viewer.extra.find_spec", lambda _: None)
+    with pytest.raises(BadInput, match=r"run\.rrd: needs rerun-sdk: install swarmwire-metrics\[view\]"):
+        RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
+
+
+def test_where_there_is_no_room_it_fails_at_once_and_leaves_no_file(tmp_path):
+    resource = pytest.importorskip("resource", reason="needs limits as Unix has them")
+    recording = RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (25_000, before[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            recording.begin(static())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    recording.end(None)
+    assert list(tmp_path.iterdir()) == []

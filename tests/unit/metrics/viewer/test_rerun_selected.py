@@ -1,0 +1,128 @@
+"""The robot that a recording shows in detail."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.senses import GroupSenses
+from swarmwire.comms.truth import Group
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.metrics.viewer.selected import selected_robot
+from tests.support.clocks import StillClock
+from tests.support.metrics.truths import static, truth
+from tests.unit.metrics.viewer.test_rerun_recording import column
+
+pytest.importorskip("rerun", reason="needs the extra [view]")
+
+EPUCK = load_body("epuck")
+assert EPUCK.proximity is not None
+RESPONSE = EPUCK.proximity.response
+LOOKS = np.deg2rad([17, 50, 90, 150, 210, 270, 310, 343])
+
+
+def record(path, of, ticks, **options):
+    metrics = Metrics()
+    recording = RerunRecording(path, metrics, StillClock(), **options)
+    for observer in (metrics, recording):
+        observer.begin(of)
+    for seen in ticks:
+        for observer in (metrics, recording):
+            observer.see(seen)
+    recording.end(None)
+
+
+def rays(path):
+    strips = column(path, "/world/selected/rays", "LineStrips2D:strips")
+    colors = column(path, "/world/selected/rays", "LineStrips2D:colors")
+    return {tick: (np.array(lines), colors[tick]) for tick, lines in strips.items()}
+
+
+def sensed(rows, **fields):
+    return {"flock": GroupSenses(np.array(rows), {name.replace("_", ".", 1): value for name, value in fields.items()})}
+
+
+def test_rays_leave_the_rim_where_the_sensors_look_and_end_where_they_read(tmp_path):
+    of, distance_m = static(2, arenas=2), np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.05, 0.05])
+    value = np.zeros((2, 8))
+    value[1] = RESPONSE.value(distance_m)
+    pose = np.array([[0, 0, 0], [0, 0, 0], [9, 9, 0], [1.0, 2.0, 0.5]])
+    seen = truth(of, pose=pose, senses=sensed([2, 3], proximity_value=value))
+    record(tmp_path / "run.rrd", of, [seen], arena=1, selected="flock-1")
+    lines, _ = rays(tmp_path / "run.rrd")[0]
+    outwards = np.stack([np.cos(LOOKS + 0.5), np.sin(LOOKS + 0.5)], axis=1)
+    read_m = np.where(value[1] > 0, distance_m, RESPONSE.reach_m)
+    read_m[0] = RESPONSE.distance_m(value[1, :1])[0]  # its answer is cut off at 1
+    np.testing.assert_allclose(lines[:, 0], EPUCK.radius_m * outwards, atol=1e-6)
+    np.testing.assert_allclose(lines[:, 1], (EPUCK.radius_m + read_m)[:, None] * outwards, atol=1e-4)
+    moved = column(tmp_path / "run.rrd", "/world/selected", "Transform3D:translation")
+    assert moved == {0: [[1.0, 2.0, 0.0]]}
+
+
+def test_a_ray_has_the_colour_of_what_it_meets_and_noise_is_nothing(tmp_path):
+    of = static(2)
+    pose = np.array([[0, 0, 0], [0.0, 0.09, 0]])  # the other stands on the ray to the left
+    value = np.array([[0.5, 0.04, 0.5, 0, 0, 0, 0, 0], [0] * 8], float)
+    record(tmp_path / "run.rrd", of, [truth(of, pose=pose, senses=sensed([0, 1], proximity_value=value))])
+    _, colors = rays(tmp_path / "run.rrd")[0]
+    wall, noise, robot, *nothing = colors
+    assert len({wall, noise, robot}) == 3
+    assert set(nothing) == {noise}
+
+
+def test_between_its_turns_it_keeps_what_it_sensed_and_the_dead_sense_nothing(tmp_path):
+    of, value = static(1), np.full((1, 8), 0.5)
+    turned = np.array([[0.0, 0.0, 1.0]])
+    ticks = [
+        truth(of, 0, senses=sensed([0], proximity_value=value)),
+        truth(of, 1, pose=turned),
+        truth(of, 2, alive=np.array([False])),
+        truth(of, 3, alive=np.array([False])),
+    ]
+    record(tmp_path / "run.rrd", of, ticks)
+    drawn = rays(tmp_path / "run.rrd")
+    assert {tick: len(lines) for tick, (lines, _) in drawn.items()} == {0: 8, 1: 8, 2: 0}
+    turn = np.array([[np.cos(1.0), np.sin(1.0)], [-np.sin(1.0), np.cos(1.0)]])
+    np.testing.assert_allclose(drawn[1][0], drawn[0][0] @ turn, atol=1e-6)
+
+
+@pytest.mark.parametrize(("robots", "expected"), [(200, list(range(12))), (201, [0, 4, 5, 10])])
+def test_in_large_swarms_rays_that_see_nothing_are_thinned_as_links_are(tmp_path, robots, expected):
+    of = static(robots)
+    ticks = [
+        truth(of, tick, senses=sensed([0], proximity_value=np.full((1, 8), 0.5 if tick == 4 else 0.0)))
+        for tick in range(12)
+    ]
+    record(tmp_path / "run.rrd", of, ticks)
+    assert list(rays(tmp_path / "run.rrd")) == expected
+
+
+def test_photocells_are_bars_as_long_as_what_they_see(tmp_path):
+    of, value = static(1), np.linspace(0.0, 1.0, 8)[None]
+    record(tmp_path / "run.rrd", of, [truth(of, senses=sensed([0], light_value=value))])
+    lines, _ = rays(tmp_path / "run.rrd")[0]
+    length_m = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
+    np.testing.assert_allclose(length_m, 2.0 * EPUCK.radius_m * value[0], atol=1e-6)
+
+
+def test_an_agent_that_senses_nothing_has_no_rays(tmp_path):
+    of = static(2)
+    record(tmp_path / "run.rrd", of, [truth(of, tick) for tick in range(3)])
+    assert rays(tmp_path / "run.rrd") == {}
+
+
+def test_the_first_robot_with_rays_is_selected_unless_another_is_named():
+    blind = replace(EPUCK, senses={})
+    of = static(4)
+    mixed = replace(of, groups=(Group("a", blind, 0, 2), Group("b", EPUCK, 2, 4)))
+    assert selected_robot(mixed, None, "here") == "flock-2"
+    assert selected_robot(replace(of, groups=(Group("a", blind, 0, 4),)), None, "here") == "flock-0"
+    assert selected_robot(mixed, "flock-1", "here") == "flock-1"
+
+
+def test_a_robot_that_is_not_there_cannot_be_selected(tmp_path):
+    with pytest.raises(BadInput, match=r"run\.rrd: selected: expected a robot such as flock-0; got 'nobody'"):
+        record(tmp_path / "run.rrd", static(2), [], selected="nobody")

@@ -1,0 +1,137 @@
+"""The hand-shake with runners, in lockstep and in real time: what does not fit is counted and changes nothing."""
+
+import msgpack
+import numpy as np
+import pytest
+
+from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.join_request import MOST_BYTES
+from swarmwire.world.crews.admission import Refused
+from swarmwire.world.crews.lockstep import Lockstep
+from swarmwire.world.crews.realtime import RealTime
+from tests.support.agent.hosts import GIVES, assignment, group
+from tests.support.world.locksteps import FLOCK, joined, ready, request, state, two, two_in_real_time
+
+Made = Lockstep | RealTime
+
+
+@pytest.fixture(params=[two, two_in_real_time], ids=["lockstep", "real time"])
+def roster(request: pytest.FixtureRequest) -> Made:
+    return request.param()
+
+
+def test_runners_get_robots_in_the_order_in_which_they_join(roster: Made) -> None:
+    got = Assignment.from_mapping(msgpack.unpackb(roster.join("second-named-first", request())))
+    assert got.robots_text == "flock-0 … lone-3 (4 robots)"
+    assert got.groups[0].keys.tolist() == group("", FLOCK).keys[:2].tolist()
+    assert Assignment.from_mapping(msgpack.unpackb(roster.join("a", request()))).groups[0].rows.tolist() == [4, 5]
+    assert not roster.counts()
+
+
+def test_an_assignment_comes_over_whole() -> None:
+    sent = assignment(
+        group("a.b:C", [1, 4], params={"x": 1.5, "n": 2, "on": True, "w": "ä"}), group("d:E", [2], "s", "footbot")
+    )
+    got = Assignment.from_mapping(msgpack.unpackb(msgpack.packb(sent.as_mapping())))
+    assert got.as_mapping() == sent.as_mapping()
+    assert got.gives == GIVES
+    assert got.groups[1].body == sent.groups[1].body
+    assert got.groups[0].keys.dtype == np.uint64
+    assert Assignment.from_mapping(Assignment((), 10, None).as_mapping()).gives is None
+
+
+@pytest.mark.parametrize(
+    ("bad", "why"),
+    [
+        *((data, "malformed") for data in (b"", b"\xc1", b"\x91" * 5000, msgpack.packb(None), msgpack.packb({1: 2}))),
+        (bytes(MOST_BYTES + 1), "oversized"),
+        *((request(version), "expected version 2") for version in (frames.VERSION + 1, frames.VERSION - 1, "2", None)),
+        *((request(robots=robots), "robots: expected a number") for robots in (0, -1, 1.5, "3", True)),
+        *((request(names=names), "names: expected a list") for names in ("flock-0", [1], {})),
+        (request(robots=1, names=["flock-0"]), "not both"),
+        *((request(agents=agents), "agents: expected") for agents in ([], {"flock": "beef"}, {"flock": 3})),
+        (request(scenario_sha256="0" * 63), "scenario_sha256: expected"),
+    ],
+    ids=repr,
+)
+def test_a_bad_request_is_refused_counted_and_changes_nothing(roster: Made, bad: bytes, why: str) -> None:
+    joined(roster, "a")
+    before = state(roster)
+    with pytest.raises(Refused, match=why):
+        roster.join("b", bad)
+    assert state(roster) == before
+    assert roster.counts() == {"bad_join": 1}
+
+
+@pytest.mark.parametrize(
+    "name", ["", "a/b", "*", "**", "a*", "$*", "a?b", "a#b", "ä", "a b", "a\n", "x" * 65], ids=repr
+)
+def test_a_bad_name_is_refused_counted_and_changes_nothing(roster: Made, name: str) -> None:
+    joined(roster, "a")
+    before = state(roster)
+    with pytest.raises(Refused, match="expected a name"):
+        roster.join(name, request())
+    assert state(roster) == before
+    assert roster.counts() == {"bad_join": 1}
+
+
+def test_a_name_in_use_is_refused(roster: Made) -> None:
+    joined(roster, "a")
+    before = state(roster)
+    with pytest.raises(Refused, match="in use"):
+        roster.join("a", request())
+    assert state(roster) == before
+    assert roster.counts() == {"refused_join": 1}
+
+
+def test_who_comes_too_late_gets_no_robots(roster: Made) -> None:
+    joined(roster, "a", "b")
+    before = state(roster)
+    with pytest.raises(Refused, match="all robots are taken"):
+        roster.join("c", request())
+    assert state(roster) == before
+    assert roster.counts() == {"refused_join": 1}
+
+
+def test_the_first_tick_may_begin_once_all_are_ready(roster: Made) -> None:
+    assert roster.waiting
+    assert roster.missing == ("that did not join", "flock-0 … lone-3 (4 robots)")
+    joined(roster, "a", "b")
+    assert roster.missing[0] == "a"
+    ready(roster, "a")
+    assert roster.waiting
+    assert roster.missing == ("b", "flock-4 … lone-7 (4 robots)")
+    ready(roster, "b")
+    assert not roster.waiting
+    assert not roster.counts()
+
+
+@pytest.mark.parametrize("kind", ["actions", "ready"])
+def test_before_the_first_tick_only_a_first_ready_counts(roster: Made, kind: str) -> None:
+    joined(roster, "a", "b")
+    if kind == "ready":
+        ready(roster, "a")
+    before = state(roster)
+    roster.answer("a", frames.encode(kind, -1, {}))
+    assert state(roster) == before
+    assert roster.counts() == {{"ready": "unexpected_kind_frames", "actions": "wrong_tick_frames"}[kind]: 1}
+
+
+@pytest.mark.parametrize("asked", [b"\xc1", msgpack.packb(3), request(frames.VERSION + 1)])
+def test_an_offer_is_not_told_to_who_asks_in_another_version(roster: Made, asked: bytes) -> None:
+    with pytest.raises(Refused):
+        roster.offer(asked)
+    assert roster.counts() == {"bad_join": 1}
+
+
+def test_where_there_is_nothing_to_offer_nothing_is_told(roster: Made) -> None:
+    assert roster.offer() is None
+
+
+def test_a_runner_is_building_from_when_it_joined_until_it_is_ready(roster: Made) -> None:
+    assert not roster.is_building("a")
+    joined(roster, "a")
+    assert roster.is_building("a")
+    ready(roster, "b")
+    assert not roster.is_building("b")

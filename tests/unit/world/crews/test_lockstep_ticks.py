@@ -1,0 +1,208 @@
+"""Ticks with runners: what each gets and answers, and that whatever does not fit is counted and changes nothing."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.outcomes import Outcomes
+from swarmwire.comms.packets import Heard, Payloads, Sent
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
+from swarmwire.world.crews.lockstep import Lockstep
+from tests.support.agent.hosts import GIVES, heard_from, plain, senses
+from tests.support.world.locksteps import (
+    FLOCK,
+    GROUPS,
+    SCOUTS,
+    actions,
+    all_senses,
+    joined,
+    parts,
+    playing,
+    ready,
+    rows_of,
+    sound,
+    state,
+)
+
+
+def test_a_tick_is_complete_once_all_have_answered() -> None:
+    lockstep = playing()
+    for tick in range(3):
+        out = dict(lockstep.open_tick(tick, all_senses(tick), Heard.none(GIVES)))
+        assert list(out) == ["a", "b"]
+        assert {frames.decode(data).tick for data in out.values()} == {tick}
+        for name in ("a", "b"):
+            assert lockstep.waiting
+            assert lockstep.missing[0] == name
+            lockstep.answer(name, encode_actions(tick, actions(rows_of(out[name]))))
+        assert not lockstep.waiting
+        assert sorted(lockstep.take().rows.tolist()) == list(range(8))
+    assert not lockstep.counts()
+
+
+def test_answers_in_any_order_give_the_same() -> None:
+    taken: list[Any] = []
+    for order in (["a", "b"], ["b", "a"]):
+        lockstep = playing()
+        out = dict(lockstep.open_tick(0, all_senses(), Heard.none(GIVES)))
+        for name in order:
+            lockstep.answer(name, encode_actions(0, actions(rows_of(out[name]))))
+        got = lockstep.take()
+        taken.append((got.rows.tolist(), got.sent.sender.tolist(), got.linear_mps.tolist(), got.sent.payloads.row(5)))
+    assert taken[0] == taken[1]
+
+
+@pytest.mark.parametrize(
+    ("runner", "data", "name"),
+    [
+        ("stranger", sound(), "unknown_runner"),
+        ("stranger", b"", "unknown_runner"),
+        ("stranger", frames.encode("failed", 4, {}, {"robots": "x", "traceback": "y"}), "unknown_runner"),
+        ("a", b"", "malformed"),
+        ("a", b"\xc1", "malformed"),
+        ("a", sound()[:-1], "malformed"),
+        ("a", bytes(frames.MOST_BYTES + 1), "oversized"),
+        ("a", sound("b"), "malformed"),  # robots of another
+        ("a", frames.encode("actions", 4, {}), "malformed"),
+        ("a", encode_actions(3, actions([0, 1, 2, 3])), "wrong_tick"),
+        ("a", encode_actions(5, actions([0, 1, 2, 3])), "wrong_tick"),
+        ("a", frames.encode("ready", -1, {}), "unexpected_kind"),
+        ("a", frames.encode("tick", 4, {}), "unexpected_kind"),
+        ("a", frames.encode("end", -1, {}), "unexpected_kind"),
+        ("b", sound("b"), "wrong_tick"),  # it has answered already
+    ],
+)
+def test_what_does_not_fit_is_counted_by_name_and_changes_nothing(runner: str, data: bytes, name: str) -> None:
+    lockstep = playing()
+    lockstep.open_tick(4, all_senses(), Heard.none(GIVES))
+    lockstep.answer("b", sound("b"))
+    before = state(lockstep)
+    lockstep.answer(runner, data)
+    assert state(lockstep) == before
+    assert lockstep.counts() == {f"{name}_frames": 1}
+    lockstep.answer("a", sound())
+    assert not lockstep.waiting
+
+
+def test_random_answers_never_raise_and_never_count_as_an_answer() -> None:
+    lockstep, generator, data = playing(), np.random.default_rng(3), sound()
+    lockstep.open_tick(4, all_senses(), Heard.none(GIVES))
+    before = state(lockstep)
+    for _ in range(1000):
+        spoiled = bytearray(data)
+        spoiled[int(generator.integers(0, 40))] ^= 1 << int(generator.integers(8))  # in the head of the frame
+        lockstep.answer("stranger", bytes(spoiled))
+        lockstep.answer("a", generator.bytes(int(generator.integers(0, 50))))
+    assert state(lockstep) == before
+    assert sum(lockstep.counts().values()) == 2000
+
+
+def test_robots_that_do_not_act_are_neither_sent_nor_expected() -> None:
+    lockstep = playing()
+    some = {"flock": senses(0, [1, 4]), "lone": senses(0, [7])}
+    out = dict(lockstep.open_tick(0, some, Heard.none(GIVES)))
+    assert {name: rows_of(data) for name, data in out.items()} == {"a": [1], "b": [4, 7]}
+    lockstep.answer("b", encode_actions(0, actions([4, 7])))
+    lockstep.answer("a", encode_actions(0, actions([1])))
+    assert not lockstep.waiting
+    assert sorted(lockstep.take().rows.tolist()) == [1, 4, 7]
+
+
+def test_a_runner_none_of_whose_robots_acts_gets_its_groups_empty_so_that_they_forget() -> None:
+    lockstep = playing()
+    out = dict(lockstep.open_tick(0, {"flock": senses(0, [4]), "scouts": senses(0, [])}, Heard.none(GIVES)))
+    found, *_ = decode_tick(frames.decode(out["a"]), GIVES, GROUPS)
+    assert {name: part.rows.tolist() for name, part in found.items()} == {"flock": [], "scouts": []}
+    lockstep.answer("a", encode_actions(0, actions([])))
+    lockstep.answer("b", encode_actions(0, actions([4])))
+    assert lockstep.take().rows.tolist() == [4]
+
+
+def test_each_runner_gets_the_outcomes_of_its_own_robots_in_their_order():
+    lockstep = Lockstep(parts(dict(enumerate([1, 0, 1, 0, 2, 2, 2, 2]))))
+    ready(joined(lockstep, "a", "b", "c"), "a", "b", "c")
+    told = Outcomes(np.array([0, 1, 1, 2, 3]), np.array([9, 2, 3, 0, 1]), np.array([0, 1, 2, 3, 4]))
+    got: dict[str, list[list[int]]] = {}
+    for name, frame in lockstep.open_tick(0, all_senses(), Heard.none(GIVES), told):
+        _, _, its = decode_tick(frames.decode(frame), GIVES, GROUPS)
+        got[name] = [its.row.tolist(), its.id.tolist(), its.result.tolist()]
+    assert got == {"a": [[1, 1, 3], [2, 3, 1], [1, 2, 4]], "b": [[0, 2], [9, 0], [0, 3]], "c": [[], [], []]}
+
+
+def test_a_runner_none_of_whose_groups_acts_gets_no_frame_and_is_not_waited_for() -> None:
+    lockstep = ready(joined(Lockstep(parts({0: 0, 1: 0, 4: 0, 5: 0, 2: 1, 6: 1, 3: 1, 7: 1})), "a", "b"), "a", "b")
+    frames_out = lockstep.open_tick(0, {"flock": senses(0, FLOCK)}, Heard.none(GIVES))
+    assert [runner for runner, _ in frames_out] == ["a"]
+    assert lockstep.waiting == 1
+    lockstep.answer("b", encode_actions(0, actions([])))
+    assert lockstep.counts() == {"wrong_tick_frames": 1}
+    lockstep.answer("a", encode_actions(0, actions(FLOCK)))
+    assert lockstep.waiting == 0
+    assert sorted(lockstep.take().rows.tolist()) == FLOCK
+    assert lockstep.open_tick(1, {}, Heard.none(GIVES)) == []
+    assert lockstep.waiting == 0
+    assert len(lockstep.take().rows) == 0
+
+
+owners_ = st.lists(st.integers(0, 3), min_size=8, max_size=8)
+
+
+@given(owners_, st.lists(st.integers(0, 7), unique=True), st.data())
+def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int], acting: list[int], data: Any) -> None:
+    slots = parts(dict(enumerate(owners)))
+    owned = [sorted(row for own in slot.groups for row in own.rows.tolist()) for slot in slots]
+    lockstep = Lockstep(slots)
+    names = [f"r{i}" for i in range(len(slots))]
+    ready(joined(lockstep, *names), *names)
+    acting_groups = {"flock": FLOCK, "scouts": SCOUTS, "lone": [3, 7]}
+    whole = {name: senses(2, sorted(set(rows) & set(acting))) for name, rows in acting_groups.items()}
+    senders = data.draw(st.lists(st.integers(0, 7), max_size=6))
+    sent = Sent(
+        np.array(senders, np.int64), np.full(len(senders), -1), Payloads.of([bytes([s] * (s + 1)) for s in senders])
+    )
+    heard = heard_from(sent, data.draw(st.lists(st.integers(0, 7), unique=True).map(sorted)))
+
+    out = lockstep.open_tick(2, whole, heard)
+    assert [name for name, _ in out] == names
+    seen: dict[int, Any] = {}
+    packets: list[Any] = []
+    answers: list[tuple[str, bytes]] = []
+    for (name, frame), own in zip(out, owned, strict=True):
+        got_senses, got, _ = decode_tick(frames.decode(frame), GIVES, GROUPS)
+        rows: list[int] = []
+        for part_name, part in got_senses.items():
+            rows += part.rows.tolist()
+            assert part.rows.tolist() == sorted(part.rows.tolist())
+            seen |= {
+                row: (part_name, [part.fields[f][at].tolist() for f in part.fields])
+                for at, row in enumerate(part.rows.tolist())
+            }
+        assert set(rows) <= set(own)
+        assert set(got.receiver.tolist()) <= set(own)
+        used = got.payload.tolist()
+        assert sorted(set(used)) == list(range(len(got.payloads)))  # each payload that is needed once, no other
+        packets += listed(got)
+        answers.append((name, encode_actions(2, actions(rows))))
+    assert packets == sorted(packets, key=lambda p: owners[p[0]])
+    assert sorted(packets) == sorted(listed(heard))
+    expected = {
+        row: (name, [part.fields[f][at].tolist() for f in part.fields])
+        for name, part in whole.items()
+        for at, row in enumerate(part.rows.tolist())
+    }
+    assert seen == expected
+    for name, answer in data.draw(st.permutations(answers)):
+        lockstep.answer(name, answer)
+    assert not lockstep.waiting
+    assert not lockstep.counts()
+    assert plain(lockstep.take()) == plain(actions(sorted(expected)))
+
+
+def listed(heard: Heard) -> list[Any]:
+    columns = [heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, *heard.given.values()]
+    payloads = [heard.payloads.row(int(p)) for p in heard.payload]
+    return list(zip(*(column.tolist() for column in columns), payloads, strict=True))

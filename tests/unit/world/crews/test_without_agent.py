@@ -1,0 +1,234 @@
+"""Robots without an agent: they stand or coast while the run goes on, and what their agents remembered is kept."""
+
+from typing import Any
+
+import msgpack
+import numpy as np
+import pytest
+
+from swarmwire.comms.memory import GroupMemory, Memory
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.senses import Actions
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.memory_frames import decode_memory
+from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
+from swarmwire.world.crews.lockstep import Lockstep
+from swarmwire.world.crews.realtime import RealTime
+from swarmwire.world.crews.roster import OnLoss
+from swarmwire.world.crews.terms import Terms
+from tests.support.agent.hosts import GIVES, heard_from
+from tests.support.world.locksteps import (
+    FLOCK,
+    GROUPS,
+    SCOUTS,
+    actions,
+    all_senses,
+    joined,
+    parts,
+    ready,
+    request,
+    rows_of,
+)
+
+LAYOUT = {"x": ("<i8", ())}
+KEPT = dict.fromkeys(("flock", "scouts", "lone"), LAYOUT)
+OPEN = Terms(open=True, start_with=0, memory=KEPT)
+TICK_NS = 10**8
+LEAVE = frames.encode("leave", -1, {})
+
+
+def lockstep(on_loss: OnLoss) -> Lockstep:
+    return Lockstep(parts(dict.fromkeys(range(8), 0)), on_loss, OPEN)
+
+
+def real_time(on_loss: OnLoss) -> RealTime:
+    return RealTime(parts(dict.fromkeys(range(8), 0)), 0.5, 30.0, on_loss, OPEN)
+
+
+def comes(roster: Lockstep | RealTime, runner: str, *names: str) -> Memory:
+    """A runner joins with these robots; what was remembered of them."""
+    given = msgpack.unpackb(roster.join(runner, request(names=list(names))))
+    ready(roster, runner)
+    return decode_memory(frames.decode(given["memory"]), KEPT)
+
+
+def opened(lockstep: Lockstep, tick: int, heard: Heard | None = None) -> dict[str, list[int]]:
+    out = lockstep.open_tick(tick, all_senses(tick), Heard.none(GIVES) if heard is None else heard)
+    return {name: rows_of(data) for name, data in out}
+
+
+def standing(got: Actions) -> list[int]:
+    still = got.drive & (got.linear_mps == 0.0) & (got.angular_radps == 0.0)
+    return sorted(got.rows[still & (got.rows > 0)].tolist())  # robot 0 of `actions` is told to stand anyway
+
+
+def remembering(tick: int, **memory: dict[int, int]) -> bytes:
+    """An answer of the robots that are in the memory, by group: rows and numbers."""
+    rows = [row for group in memory.values() for row in group]
+    kept = {
+        name: GroupMemory(np.array(list(group), np.int64), {"x": np.array(list(group.values()), np.int64)})
+        for name, group in memory.items()
+    }
+    return encode_actions(tick, actions(rows), memory=kept)
+
+
+@pytest.mark.parametrize("on_loss", ["stand", "coast"])
+def test_a_run_goes_on_without_anybody_and_late_joiners_act_from_the_next_tick_on(on_loss: Any) -> None:
+    roster = lockstep(on_loss)
+    every = list(range(1, 8)) if on_loss == "stand" else []
+    assert not roster.waiting
+    for tick in range(2):
+        assert opened(roster, tick) == {}
+        assert not roster.waiting
+        assert standing(roster.take()) == every
+    opened(roster, 2)
+    comes(roster, "a", "flock-4", "lone-3")
+    assert not roster.waiting
+    assert standing(roster.take()) == every
+    assert opened(roster, 3) == {"a": [4, 3]}
+    assert roster.waiting == 1
+    roster.answer("a", encode_actions(3, actions([4, 3])))
+    got = roster.take()
+    assert standing(got) == [row for row in every if row not in (3, 4)]
+    assert sorted(got.rows.tolist()) == (list(range(8)) if every else [3, 4])
+    assert roster.counts() == {"runners_joined_late": 1}
+
+
+@pytest.mark.parametrize("on_loss", ["stand", "coast"])
+@pytest.mark.parametrize("answered", [False, True])
+def test_who_is_lost_within_a_tick_does_not_act_in_it(on_loss: Any, answered: bool) -> None:
+    roster = lockstep(on_loss)
+    comes(roster, "a", "flock-0", "flock-1")
+    comes(roster, "b", "flock-4", "flock-5")
+    opened(roster, 0)
+    roster.answer("a", remembering(0, flock={0: 7, 1: 8}))
+    if answered:
+        roster.answer("b", remembering(0, flock={4: 7, 5: 8}))
+    roster.gone("b", "its link is gone")
+    assert not roster.waiting
+    got = roster.take()
+    others = [2, 3, 4, 5, 6, 7]
+    assert standing(got) == (others if on_loss == "stand" else [])
+    assert sorted(got.rows.tolist()) == ([0, 1, *others] if on_loss == "stand" else [0, 1])
+    assert opened(roster, 1) == {"a": [0, 1]}
+
+
+def test_what_robots_without_an_agent_hear_is_counted() -> None:
+    roster = lockstep("stand")
+    comes(roster, "a", "flock-0", "flock-1", "scouts-2")
+    heard = heard_from(actions([0]).sent, [1, 4, 5])
+    opened(roster, 0, heard)
+    assert roster.counts() == {"packets_without_agent": 2}
+
+
+def test_what_robots_hear_while_their_next_runner_is_waited_for_is_not_lost() -> None:
+    roster = ready(joined(Lockstep(parts(dict.fromkeys(range(8), 0)), "wait"), "a"), "a")
+    opened(roster, 0)
+    roster.answer("a", encode_actions(0, actions([*FLOCK, *SCOUTS, 3, 7])))
+    roster.gone("a", "its link is gone")
+    assert opened(roster, 1, heard_from(actions([0]).sent, [1, 4, 5])) == {}
+    joined(roster, "b")
+    [(_, frame)] = roster.answer("b", frames.encode("ready", -1, {}))
+    _, heard, _ = decode_tick(frames.decode(frame), GIVES, GROUPS)
+    assert heard.receiver.tolist() == [1, 4, 5]
+    assert "packets_without_agent" not in roster.counts()
+
+
+def test_memory_follows_its_robots_through_leaving_losing_and_cutting() -> None:
+    roster = lockstep("stand")
+    assert comes(roster, "a", "flock-0", "flock-1", "scouts-2") == {}
+    assert comes(roster, "b", "flock-4", "lone-3") == {}
+    opened(roster, 0)
+    roster.answer("a", remembering(0, flock={0: 10, 1: 11}, scouts={2: 12}))
+    roster.answer("b", remembering(0, flock={4: 14}, lone={3: 13}))
+    roster.take()
+    opened(roster, 1)
+    roster.answer("a", LEAVE)
+    roster.answer("b", remembering(1, flock={4: 24}, lone={3: 23}))
+    roster.take()
+    opened(roster, 2)
+    roster.gone("b", "its link is gone")
+    again = comes(roster, "c", "flock-1", "flock-4", "flock-5", "lone-3")
+    told = {name: dict(zip(of.rows.tolist(), of.columns["x"].tolist(), strict=True)) for name, of in again.items()}
+    assert told == {"flock": {1: 11, 4: 24}, "lone": {3: 23}}  # of flock-5 nobody remembers anything
+    rest = comes(roster, "a", "flock-0", "scouts-2")
+    assert rest["flock"].columns["x"].tolist() == [10]
+    assert rest["scouts"].columns["x"].tolist() == [12]
+
+
+def test_where_the_run_waits_the_tick_is_asked_again_with_the_memory_from_before_it() -> None:
+    roster = Lockstep(parts(dict.fromkeys(range(8), 0)), "wait", OPEN)
+    comes(roster, "a", "flock-0", "flock-1")
+    comes(roster, "b", "flock-4", "flock-5", "scouts-2", "scouts-6", "lone-3", "lone-7")
+    rest: dict[str, dict[int, int]] = {}
+    for tick in range(2):
+        opened(roster, tick)
+        rest = {"flock": {4: tick, 5: tick}, "scouts": {2: tick, 6: tick}, "lone": {3: tick, 7: tick}}
+        roster.answer("a", remembering(tick, flock={0: tick, 1: 10 + tick}))
+        if tick == 0:
+            roster.answer("b", remembering(tick, **rest))
+            roster.take()
+    roster.gone("a", "its link is gone")
+    roster.answer("b", remembering(1, **rest))
+    assert roster.waiting == 1
+    given = msgpack.unpackb(roster.join("c", request(names=["flock-1"])))
+    assert decode_memory(frames.decode(given["memory"]), KEPT)["flock"].columns["x"].tolist() == [10]
+    [(name, frame)] = roster.answer("c", frames.encode("ready", -1, {}))
+    assert (name, rows_of(frame), frames.decode(frame).tick) == ("c", [1], 1)
+    roster.answer("c", remembering(1, flock={1: 11}))
+    assert roster.waiting == 1
+    comes(roster, "a", "flock-0")
+    roster.answer("a", remembering(1, flock={0: 1}))
+    assert not roster.waiting
+    assert sorted(roster.take().rows.tolist()) == list(range(8))
+
+
+@pytest.mark.parametrize(
+    "memory", [{"flock": {0: 1}}, {"flock": {0: 1, 4: 2}}, {"flock": {0: 1, 1: 2}, "scouts": {2: 1}}], ids=repr
+)
+def test_memory_of_robots_that_are_not_its_own_is_no_answer(memory: dict[str, dict[int, int]]) -> None:
+    roster = lockstep("stand")
+    comes(roster, "a", "flock-0", "flock-1")
+    opened(roster, 0)
+    kept = {
+        name: GroupMemory(np.array(list(of), np.int64), {"x": np.array(list(of.values()), np.int64)})
+        for name, of in memory.items()
+    }
+    roster.answer("a", encode_actions(0, actions([0, 1]), memory=kept))
+    assert roster.counts() == {"malformed_frames": 1}
+    assert roster.waiting == 1
+
+
+def test_nothing_is_remembered_where_nobody_may_take_over() -> None:
+    roster = joined(Lockstep(parts(dict.fromkeys(range(8), 0)), "dead"))
+    assert msgpack.unpackb(roster.join("a", request()))["memory"] is None
+
+
+def commands(roster: RealTime) -> dict[int, float]:
+    got = roster.take()
+    return dict(zip(got.rows[got.drive].tolist(), got.linear_mps[got.drive].tolist(), strict=True))
+
+
+@pytest.mark.parametrize("on_loss", ["stand", "coast"])
+def test_in_real_time_too_and_no_watchdog_counts_robots_that_nobody_asks(on_loss: Any) -> None:
+    roster = real_time(on_loss)
+    for tick in range(3):
+        roster.open_tick(tick, tick * TICK_NS, all_senses(tick), Heard.none(GIVES))
+        assert commands(roster) == {}
+    comes(roster, "a", "flock-1", "flock-5")
+    [(name, frame)] = roster.open_tick(3, 3 * TICK_NS, all_senses(3), Heard.none(GIVES))
+    assert (name, rows_of(frame)) == ("a", [1, 5])
+    rows = np.array([1, 5])
+    moving = Actions(rows, np.ones(2, np.bool_), np.full(2, 0.5), np.zeros(2), np.zeros(2))
+    kept = {"flock": GroupMemory(rows, {"x": np.array([7, 8])})}
+    roster.answer("a", encode_actions(3, moving, memory=kept))
+    assert commands(roster) == {1: 0.5, 5: 0.5}
+    roster.open_tick(4, 4 * TICK_NS, all_senses(4), Heard.none(GIVES))
+    roster.answer("a", LEAVE)
+    assert commands(roster) == ({1: 0.0, 5: 0.0} if on_loss == "stand" else {})
+    for tick in range(5, 20):
+        assert roster.open_tick(tick, tick * TICK_NS, all_senses(tick), Heard.none(GIVES)) == []
+        assert commands(roster) == {}
+    assert not roster.watchdog_stops.any()
+    assert comes(roster, "b", "flock-5")["flock"].columns["x"].tolist() == [8]
+    assert [name for name, _ in roster.open_tick(20, 20 * TICK_NS, all_senses(20), Heard.none(GIVES))] == ["b"]

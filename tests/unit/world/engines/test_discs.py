@@ -1,0 +1,139 @@
+"""What the array engine is made of: gaps, lists of near things, and that these change nothing."""
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.truth import Obstacle
+from swarmwire.world.engines.discs import discs
+from swarmwire.world.engines.discs.discs import DiscsEngine
+from swarmwire.world.engines.discs.fixed import CIRCLE, POLYGON, gap_to_polygon
+from swarmwire.world.engines.discs.near import fixed_near, pairs_near
+from swarmwire.world.engines.discs.obstacle_cells import obstacle_cells
+from swarmwire.world.engines.discs.robots import ROBOT
+from tests.support.world.engines.conformance import R, asked, made, packed
+
+
+def some_obstacles(n: int, side_m: float, seed: int) -> tuple[Obstacle, ...]:
+    """Cylinders, boxes and triangles anywhere, some beyond the border."""
+    rng = np.random.default_rng(seed)
+    made_of: list[Obstacle] = []
+    for k in range(n):
+        x, y = rng.uniform(-0.55 * side_m, 0.55 * side_m, 2)
+        size = rng.uniform(0.05, 0.5, 2)
+        triangle = ((-size[0], 0.0), (size[0], -0.02), (0.0, size[1]))
+        kinds = (
+            Obstacle("cylinder", x, y, radius_m=size[0]),
+            Obstacle("box", x, y, k, size_m=(size[0], size[1])),
+            Obstacle("polygon", x, y, k, points_m=triangle, height_m=0.1),
+        )
+        made_of.append(kinds[k % 3])
+    return tuple(made_of)
+
+
+def rim(obstacle: Obstacle) -> FloatArray:
+    """Points close together on the rim of an obstacle."""
+    share = np.linspace(0.0, 1.0, 2001)[:, None]
+    if obstacle.shape == "cylinder":
+        turn = 2.0 * np.pi * share
+        centre = np.array([obstacle.x_m, obstacle.y_m])
+        return centre + obstacle.radius_m * np.concatenate([np.cos(turn), np.sin(turn)], axis=1)
+    corners = obstacle.corners_m
+    sides = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+    return np.concatenate([(1.0 - share) * a + share * b for a, b in sides])
+
+
+def test_the_gap_to_a_polygon_is_that_to_its_nearest_point() -> None:
+    rng = np.random.default_rng(3)
+    for obstacle in some_obstacles(60, 4.0, 1):
+        if obstacle.shape == "cylinder":
+            continue
+        arrays = obstacle_arrays(((obstacle,),))
+        points = rim(obstacle)
+        for x, y in np.array([obstacle.x_m, obstacle.y_m]) + rng.uniform(-1.0, 1.0, (20, 2)):
+            gap_m, nx, ny = gap_to_polygon(x, y, 0.1, 0, arrays.side_start, arrays.side)
+            away = points - [x, y]
+            nearest = np.hypot(*away.T).min()
+            inside = (arrays.side[:, 2] * x + arrays.side[:, 3] * y <= arrays.side[:, 4]).all()
+            assert gap_m + 0.1 == pytest.approx(-nearest if inside else nearest, abs=1e-3)
+            assert np.hypot(nx, ny) == pytest.approx(1.0)
+            # Along the normal lies the nearest point, or, from inside, against it.
+            foot = np.array([x, y]) + (gap_m + 0.1) * np.array([nx, ny])
+            assert np.hypot(*(points - foot).T).min() < 1e-3
+
+
+@pytest.mark.parametrize("margin_m", [0.01, 0.2])
+def test_all_that_is_near_is_listed_and_nothing_else(margin_m: float) -> None:
+    rng = np.random.default_rng(5)
+    n, arenas, side_m = 60, 3, 4.0
+    obstacles = tuple(some_obstacles(20 + 7 * arena, side_m, arena) for arena in range(arenas))
+    arrays = obstacle_arrays(obstacles)
+    state = np.zeros((arenas * n, 6))
+    state[:, :2] = rng.uniform(-0.5 * side_m, 0.5 * side_m, (arenas * n, 2))
+    robots = np.zeros(arenas * n, ROBOT)
+    robots["radius_m"] = np.tile(rng.uniform(0.03, 0.15, n), arenas)
+    robots["bottom_m"] = np.tile(np.where(np.arange(n) % 2, 0.0, 0.1), arenas)
+    radius_m = robots["radius_m"]
+
+    running = np.arange(arenas) != 1
+    pairs = pairs_near(robots, state, running, (side_m, side_m), 0.15, margin_m)
+    apart = np.hypot(*(state[:, None, :2] - state[:, :2]).transpose(2, 0, 1)) - radius_m[:, None] - radius_m
+    row = np.arange(arenas * n)
+    together = (row[:, None] // n == row // n) & running[row // n]
+    wanted = np.argwhere((apart <= 2.0 * margin_m) & (row[:, None] < row) & together)
+    assert np.array_equal(pairs, wanted)
+
+    cells = obstacle_cells(arrays, (side_m, side_m), 0.15 + margin_m)
+    things = fixed_near(robots, state, running, (side_m, side_m), False, arrays, cells, margin_m)
+    listed = {tuple(thing) for thing in things.tolist()}
+    count = {CIRCLE: 0, POLYGON: 0}
+    for arena, there in enumerate(obstacles):
+        for obstacle in there:
+            kind = CIRCLE if obstacle.shape == "cylinder" else POLYGON
+            k = count[kind]
+            count[kind] += 1
+            points = rim(obstacle)
+            for i in range(arena * n, (arena + 1) * n):
+                gap_m = np.hypot(*(points - state[i, :2]).T).min() - radius_m[i]
+                if obstacle.height_m <= robots["bottom_m"][i] or not running[arena]:
+                    assert (i, kind, k) not in listed
+                elif gap_m <= margin_m - 1e-3:
+                    assert (i, kind, k) in listed
+    assert things[:, 0].tolist() == sorted(things[:, 0].tolist())
+
+
+def test_how_often_near_things_are_listed_changes_no_bit(monkeypatch: pytest.MonkeyPatch) -> None:
+    side_m = 2.2
+    ends: list[FloatArray] = []
+    for margin in (0.06, 0.3, 3.0):
+        monkeypatch.setattr(discs, "MARGIN", margin)
+        engine = made(DiscsEngine, packed(50, side_m, R, 8), (side_m, side_m))
+        rng = np.random.default_rng(9)
+        onsets = np.zeros((1, 2), np.int64)
+        for _ in range(100):
+            onsets += engine.tick(asked(engine, rng.uniform(0.0, 0.2, 50), rng.normal(0.0, 1.0, 50)))
+        ends.append(np.concatenate([engine.state.ravel(), engine.travel_m.ravel(), onsets.ravel()]))
+    assert np.array_equal(ends[0], ends[1])
+    assert np.array_equal(ends[0], ends[2])
+
+
+def test_hundreds_of_obstacles_hold_each_robot_that_meets_one() -> None:
+    """A floor of pillars: whoever drives through is between them, never in them."""
+    pillars = [
+        Obstacle("box", x, y, 0.5, size_m=(0.1, 0.1)) for x in np.arange(-4, 5, 0.5) for y in np.arange(-4, 5, 0.5)
+    ]
+    places = np.stack(np.meshgrid(np.arange(-3.75, 4, 0.5), np.arange(-3.75, 4, 0.5)), axis=-1).reshape(-1, 2)
+    rng = np.random.default_rng(2)
+    pose = np.column_stack([places, rng.uniform(-np.pi, np.pi, len(places))])
+    engine = made(DiscsEngine, pose, (10.0, 10.0), obstacles=pillars)
+    arrays = obstacle_arrays((tuple(pillars),))
+    onsets = np.zeros((1, 2), np.int64)
+    for _ in range(40):
+        onsets += engine.tick(asked(engine, 0.3))
+    gaps = [
+        min(gap_to_polygon(x, y, R, k, arrays.side_start, arrays.side)[0] for k in range(len(pillars)))
+        for x, y in engine.state[0, :30, :2]
+    ]
+    assert onsets[0, 1] > 100
+    assert min(gaps) > -0.002 * R

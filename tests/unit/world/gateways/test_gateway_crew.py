@@ -1,0 +1,245 @@
+"""Robots behind a gateway: told what they sense, moved as told, dead ones silent; all others are played as ever."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.led_changes import LedChanges
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
+from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.senses import Actions, GroupSenses
+from swarmwire.comms.truth import Group
+from swarmwire.world.crews.pace import Pace
+from swarmwire.world.crews.quanta import Quanta
+from swarmwire.world.gateways.gateway_crew import GatewayCrew
+from swarmwire.world.gateways.gateway_group import GatewayGroup
+from tests.support.agent.hosts import GIVES, heard_from
+from tests.support.clocks import FakeClock
+from tests.support.world.gateways.scripted import ScriptedGateway, ScriptedOptions
+
+TICK_NS = NS_PER_S // 10
+
+
+class Inner:
+    """A crew that drives its robots 0 and 1 at 0.5 m/s, and keeps what it was given."""
+
+    def __init__(self) -> None:
+        self.given: list[Any] = []
+
+    def start(self) -> None:
+        self.given.append("started")
+
+    def act(self, tick, senses, heard, outcomes=NO_OUTCOMES) -> Actions:
+        self.given.append((tick, senses, heard, outcomes))
+        rows = np.array([0, 1])
+        sent = Sent(rows[:1], np.array([BROADCAST]), Payloads.of([b"inner"]))
+        return Actions(rows, np.ones(2, np.bool_), np.full(2, 0.5), np.zeros(2), np.zeros(2), sent)
+
+    def receive(self, heard, outcomes) -> None:
+        self.given.append(("received", heard, outcomes))
+
+    def hear(self, tick, at_ns) -> Sent:
+        return Sent(np.array([1]), np.array([BROADCAST]), Payloads.of([b"echo"]))
+
+    def counts(self) -> dict[str, int]:
+        return {"inner": 1}
+
+    def close(self) -> None:
+        self.given.append("closed")
+
+
+class Air:
+    """An air whose robots send one packet in each tick."""
+
+    def __init__(self) -> None:
+        self.published: list[Any] = []
+
+    def publish(self, tick, heard, outcomes) -> None:
+        self.published.append((tick, heard, outcomes))
+
+    def take(self) -> Sent:
+        return Sent(np.array([3]), np.array([0]), Payloads.of([b"outer"]))
+
+    def counts(self) -> dict[str, int]:
+        return {"late": 2, "odd": 0, "packets_to_robots": 9}
+
+
+class Around:
+    """A crew of two robots of its own and three behind a gateway, rows 2 to 4."""
+
+    def __init__(self, *, air: bool = True, quantum_s: float | None = None) -> None:
+        self.clock, self.inner, self.said = FakeClock(), Inner(), []
+        self.air = Air() if air else None
+        body = load_body("epuck2")
+        self.gateway = ScriptedGateway(("b-0", "b-1", "b-2"), body, "", ScriptedOptions(), self.clock)
+        group = GatewayGroup(Group("b", body, 2, 5), "scripted", self.gateway)
+        pace = Pace(self.clock, 10, 1.0, self.said.append)
+        self.shown = 0
+        quanta = Quanta(self.clock, pace, 10, quantum_s) if quantum_s else None
+        self.crew = GatewayCrew(self.inner, [group], self.air, pace, 10, self.show, lambda: {"unseen": 4}, quanta)
+
+    def show(self) -> None:
+        self.shown += 1
+
+    def act(self, tick: int, alive: list[int], heard: Heard | None = None, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+        rows = np.array(alive, np.int64)
+        fields = {"proximity.value": np.tile(rows + 0.1 * tick, (8, 1)).T, "odometry.left_m": rows + 0.01 * tick}
+        senses = {"a": GroupSenses(np.array([0, 1]), {}), "b": GroupSenses(rows, fields)}
+        return self.crew.act(tick, senses, Heard.none(GIVES) if heard is None else heard, outcomes)
+
+
+def commands(actions: Actions) -> dict[int, tuple[float, float]]:
+    columns = (actions.rows, actions.linear_mps, actions.angular_radps)
+    return {
+        row: (v, w)
+        for row, v, w, new in zip(*(c.tolist() for c in columns), actions.drive.tolist(), strict=True)
+        if new
+    }
+
+
+def test_each_tick_tells_all_that_is_sensed_and_takes_what_programs_command() -> None:
+    around = Around()
+    around.gateway.drive = {1: (0.05, -0.7)}
+    around.gateway.leds = LedChanges(np.array([2]), np.array([4]), np.array([0xFF0000]))
+    actions = around.act(0, [2, 3, 4])
+    (told,) = around.gateway.published
+    assert told.time_ns == 0
+    assert told.alive.tolist() == [True] * 3
+    assert told.fields["proximity.value"].shape == (3, 8)
+    assert told.fields["odometry.left_m"].tolist() == [2.0, 3.0, 4.0]
+    assert commands(actions) == {0: (0.5, 0.0), 1: (0.5, 0.0), 3: (0.05, -0.7)}
+    assert sorted(actions.rows.tolist()) == [0, 1, 2, 3, 4]
+    assert (actions.leds.rows.tolist(), actions.leds.which.tolist()) == ([4], [4])
+    assert commands(around.act(1, [2, 3, 4])) == {0: (0.5, 0.0), 1: (0.5, 0.0)}  # the last command holds
+    assert [told.time_ns for told in around.gateway.published] == [0, TICK_NS]
+    assert around.shown == 2
+
+
+def test_the_dead_are_told_as_dead_and_their_readings_stay_what_they_were() -> None:
+    around = Around()
+    around.act(0, [2, 3, 4])
+    around.act(1, [2, 4])
+    around.act(2, [])
+    _, one_dead, all_dead = around.gateway.published
+    assert one_dead.alive.tolist() == [True, False, True]
+    assert one_dead.fields["odometry.left_m"].tolist() == pytest.approx([2.01, 3.0, 4.01])
+    assert not all_dead.alive.any()
+    assert all_dead.fields["odometry.left_m"].tolist() == one_dead.fields["odometry.left_m"].tolist()
+
+
+def test_readings_that_were_handed_over_are_never_written_to_again() -> None:
+    around = Around()
+    for tick, alive in enumerate(([2, 4], [3, 4])):
+        around.act(tick, alive)
+    first, second = around.gateway.published
+    assert first.fields["odometry.left_m"].tolist() == [2.0, 0.0, 4.0]
+    assert second.fields["odometry.left_m"].tolist() == pytest.approx([2.0, 3.01, 4.01])
+
+
+def test_agents_here_get_their_own_groups_alone_and_the_air_gets_the_others_packets() -> None:
+    around = Around()
+    sent = Sent(np.array([0]), np.array([BROADCAST]), Payloads.of([b"beacon"]))
+    outcomes = Outcomes(np.array([0, 3]), np.array([7, 8]), np.array([0, 1]))
+    actions = around.act(0, [2, 3, 4], heard_from(sent, [1, 2, 4]), outcomes)
+    _, senses, heard, _ = around.inner.given[-1]
+    assert list(senses) == ["a"]
+    assert len(heard) == 3  # a host takes what is for its robots
+    assert around.air is not None
+    ((tick, outside, told),) = around.air.published
+    assert tick == 0
+    assert outside.receiver.tolist() == [2, 4]
+    assert told.row.tolist() == [3]
+    assert [actions.sent.payloads.row(i) for i in range(2)] == [b"inner", b"outer"]
+    assert actions.sent.sender.tolist() == [0, 3]
+
+
+def test_without_a_radio_nothing_but_commands_is_taken() -> None:
+    around = Around(air=False)
+    assert [around.act(0, [2, 3, 4]).sent.payloads.row(0)] == [b"inner"]
+
+
+def test_a_group_that_does_not_act_in_a_tick_is_told_nothing_and_commanded_all_the_same() -> None:
+    around = Around()
+    around.gateway.drive = {0: (0.1, 0.0)}
+    actions = around.crew.act(3, {"a": GroupSenses(np.array([0, 1]), {})}, Heard.none(GIVES))
+    assert not around.gateway.published
+    assert commands(actions)[2] == (0.1, 0.0)
+
+
+def test_a_tick_lasts_as_long_as_it_says_and_lag_is_reported() -> None:
+    around = Around()
+    began_ns = around.clock.now_ns()
+    around.act(0, [2, 3, 4])
+    assert around.clock.now_ns() - began_ns == TICK_NS
+    around.clock.time_ns += 3 * TICK_NS
+    around.act(1, [2, 3, 4])
+    report = around.crew.report()
+    assert (report.factor, report.missed_ticks, report.worst_lag_s) == (1.0, 1, pytest.approx(0.2))
+    assert len(around.said) == 1
+
+
+def test_a_loop_that_lags_by_more_than_a_tick_does_not_make_up_for_it() -> None:
+    around = Around()
+    around.act(0, [2, 3, 4])
+    around.clock.time_ns += 30 * TICK_NS
+    around.act(1, [2, 3, 4])
+    began_ns = around.clock.now_ns()
+    around.act(2, [2, 3, 4])
+    assert around.clock.now_ns() - began_ns == TICK_NS
+    around.clock.time_ns += TICK_NS + TICK_NS // 2
+    around.act(3, [2, 3, 4])  # half a tick late: the next one is shorter
+    around.act(4, [2, 3, 4])
+    assert around.clock.now_ns() - began_ns == 3 * TICK_NS
+    assert around.crew.report().missed_ticks == 2
+
+
+def test_faults_are_counted_by_kind_of_gateway_and_only_where_there_are_any() -> None:
+    around = Around()
+    around.gateway.faults = {"garbage": 3, "half_packets": 0}
+    assert around.crew.counts() == {"inner": 1, "unseen": 4, "scripted_garbage": 3, "air_late": 2}
+
+
+def test_the_agents_of_others_start_and_end_with_it() -> None:
+    around = Around()
+    around.crew.start()
+    around.crew.close()
+    assert around.inner.given == ["started", "closed"]
+
+
+class QuietAir:
+    """The loop's air, in which robots 0 and 3 hear one packet in the middle of the tick."""
+
+    def __init__(self) -> None:
+        self.sent: list[tuple[int | None, bytes]] = []
+        self.told = False
+
+    def send(self, put) -> None:
+        if len(put.sent):
+            self.sent.append((put.tick, put.sent.payloads.row(0)))
+
+    def advance(self, until_ns) -> tuple[Heard, Outcomes]:
+        due, self.told = not self.told and until_ns >= TICK_NS // 2, self.told or until_ns >= TICK_NS // 2
+        sent = Sent(np.array([1]), np.array([BROADCAST]), Payloads.of([b"beacon"]))
+        return heard_from(sent, [0, 3] if due else []), NO_OUTCOMES
+
+
+def test_in_quanta_robots_behind_gateways_are_told_when_it_is_due_and_what_they_send_goes_out_at_once() -> None:
+    around, air = Around(quantum_s=0.010), QuietAir()
+    rows = np.array([2, 3, 4])
+    fields = {"proximity.value": np.zeros((3, 8)), "odometry.left_m": np.zeros(3)}
+    senses = {"a": GroupSenses(np.array([0, 1]), {}), "b": GroupSenses(rows, fields)}
+    around.gateway.drive = {1: (0.05, -0.7)}
+    actions = around.crew.act_in_time(0, senses, Heard.none(GIVES), NO_OUTCOMES, air)
+    assert around.air is not None
+    heard = [told.receiver.tolist() for _, told, _ in around.air.published if len(told)]
+    assert heard == [[3]]
+    assert [given[1].receiver.tolist() for given in around.inner.given if given[0] == "received"] == [[], [0, 3]]
+    assert air.sent[:2] == [(0, b"inner"), (None, b"outer")]
+    assert (None, b"echo") in air.sent
+    assert set(air.sent[2:]) == {(None, b"outer"), (None, b"echo")}
+    assert not len(actions.sent)
+    assert commands(actions)[3] == (0.05, -0.7)
+    assert around.crew.report().quantum_s == 0.010

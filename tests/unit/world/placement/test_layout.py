@@ -1,0 +1,198 @@
+"""Maps become boxes that cover what is dark and no more; what can be neither map nor floor is refused at the door."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis.extra import numpy as npst
+from PIL import Image
+
+from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.geometry.floor import Patch
+from swarmwire.world.placement import grey_image, layout
+from swarmwire.world.placement.merged_boxes import merged_boxes
+from swarmwire.world.scenario.scenario_file import load_scenario, scenario_from
+from swarmwire.world.world import World
+from tests.support.world.samples import SAMPLE, changed
+
+GREY = np.full((20, 40), 254, np.uint8)
+GREY[:, 0] = GREY[0] = 0
+GREY[10:12, 5:30] = 100
+
+
+def written(folder: Path, arena: dict[str, Any]) -> Path:
+    """A scenario beside its pictures, with one robot."""
+    import tomli_w
+
+    robots = {"a": {"body": "epuck", "count": 1, "agent": "x:Y"}}
+    mapping = {"format": 1, "name": "map", "duration_s": 1.0, "arena": arena, "robots": robots}
+    path = folder / "maze.toml"
+    path.write_text(tomli_w.dumps(mapping))
+    return path
+
+
+def world_of(folder: Path, arena: dict[str, Any], *seeds: int) -> World:
+    return World(load_scenario(written(folder, arena)), seeds or (1,), {})
+
+
+def refused(folder: Path, arena: dict[str, Any]) -> str:
+    """What is said about it, without the folder."""
+    with pytest.raises(BadInput) as caught:
+        load_scenario(written(folder, arena))
+    return str(caught.value).replace(f"{folder}/", "")
+
+
+def saved(folder: Path, name: str, grey: Any, mode: str | None = None) -> str:
+    image = Image.fromarray(grey)
+    (image.convert(mode) if mode else image).save(folder / name)
+    return name
+
+
+def painted(boxes: Any, shape: tuple[int, int]) -> Any:
+    """How often each pixel is covered."""
+    count = np.zeros(shape, np.int64)
+    for row, column, rows, columns in boxes:
+        count[row : row + rows, column : column + columns] += 1
+    return count
+
+
+@settings(max_examples=60)
+@given(npst.arrays(np.bool_, npst.array_shapes(min_dims=2, max_dims=2, max_side=12)))
+def test_boxes_cover_each_dark_pixel_once_and_no_other(occupied: BoolArray) -> None:
+    boxes = merged_boxes(occupied, 200)
+    assert np.array_equal(painted(boxes, occupied.shape), occupied)
+    assert np.array_equal(boxes, merged_boxes(occupied, 200))
+
+
+def test_boxes_are_few() -> None:
+    """A maze of 20 x 20 rooms, 9 pixels wide between walls of 1; each is open to the right or below."""
+    walls = np.zeros((201, 201), np.bool_)
+    walls[::10] = walls[:, ::10] = True
+    for room in range(399):
+        row, column = 10 * (room // 20), 10 * (room % 20)
+        if row < 190 and (column == 190 or (room * 7919) % 13 < 6):
+            walls[row + 10, column + 1 : column + 10] = False
+        else:
+            walls[row + 1 : row + 10, column + 10] = False
+    boxes = merged_boxes(walls, 10_000)
+    assert np.array_equal(painted(boxes, walls.shape), walls)
+    assert len(boxes) < 400
+    assert len(merged_boxes(walls, 50)) == 51
+
+
+@pytest.mark.parametrize("name", ["maze.png", "maze.pgm", "maze.bmp"])
+def test_a_map_gives_the_size_and_boxes_where_it_is_dark(tmp_path: Path, name: str) -> None:
+    table = {"image": saved(tmp_path, name, GREY), "resolution_m": 0.1, "height_m": 0.3}
+    world = world_of(tmp_path, {"map": table}, 1, 2)
+    assert world.static.arena_size_m == pytest.approx((4.0, 2.0))
+    assert world.static.obstacles[0] == world.static.obstacles[1]
+    corners = [obstacle.corners_m for obstacle in world.static.obstacles[0]]
+    ends = {tuple(np.round([*c.min(0), *c.max(0)], 9)) for c in corners}
+    assert ends == {(-2.0, 0.9, 2.0, 1.0), (-2.0, -1.0, -1.9, 0.9), (-1.5, -0.2, 1.0, 0.0)}
+    assert {obstacle.height_m for obstacle in world.static.obstacles[0]} == {0.3}
+    as_dark = world_of(tmp_path, {"map": {**table, "occupied_below": float(np.float32(100) / np.float32(255))}})
+    assert len(as_dark.static.obstacles[0]) == 2  # what is no darker than this is free
+    only_black = world_of(tmp_path, {"map": {**table, "occupied_below": 0.39}, "size_m": [4.0, 2.0]})
+    assert len(only_black.static.obstacles[0]) == 2
+
+
+def test_random_things_keep_clear_of_the_map(tmp_path: Path) -> None:
+    arena: dict[str, Any] = {"map": {"image": saved(tmp_path, "maze.png", GREY), "resolution_m": 0.1}}
+    arena["obstacles"] = [{"shape": "cylinder", "radius_m": 0.1, "count": 8, "place": "random"}]
+    arena["lights"] = [{"intensity": 1.0, "count": 30, "place": "random"}]
+    one, other = world_of(tmp_path, arena, 1, 2).static.obstacles
+    assert one[:3] == other[:3]
+    assert {obstacle.shape for obstacle in one[3:]} == {"cylinder"}
+    assert set(one[3:]).isdisjoint(other[3:])
+    static = world_of(tmp_path, arena).static
+    points = [(o.x_m, o.y_m, o.radius_m) for o in static.obstacles[0][3:]]
+    points += [(light.x_m, light.y_m, 0.0) for light in static.lights[0]]
+    for x, y, radius in points:
+        for box in static.obstacles[0][:3]:
+            beyond = np.abs((x - box.x_m, y - box.y_m)) - 0.5 * np.array(box.size_m)
+            assert np.hypot(*np.maximum(beyond, 0.0)) > radius
+
+
+def test_greys_are_those_of_the_picture_whatever_its_form(tmp_path: Path) -> None:
+    ramp = np.arange(256, dtype=np.uint8).reshape(16, 16)
+    saved(tmp_path, "8.png", ramp)
+    saved(tmp_path, "rgb.png", ramp, "RGB")
+    saved(tmp_path, "16.png", ramp.astype(np.uint16) * 257)
+    (tmp_path / "16.pgm").write_bytes(b"P5 16 16 65535\n" + (ramp.astype(">u2") * 257).tobytes())
+    (tmp_path / "ascii.pgm").write_text("P2\n# a comment\n16 16 255\n" + " ".join(map(str, ramp.ravel())))
+    for name in ("8.png", "rgb.png", "16.png", "16.pgm", "ascii.pgm"):
+        assert grey_image.read_grey(tmp_path / name, "f", "k") == pytest.approx(ramp / 255.0, abs=1e-6), name
+    clear = np.dstack([np.zeros_like(ramp)] * 3 + [ramp])  # black, more and more of it
+    saved(tmp_path, "clear.png", clear)
+    assert grey_image.read_grey(tmp_path / "clear.png", "f", "k") == pytest.approx(1.0 - ramp / 255.0, abs=0.003)
+
+
+def test_a_floor_has_its_picture_and_patches(tmp_path: Path) -> None:
+    disc = {"shape": "disc", "at": [0.5, 0.0], "radius_m": 0.3, "shade": 0.0}
+    corner = {"shape": "polygon", "points": [[0, 0], [0, 1], [1, 0]], "shade": 0.25}
+    table = {"image": saved(tmp_path, "floor.png", GREY), "shade": 0.5, "patches": [disc, corner]}
+    floor = world_of(tmp_path, {"size_m": [4.0, 2.0], "ground": table}).static.floor
+    assert floor is not None
+    assert floor.image is not None
+    assert np.array_equal(floor.image.grey, GREY)
+    assert floor.patches == (
+        Patch("disc", 0.5, 0.0, 0.0, radius_m=0.3),
+        Patch("polygon", 0.0, 0.0, 0.25, points_m=((1.0, 0.0), (0.0, 1.0), (0.0, 0.0))),
+    )
+    assert floor.shade == 0.5
+    assert world_of(tmp_path, {"size_m": [4.0, 2.0]}).static.floor is None
+
+
+def test_what_is_no_map_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = "maze.toml: arena.map.image: expected"
+
+    def map_of(name: str, **more: Any) -> str:
+        table = {"image": name, "resolution_m": 0.1}
+        return refused(tmp_path, {"map": {**table, **more.pop("map", {})}, **more})
+
+    assert map_of("none.png") == f"{said} a file beside the scenario: there is no none.png"
+    picture = f"{said} a picture, PNG, PGM, BMP, JPEG or GIF"
+    (tmp_path / "text.png").write_text("no picture")
+    (tmp_path / "folder.png").mkdir()
+    assert map_of("text.png") == f"{picture}: text.png"
+    assert map_of("folder.png") == f"{picture}: folder.png"
+    whole = (tmp_path / saved(tmp_path, "maze.png", np.arange(5000, dtype=np.uint8).reshape(50, 100))).read_bytes()
+    for size in (3, 20, 40, 60, len(whole) // 2, len(whole) - 30):
+        (tmp_path / "cut.png").write_bytes(whole[:size])
+        assert map_of("cut.png") == f"{picture}: cut.png"
+    (tmp_path / "bad.pgm").write_text("P2 2 2 255 1 2 x 4")
+    assert map_of("bad.pgm") == f"{picture}: bad.pgm"
+    full = saved(tmp_path, "full.png", np.zeros((4, 4), np.uint8))
+    assert map_of(full) == f"{said} free space: no pixel is as bright as occupied_below = 0.5: full.png"
+    good = saved(tmp_path, "good.png", GREY)
+    size = "maze.toml: arena.size_m: expected 4 x 2 m, the size of the map, or none; got 4 x 2.1 m"
+    assert map_of(good, size_m=[4.0, 2.1]) == size
+    too_large = "maze.toml: arena.map.resolution_m: expected an arena of at most 10000 m a side"
+    assert map_of(good, map={"resolution_m": 300.0}) == too_large
+    monkeypatch.setattr(layout, "MOST_BOXES", 2)
+    few = "a picture that makes at most 2 boxes: make it coarser, or free of specks"
+    assert map_of(good) == f"{said} {few}: good.png"
+    monkeypatch.setattr(grey_image, "MOST_PIXELS", 799)
+    assert map_of(good) == f"{said} a picture of at most 799 pixels: good.png"
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
+    assert map_of(good) == f"{said} a picture of at most 799 pixels: good.png"
+    assert refused(tmp_path, {"size_m": [4.0, 2.0], "ground": {"image": "none.png"}}) == (
+        "maze.toml: arena.ground.image: expected a file beside the scenario: there is no none.png"
+    )
+
+
+def test_a_fixed_obstacle_lies_within_the_map(tmp_path: Path) -> None:
+    table = {"image": saved(tmp_path, "maze.png", GREY), "resolution_m": 0.1}
+    outside = {"shape": "cylinder", "radius_m": 0.1, "at": [2.0, 0.0]}
+    assert refused(tmp_path, {"map": table, "obstacles": [outside]}) == (
+        "maze.toml: arena.obstacles.0: expected the cylinder to lie within the arena of 4 x 2 m"
+    )
+
+
+def test_heights_of_obstacles_are_those_of_the_file() -> None:
+    low = World(scenario_from(changed("arena.obstacles.1.height_m", 0.2), "f"), (1,), {}).static.obstacles[0]
+    assert [obstacle.height_m for obstacle in low] == [np.inf] * 4 + [0.2] + [np.inf] * 2
+    assert SAMPLE["arena"]["obstacles"][1].get("height_m") is None

@@ -1,0 +1,61 @@
+"""What a scenario asks to be measured, and the conditions that end its arenas, are checked at the door."""
+
+from typing import Any
+
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.world.scenario.as_mapping import mapping_of
+from swarmwire.world.scenario.metric_tables import MetricTable
+from swarmwire.world.scenario.scenario_file import scenario_from
+from tests.support.world.samples import changed
+
+ONE_COMPARISON = "expected just one of at_least, at_most, above, below"
+FAULTS: list[tuple[str, Any, str]] = [
+    ("standard_metrics", 1, "standard_metrics: expected true or false, got 1"),
+    ("metrics", "order", "metrics: expected a list, got 'order'"),
+    ("metrics", ["order", 5], "metrics.1: expected a text that is not empty or a table, got 5"),
+    ("metrics", [""], "metrics.0: expected a text that is not empty, got ''"),
+    ("metrics", [{"gap_m": 1}], "metrics.0.metric: is missing; expected a text that is not empty"),
+    ("stop", 3, "stop: expected a table or a list, got 3"),
+    ("stop", [3], "stop.0: expected a table, got 3"),
+    ("stop", {"above": 1}, "stop.metric: is missing; expected a text that is not empty"),
+    ("stop", {"metric": "order"}, f"stop: {ONE_COMPARISON}; got none"),
+    ("stop", [{"metric": "order", "above": 1, "below": 2}], f"stop.0: {ONE_COMPARISON}; got above and below"),
+    ("stop", {"metric": "order", "above": "x"}, "stop.above: expected a number, got 'x'"),
+    (
+        "stop",
+        {"metric": "order", "abov": 1},
+        "stop.abov: unknown key; expected one of metric, at_least, at_most, above, below, hold_s (did you mean above?)",
+    ),
+    (
+        "stop",
+        [{"metric": "order", "above": 1, "hold_s": -1}],
+        "stop.0.hold_s: expected a number of at least 0 and at most 1000000000 (s), got -1",
+    ),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "text"), FAULTS)
+def test_a_fault_of_what_is_measured_names_its_key_and_what_was_expected(path: str, value: Any, text: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        scenario_from(changed(path, value), "file.toml")
+    assert str(caught.value) == f"file.toml: {text}"
+
+
+def test_a_condition_that_ends_arenas_is_a_table_or_a_list_of_tables_and_may_be_none() -> None:
+    order = {"metric": "order", "at_least": 1, "hold_s": 2}
+    [(path, table)] = scenario_from(changed("stop", order), "file.toml").stops().items()
+    assert (path, table.metric, table.comparison, table.hold_s) == ("stop", "order", ("at_least", 1.0), 2.0)
+    assert list(scenario_from(changed("stop", [order, order]), "file.toml").stops()) == ["stop.0", "stop.1"]
+    assert scenario_from(changed("stop", []), "file.toml").stops() == {}
+    assert scenario_from(changed("stop", order), "file.toml", ["stop=[]"]).stops() == {}
+
+
+def test_a_metrics_parameters_stand_beside_its_name_and_can_be_set() -> None:
+    given = changed("metrics", ["order", {"metric": "fragmentations", "hold_s": 2.0}])
+    scenario = scenario_from(given, "file.toml", ["metrics.1.hold_s=3.0"])
+    assert scenario.metrics == ("order", MetricTable(metric="fragmentations", hold_s=3.0))
+    assert [item.params for item in scenario.metrics if isinstance(item, MetricTable)] == [{"hold_s": 3.0}]
+    again = mapping_of(scenario.model_copy(update={"duration_s": 2.0}))
+    assert again["metrics"] == ["order", {"metric": "fragmentations", "hold_s": 3.0}]

@@ -1,0 +1,169 @@
+"""A scenario's radio: presets fill what it leaves open, contradictions are refused with key and reason."""
+
+from typing import Any
+
+import pytest
+
+from swarmwire.comms.air.parameters.bursts import Bursts, bursts_from_steps
+from swarmwire.comms.air.parameters.propagation import OwnAntenna
+from swarmwire.comms.air.presets.registry import PRESETS
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.errors import BadInput
+from swarmwire.world.scenario.as_mapping import mapping_of
+from swarmwire.world.scenario.scenario_file import scenario_from
+from tests.support.world.samples import SAMPLE
+
+
+def radio_of(table: dict[str, Any]) -> Radio:
+    """The radio of the sample scenario with this table."""
+    radio = scenario_from({**SAMPLE, "radio": table}, "f").radio
+    assert radio is not None
+    return radio
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_preset_is_a_radio(name: str) -> None:
+    radio = radio_of({"preset": name})
+    assert radio.preset == name
+    assert PRESETS[name].source
+
+
+def test_what_a_scenario_says_wins_over_its_preset_key_by_key() -> None:
+    radio = radio_of({"preset": "ieee802154", "loss": 0.1, "log_distance": {"reference_loss_db": 50.0}})
+    assert radio.loss == 0.1
+    assert radio.log_distance is not None
+    assert (radio.log_distance.exponent, radio.log_distance.reference_loss_db) == (3.0, 50.0)
+    assert radio.access_or_default.method == "csma-802154"
+
+
+def test_bursts_may_be_given_by_steps_from_packet_to_packet() -> None:
+    """As netem's gemodel 2% 20% 80% 1% for packets every 100 ms."""
+    steps = {"p": 0.02, "r": 0.2, "loss_bad": 0.8, "loss_good": 0.01, "interval_s": 0.1}
+    scenario = scenario_from({**SAMPLE, "radio": {"range_m": 2.0, "bursts": steps}}, "f")
+    assert scenario.radio is not None
+    bursts = scenario.radio.bursts
+    assert bursts == bursts_from_steps(0.02, 0.2, 0.8, 0.01, 0.1)
+    assert mapping_of(scenario)["radio"]["bursts"] == steps
+    in_python = scenario.model_copy(update={"name": "another"})
+    assert scenario_from(mapping_of(in_python), "g").radio == scenario.radio
+
+
+@pytest.mark.parametrize("mean", [0.1, 0.3, 0.79])
+@pytest.mark.parametrize(("loss_bad", "loss_good"), [(1.0, 0.0), (0.8, 0.05)])
+def test_bursts_may_be_given_by_their_mean_loss(mean: float, loss_bad: float, loss_good: float) -> None:
+    table = {"bad_s": 2.0, "mean_loss": mean, "loss_bad": loss_bad, "loss_good": loss_good}
+    scenario = scenario_from({**SAMPLE, "radio": {"range_m": 2.0, "bursts": table}}, "f")
+    assert scenario.radio is not None
+    bursts = scenario.radio.bursts
+    assert bursts is not None
+    assert (bursts.bad_s, bursts.loss_bad, bursts.loss_good) == (2.0, loss_bad, loss_good)
+    assert bursts.loss == pytest.approx(mean, rel=1e-12)
+    assert mapping_of(scenario)["radio"]["bursts"] == table
+
+
+@pytest.mark.parametrize("loss_good", [0.0, 0.25])
+def test_a_mean_loss_no_greater_than_that_of_good_links_is_never_more(loss_good: float) -> None:
+    table = {"mean_loss": loss_good, "loss_good": loss_good}
+    scenario = scenario_from({**SAMPLE, "radio": {"range_m": 2.0, "bursts": table}}, "f")
+    assert scenario.radio is not None
+    bursts = scenario.radio.bursts
+    assert bursts is not None
+    assert (bursts.loss_bad, bursts.loss) == (loss_good, loss_good)
+    in_python = scenario.model_copy(update={"name": "another"})
+    assert scenario_from(mapping_of(in_python), "g").radio == scenario.radio
+
+
+def test_spells_left_out_have_their_usual_length() -> None:
+    assert radio_of({"range_m": 2.0, "bursts": {"good_s": 3.0}}).bursts == Bursts(good_s=3.0)
+
+
+SIGNAL = {"model": "log-distance"}
+FAULTS: list[tuple[dict[str, Any], str]] = [
+    ({}, "radio.range_m: is missing"),
+    ({"preset": "nothing"}, "radio.preset: expected one of ideal, disk"),
+    ({"range_m": 2.0, "access": {}}, "radio.access: expected a model with signals"),
+    ({"range_m": 2.0, "reception": {}}, "radio.reception: expected a model with signals"),
+    ({"range_m": 2.0, "gives": {"rssi": {}}}, "radio.gives.rssi: expected a model with signals"),
+    ({"preset": "disk", "fading": {}}, "radio.fading: expected a model with signals"),
+    ({**SIGNAL, "two_ray": {}}, 'radio.two_ray: expected model = "two-ray"'),
+    ({**SIGNAL, "bit_rate_bps": 0}, "radio.bit_rate_bps: expected a whole number of at least 1"),
+    ({**SIGNAL, "walls": {}, "line_of_sight": True}, "radio.walls: expected no line_of_sight"),
+    ({**SIGNAL, "bodies_block": True}, "radio.bodies_block: expected the model disk"),
+    ({**SIGNAL, "access": {"method": "dcf"}}, "radio.access.method: expected a frame of IEEE 802.11"),
+    ({**SIGNAL, "frame": "802.11b"}, "radio.bit_rate_bps: 802.11b has 1000000"),
+    ({**SIGNAL, "reception": {"model": "table"}}, "radio.reception.table: is missing"),
+    ({**SIGNAL, "delays": {"distribution": "uniform", "deviation_s": 1.0}}, "radio.delays.deviation_s"),
+    ({"preset": "ieee802154", "model": "disk", "range_m": 1.0}, "radio.antenna: expected a model with signals"),
+    (
+        {**SIGNAL, "bursts": {"p": 0.1, "r": 0.5, "interval_s": 0.1, "bad_s": 1.0}},
+        "radio.bursts.p: expected either bad_s with good_s or mean_loss, or p, r and interval_s; got bad_s and p and r",
+    ),
+    (
+        {"preset": "gilbert", "bursts": {"r": 0.5}},
+        "radio.bursts.r: expected either bad_s with good_s or mean_loss, or p",
+    ),
+    ({**SIGNAL, "bursts": {"p": 0.1, "r": 0.5}}, "radio.bursts.interval_s: is missing; expected p, r and"),
+    ({**SIGNAL, "bursts": {"interval_s": 0.1}}, "radio.bursts.p: is missing; expected p, r and"),
+    ({**SIGNAL, "bursts": {"p": 0.5, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.r: expected less than 1 - p"),
+    ({**SIGNAL, "bursts": {"p": 1.0, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.p: expected a number above 0 and"),
+    (
+        {**SIGNAL, "bursts": {"mean_loss": 0.1, "good_s": 1.0}},
+        "radio.bursts.mean_loss: expected either good_s or mean_loss, got both",
+    ),
+    (
+        {**SIGNAL, "bursts": {"mean_loss": 0.1, "p": 0.1}},
+        "radio.bursts.p: expected either bad_s with good_s or mean_loss, or p, r and interval_s; got mean_loss and p",
+    ),
+    ({**SIGNAL, "bursts": {"mean_loss": 1.0}}, "radio.bursts.mean_loss: expected a number"),
+    (
+        {**SIGNAL, "bursts": {"mean_loss": 0.5, "loss_bad": 0.5}},
+        "radio.bursts.mean_loss: expected at least loss_good, 0, and less than loss_bad, 0.5; got 0.5",
+    ),
+    ({**SIGNAL, "bursts": {"mean_loss": 0.1, "loss_good": 0.2}}, "radio.bursts.mean_loss: expected at least loss_good"),
+    ({**SIGNAL, "bursts": {"mean_loss": 1e-9}}, "radio.bursts.mean_loss: expected loss_good, 0, or more above it"),
+    ({"range_m": 2.0, "cut_off_db": 3.0}, "radio.cut_off_db: expected a model with signals"),
+    (
+        {**SIGNAL, "bursts": {"loss_bad": 0.1, "loss_good": 0.2}},
+        "radio.bursts.loss_bad: expected at least loss_good",
+    ),
+    ({**SIGNAL, "access": {"method": "aloha", "most_retries": 3}}, "radio.access.most_retries: expected method csma-"),
+    ({**SIGNAL, "access": {"method": "none", "busy_dbm": -70.0}}, "radio.access.busy_dbm: expected method csma-802154"),
+    ({**SIGNAL, "reception": {"least_sinr_db": 3.0}}, 'radio.reception.least_sinr_db: expected "threshold" with it'),
+    ({**SIGNAL, "fading": {"distribution": "nakagami", "k": 3.0}}, 'radio.fading.k: expected "rician" with it'),
+    ({**SIGNAL, "fading": {"distribution": "rician", "m": 1.0}}, 'radio.fading.m: expected "nakagami" with it'),
+    (
+        {"preset": "wifi-b-1M", "reception": {"model": "802.15.4"}},
+        "radio.reception.model: expected one of threshold, table, 802.11b for frames of 802.11b; got 802.15.4",
+    ),
+]
+
+
+def test_another_model_than_the_presets_takes_the_presets_path_loss_with_it() -> None:
+    radio = radio_of({"preset": "ieee802154", "model": "friis"})
+    assert (radio.model, radio.log_distance) == ("friis", None)
+    assert radio.access_or_default.method == "csma-802154"
+
+
+@pytest.mark.parametrize(("table", "text"), FAULTS)
+def test_a_contradiction_is_refused_with_its_key(table: dict[str, Any], text: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        radio_of(table)
+    assert str(caught.value).startswith(f"f: {text}")
+
+
+def test_groups_may_have_their_own_power_and_gain_of_a_radio_with_signals() -> None:
+    table = {**SAMPLE, "radio": SIGNAL}
+    own = {**SAMPLE["robots"], "big": {**SAMPLE["robots"]["big"], "radio": {"power_dbm": -10.0}}}
+    scenario = scenario_from({**table, "robots": own}, "f")
+    assert scenario.robots["big"].radio == OwnAntenna(power_dbm=-10.0)
+    assert scenario.robots["flock"].radio is None
+    with pytest.raises(
+        BadInput, match=r"^f: robots\.big\.radio: expected a radio with signals: a disk knows no strength"
+    ):
+        scenario_from({**SAMPLE, "robots": own}, "f")
+    mute = {key: value for key, value in SAMPLE.items() if key != "radio"}
+    with pytest.raises(BadInput, match=r"^f: robots\.big\.radio: expected a radio with signals: there is no \[radio\]"):
+        scenario_from({**mute, "robots": own}, "f")
+    own["big"]["radio"] = {"power_dbm": 1000.0}
+    with pytest.raises(BadInput, match=r"^f: robots\.big\.radio\.power_dbm: expected a number of at least -100"):
+        scenario_from({**table, "robots": own}, "f")

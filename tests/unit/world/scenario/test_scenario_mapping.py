@@ -1,0 +1,36 @@
+"""A scenario can be taken back to the mapping that describes it."""
+
+import tomllib
+
+import pytest
+
+from swarmwire.world.scenario.as_mapping import mapping_of, same_content
+from swarmwire.world.scenario.scenario_file import load_scenario, scenario_from
+from tests.support.deploy.commands import LOSSY, ROOT
+
+SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_what_was_read_comes_back_as_it_was_written(path):
+    assert mapping_of(load_scenario(path)) == tomllib.loads(path.read_text())
+
+
+def test_overrides_are_part_of_it():
+    mapping = mapping_of(load_scenario(LOSSY, ["radio.loss=0.25", "run.on_runner_loss=dead"]))
+    assert mapping["radio"]["loss"] == 0.25
+    assert mapping["run"] == {"on_runner_loss": "dead"}
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_a_scenario_that_was_changed_in_python_says_what_it_is_now(path):
+    changed = load_scenario(path).model_copy(update={"duration_s": 1.5})
+    mapping = mapping_of(changed)
+    assert mapping["duration_s"] == 1.5
+    assert same_content(scenario_from(mapping, str(path)), changed)  # beside the pictures that it names
+
+
+def test_the_mapping_is_the_callers_own():
+    scenario = load_scenario(LOSSY)
+    mapping_of(scenario)["robots"]["flock"]["count"] = 1
+    assert mapping_of(scenario)["robots"]["flock"]["count"] == 20

@@ -1,0 +1,131 @@
+"""What holds of every sense there is, with all that can go wrong with it: an arena alone, seldom looked at, failed."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.sheets import SHEETS, RangedSheet
+from swarmwire.world.scenario.scenario_file import scenario_from
+from swarmwire.world.sensors import SENSORS
+from swarmwire.world.world import World
+from tests.support.world.samples import commanded
+
+STAGES = "rate_hz = 4.0\ndelay_s = 0.15\ndrop_out = 0.2\n"
+OUTLIER = "outlier = 0.1\nstep = 0.01\n"
+RING = "angles_deg = [0, 90, 200]\n"
+SEEING = RING + 'range_m = 0.5\nresponse = { kind = "rational", a = 0.01, b = 0.001, reach_m = 0.5 }\nnoise = 0.1\n'
+KEYS = {
+    "proximity": SEEING,
+    "infrared": SEEING,
+    "light": RING + "noise = 0.1\n",
+    "compass": "noise_rad = 0.1\n",
+    "positioning": "noise_m = 0.1\n",
+    "odometry": "slip = 0.1\nwheel_error_std = 0.1\nstep_m = 0.001\n",
+    "bumper": "",
+    "imu": "noise_mps2 = 0.1\nbias_std_mps2 = 0.1\ndrift_mps2 = 0.1\nnoise_radps = 0.1\ndrift_radps = 0.1\n",
+    "battery": "capacity_wh = 0.01\nidle_w = 1.0\ndrive_w_per_mps = 10.0\nnoise = 0.1\nnoise_v = 0.1\n",
+    "scan": "rays = 12\nrange_m = 1.0\n",
+    "ground": "points_m = [[0.0, 0.01], [0.01, 0.0]]\nnoise = 0.1\n",
+    "camera": "height_m = 0.2\naperture_deg = 70.0\nmost_blobs = 4\n",
+}
+OWN = f'[senses.own]\nkind = "{Path(__file__).parents[3] / "support" / "world" / "own_code.py"}:Alone"\n{STAGES}'
+NAMES = (*KEYS, "own")
+
+
+def body() -> str:
+    """A sheet with all senses."""
+    tables = [
+        f"[senses.{name}]\n{keys}{STAGES}{OUTLIER if issubclass(SHEETS[name], RangedSheet) else ''}"
+        for name, keys in KEYS.items()
+    ]
+    return "\n".join(['like = "epuck"', *tables, OWN])
+
+
+def world(folder: Path, seeds: tuple[int, ...] = (1,), every: int = 1) -> World:
+    """Nine robots with lit LEDs, crowded between lights."""
+    (folder / "all.toml").write_text(body())
+    arena = {"size_m": [0.5, 0.5], "lights": [{"intensity": 2.0, "place": "random", "count": 2}]}
+    group = {"body": "all.toml", "count": 9, "agent": "x:X", "act_every_ticks": every}
+    tables = {"arena": arena, "robots": {"a": group}}
+    scenario = scenario_from({"format": 1, "name": "t", "seed": 1, "duration_s": 1.0, **tables}, str(folder / "s.toml"))
+    of = World(scenario, seeds, {"a": NAMES})
+    of.scene.leds[:] = 0x00FF00
+    return of
+
+
+def moved(of: World, tick: int) -> None:
+    """All drive some way, which is the same in each arena."""
+    robot = np.arange(of.static.arenas * of.static.robots) % of.static.robots
+    of.move(commanded(of, 0.1 * np.sin(tick + robot), np.cos(robot)))
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    """What all senses read in each of 13 ticks, two arenas side by side."""
+    of, read = world(tmp_path_factory.mktemp("told"), (1, 2)), list[dict[str, Any]]()
+    for tick in range(13):
+        read.append(of.sense(tick)["a"].fields)
+        moved(of, tick)
+    return read
+
+
+def test_every_sense_is_here() -> None:
+    assert KEYS.keys() == SHEETS.keys() == SENSORS.keys()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_some_readings_are_there_and_some_are_lost(told: list[dict[str, Any]], name: str) -> None:
+    fields = [field for field in told[0] if field.startswith(f"{name}.")]
+    assert fields
+    for field in fields:
+        first, later = told[0][field], np.stack([tick[field] for tick in told[3:]])
+        assert first.flags.c_contiguous
+        assert len(np.unique(first)) == 1  # nothing was shown so far: all are blank
+        assert len(np.unique(later)) > 1
+
+
+@pytest.mark.parametrize("over", [0, 1])
+def test_an_arena_senses_the_same_once_another_has_left(tmp_path: Path, told: list[dict[str, Any]], over: int) -> None:
+    of, kept = world(tmp_path, (1, 2)), slice(0, 9) if over else slice(9, 18)
+    for tick, expected in enumerate(told):
+        if tick == 5:
+            of.leave(np.arange(2) == over)
+        senses = of.sense(tick)["a"]
+        assert senses.rows.tolist() == list(range(18) if tick < 5 else range(18)[kept])
+        for field, values in senses.fields.items():
+            np.testing.assert_array_equal(values[-9:] if over == 0 else values[:9], expected[field][kept])
+        moved(of, tick)
+
+
+def test_an_arena_alone_senses_what_it_senses_among_others(tmp_path: Path, told: list[dict[str, Any]]) -> None:
+    alone = world(tmp_path, (2,))
+    for tick in range(13):
+        for field, values in alone.sense(tick)["a"].fields.items():
+            assert np.array_equal(values, told[tick][field][9:], equal_nan=True), field
+        moved(alone, tick)
+
+
+def test_how_often_a_group_looks_changes_nothing(tmp_path: Path, told: list[dict[str, Any]]) -> None:
+    seldom = world(tmp_path, (1, 2), every=4)
+    for tick in range(13):
+        read = seldom.sense(tick)
+        assert bool(read) == (tick % 4 == 0)
+        for field, values in (read["a"].fields if read else {}).items():
+            assert np.array_equal(values, told[tick][field], equal_nan=True), field
+        moved(seldom, tick)
+
+
+def test_a_sensor_that_failed_reads_blank_and_all_others_go_on(tmp_path: Path, told: list[dict[str, Any]]) -> None:
+    of = world(tmp_path, (1, 2))
+    for tick in range(13):
+        for sensor in of.sensors["a"].values():
+            sensor.failed = np.arange(18).reshape(2, 9) % 3 == 0 if tick == 12 else None
+        read = of.sense(tick)["a"].fields
+        if tick == 12:
+            for field, values in read.items():
+                blank = told[0][field][0]
+                assert np.array_equal(values[::3], np.broadcast_to(blank, values[::3].shape), equal_nan=True), field
+                assert np.array_equal(values[1::3], told[12][field][1::3], equal_nan=True), field
+        moved(of, tick)

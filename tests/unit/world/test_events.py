@@ -1,0 +1,240 @@
+"""What events do to the world, tick by tick, with a crew that is made for the purpose."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.comms.air.air import Air
+from swarmwire.comms.events.selection import Selection
+from swarmwire.comms.events.swarm import Swarm
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.world.crews import split_robots as assignments
+from swarmwire.world.loop import Loop
+from swarmwire.world.world import World
+from tests.support.world.samples import commanded, posed
+
+
+class Watch:
+    """Keeps every truth."""
+
+    def __init__(self) -> None:
+        self.seen: list[Truth] = []
+
+    def begin(self, static: Static) -> None: ...
+
+    def see(self, truth: Truth) -> None:
+        self.seen.append(truth)
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        return {}
+
+
+class Ahead:
+    """A crew that drives everyone who is there, and keeps who that was."""
+
+    def __init__(self, linear_mps: float = 0.1) -> None:
+        self.linear_mps = linear_mps
+        self.rows: list[list[int]] = []
+
+    def start(self) -> None: ...
+
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> Actions:
+        rows = np.concatenate([group.rows for group in senses.values()])
+        self.rows.append(rows.tolist())
+        n = len(rows)
+        return Actions(rows, np.ones(n, np.bool_), np.full(n, self.linear_mps), *np.zeros((2, n)))
+
+    def counts(self) -> dict[str, int]:
+        return {}
+
+    def close(self) -> None: ...
+
+
+def ran(poses: list[list[float]], events: list[dict[str, Any]], ticks: int = 30, crew: Any = None) -> list[Truth]:
+    watch = Watch()
+    scenario = posed(poses, events=events, radio={"range_m": 9.0})
+    world = World(scenario, [1], {})
+    keys, size_m = world.keys, scenario.arena.size_m
+    assert scenario.radio
+    air = Air(scenario.radio, keys, len(poses), size_m, obstacle_arrays(world.static.obstacles), 10)
+    Loop(world, air, crew or Ahead(), [watch], scenario.events).run(ticks)
+    return watch.seen
+
+
+def at(do: str, at_s: float, *names: str, **keys: Any) -> dict[str, Any]:
+    return {"do": do, "at_s": at_s, "robots": {"names": list(names)}, **keys}
+
+
+TWO = [[-1.0, 0.0, 0.0], [-1.0, 1.0, 0.0]]
+
+
+def test_a_killed_robot_brakes_and_leaves_the_frames_until_it_is_revived():
+    crew = Ahead()
+    seen = ran(TWO, [at("kill", 0.45, "a-0", for_s=1.0)], crew=crew)
+    assert [truth.alive.tolist() for truth in seen] == [[not 5 <= tick < 15, True] for tick in range(30)]
+    assert crew.rows == [[1] if 5 <= tick < 15 else [0, 1] for tick in range(30)]
+    assert (seen[5].command[0] == 0).all()
+    assert np.array_equal(seen[7].pose[0], seen[15].pose[0])
+    assert seen[29].pose[0, 0] > seen[15].pose[0, 0] + 0.1
+    x = [truth.pose[1, 0] for truth in seen]
+    assert x == [truth.pose[1, 0] for truth in ran(TWO, [])], "the other robot goes on as if nothing were"
+
+
+def test_an_event_takes_effect_at_the_first_tick_that_starts_at_its_time_or_later():
+    for at_s, tick in ((0.0, 0), (0.3, 3), (0.31, 4)):
+        seen = ran(TWO, [at("kill", at_s, "a-1")], ticks=6)
+        [only] = [(truth.tick, happened) for truth in seen for happened in truth.events]
+        assert only[0] == tick
+        assert (only[1].serial, only[1].at_s, only[1].do, only[1].ended) == (0, at_s, "kill", False)
+        assert only[1].changed.tolist() == [False, True]
+
+
+def test_a_dead_robot_is_an_obstacle_that_only_resists():
+    """The one that drives into it gets less far than alone, and the dead one is never faster than what pushes it."""
+    seen = ran([[-1.0, 0.0, 0.0], [-0.8, 0.02, 0.0]], [at("kill", 0.0, "a-1")], ticks=60)
+    alone = ran([[-1.0, 0.0, 0.0], [-0.8, 1.0, 0.0]], [], ticks=60)
+    assert sum(truth.contact_onsets[0, 0] for truth in seen) >= 1
+    assert seen[-1].pose[0, 0] < alone[-1].pose[0, 0]
+    assert max(np.hypot(*truth.velocity[1, :2]) for truth in seen) < 0.11
+
+
+def test_kills_that_overlap_do_not_undo_one_another_and_revive_lifts_all():
+    twice = [at("kill", 0.2, "a-0", for_s=0.3), at("kill", 0.3, "a-0", for_s=1.0)]
+    assert [not truth.alive[0] for truth in ran(TWO, twice, 20)] == [2 <= tick < 13 for tick in range(20)]
+    lifted = [*twice, at("revive", 0.8, "a-0")]
+    seen = ran(TWO, lifted, 20)
+    assert [not truth.alive[0] for truth in seen] == [2 <= tick < 8 for tick in range(20)]
+    told = [(truth.tick, e.do, e.ended, e.changed.tolist()) for truth in seen for e in truth.events]
+    assert told == [
+        (2, "kill", False, [True, False]),
+        (3, "kill", False, [False, False]),
+        (5, "kill", True, [False, False]),
+        (8, "revive", False, [True, False]),
+        (13, "kill", True, [False, False]),
+    ]
+
+
+def test_at_equal_times_what_ends_comes_first_and_an_event_may_be_over_within_a_tick():
+    seen = ran(TWO, [at("kill", 0.2, "a-0", for_s=0.3), at("kill", 0.5, "a-0"), at("kill", 0.31, "a-1", for_s=0.02)], 9)
+    assert [e.changed.tolist() for e in seen[5].events] == [[True, False], [True, False]]
+    assert [not truth.alive[0] for truth in seen] == [tick >= 2 for tick in range(9)]
+    assert [(e.ended, e.changed.tolist()) for e in seen[4].events] == [(False, [False, True]), (True, [False, True])]
+    assert all(truth.alive[1] for truth in seen)
+
+
+def test_commands_for_the_dead_do_nothing():
+    world = World(posed(TWO), [1], {})
+    world.live(np.array([False, True]))
+    world.move(commanded(world, 0.1, 0.0))
+    assert world.command.tolist() == [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]
+
+
+def test_all_may_be_dead_and_the_run_goes_on():
+    scenario = posed(TWO)
+    world = World(scenario, [1], {})
+    whole = assignments.whole(scenario, world.static, {"a": "swarmwire.agent.behaviours:Diffusion"})
+    world.live(np.zeros(2, np.bool_))
+    crew = LocalCrew(whole)
+    crew.start()
+    assert len(crew.act(0, world.sense(0), Heard.none(), NO_OUTCOMES).rows) == 0
+
+
+def test_the_radio_graph_leaves_out_the_dead_radios_that_are_off_and_pairs_that_are_apart():
+    four = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]]
+    events = [
+        at("kill", 0.1, "a-0", for_s=0.1),
+        at("blackout", 0.2, "a-1", for_s=0.1),
+        {"do": "partition", "at_s": 0.3, "between": [["a-0", "a-1"], ["a-2"]], "for_s": 0.1},
+    ]
+    edges = [set(map(tuple, truth.edges.tolist())) for truth in ran(four, events, 5) if truth.edges is not None]
+    everyone = {(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)}
+    assert edges == [
+        everyone,
+        {(1, 2), (1, 3), (2, 3)},
+        {(0, 2), (0, 3), (2, 3)},
+        everyone - {(0, 2), (1, 2)},
+        everyone,
+    ]
+
+
+def test_a_ramp_changes_the_radio_tick_by_tick_and_only_while_it_moves():
+    """The two are 1 m apart; the reach falls from 9 m at 0.2 s to 0.5 m at 1.2 s, and is 9 m again at 1.5 s."""
+    ramp = {"do": "ramp", "at_s": 0.2, "what": "radio.range_m", "to": 0.5, "over_s": 1.0, "for_s": 1.3}
+    seen = ran(TWO, [ramp], 20)
+    joined = [truth.edges is not None and len(truth.edges) == 1 for truth in seen]
+    assert joined == [not 12 <= tick < 15 for tick in range(20)]
+    told = [(truth.tick, e.do, e.ended, e.changed.tolist()) for truth in seen for e in truth.events]
+    assert told == [(2, "ramp", False, [True, True]), (15, "ramp", True, [True, True])]
+
+
+def test_the_air_is_tuned_only_when_a_number_changes(monkeypatch: pytest.MonkeyPatch):
+    tuned: list[float] = []
+    monkeypatch.setattr(Air, "tune", lambda _, radio: tuned.append(radio.loss))
+    ran(TWO, [{"do": "ramp", "at_s": 0.2, "what": "radio.loss", "to": 0.4, "over_s": 0.4, "for_s": 1.0}], 20)
+    assert tuned == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.0])
+
+
+def test_a_partition_by_place_takes_robots_where_they_are_when_it_begins():
+    """Robot 0 drives across the middle, about which the second partition then has it on the other side."""
+    halves = {"do": "partition", "halves": "x"}
+    events = [{**halves, "at_s": 0.1, "for_s": 1.0}, {**halves, "at_s": 4.0}]
+    seen = ran([[-0.05, 0.0, 0.0], [-0.5, 1.0, 0.0]], events, 42)
+    joined = [truth.edges is not None and len(truth.edges) == 1 for truth in seen]
+    assert joined == [tick < 40 for tick in range(42)]
+
+
+def swarm(*keys: int, robots: int = 10) -> Swarm:
+    pose = np.zeros((robots * len(keys), 3))
+    return Swarm({"a": range(4), "b": range(4, robots)}, robots, np.array(keys, np.uint64), pose)
+
+
+def chosen(of: Swarm, serial: int = 0, eligible: Any = None, **keys: Any) -> list[list[int]]:
+    mask = np.ones(of.rows, np.bool_) if eligible is None else eligible
+    rows = Selection(**keys).rows(serial, of, mask).reshape(-1, of.robots)
+    return [np.flatnonzero(own).tolist() for own in rows]
+
+
+@pytest.mark.parametrize(
+    ("share", "robots", "number"),
+    [(0.05, 10, 1), (0.04, 10, 1), (0.15, 10, 2), (0.25, 10, 3), (0.24, 10, 2), (0.145, 100, 15), (1.0, 10, 10)],
+)
+def test_a_share_is_rounded_half_up_and_at_least_one(share: float, robots: int, number: int):
+    assert len(chosen(swarm(7, robots=robots), share=share)[0]) == number
+
+
+def test_a_share_is_of_those_eligible_of_the_group_and_none_of_nobody():
+    eligible = np.array([False, True, True, False, *[True] * 6])
+    assert chosen(swarm(7), eligible=eligible, group="a", share=1.0) == [[1, 2]]
+    assert chosen(swarm(7), eligible=eligible, group="a", count=5) == [[1, 2]]
+    assert chosen(swarm(7), eligible=np.zeros(10, np.bool_), share=0.5) == [[]]
+    assert chosen(swarm(7), eligible=eligible, names=("a-0", "b-1")) == [[0, 5]]
+    assert chosen(swarm(7), eligible=eligible, group="a") == [[0, 1, 2, 3]]
+
+
+def test_the_draw_belongs_to_arena_and_event():
+    """Other seeds and other events draw other robots; an arena draws the same alone and beside others."""
+    many = swarm(*range(8), robots=40)
+    drawn = chosen(many, count=10)
+    assert [chosen(swarm(key, robots=40), count=10)[0] for key in range(8)] == drawn
+    assert len({tuple(own) for own in drawn}) == 8
+    assert chosen(many, serial=1, count=10)[0] != drawn[0]
+
+
+def test_failures_at_a_rate_are_told_when_they_happen_and_not_before_with_their_part():
+    event = at("fail", 0.4, "a-0", "a-1", part="motors", per_hour=3000.0, for_s=0.5)
+    seen = ran(TWO, [event])
+    told = [(truth, happened) for truth in seen for happened in truth.events]
+    assert {happened.words for _, happened in told} == {"fail motors", "fail motors ended"}
+    assert all(happened.singly and happened.changed.any() for _, happened in told)
+    assert all(happened.at_s == truth.time_ns / 1e9 >= 0.4 for truth, happened in told)
+
+
+def test_a_failure_of_all_at_once_is_told_at_the_scenarios_time():
+    told = [happened for truth in ran(TWO, [at("fail", 0.45, "a-1", part="compass")]) for happened in truth.events]
+    assert [(happened.at_s, happened.words, happened.singly) for happened in told] == [(0.45, "fail compass", False)]
