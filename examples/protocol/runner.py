@@ -23,7 +23,7 @@ from typing import Any
 import msgpack
 import zenoh
 
-VERSION, BROADCAST = 2, -1
+VERSION, BROADCAST = 1, -1
 LETTERS = {"<f8": "d", "<i8": "q", "<u8": "Q", "|b1": "?", "|u1": "B"}  # of Python's struct
 HEADING = "Heading(heading_rad:<f4)"  # the message that the robots send, as its tag is made from it
 TAG = 1 + int.from_bytes(hashlib.blake2b(HEADING.encode(), digest_size=2).digest(), "little") % 0xFFFF

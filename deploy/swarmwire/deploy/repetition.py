@@ -153,8 +153,8 @@ def _read_summary(folder: Path) -> _Summary | None:
     found = RunFolder(folder).summary
     if found is None:
         return None
-    inputs: dict[str, Any] = found.get("inputs") or {}
-    given: dict[str, Any] = found.get("interventions") or {}
+    inputs: dict[str, Any] = found["inputs"] or {}
+    given: dict[str, Any] = found["interventions"] or {}
     hashes = tuple(found["trajectory_sha256"])
     return _Summary(found["ended"], found["ticks"], hashes, inputs.get("sha256"), given.get("sha256"))
 

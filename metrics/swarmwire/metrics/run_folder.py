@@ -1,21 +1,23 @@
 """A run folder, read back: of runs that ended, that were killed, and that still go on."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any, TypeGuard, cast
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.comms.parsing import from_json
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.damage import damage
 from swarmwire.metrics.record.distance_totals import distance_totals_schema
 from swarmwire.metrics.record.event_recorder import event_schema
-from swarmwire.metrics.record.formats import SUMMARY_FORMAT, TABLES_FORMAT, refuse_other_format
+from swarmwire.metrics.record.formats import RUN_FORMAT, SUMMARY_FORMAT, TABLES_FORMAT
 from swarmwire.metrics.record.link_totals import link_totals_schema
-from swarmwire.metrics.record.metric_facts import MetricFacts, read_facts
-from swarmwire.metrics.record.names import STATIC, SUMMARY
+from swarmwire.metrics.record.metric_facts import MetricFacts, facts_in
+from swarmwire.metrics.record.names import RUN_JSON, STATIC, SUMMARY
 from swarmwire.metrics.record.packet_columns import packet_schema
 from swarmwire.metrics.record.part_files import parts_of, scan_files, table_file
 from swarmwire.metrics.record.robot_totals import robot_totals_schema
@@ -32,6 +34,43 @@ SCHEMAS = {
     "radio_robots": robot_totals_schema,
     "radio_distances": distance_totals_schema,
     "radio_links": link_totals_schema,
+}
+NUMBER, MAYBE_NUMBER = (int, float), (int, float, NoneType)
+# What is read from a summary, and from each item of its `by_arena`.
+ARENA_KINDS: Mapping[str, Any] = {
+    "ended": str,
+    "sim_time_s": NUMBER,
+    "stop_time_s": MAYBE_NUMBER,
+    "stopped_by": (str, NoneType),
+    "ticks": int,
+}
+SUMMARY_KINDS: Mapping[str, Any] = {
+    "arenas": int,
+    "by_arena": list,
+    "counts": dict,
+    "cpu": str,
+    "ended": str,
+    "engine": str,
+    "error": (str, NoneType),
+    "events": list,
+    "files": list,
+    "global_senses": dict,
+    "inputs": (dict, NoneType),
+    "interventions": (dict, NoneType),
+    "lost_runners": list,
+    "metrics": (dict, list),
+    "mode": str,
+    "radio": (dict, list, NoneType),
+    "realtime_factor": NUMBER,
+    "record": dict,
+    "runner_changes": list,
+    "runners": int,
+    "sim_time_s": NUMBER,
+    "stop": list,
+    "ticks": int,
+    "trajectory_sha256": list,
+    "versions": dict,
+    "wall_time_s": NUMBER,
 }
 CHANGES_UNDERFOOT = 3  # times that the files of a running run may be joined while they are read
 
@@ -59,7 +98,7 @@ class RunFolder:
             return None
         except (OSError, ValueError) as error:
             raise BadInput(str(path), "", f"expected the summary of a run: {error}") from error
-        refuse_other_format(found, SUMMARY_FORMAT, path)
+        check_format(found, SUMMARY_FORMAT, str(path))
         if not _is_summary(found):
             raise BadInput(str(path), "", "expected the summary of a run")
         return found
@@ -74,9 +113,23 @@ class RunFolder:
         return self._static
 
     @property
+    def started(self) -> dict[str, Any]:
+        """`run.json`: from what the run was made; empty if it is missing or damaged."""
+        path = self.path / RUN_JSON
+        try:
+            found: object = from_json(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):  # those who need the file say what is wrong with it
+            return {}
+        check_format(found, RUN_FORMAT, str(path))
+        return cast("dict[str, Any]", found) if isinstance(found, dict) else {}
+
+    @property
     def measured(self) -> dict[str, MetricFacts]:
-        """By name: what each metric that the run measured says of itself; empty where older runs did not keep it."""
-        return read_facts(self.path)
+        """By name: what each metric that the run measured says of itself; empty if `run.json` is missing or damaged."""
+        try:
+            return {of.name: of for of in facts_in(self.started)}
+        except (KeyError, TypeError, ValueError):
+            return {}
 
     def ticks(self, arena: int | None = None) -> "pl.DataFrame":
         """A row per tick and arena, of one arena or of all; lists with an item per robot in its order.
@@ -126,7 +179,7 @@ class RunFolder:
     def events(self, arena: int | None = None) -> "pl.DataFrame":
         """A row per event and arena: at_s, tick, time_s, do, part, ended, arena, robots (names of those it changed).
 
-        `part` is what fails, else empty; records of old lack it. What happens to each robot at a time of its own
+        `part` is what fails, else empty. What happens to each robot at a time of its own
         (`singly` in the summary) has no row of an arena in which nobody changed.
         """
         return self._read("events", arena)
@@ -177,7 +230,7 @@ class RunFolder:
         """Tables are of the format of the static part; should that be missing or damaged, they can be read still."""
         path = self.path / STATIC
         with suppress(OSError, ValueError):
-            refuse_other_format(from_json(path.read_text(encoding="utf-8")), TABLES_FORMAT, path)
+            check_format(from_json(path.read_text(encoding="utf-8")), TABLES_FORMAT, str(path))
 
     def _checked(self, arena: int) -> int:
         if not 0 <= arena < self.static.arenas:
@@ -218,15 +271,17 @@ def _repeated(rows: int, times: int) -> "pl.Series":
 
 def _is_summary(found: object) -> TypeGuard[dict[str, Any]]:
     """Whether all is there, of the right kind, that is read from a summary."""
+    if not _holds(found, SUMMARY_KINDS):
+        return False
+    hashes, ends = found["trajectory_sha256"], found["by_arena"]
+    if found["ticks"] < 0 or not len(hashes) == len(ends) == found["arenas"]:
+        return False
+    return all(isinstance(item, str) for item in hashes) and all(_holds(end, ARENA_KINDS) for end in ends)
+
+
+def _holds(found: object, kinds: Mapping[str, Any]) -> TypeGuard[dict[str, Any]]:
+    """Whether it is an object that has all these keys, each of its kind."""
     if not isinstance(found, dict):
         return False
-    summary = cast("dict[str, Any]", found)
-    kinds = {"ticks": int, "sim_time_s": (int, float), "ended": str, "events": list, "metrics": (dict, list)}
-    kinds |= {"record": dict, "arenas": int, "trajectory_sha256": list, "format": int}
-    if not all(isinstance(summary.get(key), kind) for key, kind in kinds.items()):
-        return False
-    arenas, hashes, ends = (summary.get(key, []) for key in ("arenas", "trajectory_sha256", "by_arena"))
-    if summary["ticks"] < 0 or len(hashes) != arenas or not all(isinstance(item, str) for item in hashes):
-        return False
-    # Older ones do not tell how each arena ended.
-    return not ends or (len(ends) == arenas and all(isinstance(end.get("ticks"), int) for end in ends))
+    values = cast("dict[str, object]", found)
+    return all(key in values and isinstance(values[key], kind) for key, kind in kinds.items())

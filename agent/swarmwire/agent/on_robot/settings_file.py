@@ -26,7 +26,8 @@ def read_settings(file: Path | None, flags: Flags) -> RobotSettings:
     BadInput names the file and the key of the first that is wrong.
     """
     where = str(file) if file else NO_FILE
-    table = read_toml(file) if file else {}
+    table = read_toml(file) if file else {"format": FORMAT}
+    check_format(table, FORMAT, where)
     beside = (file.parent if file else Path()).resolve()
     for key, (_, value) in flags.items():
         _put(table, key, value, where)
@@ -41,7 +42,6 @@ def _put(table: dict[str, Any], key: str, value: Any, where: str) -> None:
 
 
 def _settings(table: dict[str, Any], where: str, beside: Path) -> RobotSettings:
-    check_format(table.get("format", FORMAT), FORMAT, where)
     table = dict(table)
     for key in ("params", "driver"):
         if key in table:

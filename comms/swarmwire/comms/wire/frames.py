@@ -7,7 +7,7 @@ What else is in a frame is counted while it is unpacked.
 # What arrives is of unknown types until it is checked, item by item; a `cast` is a call, here in the busiest of loops.
 # pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false, reportUnknownMemberType=false
 
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,7 +18,7 @@ from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire.unpacking import unpacked
 
-VERSION = 2  # of frames between world and runners, and of what runners ask before
+VERSION = 1  # of frames between world and runners, and of what runners ask before
 KEYS = {"v", "kind", "tick", "arrays", "values"}
 MOST_BYTES = 64 * 1024 * 1024  # of a frame
 DTYPES = {code: np.dtype(code) for code in ("<f8", "<i8", "<u8", "|b1", "|u1")}
@@ -41,7 +41,7 @@ def encode(kind: str, tick: int, arrays: Mapping[str, AnyArray], values: Mapping
     return msgpack.packb({"v": VERSION, "kind": kind, "tick": tick, "arrays": packed, "values": dict(values or {})})
 
 
-def decode(data: bytes, most_bytes: int = MOST_BYTES, versions: Container[int] = (VERSION,)) -> Frame:
+def decode(data: bytes, most_bytes: int = MOST_BYTES) -> Frame:
     """The frame of these bytes; BadFrame ("oversized" or "malformed") if they are none. Arrays are read-only views."""
     body = unpacked(data, most_bytes)
     # Written out by hand, not with `match` or `cast`, here and below: a world decodes some arrays from each of hundreds
@@ -49,7 +49,7 @@ def decode(data: bytes, most_bytes: int = MOST_BYTES, versions: Container[int] =
     if type(body) is not dict or body.keys() != KEYS:
         raise BadFrame("malformed", f"expected a map of {', '.join(sorted(KEYS))}")
     version, kind, tick, arrays, values = body["v"], body["kind"], body["tick"], body["arrays"], body["values"]
-    if type(version) is not int or version not in versions:
+    if type(version) is not int or version != VERSION:
         raise BadFrame("malformed", f"version {version!r}, expected {VERSION}")
     if type(kind) is not str or type(tick) is not int or type(arrays) is not dict or type(values) is not dict:
         raise BadFrame("malformed", "expected kind to be a text, tick a number, arrays and values maps")

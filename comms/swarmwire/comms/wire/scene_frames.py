@@ -14,7 +14,7 @@ from swarmwire.comms.truth import Obstacle, Static
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame
 
-OBSERVED_VERSION = 2  # of the frames for observers
+OBSERVED_VERSION = 1  # of the frames for observers
 _MAY_BE_INFINITE = ".height_m"  # of an obstacle
 
 

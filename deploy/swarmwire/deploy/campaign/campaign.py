@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.campaign.columns import Columns
 from swarmwire.deploy.campaign.design import Point
@@ -15,11 +16,9 @@ from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.campaign.about import read_about
 from swarmwire.metrics.campaign.formats import ABOUT, CAMPAIGN_FORMAT
 from swarmwire.metrics.campaign.outcome import Outcome
-from swarmwire.metrics.record.formats import refuse_other_format
 from swarmwire.metrics.whole_file import write_whole
 
 SCENARIO_FOLDER = "scenario"
-UNTOLD_ROBOTS = 100  # in an arena, of campaigns and tunings that do not tell: for packs of middling size
 
 
 @dataclass(frozen=True)
@@ -83,8 +82,7 @@ def read_campaign(folder: Path) -> Campaign:
     except ValueError:  # no JSON, or no UTF-8
         found = None
     try:
-        refuse_other_format(found, CAMPAIGN_FORMAT, path)
-        del found["format"]  # KeyError: every campaign names one
+        check_format(found, CAMPAIGN_FORMAT, str(path))
         campaign = _campaign(found)
     except (KeyError, TypeError, ValueError):
         raise BadInput(str(path), "", "expected what swarmwire writes at the start of a campaign") from None
@@ -119,5 +117,4 @@ def _campaign(found: dict[str, Any]) -> Campaign:
         "outcomes": tuple(Outcome(**known_fields(Outcome, outcome)) for outcome in found["outcomes"]),
         "point_overrides": tuple(tuple(texts) for texts in found["point_overrides"]),
     }
-    untold: dict[str, Any] = {"robots": UNTOLD_ROBOTS}
-    return Campaign(**{**untold, **known_fields(Campaign, found), **tuples, **objects})
+    return Campaign(**{**known_fields(Campaign, found), **tuples, **objects})

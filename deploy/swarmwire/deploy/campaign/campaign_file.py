@@ -41,16 +41,14 @@ def campaign_table(path: Path) -> dict[str, Any] | None:
     table = read_toml(path)
     if "scenario" not in table and any(key in table for key in OF_SCENARIOS):
         return None
-    if "format" in table:  # first of all: another version may have other keys
-        check_format(table["format"], FORMAT, where)
+    check_format(table, FORMAT, where)
     for key, value in table.items():
         if key not in TYPES:
             raise BadInput(where, key, f"unknown key; expected {one_of(TYPES, key)}")
         if type(value) not in TYPES[key]:
             raise BadInput(where, key, f"expected {' or '.join(WORDS[of] for of in TYPES[key])}, got {value!r}")
-    for key in ("format", "scenario"):
-        if key not in table:
-            raise BadInput(where, key, f"is missing: expected {WORDS[TYPES[key][0]]}")
+    if "scenario" not in table:
+        raise BadInput(where, "scenario", f"is missing: expected {WORDS[TYPES['scenario'][0]]}")
     return table
 
 

@@ -57,7 +57,7 @@ class Register:
         path = folder / REGISTER
         try:
             content: Any = from_json(path.read_text(encoding="utf-8"))
-            check_format(content["format"], FORMAT, str(path))
+            check_format(content, FORMAT, str(path))
             register = cls(Issued(**content["authority"]), tuple(Issued(**of) for of in content["certificates"]))
             for of in (register.authority, *register.certificates):
                 _ = date_of(of.valid_from), date_of(of.valid_until), int(of.serial, 16)

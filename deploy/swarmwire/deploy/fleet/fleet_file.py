@@ -21,10 +21,9 @@ def read_fleet(file: Path) -> Fleet:
     """The fleet of a file; BadInput names the file and the first key that is wrong."""
     where = str(file)
     table = read_toml(file)
-    if "format" in table:  # first of all: another version may have other keys
-        check_format(table["format"], FORMAT, where)
+    check_format(table, FORMAT, where)
     checked_table(table, OF_FLEET, where, "")
-    for key in ("format", "swarm", "robots"):
+    for key in ("swarm", "robots"):
         if key not in table:
             raise BadInput(where, key, "is missing")
     fault = fault_of_name(table["swarm"])

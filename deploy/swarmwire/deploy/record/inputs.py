@@ -10,7 +10,6 @@ ticks; a frame that is cut off at the end of the file is passed over.
 
 import hashlib
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -31,8 +30,6 @@ from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions, sen
 from swarmwire.metrics.record.names import INPUTS
 
 LENGTH_BYTES = 4
-VERSIONS = (1, frames.VERSION)  # of frames in records: those of 1 hold actions as those of today do
-LATER = range(frames.VERSION + 1, 2**31)
 WITHIN = "within/"  # name of the array of what came within the tick, and of its packets' arrays before their names
 AT_ONCE = -1  # in place of a tick: packets that waited for nobody's turn
 
@@ -173,17 +170,9 @@ class RecordedInputs:
     def _frame(self, place: int) -> frames.Frame:
         data = self._data[self._spans[place]]
         try:
-            return frames.decode(data, len(data), VERSIONS)
+            return frames.decode(data, len(data))
         except BadFrame as fault:
-            self._refuse_newer(data)
             raise self._damaged(place, fault) from None
-
-    def _refuse_newer(self, data: bytes) -> None:
-        """BadInput if the frame is of a version that is not known here yet."""
-        with suppress(BadFrame):
-            frames.decode(data, len(data), LATER)
-            newer = f"expected {frames.VERSION}, got a later one: made by a newer swarmwire; upgrade to read it"
-            raise BadInput(str(self._path), "v", newer)
 
     def _damaged(self, place: int, fault: BadFrame) -> BadInput:
         return BadInput(str(self._path), f"frame {place}", f"expected the actions of a tick: {fault}")

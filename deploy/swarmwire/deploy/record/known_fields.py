@@ -1,4 +1,4 @@
-"""Fields of an object in a file, as the dataclass of today has them."""
+"""Fields of an object in a file, as its dataclass has them."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -6,6 +6,5 @@ from typing import Any
 
 
 def known_fields(kind: type[Any], found: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields that this dataclass has: a later swarmwire may have added others, which keeps the format."""
-    names = {field.name for field in fields(kind)}
-    return {name: value for name, value in found.items() if name in names}
+    """All fields of this dataclass; KeyError if one is missing. Others are passed over: added ones keep the format."""
+    return {field.name: found[field.name] for field in fields(kind)}

@@ -5,19 +5,20 @@ A run that is killed leaves no summary; what stands here is enough to run it aga
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.record import machine
 from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.modules import changed_modules, module_digests
 from swarmwire.deploy.record.scenario_copy import CopiedFile, changed_files, copy_scenario
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.record.formats import RUN_FORMAT, refuse_other_format
-from swarmwire.metrics.record.metric_facts import MetricFacts, facts_of, read_facts
+from swarmwire.metrics.record.formats import RUN_FORMAT
+from swarmwire.metrics.record.metric_facts import MetricFacts, facts_in, facts_of
 from swarmwire.metrics.record.names import RUN_JSON
 from swarmwire.metrics.whole_file import write_whole
 from swarmwire.world.scenario.scenario import Scenario
@@ -35,9 +36,9 @@ class Origin:
     modules: Mapping[str, str]  # sha256 of the installed code, by module
     cpu: str
     versions: Mapping[str, str]
-    gateways: Mapping[str, str] = field(default_factory=dict[str, str])  # by group: of which kind it has one
-    metrics: tuple[MetricFacts, ...] = ()  # that were measured; none: by a swarmwire that did not keep them
-    quantum_s: float | None = None  # wall time after which real time woke within ticks; None: packets wait for ticks
+    gateways: Mapping[str, str]  # by group: of which kind it has one
+    metrics: tuple[MetricFacts, ...]  # that were measured
+    quantum_s: float | None  # wall time after which real time woke within ticks; None: packets wait for ticks
 
     def changes(self, folder: Path, code: Sequence[str]) -> list[str]:
         """What is not as it was when the run of this folder began, a line each; `code`: specs of users' classes."""
@@ -98,9 +99,8 @@ def read_origin(folder: Path) -> Origin:
     except ValueError:  # no JSON, or no UTF-8
         found = None
     try:
-        refuse_other_format(found, RUN_FORMAT, path)
-        del found["format"]  # KeyError: every start of a run names one
-        return replace(_origin(found), metrics=tuple(read_facts(folder).values()))
+        check_format(found, RUN_FORMAT, str(path))
+        return _origin(found)
     except (KeyError, TypeError, ValueError, OverflowError):
         raise BadInput(str(path), "", "expected what swarmwire writes at the start of a run") from None
 
@@ -118,6 +118,7 @@ def _origin(found: dict[str, Any]) -> Origin:
         modules=dict(found["modules"]),
         cpu=str(found["cpu"]),
         versions=dict(found["versions"]),
-        gateways=dict(found.get("gateways", {})),
-        quantum_s=None if found.get("quantum_s") is None else float(found["quantum_s"]),
+        gateways=dict(found["gateways"]),
+        metrics=facts_in(found),
+        quantum_s=None if found["quantum_s"] is None else float(found["quantum_s"]),
     )

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.comms.parsing import from_json
-from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, UNTOLD_ROBOTS
+from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER
 from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.deploy.tuning.goal import Goal
 from swarmwire.deploy.tuning.search import Parameter, Search
 from swarmwire.metrics.campaign.outcome import Outcome
-from swarmwire.metrics.record.formats import refuse_other_format
 from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.metrics.whole_file import write_whole
 
@@ -69,8 +69,7 @@ def read_tuning(folder: Path) -> Tuning:
     except ValueError:  # no JSON, or no UTF-8
         found = None
     try:
-        refuse_other_format(found, FORMAT, path)
-        del found["format"]  # KeyError: every tuning names one
+        check_format(found, FORMAT, str(path))
         return _tuning(found)
     except (KeyError, TypeError, ValueError):
         raise BadInput(str(path), "", "expected what swarmwire writes at the start of a tuning") from None
@@ -84,8 +83,7 @@ def _tuning(found: dict[str, Any]) -> Tuning:
         "searches": tuple(_search(of) for of in found["searches"]),
         "goal": Goal(**known_fields(Goal, goal)),
     }
-    untold: dict[str, Any] = {"robots": UNTOLD_ROBOTS}
-    return Tuning(**{**untold, **known_fields(Tuning, found), **tuples, **objects})
+    return Tuning(**{**known_fields(Tuning, found), **tuples, **objects})
 
 
 def _search(found: dict[str, Any]) -> Search:

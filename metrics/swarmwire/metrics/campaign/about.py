@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any, cast
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.comms.one_of import one_of
 from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.campaign.formats import CAMPAIGN_FORMAT
 from swarmwire.metrics.campaign.outcome import KINDS, Outcome
-from swarmwire.metrics.record.formats import refuse_other_format
 
 DESIGNS = ("grid", "list", "random", "latin")
 Value = bool | int | float | str | list[Any] | None  # of a parameter
@@ -52,7 +52,7 @@ def read_about(path: Path) -> About:
         raise BadInput(str(path.parent), path.name, "expected a campaign's folder: the file is missing") from None
     except (OSError, ValueError) as error:
         raise BadInput(str(path), "", f"expected what a campaign was asked for: {error}") from error
-    refuse_other_format(found, CAMPAIGN_FORMAT, path)
+    check_format(found, CAMPAIGN_FORMAT, str(path))
     return _about(_Fields(found, str(path)))
 
 
@@ -93,7 +93,6 @@ class _Fields:
 
 
 def _about(fields: _Fields) -> About:
-    fields.get("format", int, str(CAMPAIGN_FORMAT))
     return About(
         name=fields.text("name"),
         scenario=fields.text("scenario"),
@@ -134,6 +133,5 @@ def _points(fields: _Fields) -> tuple[Point, ...]:
 
 
 def _outcome(of: _Fields) -> Outcome:
-    listed = "listed" in of.found and of.get("listed", bool, "true or false")
-    hold_s = float(of.get("hold_s", (int, float), "a number of s")) if "hold_s" in of.found else 0.0
+    listed, hold_s = of.get("listed", bool, "true or false"), float(of.get("hold_s", (int, float), "a number of s"))
     return Outcome(of.text("column"), of.text("unit"), of.one_of("kind", KINDS), of.text("help"), listed, hold_s)

@@ -9,8 +9,6 @@ from swarmwire.metrics.capture.frame import Frame
 if TYPE_CHECKING:
     import polars as pl
 
-LATER_COLUMNS = {"to": "Int32", "payload": "Binary"}  # unknown in older records: all looks like a broadcast there
-
 
 def frames_on_air(packets: "pl.DataFrame", names: Sequence[str]) -> Iterator[Frame]:
     """The frames of one arena in the order of time; `packets` as `RunFolder.packets` has them, `names` of robots.
@@ -19,9 +17,6 @@ def frames_on_air(packets: "pl.DataFrame", names: Sequence[str]) -> Iterator[Fra
     """
     import polars as pl
 
-    for name, kind in LATER_COLUMNS.items():
-        if name not in packets.columns:
-            packets = packets.with_columns(pl.lit(None, getattr(pl, kind)).alias(name))
     once = ("on_air_at_ns", "to", "size_bytes", "topic", "payload")
     each = packets.filter(pl.col("receiver").is_not_null()).sort("receiver")
     frames = each.group_by("sender", "sequence").agg(

@@ -94,17 +94,13 @@ def _stacked(frame: "pl.DataFrame", names: tuple[str, ...]) -> AnyArray:
 def states(frame: "pl.DataFrame") -> tuple[tuple[str, ...], IntArray | None]:
     """The names of the states that robots noted, in order of their first tick, and who was in which.
 
-    Null, the empty text and the number 0 are no state; other numbers are their own names. Second: (T, n) places in the
+    Null and the empty text are no state. Second: (T, n) places in the
     names or NO_STATE, or None if no robot ever noted a state.
     """
     import polars as pl
 
-    if "state" not in frame.columns:
-        return (), None
-    noted = frame["state"].explode()
-    unnoted = "0" if noted.dtype.is_integer() else ""
-    texts = noted.cast(pl.String)
-    names = [name for name in texts.unique(maintain_order=True).to_list() if name is not None and name != unnoted]
+    texts = frame["state"].explode()
+    names = [name for name in texts.unique(maintain_order=True).to_list() if name]
     if not names:
         return (), None
     place = texts.cast(pl.Enum(names), strict=False).to_physical().cast(pl.Int64).fill_null(NO_STATE)

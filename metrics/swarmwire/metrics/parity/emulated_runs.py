@@ -49,7 +49,7 @@ def runs_of_folder(path: Path, metrics: tuple[str, ...]) -> EmulatedRuns:
     runs: list[EmulatedRun] = []
     for arena, seed in enumerate(static.seeds):
         table = folder.metrics(arena)
-        radio = None if summary is None or "radio" not in summary else _arena(summary["radio"], arena)
+        radio = None if summary is None else _arena(summary["radio"], arena)
         series = {name: _floats(table[name]) for name in metrics if name in table.columns}
         counts = {name: _floats(table[name]) for name in COUNTS if name in table.columns}
         runs.append(EmulatedRun(seed, series, radio, len(table) / static.rate_hz, counts))

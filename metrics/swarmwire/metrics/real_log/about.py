@@ -8,8 +8,8 @@ from typing import Any, cast
 
 from swarmwire.comms.bodies.body import Body, body_from_mapping
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.comms.parsing import from_json
-from swarmwire.metrics.record.formats import refuse_other_format
 
 LOG_FORMAT = 1
 ROBOT = "robot.json"
@@ -27,8 +27,8 @@ class AboutRobot:
     params: Mapping[str, Any]
     body: Body
     rate_hz: float
-    started_utc_ns: int  # 0: not told
-    radio_kind: str  # "air": the packets went over a run's radio; "": not told
+    started_utc_ns: int
+    radio_kind: str  # "air": the packets went over a run's radio
 
 
 def read_about_robot(path: Path) -> AboutRobot:
@@ -42,9 +42,7 @@ def read_about_robot(path: Path) -> AboutRobot:
     if not isinstance(found, dict):
         raise BadInput(str(path), "", "expected an object")
     told = cast("dict[str, Any]", found)
-    if "format" not in told:
-        raise BadInput(str(path), "format", f"expected {LOG_FORMAT}")
-    refuse_other_format(told, LOG_FORMAT, path)
+    check_format(told, LOG_FORMAT, str(path))
     return _about(told, str(path))
 
 
@@ -64,11 +62,9 @@ def _about(told: dict[str, Any], where: str) -> AboutRobot:
     rate_hz = float(get("rate_hz", (int, float), "a rate in Hz"))
     if not (isfinite(rate_hz) and rate_hz > 0.0):
         raise BadInput(where, "rate_hz", f"expected more than 0 Hz, got {rate_hz:g}")
-    started_utc_ns = told.get("started_utc_ns", 0)
-    if not isinstance(started_utc_ns, int) or isinstance(started_utc_ns, bool):
-        raise BadInput(where, "started_utc_ns", "expected whole nanoseconds since 1970")
-    radio = told.get("radio")
-    kind = cast("dict[str, Any]", radio).get("kind", "") if isinstance(radio, dict) else ""
+    radio: dict[str, Any] = get("radio", dict, "an object")
+    if not isinstance(radio.get("kind"), str):
+        raise BadInput(where, "radio.kind", "expected a text")
     return AboutRobot(
         name=name,
         swarm=get("swarm", str, "the swarm's name"),
@@ -78,6 +74,6 @@ def _about(told: dict[str, Any], where: str) -> AboutRobot:
         params=get("params", dict, "an object"),
         body=body_from_mapping(get("body", dict, "a body's sheet"), where),
         rate_hz=rate_hz,
-        started_utc_ns=started_utc_ns,
-        radio_kind=str(kind),
+        started_utc_ns=get("started_utc_ns", int, "whole nanoseconds since 1970"),
+        radio_kind=radio["kind"],
     )

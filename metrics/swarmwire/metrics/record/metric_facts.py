@@ -1,13 +1,11 @@
 """What the metrics of a run say of themselves, as `run.json` keeps it, so that drawings need nobody's code."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isinf
-from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.record.names import RUN_JSON
 
 
 @dataclass(frozen=True)
@@ -27,14 +25,9 @@ def facts_of(metric: Metric | type[Metric]) -> MetricFacts:
     return MetricFacts(metric.name, metric.help, metric.unit, metric.kind, (least, largest))
 
 
-def read_facts(folder: Path) -> dict[str, MetricFacts]:
-    """By name, the metrics of the run of this folder; none where they were not kept, or cannot be read."""
-    try:
-        found: Any = from_json((folder / RUN_JSON).read_text(encoding="utf-8"))
-        facts = [_facts(item) for item in found["metrics"]]
-    except (OSError, ValueError, KeyError, TypeError):  # what is amiss with the file is told by those who need it
-        return {}
-    return {of.name: of for of in facts}
+def facts_in(started: Mapping[str, Any]) -> tuple[MetricFacts, ...]:
+    """The metrics that `run.json` lists; KeyError, TypeError or ValueError if it does not list them as a run does."""
+    return tuple(_facts(item) for item in started["metrics"])
 
 
 def _facts(item: Any) -> MetricFacts:

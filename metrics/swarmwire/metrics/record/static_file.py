@@ -9,10 +9,11 @@ from typing import Any, cast
 
 from swarmwire.comms.bodies.body import body_from_mapping
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch
 from swarmwire.comms.parsing import from_json
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
-from swarmwire.metrics.record.formats import TABLES_FORMAT, refuse_other_format
+from swarmwire.metrics.record.formats import TABLES_FORMAT
 from swarmwire.metrics.whole_file import write_whole
 
 
@@ -25,7 +26,7 @@ def read_static(path: Path) -> Static:
     """What `write_static` wrote, equal to it; BadInput if there is no such file, or it holds something else."""
     try:
         read = from_json(path.read_text(encoding="utf-8"))
-        refuse_other_format(read, TABLES_FORMAT, path)
+        check_format(read, TABLES_FORMAT, str(path))
         del read["format"]
         static = _static(read, str(path))
         _check(static)

@@ -41,7 +41,7 @@ def lanes_of(events: "pl.DataFrame") -> list[Lane]:
     lanes: dict[str, Lane] = {}
     opened: dict[str, list[tuple[int, list[str]]]] = {}
     for row in events.iter_rows(named=True):
-        words = f"{row['do']} {row.get('part') or ''}".strip()
+        words = f"{row['do']} {row['part']}".strip()
         lane, still_open = lanes.setdefault(words, Lane(words)), opened.setdefault(words, [])
         lane.robots.update(row["robots"])
         if row["ended"]:

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parsing import from_json
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.damage import damage
 from swarmwire.metrics.drawing.film import Film, film_of
-from swarmwire.metrics.record.names import RUN_JSON, SCENARIO
+from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.metrics.report.lanes import Lane, lanes_of
 from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.verify.sound_table import sound_table
@@ -47,11 +46,11 @@ class RunData:
 
     def record(self, name: str) -> dict[str, Any]:
         """What the summary says of a table that was recorded; empty without one."""
-        return {} if self.summary is None else dict(self.summary["record"].get(name) or {})
+        return {} if self.summary is None else dict(self.summary["record"].get(name, {}))
 
     def of_arena(self, part: str, arena: int = ARENA) -> Any:
         """What the summary says of an arena: its `radio` or `metrics`; None without a summary."""
-        found: Any = None if self.summary is None else self.summary.get(part)
+        found: Any = None if self.summary is None else self.summary[part]
         return cast("list[Any]", found)[arena] if isinstance(found, list) else found
 
     def table(self, name: str, arena: int | None = ARENA) -> "pl.DataFrame | str":
@@ -92,19 +91,11 @@ def read_run(path: Path) -> RunData:
         film: Film | str = film_of(folder, ARENA, str(path))
     except BadInput as error:
         film = f"{error}."
-    data = RunData(folder, static, summary, _started(path), _text(path / SCENARIO), film, [], None)
+    data = RunData(folder, static, summary, folder.started, _text(path / SCENARIO), film, [], None)
     events = data.table("events")
     if isinstance(events, str):
         return data
     return replace(data, lanes=lanes_of(events), events=events)
-
-
-def _started(path: Path) -> dict[str, Any]:
-    try:
-        found: object = from_json((path / RUN_JSON).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return cast("dict[str, Any]", found) if isinstance(found, dict) else {}
 
 
 def _text(path: Path) -> str:

@@ -48,7 +48,7 @@ def packets_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdi
     """If all packets of a run that ended by itself were recorded: as many receivers of each fate."""
     import polars as pl
 
-    recorded: dict[str, Any] = {} if summary is None else summary.get("record", {}).get("packets", {})
+    recorded: dict[str, Any] = {} if summary is None else summary["record"].get("packets", {})
     if summary is None or recorded.get("share") != 1.0 or recorded["dropped"] or summary["ended"] in BROKEN_OFF:
         return None
     counted = scan_files(files).group_by("arena", "fate").agg(pl.col("receivers").sum()).collect()
@@ -78,15 +78,14 @@ def events_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdic
 
 def _arenas_of(event: Mapping[str, Any], ticks: list[int]) -> int:
     """In how many arenas, of so many ticks, an event of the summary has a row."""
-    if not event.get("singly"):  # which older summaries lack
+    if not event["singly"]:
         return sum(event["tick"] < done for done in ticks)
     return 1 if len(ticks) == 1 else sum(bool(robots) for robots in event["robots"])
 
 
 def arena_ticks(summary: Mapping[str, Any]) -> list[int]:
-    """How many ticks each arena took part in; older summaries have but those of the run."""
-    ends = summary.get("by_arena") or [summary] * summary["arenas"]
-    return [end["ticks"] for end in ends]
+    """How many ticks each arena took part in."""
+    return [end["ticks"] for end in summary["by_arena"]]
 
 
 def per_arena(summary: Mapping[str, Any], key: str) -> list[Any]:

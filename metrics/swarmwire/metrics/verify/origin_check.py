@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.format_number import check_format
 from swarmwire.comms.parsing import from_json
-from swarmwire.metrics.record import formats
+from swarmwire.metrics.record.formats import RUN_FORMAT
 from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS, INPUTS, RUN_JSON
 from swarmwire.metrics.verify.finding import Finding, State
 
@@ -21,14 +22,14 @@ def check_run_json(folder: Path) -> Finding:
     except (OSError, ValueError) as error:
         return Finding(RUN_JSON, State.DAMAGED, str(error))
     try:
-        formats.refuse_other_format(found, formats.RUN_FORMAT, folder / RUN_JSON)
+        check_format(found, RUN_FORMAT, str(folder / RUN_JSON))
     except BadInput as error:
         return Finding(RUN_JSON, State.DAMAGED, f"{error.key}: {error.expected}")
     match found:
-        case {"format": int(), "seeds": list(), "ticks": int(ticks)}:
+        case {"seeds": list(), "ticks": int(ticks)}:
             return Finding(RUN_JSON, State.WHOLE, f"{ticks} ticks asked for")
         case _:
-            return Finding(RUN_JSON, State.DAMAGED, f"expected the start of a run, format {formats.RUN_FORMAT}")
+            return Finding(RUN_JSON, State.DAMAGED, "expected what swarmwire writes at the start of a run")
 
 
 def check_digests(folder: Path, summary: Mapping[str, Any] | None) -> Finding:
@@ -52,7 +53,7 @@ def check_digests(folder: Path, summary: Mapping[str, Any] | None) -> Finding:
 
 def check_inputs(folder: Path, summary: Mapping[str, Any] | None) -> list[Finding]:
     """What came from outside, if anything did."""
-    recorded: Mapping[str, Any] | None = (summary or {}).get("inputs")
+    recorded: Mapping[str, Any] | None = None if summary is None else summary["inputs"]
     path = folder / INPUTS
     if not path.is_file():
         return [] if recorded is None else [Finding(INPUTS, State.MISSING, "without it the run cannot be repeated")]

@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.comms.fates import FATE_NAMES
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.record.tick_columns import VALUE, tick_schema
 from swarmwire.metrics.run_folder import SCHEMAS
@@ -10,11 +9,6 @@ from swarmwire.metrics.run_folder import SCHEMAS
 if TYPE_CHECKING:
     import polars as pl
 
-LATER_COLUMNS = {
-    "ticks": (VALUE,),
-    "packets": ("to", "payload"),
-    "events": ("part",),
-}  # which older records lack, or all in which nobody told a value
 MAY_BE_NULL = {
     "packets": ("receiver", "to", "rssi_dbm", "distance_m", "payload"),
     "radio_distances": ("pdr",),
@@ -27,7 +21,7 @@ def table_fault(name: str, table: "pl.LazyFrame", static: Static | None) -> str 
     """The first fault in words, None if there is none; without `static` robots and arenas are not checked."""
     there = table.collect_schema()
     return (
-        _type_fault(there, _schema(name, static), LATER_COLUMNS.get(name, ()))
+        _type_fault(there, _schema(name, static))
         or (_value_fault(name, table, static) if name in SCHEMAS else None)
         or (_ratio_fault(table) if name == "radio_distances" else None)
         or (_names_fault(table, static) if name == "radio_robots" and static else None)
@@ -40,18 +34,12 @@ def _schema(name: str, static: Static | None) -> "dict[str, Any]":
     return {} if static is None else tick_schema(static, (), with_value=True)
 
 
-def _type_fault(there: "pl.Schema", expected: "dict[str, Any]", may_lack: tuple[str, ...]) -> str | None:
-    import polars as pl
-
+def _type_fault(there: "pl.Schema", expected: "dict[str, Any]") -> str | None:
     for column, kind in expected.items():
         found = there.get(column)
         if found is None:
-            if column not in may_lack:
+            if column != VALUE:  # only there once a robot has told one
                 return f"no column {column}"
-        elif isinstance(found, pl.Enum) and isinstance(kind, pl.Enum):
-            # Older records know fewer fates.
-            if not set(found.categories) <= set(FATE_NAMES):
-                return f"{column} has other names than fates"
         elif found != kind:
             return f"{column} is of type {found}, expected {kind}"
     return None

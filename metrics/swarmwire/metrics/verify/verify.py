@@ -17,7 +17,7 @@ from swarmwire.metrics.verify.origin_check import check_digests, check_inputs, c
 from swarmwire.metrics.verify.radio_agreement import distances_agree, links_agree, robots_agree
 from swarmwire.metrics.verify.recording_check import check_recording
 from swarmwire.metrics.verify.table_check import check_table
-from swarmwire.metrics.verify.table_faults import LATER_COLUMNS, table_fault
+from swarmwire.metrics.verify.table_faults import table_fault
 
 Agreement = Callable[[list[Path], Mapping[str, Any] | None], Verdict]
 TABLES: dict[str, Agreement] = {
@@ -120,7 +120,7 @@ def _fault(folder: RunFolder, name: str, files: list[Path]) -> str | None:
 def _columns(name: str) -> Collection[str]:
     if name not in SCHEMAS:
         return ("tick", "time_s", "arena", *ROBOT_COLUMNS)
-    return [column for column in SCHEMAS[name]() if column not in LATER_COLUMNS.get(name, ())]
+    return SCHEMAS[name]().keys()
 
 
 def _reach(name: str, files: list[Path]) -> str:
@@ -157,7 +157,7 @@ def _log(folder: RunFolder) -> Finding:
 def _copies(folder: RunFolder, summary: dict[str, Any] | None) -> list[Finding]:
     """Of each file that the summary lists, whether it is there and as it was."""
     findings: list[Finding] = []
-    for copy in (summary or {}).get("files", []):
+    for copy in summary["files"] if summary else ():
         path = folder.path / copy["path"]
         if not path.is_file():
             findings.append(Finding(copy["path"], State.MISSING, "a file that the run used"))

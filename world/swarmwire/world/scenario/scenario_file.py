@@ -52,8 +52,7 @@ def load_scenario(path: Path | str, overrides: Sequence[str] = ()) -> Scenario:
 
 
 def _checked(given: dict[str, Any], where: str) -> Scenario:
-    if "format" in given:  # first of all: another version may have other keys
-        check_format(given["format"], FORMAT, where)
+    check_format(given, FORMAT, where)
     try:
         scenario = Scenario.model_validate(given)
     except ValidationError as error:

@@ -93,13 +93,13 @@ def _arena_row(run: RunData) -> Callable[[int], tuple[str, ...]]:
     """A row of the table of arenas, by its place."""
     assert run.summary is not None
     hashes: list[str] = run.summary["trajectory_sha256"]
-    ends: list[dict[str, Any]] = run.summary.get("by_arena") or []
+    ends: list[dict[str, Any]] = run.summary["by_arena"]
 
     def row(arena: int) -> tuple[str, ...]:
         radio = run.of_arena("radio", arena)
         told = (f"{radio['sent']:,}", share(radio["pdr"])) if radio else ("–", "–")
-        end = ends[arena] if arena < len(ends) else run.summary or {}
-        ended = (str(end.get("ended", "–")), number(end.get("sim_time_s")), number(end.get("stop_time_s")))
+        end = ends[arena]
+        ended = (end["ended"], number(end["sim_time_s"]), number(end["stop_time_s"]))
         return (str(run.static.seeds[arena]), *ended, *told, f"{hashes[arena][:16]}…")
 
     return row

@@ -75,10 +75,10 @@ def _is_time(name: str, facts: Facts) -> bool:
 
 def _moments(run: RunData, film: Film) -> list[Lane]:
     """Since when what stopped the arena had held, and when what the metrics that are times wait for came about."""
-    ends: list[dict[str, Any]] = (run.summary or {}).get("by_arena") or [{}]
+    end: dict[str, Any] = run.summary["by_arena"][ARENA] if run.summary else {"stopped_by": None}
     moments: dict[str, float] = {}
-    if ends[ARENA].get("stopped_by"):
-        moments[f"stop: {ends[ARENA]['stopped_by']}, since"] = float(ends[ARENA]["stop_time_s"])
+    if end["stopped_by"]:
+        moments[f"stop: {end['stopped_by']}, since"] = float(end["stop_time_s"])
     for name, value in film.metrics.items():
         if _is_time(name, film.facts) and np.isfinite(value[-1]):
             moments[f"{name.removesuffix('_s')}:"] = float(value[-1])
@@ -106,7 +106,7 @@ def _events(run: RunData) -> list[str | Table]:
     rows = tuple(
         (
             number(row["time_s"]),
-            f"{row['do']} {row.get('part') or ''}".strip().replace("_", " ") + (" ended" if row["ended"] else ""),
+            f"{row['do']} {row['part']}".strip().replace("_", " ") + (" ended" if row["ended"] else ""),
             _names(row["robots"]),
         )
         for row in run.events.head(_MOST_EVENTS).iter_rows(named=True)

@@ -82,12 +82,12 @@ def _course(run: RunData) -> list[tuple[str, str]]:
         asked = run.started.get("ticks")
         wanted = f" of {number(asked / run.static.rate_hz)} s" if isinstance(asked, int) else ""
         return [("ended", f"no summary: it was killed, or goes on; {reached}{wanted}")]
-    runners = summary.get("runners", 0)
+    runners = summary["runners"]
     crew = "agents in the world's process" if not runners else f"agents in {counted(runners, 'process', 'processes')}"
     return [
-        ("engine", str(summary.get("engine", "–"))),
-        ("mode", f"{summary.get('mode', '–')}, {crew}"),
-        *([("stops at", "; ".join(summary["stop"]))] if summary.get("stop") else []),
+        ("engine", summary["engine"]),
+        ("mode", f"{summary['mode']}, {crew}"),
+        *([("stops at", "; ".join(summary["stop"]))] if summary["stop"] else []),
         ("ended", _ended(summary)),
         (
             "simulated",
@@ -99,18 +99,17 @@ def _course(run: RunData) -> list[tuple[str, str]]:
 
 def _ended(summary: dict[str, Any]) -> str:
     how = str(_ENDED.get(summary["ended"], summary["ended"]))
-    arenas: list[dict[str, Any]] = summary.get("by_arena") or []
-    stopped = [arena for arena in arenas if arena.get("stopped_by")]
+    arenas: list[dict[str, Any]] = summary["by_arena"]
+    stopped = [arena for arena in arenas if arena["stopped_by"]]
     if len(arenas) > 1 and stopped:
         how += f"; {len(stopped)} of {len(arenas)} arenas by what they stop at"
     elif stopped:
         how += f": {stopped[0]['stopped_by']}, since {number(stopped[0]['stop_time_s'])} s"
-    return f"{how}: {summary['error']}" if summary.get("error") else how
+    return f"{how}: {summary['error']}" if summary["error"] else how
 
 
 def _took(summary: dict[str, Any]) -> str:
-    wall_s, factor = summary.get("wall_time_s"), summary.get("realtime_factor")
-    return f"{number(wall_s)} s, {number(factor)} × real time" if wall_s is not None else "–"
+    return f"{number(summary['wall_time_s'])} s, {number(summary['realtime_factor'])} × real time"
 
 
 def _hash(run: RunData) -> list[str]:
@@ -140,13 +139,13 @@ def _not_as_it_should_be(run: RunData) -> list[str]:
         )
     if summary is None:
         return said
-    counts = {name: value for name, value in summary.get("counts", {}).items() if value}
+    counts = {name: value for name, value in summary["counts"].items() if value}
     if counts:
         said.append(f"Not as it should be: {', '.join(f'`{name}` {value:,}' for name, value in counts.items())}.")
-    lost: list[Any] = summary.get("lost_runners") or []
+    lost: list[Any] = summary["lost_runners"]
     if lost:
         said.append(f"Lost runners: {'; '.join(map(str, lost))}.")
-    changes: list[dict[str, Any]] = summary.get("runner_changes") or []
+    changes: list[dict[str, Any]] = summary["runner_changes"]
     moved = [f"{of['runner']} {of['what']} in tick {of['tick']}" for of in changes if of["tick"] >= 0]
     if moved:
         said.append(f"Runners that came and went: {'; '.join(moved)}.")
@@ -154,7 +153,7 @@ def _not_as_it_should_be(run: RunData) -> list[str]:
     if dropped:
         rows = ", ".join(f"{value:,} of `{name}`" for name, value in dropped.items())
         said.append(f"Rows that were dropped for want of time, which figures below lack: {rows}.")
-    senses: dict[str, list[str]] = summary.get("global_senses") or {}
+    senses: dict[str, list[str]] = summary["global_senses"]
     if senses:
         bodies = "; ".join(f"{body}: {', '.join(names)}" for body, names in senses.items())
         said.append(f"Bodies that know more than their surroundings: {bodies}.")
