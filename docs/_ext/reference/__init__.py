@@ -23,7 +23,6 @@ from reference.fields import field_table
 from reference.keys import key_tables
 from reference.metrics import metric_details, metric_table
 from reference.presets import preset_sources, preset_table
-from reference.seams import seam_table
 from reference.senses import sense_tables
 
 TABLES: dict[str, Callable[..., str]] = {
@@ -43,7 +42,6 @@ TABLES: dict[str, Callable[..., str]] = {
     "metrics": metric_table,
     "preset-sources": preset_sources,
     "presets": preset_table,
-    "seams": seam_table,
     "senses": sense_tables,
 }
 

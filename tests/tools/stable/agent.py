@@ -4,8 +4,7 @@ import ast
 from importlib import import_module
 from typing import Any
 
-from tests.tools.stable.seams import described_in
-from tests.tools.stable.sources import Name, made_in, modules, names_of, tree_of
+from tests.tools.stable.sources import Name, described_in, made_in, modules, names_of, tree_of
 
 PAGE = "agent.md"
 SPOKEN = ("__call__", "__getitem__", "__iter__", "__len__")  # methods that users call by other signs
