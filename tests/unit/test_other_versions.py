@@ -1,4 +1,4 @@
-"""What another version of swarmwire wrote is refused where it comes in, in one line that says what was expected."""
+"""What is written for another version is refused where it is read, in one line that says what was expected."""
 
 import json
 from collections.abc import Callable
@@ -10,78 +10,155 @@ import pytest
 
 from swarmwire.agent import API_VERSION
 from swarmwire.agent.loading import NoAgent, load_agent
+from swarmwire.agent.on_robot.settings_file import read_settings
+from swarmwire.agent.radios.packet_header import PacketHeader
+from swarmwire.agent.runner import given_robots
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.wire import frames
+from swarmwire.comms.format_number import check_format
+from swarmwire.comms.glimpse import Scene
+from swarmwire.comms.wire import control_frames, frames, scene_frames, truth_frames
+from swarmwire.comms.wire.air_terms import AirTerms
+from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.offer import Offer
 from swarmwire.deploy import RunFolder
+from swarmwire.deploy.campaign.campaign import read_campaign
+from swarmwire.deploy.campaign.campaign_file import campaign_table
+from swarmwire.deploy.certificates.register import Register
+from swarmwire.deploy.fleet.fleet_file import read_fleet
+from swarmwire.deploy.record.inputs import LENGTH_BYTES, recorded_inputs
 from swarmwire.deploy.record.origin import read_origin
-from swarmwire.metrics.record.formats import RUN_FORMAT, SUMMARY_FORMAT, TABLES_FORMAT
-from swarmwire.world.crews.admission import Refused
-from swarmwire.world.scenario.scenario_file import scenario_from
-from tests.support.world.locksteps import two
-from tests.tools.stable.recorded_run import recorded
+from swarmwire.deploy.tuning.tuning import read_tuning
+from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.metrics.real_log.about import read_about_robot
+from swarmwire.metrics.verify.verify import verify
+from swarmwire.world.scenario.scenario_file import load_scenario
+
+FILES: dict[str, tuple[str, Callable[[Path], Any]]] = {
+    "scenario": ("scenario.toml", load_scenario),
+    "campaign file": ("campaign.toml", campaign_table),
+    "fleet": ("fleet.toml", read_fleet),
+    "robot settings": ("robot.toml", lambda at: read_settings(at, {})),
+    "summary": ("summary.json", lambda at: RunFolder(at.parent).summary),
+    "static": ("static.json", lambda at: RunFolder(at.parent).static),
+    "tables": ("static.json", lambda at: RunFolder(at.parent).ticks()),
+    "run": ("run.json", lambda at: RunFolder(at.parent).measured),
+    "run to repeat": ("run.json", lambda at: read_origin(at.parent)),
+    "campaign": ("campaign.json", lambda at: read_campaign(at.parent)),
+    "campaign results": ("campaign.json", lambda at: CampaignFolder(at.parent)),
+    "tuning": ("tuning.json", lambda at: read_tuning(at.parent)),
+    "robot log": ("robot.json", read_about_robot),
+    "certificates": ("certs.json", lambda at: Register.read(at.parent)),
+}
+NEWER = "expected 1, got 2: made by a newer swarmwire; upgrade to read it"
+NUMBERS = (
+    (2, NEWER), (0, "expected 1, got 0"), (None, "is missing: expected 1"),
+    ("1", "expected 1, got '1'"), (True, "expected 1, got True"),
+)  # fmt: skip
+
+
+def written(path: Path, number: object) -> None:
+    """A file that holds this format number, or none, and a key that no format has."""
+    held = {"weather": "fine", **({} if number is None else {"format": number})}
+    toml = "\n".join(f"{key} = {json.dumps(value)}" for key, value in held.items())
+    path.write_text(toml if path.suffix == ".toml" else json.dumps(held))
+
+
+@pytest.mark.parametrize(("number", "said"), NUMBERS)
+@pytest.mark.parametrize("kind", FILES)
+def test_a_file_of_another_format_is_refused_before_the_rest_of_it_is_read(kind, number, said, tmp_path):
+    name, read = FILES[kind]
+    written(tmp_path / name, number)
+    with pytest.raises(BadInput) as caught:
+        read(tmp_path / name)
+    assert str(caught.value) == f"{tmp_path / name}: format: {said}"
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_file_of_this_format_is_read_further(kind, tmp_path):
+    name, read = FILES[kind]
+    written(tmp_path / name, 1)
+    try:
+        read(tmp_path / name)
+    except BadInput as refused:
+        assert "format" not in (refused.key, refused.expected.partition(":")[0])
+
+
+def test_of_an_older_file_it_is_said_who_reads_it():
+    with pytest.raises(BadInput, match="^a: format: expected 3, got 2: made by an older swarmwire; that one reads it$"):
+        check_format({"format": 2}, 3, "a")
+
+
+def test_verify_names_the_format_of_each_file(tmp_path):
+    for name in ("summary.json", "static.json", "run.json"):
+        written(tmp_path / name, 2)
+    found = {finding.part: finding.text for finding in verify(tmp_path)}
+    assert all(NEWER in found[name] for name in ("summary.json", "static.json", "run.json"))
+
+
+def packed(**values: Any) -> bytes:
+    return msgpack.packb({key: value for key, value in values.items() if value is not None})
+
+
+def frame(kind: str, number: Any) -> frames.Frame:
+    return frames.Frame(kind, -1, {}, {} if number is None else {"version": number})
+
+
+WIRE: dict[str, tuple[type[Exception], Callable[[Any], Any]]] = {
+    "frame": (BadFrame, lambda v: frames.decode(packed(v=v, kind="", tick=0, arrays={}, values={}))),
+    "request to join": (BadFrame, lambda v: JoinRequest.decode(packed(v=v))),
+    "offer": (BadFrame, lambda v: Offer.decode(packed(v=v))),
+    "assignment": (BadFrame, lambda v: given_robots(packed(v=v))),
+    "terms of an air": (BadFrame, lambda v: AirTerms.decode(packed(v=v))),
+    "scene": (BadFrame, lambda v: scene_frames.decode_scene(frame("scene", v))),
+    "truth": (BadFrame, lambda v: truth_frames.decode_truth(frame("truth", v), Scene.__new__(Scene))),
+    "control": (BadInput, lambda v: control_frames.decode_request(packed(v=v, do="pause"))),
+    "answer to control": (BadFrame, lambda v: control_frames.decode_reply(packed(v=v))),
+}
+
+
+@pytest.mark.parametrize("number", [2, 0, None, True, "1"])
+@pytest.mark.parametrize("kind", WIRE)
+def test_another_version_on_the_wire_is_refused_in_one_line(kind, number):
+    refusal, read = WIRE[kind]
+    with pytest.raises(refusal, match=r"^[^\n]*$") as caught:
+        read(number)
+    assert "expected" in str(caught.value)
+
+
+@pytest.mark.parametrize("number", [0, 2])
+def test_another_header_of_a_packet_between_robots_is_refused(number):
+    packet = PacketHeader(to=-1, sequence=7, sent_utc_ns=1).encode()
+    with pytest.raises(BadFrame, match=f"version {number} to -1, expected 1"):
+        PacketHeader.decode(bytes([number]) + packet[1:])
+
+
+@pytest.mark.parametrize("number", [0, 2])
+def test_recorded_actions_of_another_version_are_refused(number, tmp_path):
+    path = tmp_path / "inputs" / "actions.frames"
+    path.parent.mkdir()
+    data = packed(v=number, kind="actions", tick=0, arrays={}, values={})
+    path.write_bytes(len(data).to_bytes(LENGTH_BYTES, "little") + data)
+    with pytest.raises(BadInput) as caught:
+        recorded_inputs(tmp_path)
+    assert str(caught.value).startswith(f"{path}: frame 0: expected the actions of a tick: ")
+    assert str(caught.value).endswith(f"version {number}, expected 1")
+
 
 AGENT = """
 from swarmwire.agent import Agent
-class Later(Agent):
+class Mine(Agent):
     api = {version}
     def step(self, robot): ...
 """
 
 
-def load_later(folder: Path, version: int) -> Any:
-    (folder / "later.py").write_text(AGENT.format(version=version))
-    return load_agent(f"{folder / 'later.py'}:Later")
+def load_mine(folder: Path, version: int) -> Any:
+    (folder / "mine.py").write_text(AGENT.format(version=version))
+    return load_agent(f"{folder / 'mine.py'}:Mine")
 
 
-def folder_with(folder: Path, name: str, version: int) -> RunFolder:
-    (folder / name).write_text(json.dumps({**recorded()[name], "format": version}))
-    return RunFolder(folder)
-
-
-def packed(**values: Any) -> bytes:
-    return msgpack.packb(values)
-
-
-DOORS: dict[str, tuple[int, type[Exception], Callable[[Path, int], Any]]] = {
-    "agent": (API_VERSION, NoAgent, load_later),
-    "scenario": (1, BadInput, lambda _, v: scenario_from({"format": v}, "mine.toml")),
-    "summary": (SUMMARY_FORMAT, BadInput, lambda at, v: folder_with(at, "summary.json", v).summary),
-    "static": (TABLES_FORMAT, BadInput, lambda at, v: folder_with(at, "static.json", v).static),
-    "tables": (TABLES_FORMAT, BadInput, lambda at, v: folder_with(at, "static.json", v).ticks()),
-    "repetition": (RUN_FORMAT, BadInput, lambda at, v: read_origin(folder_with(at, "run.json", v).path)),
-    "runner": (frames.VERSION, Refused, lambda _, v: two().join("a", packed(v=v))),
-    "frame": (frames.VERSION, BadFrame, lambda _, v: frames.decode(packed(v=v, kind="", tick=0, arrays={}, values={}))),
-}
-
-
-@pytest.mark.parametrize("door", DOORS)
-def test_another_version_is_refused_in_one_line(door, tmp_path):
-    known, refusal, enter = DOORS[door]
-    with pytest.raises(refusal) as caught:
-        enter(tmp_path, known + 1)
-    [line] = str(caught.value).splitlines()
-    assert str(known) in line.replace(str(tmp_path), "")
-    assert "expected" in line
-
-
-@pytest.mark.parametrize(
-    ("name", "expected", "enter"),
-    [
-        ("summary.json", "expected the summary of a run", lambda folder: folder.summary),
-        ("static.json", "expected the static part of a run", lambda folder: folder.static),
-        ("run.json", "expected what swarmwire writes at the start of a run", lambda folder: read_origin(folder.path)),
-    ],
-)
-def test_a_file_of_a_run_without_its_version_is_refused_in_one_line(name, expected, enter, tmp_path):
-    missing = {key: value for key, value in recorded()[name].items() if key != "format"}
-    (tmp_path / name).write_text(json.dumps(recorded()[name]))
-    assert enter(RunFolder(tmp_path))
-    (tmp_path / name).write_text(json.dumps(missing))
-    with pytest.raises(BadInput) as caught:
-        enter(RunFolder(tmp_path))
-    assert str(caught.value).startswith(f"{tmp_path / name}: {expected}")
-    assert "\n" not in str(caught.value)
-
-
-def test_an_agent_that_names_this_version_is_taken(tmp_path):
-    assert load_later(tmp_path, API_VERSION).api == API_VERSION
+def test_an_agent_that_names_another_version_is_refused_and_one_that_names_this_is_taken(tmp_path):
+    assert load_mine(tmp_path, API_VERSION).api == API_VERSION
+    for other in (API_VERSION - 1, API_VERSION + 1):
+        with pytest.raises(NoAgent, match=rf"\.api: expected {API_VERSION}[^\n]*, got {other}$"):
+            load_mine(tmp_path, other)

@@ -149,14 +149,6 @@ def test_packets_whose_arenas_are_no_numbers_are_refused_in_one_line_with_the_fi
         exported(folder, tmp_path / "t.pcapng")
 
 
-def test_packets_of_an_older_record_without_addressees_are_captured(folders, tmp_path):
-    folder = tmp_path / "run"
-    shutil.copytree(folders["argos-rab"], folder)
-    file = folder / "packets.parquet"
-    pl.read_parquet(file).drop("to", "payload").write_parquet(file)
-    assert len(exported(folder, tmp_path / "t.pcapng").packets) > 20
-
-
 def test_a_run_whose_packets_were_not_recorded_is_refused_with_the_way_out(tmp_path):
     run(SCENARIO, overrides=SHORT, out=tmp_path / "run")
     with pytest.raises(BadInput, match="recorded with --packets all"):

@@ -10,11 +10,12 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Happened
 from swarmwire.metrics.record import recorders, table_writer, tick_recorder
 from swarmwire.metrics.registry import standard
-from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.run_folder import SUMMARY_KINDS, RunFolder
 from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.table_faults import table_fault
 from swarmwire.metrics.verify.verify import verify
 from tests.support.metrics.recorded import links, record, wandering
+from tests.support.metrics.summaries import made_up_summary
 from tests.support.metrics.truths import static
 
 TICKS = 11
@@ -123,11 +124,13 @@ def test_pandas_gets_the_same(recorded):
 def test_the_summary_is_there_once_the_run_has_ended(tmp_path):
     folder = RunFolder(tmp_path)
     assert folder.summary is None
-    summary = {"format": 1, "arenas": 1, "ticks": 3, "sim_time_s": 0.3, "ended": "duration", "events": []}
-    summary |= {"metrics": {}, "record": {}, "trajectory_sha256": ["a"]}
+    summary = made_up_summary(3)
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     assert folder.summary == summary
-    for wrong in ("{", "[]", "{}", json.dumps({**summary, "ticks": -3}), json.dumps({**summary, "arenas": 2})):
+    ends = ([], [3], [{**summary["by_arena"][0], "ticks": None}])
+    changed = ({"ticks": -3}, {"arenas": 2}, {"trajectory_sha256": [3]}, *({"by_arena": end} for end in ends))
+    less = [{key: value for key, value in summary.items() if key != left_out} for left_out in SUMMARY_KINDS]
+    for wrong in ("{", "[]", *map(json.dumps, [*({**summary, **change} for change in changed), *less])):
         (tmp_path / "summary.json").write_text(wrong)
         with pytest.raises(BadInput, match=r"summary\.json: expected"):
             _ = folder.summary

@@ -1,13 +1,13 @@
 """What a driver-run robot learns when it joins the air of a world: msgpack, checked on arrival."""
 
 from dataclasses import asdict, dataclass, fields
-from typing import Any, cast
+from typing import cast
 
 import msgpack
-from msgpack.exceptions import UnpackException
 
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.wire.frames import VERSION
+from swarmwire.comms.wire.frames import MOST_BYTES, VERSION
+from swarmwire.comms.wire.join_request import versioned
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,16 +27,11 @@ class AirTerms:
 
     @classmethod
     def decode(cls, data: bytes) -> "AirTerms":
-        """The terms of these bytes; BadFrame if they are none."""
-        try:
-            found: object = msgpack.unpackb(data)
-        except (ValueError, UnpackException) as error:
-            raise BadFrame("malformed", f"no msgpack: {error}") from error
-        if type(found) is not dict:
-            raise BadFrame("malformed", "expected a map")
-        values = cast("dict[str, Any]", found)
-        if values.keys() != {"v", *(of.name for of in fields(cls))} or values.pop("v") != VERSION:
-            raise BadFrame("malformed", f"expected the terms of an air, version {VERSION}")
+        """The terms of these bytes; BadFrame if they are none, "version" if they are of another version."""
+        values = versioned(data, MOST_BYTES)  # with the names of all robots
+        del values["v"]
+        if values.keys() != {of.name for of in fields(cls)}:
+            raise BadFrame("malformed", "expected the terms of an air")
         for name in ("row", "rate_hz", "max_payload_bytes"):
             if type(values[name]) is not int or values[name] < (name == "rate_hz"):
                 raise BadFrame("malformed", f"{name}: expected a whole number")

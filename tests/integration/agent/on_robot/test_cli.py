@@ -46,7 +46,7 @@ def _robot(file: Path, *more: str) -> list[str]:
 def _settings(folder: Path, file: Path, more: str = "") -> Path:
     settings = folder / "robot.toml"
     settings.write_text(
-        f'name = "flock-0"\nagent = "{DRIVING}"\ndriver = {{ name = "written", address = "{file}" }}\n{more}'
+        f'format = 1\nname = "flock-0"\nagent = "{DRIVING}"\ndriver = {{ name = "written", address = "{file}" }}\n{more}'
     )
     return settings
 

@@ -13,6 +13,7 @@ Make = Callable[[Mapping[str, Any], np.random.Generator], float | None]  # (poin
 
 LIMIT_S = 100.0
 RATE_HZ = 10.0
+PLAIN = {"listed": False, "hold_s": 0.0}  # of an outcome
 
 
 def order(point: Mapping[str, Any], rng: np.random.Generator) -> float:
@@ -99,8 +100,8 @@ def about_of(
     limit_s: float,
 ) -> dict[str, Any]:
     """campaign.json."""
-    outcomes = [{"column": column, "unit": "", "kind": "number", "help": f"made-up {column}"} for column in numbers]
-    outcomes += [{"column": column, "unit": "s", "kind": "time", "help": f"made-up {column}"} for column in times]
+    outcomes = [{"column": column, "unit": "", "kind": "number", "help": f"made-up {column}", **PLAIN} for column in numbers]
+    outcomes += [{"column": column, "unit": "s", "kind": "time", "help": f"made-up {column}", **PLAIN} for column in times]
     return {
         "format": 1,
         "name": name,

@@ -63,6 +63,7 @@ def as_logs(
             "driver": {"name": "emulated"},
             "radio": {"kind": "zenoh"},
             "rate_hz": static.rate_hz,
+            "started_utc_ns": 1_000_000_000,
         }
         (own / "robot.json").write_text(json.dumps({**says, **(about or {})}))
         at_s = begins_s + (phase_s[robot] if phase_s else 0.0)

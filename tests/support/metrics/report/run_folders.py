@@ -8,6 +8,7 @@ from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from tests.support.metrics.recorded import record
+from tests.support.metrics.summaries import made_up_summary
 
 
 def run_folder(folder: Path, of, ticks, ended="duration", summary=True, **options) -> Path:
@@ -17,7 +18,16 @@ def run_folder(folder: Path, of, ticks, ended="duration", summary=True, **option
     (folder / "run.json").write_text(json.dumps({"format": 1, "ticks": 50, "cpu": "a CPU", "versions": {"numpy": "2"}}))
     (folder / "scenario.toml").write_text(f"format = 1\nname = '{of.name}'\n")
     if summary:
-        told = {**_observed(of, seen), **_about(of, seen, ended), "record": tables}
+        counts = {"clipped_commands": 3, "nan_commands": 0}
+        told = made_up_summary(
+            len(seen),
+            arenas=of.arenas,
+            rate_hz=of.rate_hz,
+            **_observed(of, seen),
+            ended=ended,
+            counts=counts,
+            record=tables,
+        )
         (folder / "summary.json").write_text(json.dumps(told))
     return folder
 
@@ -33,23 +43,3 @@ def _observed(of, seen):
         parts["metrics"] = parts["metrics"][0]
         parts["radio"] = parts["radio"][0] if parts["radio"] else None
     return parts
-
-
-def _about(of, seen, ended):
-    return {
-        "format": 1,
-        "scenario": of.name,
-        "arenas": of.arenas,
-        "ended": ended,
-        "ticks": len(seen),
-        "sim_time_s": len(seen) / of.rate_hz,
-        "wall_time_s": 0.5,
-        "realtime_factor": 2.0,
-        "trajectory_sha256": [f"{arena:064x}" for arena in range(of.arenas)],
-        "engine": "discs",
-        "mode": "local",
-        "runners": 0,
-        "counts": {"clipped_commands": 3, "nan_commands": 0},
-        "cpu": "a CPU",
-        "versions": {"numpy": "2"},
-    }

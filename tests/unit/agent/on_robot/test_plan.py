@@ -19,7 +19,7 @@ def _plan(agent: str = "Driving", beside: Path | None = None, **more: Any) -> Pl
     file = None
     if beside:
         file = beside / "robot.toml"
-        file.write_text("")
+        file.write_text("format = 1\n")
     settings = read_settings(file, {key: (key, value) for key, value in flags.items()})
     return plan_of(settings, "robot.toml", DatedFakeClock())
 

@@ -241,12 +241,12 @@ def test_numbers_about_a_glimpse_are_checked(change):
         decode_truth(frames.decode(encode_truth(replace(quiet(), **change))), SCENE)
 
 
-@pytest.mark.parametrize("version", [None, 0, 1, 3, "2", True])
+@pytest.mark.parametrize("version", [None, 0, 2, "1", True])
 def test_frames_of_another_version_are_refused(version):
     for kind, data in (("truth", encode_truth(quiet())), ("scene", encode_scene(SCENE))):
         frame = frames.decode(data)
         other = replace(frame, values={**frame.values, "version": version})
-        with pytest.raises(BadFrame, match=f"expected {kind} 2"):
+        with pytest.raises(BadFrame, match=f"expected {kind} {OBSERVED_VERSION}"):
             decode_truth(other, SCENE) if kind == "truth" else decode_scene(other)
 
 

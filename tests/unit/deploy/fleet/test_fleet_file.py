@@ -121,7 +121,6 @@ def test_files_are_beside_the_robots_settings(tmp_path):
 @pytest.mark.parametrize(
     ("changed", "expected"),
     [
-        ({"format": 2}, "format: expected 1, got 2: made by a newer swarmwire"),
         ({"swarm": None}, "swarm: is missing"),
         ({"swarm": "a/*"}, "swarm: expected 1 to 63 letters"),
         ({"robot": {}}, r"robot: unknown key; expected .*\(did you mean robots\?\)"),

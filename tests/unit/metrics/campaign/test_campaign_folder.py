@@ -135,8 +135,6 @@ def test_a_point_that_there_is_not_is_refused(tmp_path, point):
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"format": 2}, "format: expected 1, got 2"),
-        ({"format": None}, "format"),
         ({"seeds": [1, 1]}, "seeds"),
         ({"seeds": [True]}, "seeds"),
         ({"seeds": []}, "seeds"),

@@ -97,8 +97,6 @@ def test_missing_robots_and_different_agents_are_told(folder):
         ({"robots": ["flock-1"]}, "robots", "expected that of"),
         ({"name": "flock-0"}, "name", "expected another robot than in"),
         ({"name": "flock-9"}, "name", "expected one of robots"),
-        ({"format": 2}, "format", "by a newer swarmwire"),
-        ({"format": None}, "format", "expected 1"),
         ({"rate_hz": 0}, "rate_hz", "more than 0 Hz"),
         ({"agent": None}, "agent", "expected the agent's class"),
         ({"body": {}}, "name", "is missing"),

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from swarmwire.metrics.drawing.metric_axes import is_count, limits, titled
-from swarmwire.metrics.record.metric_facts import MetricFacts, facts_of, read_facts
+from swarmwire.metrics.record.metric_facts import MetricFacts, facts_of
 from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.run_folder import RunFolder
 
 OWN = MetricFacts("gas", "what it smells of", "ppm", "count", (0.0, None))
 
@@ -17,17 +18,23 @@ OWN = MetricFacts("gas", "what it smells of", "ppm", "count", (0.0, None))
 @pytest.mark.parametrize("name", METRICS)
 def test_what_is_kept_of_a_metric_comes_back(tmp_path, name):
     facts = facts_of(METRICS[name])
-    (tmp_path / "run.json").write_text(json.dumps({"metrics": [asdict(facts), asdict(OWN)]}, allow_nan=False))
-    assert read_facts(tmp_path) == {name: facts, "gas": OWN}
+    (tmp_path / "run.json").write_text(json.dumps({"format": 1, "metrics": [asdict(facts), asdict(OWN)]}, allow_nan=False))
+    assert RunFolder(tmp_path).measured == {name: facts, "gas": OWN}
     least, largest = METRICS[name].bounds
     assert facts.bounds == (None if least == -inf else least, largest)
 
 
-@pytest.mark.parametrize("text", [None, "{", "[]", "{}", '{"metrics": 3}', '{"metrics": [{"name": "gas"}]}'])
-def test_where_nothing_was_kept_nothing_is_known(tmp_path, text):
+@pytest.mark.parametrize("metrics", ["", ', "metrics": 3', ', "metrics": [{"name": "gas"}]'])
+def test_of_a_damaged_list_nothing_is_known(tmp_path, metrics):
+    (tmp_path / "run.json").write_text(f'{{"format": 1{metrics}}}')
+    assert RunFolder(tmp_path).measured == {}
+
+
+@pytest.mark.parametrize("text", [None, "{", "[]"])
+def test_without_a_readable_file_nothing_is_known(tmp_path, text):
     if text is not None:
         (tmp_path / "run.json").write_text(text)
-    assert read_facts(tmp_path) == {}
+    assert RunFolder(tmp_path).started == RunFolder(tmp_path).measured == {}
 
 
 def test_an_axis_is_that_of_what_the_metric_said():

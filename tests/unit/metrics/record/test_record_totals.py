@@ -18,6 +18,7 @@ from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.verify import verify
 from tests.support.metrics.radio_runs import DISK, ticks
 from tests.support.metrics.recorded import links, record
+from tests.support.metrics.summaries import made_up_summary
 from tests.support.metrics.truths import departed, static, truth
 
 TOTALS = ("radio_robots", "radio_distances", "radio_links")
@@ -32,8 +33,7 @@ def folder(tmp_path):
     tally.begin(OF)
     for one in seen:
         tally.see(one)
-    summary = {"format": 1, "arenas": 2, "ticks": 20, "sim_time_s": 2.0, "ended": "duration", "events": []}
-    summary |= {"metrics": [{}, {}], "record": recorded, "trajectory_sha256": ["a", "b"], **tally.end(None)}
+    summary = made_up_summary(20, arenas=2, record=recorded, **tally.end(None))
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     return RunFolder(tmp_path)
 

@@ -18,6 +18,7 @@ from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.verify import TABLES, verify
 from tests.support.metrics.recorded import links, record, wandering
+from tests.support.metrics.summaries import made_up_summary
 from tests.support.metrics.truths import static, tally
 
 TICKS, ARENAS = 10, 2
@@ -40,9 +41,8 @@ def summarise(folder, of, recorded, **given):
         for seen in seen_ticks(of):
             observer.see(seen)
         parts.update(observer.end(tally({Fate.IN_FLIGHT: 4}, {})))
-    run = {"format": 1, "arenas": ARENAS, "ticks": TICKS, "sim_time_s": 1.0, "ended": "duration", "record": recorded}
-    run |= {"trajectory_sha256": HASHES, "inputs": None}
-    (folder / "summary.json").write_text(json.dumps({**run, **parts, **given}))
+    run = made_up_summary(TICKS, arenas=ARENAS, record=recorded, trajectory_sha256=HASHES, **parts)
+    (folder / "summary.json").write_text(json.dumps({**run, **given}))
 
 
 def fill(folder, **given):
@@ -66,13 +66,6 @@ def test_events_of_single_robots_are_counted_by_the_arenas_that_they_concern(tmp
     assert states(tmp_path) == {"events": State.DIFFERS}
     summary["events"][0] |= {"singly": True, "robots": [[], ["flock-1"]]}
     (tmp_path / "summary.json").write_text(json.dumps(summary))
-    assert states(tmp_path) == {}
-
-
-def test_events_recorded_before_parts_were_are_whole(tmp_path):
-    fill(tmp_path)
-    path = tmp_path / "events.parquet"
-    pl.read_parquet(path).drop("part").write_parquet(path)
     assert states(tmp_path) == {}
 
 

@@ -23,10 +23,6 @@ RANDOM_ALONE = 'expected place = "random" with within or apart_m, not at = [x, y
 CONVEX = "expected the corners of a convex polygon in order"
 POLYGON = {"shape": "polygon", "at": [0.0, 0.0]}
 FAULTS: list[tuple[str, Any, str]] = [
-    ("format", 2, "format: expected 1, got 2: made by a newer swarmwire; upgrade to read it"),
-    ("format", 0, "format: expected 1, got 0"),
-    ("format", "1", "format: expected 1, got '1'"),
-    ("format", True, "format: expected 1, got True"),
     ("name", "", "name: expected a text that is not empty, got ''"),
     ("seed", -1, "seed: expected a whole number of at least 0 and at most 9223372036854775807, got -1"),
     ("duration_s", float("inf"), "duration_s: expected a number above 0 and at most 1000000000 (s), got inf"),
@@ -196,12 +192,6 @@ def test_a_missing_key_says_what_it_should_hold() -> None:
     with pytest.raises(BadInput) as caught:
         scenario_from(without("robots.flock.count"), "file.toml")
     assert str(caught.value) == f"file.toml: robots.flock.count: is missing; {COUNT}"
-
-
-def test_another_version_is_told_before_keys_that_only_it_has() -> None:
-    with pytest.raises(BadInput) as caught:
-        scenario_from({**SAMPLE, "format": 2, "weather": "fine"}, "f")
-    assert str(caught.value) == "f: format: expected 1, got 2: made by a newer swarmwire; upgrade to read it"
 
 
 def test_an_arena_has_a_size_or_a_map() -> None:
