@@ -1,0 +1,293 @@
+"""Short runs that all metrics are tried on, made without a world, and what can be done to a run as a whole."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from hypothesis import strategies as st
+
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.truth import Departed, Finished, Light, Static, Truth
+from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.metrics import Metrics
+from tests.support.metrics.swarm.swarms import mixed, rolled
+from tests.support.metrics.truths import static, tally, truth
+
+Array = np.ndarray[Any, Any]
+TICKS, TICK_NS, RANGE_M = 10, 100_000_000, 1.6
+ROWS = "alive", "pose", "velocity", "command", "value"  # columns with a row for each robot
+FATES = Fate.HEARD, Fate.HEARD, Fate.HEARD, Fate.LOST, Fate.COLLIDED
+
+
+@dataclass(frozen=True)
+class History:
+    """What there is, and what happened, tick by tick."""
+
+    static: Static
+    ticks: tuple[Truth, ...]
+
+    def each(self, change: Callable[[Truth], Truth]) -> "History":
+        """The same with each tick changed."""
+        return replace(self, ticks=tuple(map(change, self.ticks)))
+
+    @property
+    def alive(self) -> Array:
+        """(ticks, arenas, robots)."""
+        return np.stack([one.alive for one in self.ticks]).reshape(-1, self.static.arenas, self.static.robots)
+
+
+def measured(metrics: Sequence[Metric], history: History) -> tuple[Array, list[dict[str, Any]]]:
+    """Their values in each tick, (ticks, metrics, arenas), and their summary."""
+    observer, found = Metrics(metrics), []
+    observer.begin(history.static)
+    for seen in history.ticks:
+        observer.see(seen)
+        found.append(observer.values.copy())
+    return np.array(found), observer.end(None)["metrics"]
+
+
+def _place(rng: Any, boundary: str, shape: tuple[int, int, int], spread: float) -> Array:
+    """Walks (ticks, rows, 2) around one point; with a small spread they stay within a quarter of each side of 0."""
+    compact = spread < 0.5
+    middle_m = np.zeros(2) if compact else rng.uniform(-2.0, 2.0, 2)
+    start_m = middle_m + spread * rng.uniform((-3.9, -2.9), (3.9, 2.9), (shape[1], 2))
+    some = rng.integers(0, shape[1], 2)
+    start_m[some[0]] = start_m[some[1]]  # one stands where another does
+    place_m = start_m + np.cumsum(rng.normal(0.0, 0.03, shape) * (rng.random(shape[1:2]) < 0.7)[:, None], axis=0)
+    return rolled(place_m) if boundary == "torus" else place_m
+
+
+def _links(rng: Any, of: Static, alive: Array, tick: int) -> Finished:
+    """Some packets of robots alive to others of their arena, sent in the last few ticks."""
+    pairs = [
+        (arena, a, b)
+        for arena, living in enumerate(alive)
+        for a in range(of.robots)
+        for b in range(of.robots)
+        if a != b and living[a] and living[b]
+    ]
+    chosen = rng.permutation(len(pairs))[: rng.integers(0, 12)]
+    arena, sender, receiver = np.array([pairs[k] for k in chosen], np.int64).reshape(-1, 3).T.copy()
+    one, final_ns = np.ones_like(arena), tick * TICK_NS - rng.integers(0, TICK_NS, len(arena))
+    sent_ns = final_ns - rng.integers(1, 3 * TICK_NS, len(arena))
+    fate, size = rng.choice(np.array(FATES, np.int64), len(arena)), rng.integers(8, 90, len(arena))
+    return Finished(arena, sender, receiver, one, -one, tick * one, sent_ns, sent_ns, final_ns, fate, size, one)
+
+
+def _packets(rng: Any, alive: Array, tick: int) -> Departed:
+    arena, sender = (column.copy() for column in np.argwhere(alive & (rng.random(alive.shape) < 0.4)).T)
+    one, on_ns = np.ones_like(arena), tick * TICK_NS - rng.integers(0, TICK_NS, len(arena))
+    off_ns = on_ns + rng.integers(1, 2 * TICK_NS, len(arena))
+    return Departed(arena, sender, BROADCAST * one, tick * one, one, 0 * one, Fate.HEARD + 0 * one, on_ns, off_ns)
+
+
+def _edges(of: Static, place_m: Array, alive: Array) -> Array:
+    """Pairs of rows of robots alive of one arena in range."""
+    away_m = place_m[:, None] - place_m[None]
+    away_m = rolled(away_m) if of.boundary == "torus" else away_m
+    arena = np.arange(len(place_m)) // of.robots
+    near = (np.hypot(away_m[..., 0], away_m[..., 1]) < RANGE_M) & (arena[:, None] == arena[None])
+    return np.argwhere(np.triu(near & alive[:, None] & alive[None], 1))
+
+
+def make(seed: int, boundary: str, spread: float, robots: int, arenas: int, dead: float, radio: bool = True) -> History:
+    """A run: robots walk, turn, die and live again, touch, note values and send; some are dead all the time."""
+    rng = np.random.default_rng(seed)
+    lights = [[Light(*rng.uniform(-1.3, 1.3, 2), 1.0) for _ in range(2)] for _ in range(arenas)]
+    of = mixed(static(robots, arenas, radio, lights=lights), int(rng.integers(1, robots + 1)))
+    of = replace(of, boundary=boundary)
+    rows = robots * arenas
+    place_m = _place(rng, boundary, (TICKS, rows, 2), spread)
+    heading_rad = rng.uniform(-np.pi, np.pi, (TICKS, rows, 1))
+    never = rng.random(robots) < dead
+    never[0] = False
+    ticks = []
+    for tick in range(TICKS):
+        alive = (rng.random(rows) >= dead) & ~np.tile(never, arenas)
+        fields: dict[str, Any] = {
+            "alive": alive,
+            "pose": np.concatenate([place_m[tick], heading_rad[tick]], axis=1),
+            "velocity": rng.normal(0.0, 0.1, (rows, 3)) * (rng.random((rows, 1)) < 0.9),
+            "command": rng.normal(0.0, 0.1, (rows, 3)),
+            "contact_onsets": rng.integers(0, 3, (arenas, 2)),
+            "value": np.where(alive & (rng.random(rows) < 0.6), rng.normal(5.0, 2.0, rows), np.nan) if tick else None,
+        }
+        if radio:
+            counts = [{fate: int(rng.integers(0, 5)) for fate in (*FATES, Fate.OUT_OF_RANGE)} for _ in range(arenas)]
+            living = alive.reshape(arenas, robots)
+            fields["edges"] = _edges(of, place_m[tick], alive)
+            fields["finished"], fields["departed"] = _links(rng, of, living, tick), _packets(rng, living, tick)
+            fields["tally"] = tally(*counts)
+        ticks.append(truth(of, tick, **fields))
+    return History(of, tuple(ticks))
+
+
+@st.composite
+def histories(
+    draw: st.DrawFn,
+    boundaries: Sequence[str] = ("walls", "open", "torus"),
+    spreads: Sequence[float] = (0.33, 1.0, 0.04),
+) -> History:
+    """Runs of ten ticks: walls or none or a torus, in a heap or spread out, with few or many dead."""
+    return make(
+        draw(st.integers(0, 10**6)),
+        draw(st.sampled_from(boundaries)),
+        draw(st.sampled_from(spreads)),
+        draw(st.integers(1, 9)),
+        draw(st.integers(1, 3)),
+        draw(st.sampled_from([0.0, 0.2, 0.7])),
+    )
+
+
+def at_rest(robots: int, alive: bool, radio: bool = True) -> History:
+    """Robots in the middle that do nothing, say nothing and hear nothing, 1 m from a light."""
+    of = static(robots, radio=radio, lights=[[Light(1.0, 0.0, 1.0)]])
+    fields: dict[str, Any] = {"alive": np.full(robots, alive)}
+    if radio:
+        fields |= {"edges": np.zeros((0, 2), np.int64), "finished": no_rows(Finished), "departed": no_rows(Departed)}
+        fields["tally"] = tally({}, sent=0)
+    return History(of, tuple(truth(of, tick, **fields) for tick in range(TICKS)))
+
+
+def no_rows(table: type) -> Any:
+    """A table of packets without any."""
+    return table(*(np.zeros(0, np.int64) for field in fields(table) if field.default is not None))
+
+
+def chosen(table: Any, rows: Array, **columns: Array) -> Any:
+    """These rows of a table of packets, some of its columns replaced."""
+    taken = {field.name: getattr(table, field.name) for field in fields(table)}
+    return type(table)(**{name: None if of is None else columns.get(name, of)[rows] for name, of in taken.items()})
+
+
+def placed(history: History, by_m: tuple[float, float], turn_rad: float = 0.0, mirror: bool = False) -> History:
+    """The scene, lights and all, mirrored at the x axis, turned around the origin and moved.
+
+    On a torus the turn must be 0 or half a turn.
+    """
+    side = -1.0 if mirror else 1.0
+    c, s = np.cos(turn_rad), np.sin(turn_rad)
+    turn, torus = np.array([[c, s], [-side * s, side * c]]), history.static.boundary == "torus"
+
+    def place(at_m: Array) -> Array:
+        there_m = at_m @ turn + by_m
+        return rolled(there_m) if torus else there_m
+
+    def change(seen: Truth) -> Truth:
+        pose = np.column_stack([place(seen.pose[:, :2]), side * seen.pose[:, 2] + turn_rad])
+        velocity = np.column_stack([seen.velocity[:, :2] @ turn, side * seen.velocity[:, 2]])
+        return replace(seen, pose=pose, velocity=velocity, command=seen.command * (1.0, side, side))
+
+    lights = tuple(
+        tuple(Light(*place(np.array([one.x_m, one.y_m])).tolist(), one.intensity_m) for one in own)
+        for own in history.static.lights
+    )
+    return replace(history, static=replace(history.static, lights=lights)).each(change)
+
+
+def robots_taken(history: History, taken: Array) -> History:
+    """The run of these robots (k,) of each arena alone, in this order, which keeps the robots of a group together."""
+    of = history.static
+    rows = (np.arange(of.arenas)[:, None] * of.robots + taken).ravel()
+    place = np.full(of.robots, -1)
+    place[taken] = np.arange(len(taken))
+    row = np.full(of.arenas * of.robots, -1)
+    row[rows] = np.arange(len(rows))
+
+    def change(seen: Truth) -> Truth:
+        own = {name: getattr(seen, name)[rows] for name in ROWS if getattr(seen, name) is not None}
+        own |= {"state": seen.state[rows], "leds": seen.leds[rows]}
+        if seen.edges is not None:
+            own["edges"] = row[seen.edges]
+        for name, columns in (("finished", ("sender", "receiver")), ("departed", ("sender",))):
+            table = getattr(seen, name)
+            if table is not None:
+                named = {column: place[getattr(table, column)] for column in columns}
+                own[name] = chosen(table, np.arange(len(table.arena)), **named)
+        return replace(seen, **own)
+
+    groups, start = [], 0
+    for group in of.groups:
+        stop = start + int(np.count_nonzero((taken >= group.start) & (taken < group.stop)))
+        groups.append(replace(group, start=start, stop=stop))
+        start = stop
+    names = tuple(of.robot_names[robot] for robot in taken)
+    return replace(history, static=replace(of, groups=tuple(groups), robot_names=names)).each(change)
+
+
+def packets_shuffled(history: History, rng: Any) -> History:
+    """The same edges and packets in each tick, told in another order."""
+
+    def change(seen: Truth) -> Truth:
+        own = {name: getattr(seen, name) for name in ("finished", "departed")}
+        own = {name: chosen(table, rng.permutation(len(table.arena))) for name, table in own.items() if table}
+        return replace(seen, edges=None if seen.edges is None else rng.permutation(seen.edges), **own)
+
+    return history.each(change)
+
+
+def arena_alone(history: History, arena: int) -> History:
+    """The run of one arena, as if there were no other."""
+    of = history.static
+    rows = slice(arena * of.robots, (arena + 1) * of.robots)
+    only = np.arange(of.arenas) == arena
+
+    def change(seen: Truth) -> Truth:
+        own = {name: getattr(seen, name)[rows] for name in ROWS if getattr(seen, name) is not None}
+        own |= {"running": seen.running[only], "contact_onsets": seen.contact_onsets[only]}
+        own |= {"state": seen.state[rows], "leds": seen.leds[rows]}
+        if seen.edges is not None and seen.tally is not None:
+            own["edges"] = seen.edges[seen.edges[:, 0] // of.robots == arena] - rows.start
+            own["tally"] = type(seen.tally)(*(getattr(seen.tally, field.name)[only] for field in fields(seen.tally)))
+        for name in ("finished", "departed"):
+            table = getattr(seen, name)
+            if table is not None:
+                own[name] = chosen(table, table.arena == arena, arena=0 * table.arena)
+        return replace(seen, **own)
+
+    alone = replace(of, seeds=of.seeds[arena : arena + 1], obstacles=of.obstacles[:1], lights=of.lights[arena:][:1])
+    return replace(history, static=alone).each(change)
+
+
+def with_the_dead_elsewhere(history: History, rng: Any) -> History:
+    """The same but for what the dead of the last tick do there, and where they are."""
+    last = history.ticks[-1]
+    dead = ~last.alive
+    own = {}
+    for name in ROWS[1:]:
+        column = getattr(last, name)
+        if column is not None:
+            own[name] = column.copy()
+            own[name][dead] = rng.normal(0.0, 1.0, own[name][dead].shape)
+    return replace(history, ticks=(*history.ticks[:-1], replace(last, **own)))
+
+
+def and_then_nothing(history: History) -> History:
+    """One tick more, in which all stands still."""
+    last = history.ticks[-1]
+    own: dict[str, Any] = {"tick": last.tick + 1, "time_ns": last.time_ns + TICK_NS}
+    own["contact_onsets"] = 0 * last.contact_onsets
+    if last.tally is not None:
+        own |= {"finished": no_rows(Finished), "departed": no_rows(Departed)}
+        own["tally"] = tally(*[{}] * history.static.arenas, sent=0)
+    return replace(history, ticks=(*history.ticks, replace(last, **own)))
+
+
+def arena_left(history: History, arena: int, tick: int) -> History:
+    """The same, but that this arena has left from a tick on: nobody lives there, and nothing is heard or touched."""
+    there = np.arange(history.static.arenas) == arena
+    rows = np.repeat(there, history.static.robots)
+
+    def change(seen: Truth) -> Truth:
+        if seen.tick < tick:
+            return seen
+        own: dict[str, Any] = {"running": ~there, "alive": seen.alive & ~rows}
+        own["contact_onsets"] = seen.contact_onsets * ~there[:, None]
+        if seen.edges is not None and seen.tally and seen.finished and seen.departed:
+            own |= {name: getattr(seen, name).of(~there) for name in ("finished", "departed", "tally")}
+            own["edges"] = seen.edges[~rows[seen.edges[:, 0]]]
+        return replace(seen, **own)
+
+    return history.each(change)
