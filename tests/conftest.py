@@ -4,6 +4,7 @@ The tier of a test is its directory: `unit`, `integration`, `statistics`, `docs`
 """
 
 import os
+import platform
 import signal
 import sys
 import time
@@ -11,8 +12,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numba
 import pytest
 from hypothesis import HealthCheck, settings
+from numba.core.event import TimingListener, install_listener
 
 # The first example may wait for the compiler. `quick` is for `make test`, `full` for `make test-all`.
 _SHARED: dict[str, Any] = {
@@ -28,10 +31,9 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 
 TESTS = Path(__file__).parent
 UNIT_LIMIT_S = 2.0  # of processor time, so that a busy machine fails no test
-# Tests of these folders call compiled kernels. They come first, and in this order: of two workers one then compiles
-# them, each kernel once, while the other runs the tests that need none.
-WARM_UP = "test_warm_up.py"
-KERNELS = (WARM_UP, "comms/air", "world", "comms/geometry", "comms/events", "agent/behaviours", "deploy")
+# The order of the unit tests, by the start of their path. Of two workers the first then compiles the kernels of radio
+# and world, each once, while the second runs tests that need none of them; whole runs, which need all, come last.
+ORDER = ("comms/air", "comms/geometry", "comms/events", "world", "agent/behaviours", "metrics", "", "deploy")
 STARTS_A_PROCESS = {"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.exec", "os.system", "time.sleep"}
 
 _too_slow: list[str] = []
@@ -46,15 +48,16 @@ def pytest_configure() -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Unit tests that need kernels first, then the other unit tests, then all else."""
+    """Unit tests in their order, then all else as it comes."""
     items.sort(key=_rank)  # stable
 
 
 def _rank(item: pytest.Item) -> int:
     if not _is_unit(item):
-        return len(KERNELS) + 1
+        return len(ORDER)
     path = item.path.relative_to(TESTS / "unit").as_posix()
-    return next((at for at, start in enumerate(KERNELS) if path.startswith(start)), len(KERNELS))
+    matching = [at for at, start in enumerate(ORDER) if start and path.startswith(start)]
+    return matching[0] if matching else ORDER.index("")
 
 
 def _is_unit(item: pytest.Item) -> bool:
@@ -66,6 +69,7 @@ def _refuse_processes(event: str, _: tuple[Any, ...]) -> None:
         raise AssertionError(f"a unit test calls {event}: move it to tests/integration")
 
 
+platform.processor()  # asks a program once; what a run says of its machine then needs none
 sys.addaudithook(_refuse_processes)
 
 
@@ -82,19 +86,21 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
-    """Note how much processor time a unit test takes."""
-    before_s = time.process_time()
+    """Note the processor time of a unit test without that of the compiler, which only an empty cache costs."""
+    compiling, before_s = TimingListener(), time.process_time()
     try:
-        return (yield)
+        with install_listener("numba:compile", compiling):
+            return (yield)
     finally:
-        if _is_unit(item):
-            item.user_properties.append(("cpu_s", time.process_time() - before_s))
+        compiled_s = compiling.duration if compiling.done else 0.0
+        if _is_unit(item) and sys.gettrace() is None and not numba.config.DISABLE_JIT:
+            item.user_properties.append(("cpu_s", time.process_time() - before_s - compiled_s))
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     """Collect the unit tests that took too long; under xdist, in the process that prints."""
     cpu_s = dict(report.user_properties).get("cpu_s", 0.0)
-    if report.when == "call" and isinstance(cpu_s, float) and cpu_s > UNIT_LIMIT_S and WARM_UP not in report.nodeid:
+    if report.when == "call" and isinstance(cpu_s, float) and cpu_s > UNIT_LIMIT_S:
         _too_slow.append(f"{report.nodeid}: {cpu_s:.1f} s")
 
 

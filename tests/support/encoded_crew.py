@@ -1,7 +1,7 @@
 """An agent backend in this process that encodes and decodes every frame, as runners behind zenoh do.
 
-The robots are split among `runners` parts. Each part is a runner's own protocol code fed with bytes, and the world's side
-is the real lockstep; only zenoh and the processes are missing. Answers arrive in another order in every tick.
+The robots are split among `runners` parts. Each part is the protocol code of a runner, fed with bytes; the world's side
+is the lockstep of real runs. Only zenoh and the processes are missing. Answers arrive in another order in every tick.
 """
 
 from collections.abc import Iterator

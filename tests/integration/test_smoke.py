@@ -1,0 +1,93 @@
+"""The mission from end to end, with real processes, zenoh, files and sockets: the part of this tier in `make test`."""
+
+import json
+import os
+import signal
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swarmwire.agent.drivers.driver import Command
+from swarmwire.deploy import Result, RunFolder, run
+from tests.support.deploy.commands import LOSSY, ROOT, called, family, runners_of, started, swarmwire
+from tests.support.robots.rigs import RIGS
+
+MAIN = ("avoidance", "flocking", "flocking-lossy", "pso", "flocking-disrupted", "flocking-802154")
+SHORT = ["duration_s=2"]
+
+
+@pytest.fixture(scope="module")
+def local() -> Result:
+    return run(LOSSY, overrides=SHORT)
+
+
+@pytest.mark.parametrize("runners", [1, 3, "per-robot"])
+def test_agents_in_processes_behind_zenoh_give_the_run_of_one_process(local, runners):
+    result = run(LOSSY, overrides=SHORT, runners=runners)
+    assert result.trajectory_sha256 == local.trajectory_sha256
+    assert (result.radio, result.metrics) == (local.radio, local.metrics)
+
+
+def test_over_a_lossy_radio_every_packet_has_one_fate_at_each_intended_receiver(local):
+    radio = local.radio
+    assert radio is not None
+    assert sum(radio.fates.values()) == radio.intended
+    decided = radio.fates["heard"] + radio.fates["lost"]
+    # The scenario loses 30 %; the bound is four standard deviations of a binomial share.
+    assert radio.fates["lost"] / decided == pytest.approx(0.3, abs=4 * np.sqrt(0.21 / decided))
+    assert radio.latency_air_s.p50 == pytest.approx(0.11, abs=0.02)
+
+
+@pytest.mark.parametrize("name", MAIN)
+def test_a_main_scenario_runs_from_the_command_line(name, tmp_path, monkeypatch, capsys):
+    scenario, folder = ROOT / "scenarios" / f"{name}.toml", tmp_path / "run"
+    code, _, errors = called(monkeypatch, capsys, "run", scenario, "--set", "duration_s=1", "--out", folder)
+    assert code == 0, errors
+    summary = json.loads((folder / "summary.json").read_text())
+    assert (summary["ended"], summary["sim_time_s"]) == ("duration", 1.0)
+    radio = summary["radio"]
+    assert radio is None or sum(radio["fates"].values()) == radio["intended"]
+
+
+def test_a_recorded_run_is_intact_and_repeats_bit_for_bit(tmp_path):
+    folder = tmp_path / "run"
+    done = swarmwire("run", LOSSY, "--set", "duration_s=2", "--runners", "2", "--packets", "--out", folder)
+    assert done.returncode == 0, done.stderr
+    assert RunFolder(folder).ticks["tick"].to_list() == list(range(20))
+    assert swarmwire("verify", folder).returncode == 0
+    assert swarmwire("repeat", folder).returncode == 0
+
+
+def test_a_small_sweep_over_the_loss_shows_that_packets_are_lost(tmp_path):
+    vary = ["--vary", "radio.loss=0,0.9", "--seeds", "2", "--set", "duration_s=1", "--workers", "2"]
+    done = swarmwire("sweep", LOSSY, *vary, "--out", tmp_path / "losses")
+    assert done.returncode == 0, done.stderr
+    rows = pl.read_parquet(tmp_path / "losses" / "summary.parquet")
+    pdr = {loss: rows.filter(pl.col("radio.loss") == loss)["radio.pdr"].mean() for loss in (0.0, 0.9)}
+    assert len(rows) == 4
+    assert pdr[0.0] == 1.0
+    assert pdr[0.9] == pytest.approx(0.1, abs=0.05)
+
+
+def test_a_driver_and_the_gateway_of_its_robot_understand_each_other():
+    rig = RIGS["epuck2"]()
+    try:
+        rig.connect()
+        rig.told()
+        rig.driver.act(Command(0.05, 0.5))
+        rig.until_told(0.05, 0.5)
+    finally:
+        rig.close()
+
+
+def test_a_killed_agent_process_costs_its_robots_alone(tmp_path):
+    folder = tmp_path / "run"
+    process = started(LOSSY, "--runners", "2", "--set", "run.on_runner_loss='dead'", "--realtime=5", "--out", folder)
+    children = family(process)
+    os.kill(runners_of(process)[0].pid, signal.SIGKILL)
+    assert process.wait(timeout=60) == 0
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["counts"]["runners_lost"] == 1
+    assert summary["ended"] == "duration"
+    assert not [child for child in children if child.is_running()]
