@@ -17,9 +17,10 @@ ENOUGH = Counted(lines=0.95, branches=0.90)
 PYTEST = ["-m", "pytest", "-q", "-m", "not slow", "-n", "2", "--dist", "worksteal", "--timeout", "900"]
 AGAIN = ["--reruns", "1", "--only-rerun", "ZError", "--only-rerun", "it did not come to hold"]  # as `make test`
 PLAIN = ["-p", "tests.tools.coverage.plain_kernels", "tests/unit/comms", "tests/unit/world"]
-NETWORKED = [f"tests/integration/{part}" for part in ("agent", "robots", "comms", "world")]
 THREADS = ["-p", "tests.tools.coverage.network_threads"]
-AS_USED = [*THREADS, "PLACEHOLDER]
+UNITS = [f"tests/unit/{folder}" for folder in ("agent", "robots", "comms/wire", "world/crews", "world/gateways")]
+PROCESSES = [f"tests/integration/{part}" for part in ("agent", "robots", "comms", "world")]
+AS_USED = [*THREADS, *UNITS, *PROCESSES]
 
 
 def main() -> int:
