@@ -179,8 +179,8 @@ class RunFolder:
     def events(self, arena: int | None = None) -> "pl.DataFrame":
         """A row per event and arena: at_s, tick, time_s, do, part, ended, arena, robots (names of those it changed).
 
-        `part` is what fails, else empty. What happens to each robot at a time of its own
-        (`singly` in the summary) has no row of an arena in which nobody changed.
+        `part` is what fails, else empty. What happens to each robot at a time of its own (`singly` in the summary) has
+        no row of an arena in which nobody changed.
         """
         return self._read("events", arena)
 

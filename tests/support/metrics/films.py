@@ -60,9 +60,8 @@ def ticks_frame(of: Film, states: Any = None, arena: int = 0) -> pl.DataFrame:
     for place, name in enumerate(("x_m", "y_m", "heading_rad")):
         columns[name] = pl.Series(list(of.pose[:, :, place]), dtype=pl.Array(pl.Float32, robots))
     columns["alive"] = pl.Series(of.alive.tolist(), dtype=pl.Array(pl.Boolean, robots))
-    if states is not None:
-        inner = pl.String if isinstance(states[0][0], str | None) else pl.UInt16
-        columns["state"] = pl.Series(states, dtype=pl.Array(inner, robots))
+    noted = [[""] * robots] * count if states is None else states
+    columns["state"] = pl.Series(noted, dtype=pl.Array(pl.String, robots))
     for name, value in of.metrics.items():
         columns[name] = pl.Series(value).fill_nan(None)
     return pl.DataFrame(columns)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
 from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.campaign.columns import Columns
 from swarmwire.deploy.campaign.design import Point
@@ -81,12 +80,11 @@ def read_campaign(folder: Path) -> Campaign:
         raise BadInput(str(folder), "", expected) from None
     except ValueError:  # no JSON, or no UTF-8
         found = None
+    read_about(path)  # refuses another format, and names the key of what is wrong in all that reports read
     try:
-        check_format(found, CAMPAIGN_FORMAT, str(path))
         campaign = _campaign(found)
     except (KeyError, TypeError, ValueError):
         raise BadInput(str(path), "", "expected what swarmwire writes at the start of a campaign") from None
-    read_about(path)  # the reader of reports knows what stands there
     _check(campaign, str(path))
     return campaign
 

@@ -133,5 +133,11 @@ def _points(fields: _Fields) -> tuple[Point, ...]:
 
 
 def _outcome(of: _Fields) -> Outcome:
-    listed, hold_s = of.get("listed", bool, "true or false"), float(of.get("hold_s", (int, float), "a number of s"))
-    return Outcome(of.text("column"), of.text("unit"), of.one_of("kind", KINDS), of.text("help"), listed, hold_s)
+    return Outcome(
+        column=of.text("column"),
+        unit=of.text("unit"),
+        kind=of.one_of("kind", KINDS),
+        help=of.text("help"),
+        listed=of.get("listed", bool, "true or false"),
+        hold_s=float(of.get("hold_s", (int, float), "a number of s")),
+    )

@@ -94,8 +94,8 @@ def _stacked(frame: "pl.DataFrame", names: tuple[str, ...]) -> AnyArray:
 def states(frame: "pl.DataFrame") -> tuple[tuple[str, ...], IntArray | None]:
     """The names of the states that robots noted, in order of their first tick, and who was in which.
 
-    Null and the empty text are no state. Second: (T, n) places in the
-    names or NO_STATE, or None if no robot ever noted a state.
+    Null and the empty text are no state. Second: (T, n) places in the names or NO_STATE, or None if no robot ever noted
+    a state.
     """
     import polars as pl
 

@@ -196,7 +196,7 @@ def test_ticks_that_were_dropped_make_the_table_partial(tmp_path):
 @pytest.mark.parametrize(
     ("change", "part", "text"),
     [
-        ({"ticks": 11}, "ticks", "10 ticks; the summary has 11"),
+        ({"by_arena": made_up_summary(11, arenas=ARENAS)["by_arena"]}, "ticks", "10 ticks; the summary has 11"),
         ({"events": []}, "events", "20 rows; the summary has 0 events"),
         ({"metrics": [{"order": {"final": 2.0}}] * 2}, "ticks", "the summary has 2.0"),
         ({"metrics": [{"speed": {"final": 2.0}}] * 2}, "ticks", "speed ends at no column"),
