@@ -56,6 +56,14 @@ NUMBERS = (
 )  # fmt: skip
 
 
+def fault_of(read: Callable[[Path], Any], path: Path) -> BadInput | None:
+    try:
+        read(path)
+    except BadInput as fault:
+        return fault
+    return None
+
+
 def written(path: Path, number: object) -> None:
     """A file that holds this format number, or none, and a key that no format has."""
     held = {"weather": "fine", **({} if number is None else {"format": number})}
@@ -77,10 +85,8 @@ def test_a_file_of_another_format_is_refused_before_the_rest_of_it_is_read(kind,
 def test_a_file_of_this_format_is_read_further(kind, tmp_path):
     name, read = FILES[kind]
     written(tmp_path / name, 1)
-    try:
-        read(tmp_path / name)
-    except BadInput as refused:
-        assert "format" not in (refused.key, refused.expected.partition(":")[0])
+    fault = fault_of(read, tmp_path / name)
+    assert fault is None or fault.key != "format"
 
 
 def test_of_an_older_file_it_is_said_who_reads_it():

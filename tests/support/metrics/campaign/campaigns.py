@@ -100,8 +100,12 @@ def about_of(
     limit_s: float,
 ) -> dict[str, Any]:
     """campaign.json."""
-    outcomes = [{"column": column, "unit": "", "kind": "number", "help": f"made-up {column}", **PLAIN} for column in numbers]
-    outcomes += [{"column": column, "unit": "s", "kind": "time", "help": f"made-up {column}", **PLAIN} for column in times]
+    outcomes = [
+        {"column": column, "unit": "", "kind": "number", "help": f"made-up {column}", **PLAIN} for column in numbers
+    ]
+    outcomes += [
+        {"column": column, "unit": "s", "kind": "time", "help": f"made-up {column}", **PLAIN} for column in times
+    ]
     return {
         "format": 1,
         "name": name,

@@ -18,7 +18,8 @@ OWN = MetricFacts("gas", "what it smells of", "ppm", "count", (0.0, None))
 @pytest.mark.parametrize("name", METRICS)
 def test_what_is_kept_of_a_metric_comes_back(tmp_path, name):
     facts = facts_of(METRICS[name])
-    (tmp_path / "run.json").write_text(json.dumps({"format": 1, "metrics": [asdict(facts), asdict(OWN)]}, allow_nan=False))
+    run = {"format": 1, "metrics": [asdict(facts), asdict(OWN)]}
+    (tmp_path / "run.json").write_text(json.dumps(run, allow_nan=False))
     assert RunFolder(tmp_path).measured == {name: facts, "gas": OWN}
     least, largest = METRICS[name].bounds
     assert facts.bounds == (None if least == -inf else least, largest)
