@@ -20,9 +20,25 @@ class FakeClock:
         self.slept_until.append(at_ns)
         self.time_ns = max(self.time_ns, at_ns)
 
+    def utc_stamp(self) -> str:
+        """As `WallClock` tells the date."""
+        return "20261121T030405Z"
+
 
 class StillClock(FakeClock):
     """A clock on which nobody may sleep."""
 
     def sleep_until(self, at_ns: int) -> None:
         raise AssertionError("whatever looks on does not wait for the time")
+
+
+class GoingClock(FakeClock):
+    """A clock that goes on with each look."""
+
+    def __init__(self, step_ns: int) -> None:
+        super().__init__()
+        self._step_ns = step_ns
+
+    def now_ns(self) -> int:
+        self.time_ns += self._step_ns
+        return self.time_ns

@@ -69,31 +69,3 @@ def test_a_stranger_cannot_stop_or_change_a_run(tmp_path):
     assert counts["unknown_runner_frames"] == 2
     assert counts["frames_dropped_by_runners"] == 2
     assert counts["bad_join"] == 1
-
-
-NAN = """
-import numpy as np
-from swarmwire.agent import Robots, State, VectorAgent
-
-class Nan(VectorAgent):
-    def step(self, robots: Robots, state: State) -> None:
-        robots.drive(np.nan, np.inf)
-
-class ToNobody(VectorAgent):
-    def step(self, robots: Robots, state: State) -> None:
-        robots.radio.send(Hello, to=77)
-
-from swarmwire.agent import Message
-class Hello(Message):
-    pass
-"""
-
-
-def test_commands_that_are_no_numbers_and_packets_to_nobody_are_counted(tmp_path):
-    (tmp_path / "odd.py").write_text(NAN)
-    for name, count in (("Nan", "nan_commands"), ("ToNobody", "packets_to_nobody")):
-        spec = [f"robots.flock.agent={tmp_path / 'odd.py'}:{name}", "robots.flock.params={}", "duration_s=1"]
-        for runners in (None, 2):
-            result = run(LOSSY, overrides=spec, runners=runners)
-            assert result.ticks == 10
-            assert result.counts[count] == 20 * 10

@@ -1,25 +1,163 @@
-"""Agents from elsewhere join, leave, are killed, frozen, thawed, in lockstep: what robots do, and what is counted."""
+"""Runners that are processes join, leave, are killed, frozen and thawed, in lockstep and real time.
+
+`tests/unit/deploy/test_joining.py` has more cases over the same frames in one process.
+"""
 
 import signal
-import subprocess
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 
 import pytest
 
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Truth
-from swarmwire.comms.wire.frames import VERSION
 from swarmwire.deploy import repeat, run
-from swarmwire.deploy.listening import Listening
-from swarmwire.deploy.simulation import Simulation
-from swarmwire.world.crews.change import Change
-from tests.integration.deploy.test_realtime import Watcher
 from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.joiners import HERE, Joiners
+from tests.support.deploy.joiners import Joiners, Watcher, interrupt, moving
 
-LONG = "duration_s=5000"
-SHORT = "duration_s=3"
+When = Callable[[Joiners, Truth], bool]
+LEFT, OVER = (130, "left the run"), (0, "the run is over")
+LONG, SHORT = "duration_s=5000", "duration_s=3"
+FACTOR = 5.0
+
+
+def at(tick: int) -> When:
+    return lambda _, truth: truth.tick >= tick
+
+
+def move(robots: int) -> When:
+    return lambda _, truth: len(moving(truth)) == robots
+
+
+def after(what: str, ticks: int) -> When:
+    """Some ticks after this was told."""
+    return lambda joiners, truth: (tick := joiners.tick_of(what)) is not None and truth.tick > tick + ticks
+
+
+def ended(name: str) -> When:
+    return lambda joiners, _: joiners.processes[name].poll() is not None
+
+
+@dataclass(frozen=True)
+class Case:
+    """Who joins before the first tick, what happens then, and what comes of it.
+
+    `steps` are made one after the other, each once its condition holds; `upon` is made when a change is told. "start a
+    --robots 4" starts a runner, "SIGKILL a" sends a signal, "quit" is Ctrl-C in the world.
+    """
+
+    on_loss: str
+    first: tuple[str, ...]
+    told: str  # after those who joined before the first tick
+    steps: tuple[tuple[When, str], ...] = ()
+    upon: Mapping[str, str] = field(default_factory=dict)
+    settings: tuple[str, ...] = (LONG,)
+    start_with: int | None = None
+    realtime: float | None = None
+    quantum: float | None = None
+    before: tuple[str, ...] = ()  # what starts the runners
+    over: str = "interrupted"
+    counts: Mapping[str, int] = field(default_factory=dict)
+    reason: str = ""  # of the first change of `told`
+    ends: Mapping[str, tuple[int, str]] = field(default_factory=dict)  # exit code and last line, by runner
+    stopped: range | None = None  # robots that the watchdog stopped, at least; none at all if this is empty
+    same: bool = False  # as with all agents in one process
+    repeats: bool = True
+
+
+FROZEN = ((at(8), "SIGSTOP a"), (after("lost a", 5), "SIGCONT a"), (after("lost a", 10), "quit"))
+NO_ANSWER = "no answer for 1 s"
+CASES = {
+    "agents from elsewhere": Case(
+        on_loss="stop",
+        first=("a --names flock-3,flock-17", "b --robots 6", "c --robots 12"),
+        told="",
+        settings=(SHORT,),
+        over="duration",
+        ends=dict.fromkeys("abc", OVER),
+        same=True,
+    ),
+    "killed, and back": Case(
+        on_loss="wait",
+        first=("a --robots 8", "b --robots 12"),
+        steps=((at(11), "SIGKILL a"),),
+        upon={"lost a": "start a"},
+        told="lost a, returned a",
+        settings=(SHORT,),
+        over="duration",
+        counts={"runners_lost": 1, "runners_returned": 1},
+        reason="its process or its link is gone",
+        ends={"a": OVER, "b": OVER},
+        same=True,
+    ),
+    "late, and leaves": Case(
+        on_loss="stand",
+        first=("a --robots 5",),
+        start_with=5,
+        steps=((at(5), "start b --robots 4"), (move(9), "SIGINT b"), (move(5), "quit")),
+        told="joined b, left b",
+        counts={"runners_joined_late": 1, "runners_left": 1},
+        ends={"b": LEFT},
+    ),
+    "frozen for too long": Case(
+        on_loss="stand",
+        first=("a --robots 5", "b --robots 15"),
+        settings=(LONG, "run.runner_timeout_s=1"),
+        steps=FROZEN,
+        told="lost a",
+        counts={"runners_lost": 1},
+        reason=NO_ANSWER,
+        ends={"a": (1, f"the world let it go: {NO_ANSWER}")},
+    ),
+    "in the background of a script, where Ctrl-C is ignored": Case(
+        on_loss="stop",
+        before=("sh", "-c", "trap '' INT; exec \"$@\"", "sh"),
+        first=("a",),
+        steps=((at(4), "SIGTERM a"),),
+        told="",
+        over="left",
+        ends={"a": LEFT},
+        repeats=False,
+    ),
+    "real time with quanta: late, and leaves": Case(
+        on_loss="stand",
+        realtime=FACTOR,
+        quantum=0.005,
+        first=("a --robots 5",),
+        start_with=5,
+        steps=((move(5), "start b --robots 4"), (move(9), "SIGINT b"), (move(5), "quit")),
+        told="joined b, left b",
+        settings=(LONG, "run.watchdog_s=1000"),
+        counts={"runners_joined_late": 1, "runners_left": 1},
+        ends={"b": LEFT},
+    ),
+    "real time: killed, and back": Case(
+        on_loss="coast",
+        realtime=FACTOR,
+        first=("a --robots 5", "b --robots 15"),
+        steps=((move(20), "SIGKILL a"), (after("lost a", 10), "start a"), (after("returned a", 5), "quit")),
+        told="lost a, returned a",
+        settings=(LONG, "run.watchdog_s=60"),
+        counts={"runners_lost": 1, "runners_returned": 1},
+        stopped=range(0),
+    ),
+    "real time: frozen, stopped by the watchdog, lost": Case(
+        on_loss="wait",
+        realtime=FACTOR,
+        first=("a --robots 5", "b --robots 15"),
+        steps=(
+            (move(20), "SIGSTOP a"),
+            (move(15), ""),
+            (after("lost a", 5), "SIGCONT a"),
+            (ended("a"), "quit"),
+        ),
+        told="lost a",
+        settings=(LONG, "run.watchdog_s=0.5", "run.runner_timeout_s=1"),
+        counts={"runners_lost": 1},
+        reason=NO_ANSWER,
+        ends={"a": (1, f"the world let it go: {NO_ANSWER}")},
+        stopped=range(5),
+    ),
+}
 
 
 @pytest.fixture
@@ -29,13 +167,62 @@ def joiners(tmp_path) -> Iterator[Joiners]:
     found.close()
 
 
-def interrupt() -> None:
-    signal.raise_signal(signal.SIGINT)
+def do(joiners: Joiners, line: str) -> None:
+    """One line of a case."""
+    what, *words = line.split() or [""]
+    if what == "start":
+        if words[0] in joiners.processes:  # which was killed
+            joiners.said(words[0])
+        joiners.start(words[0], *words[1:])
+    elif what == "quit":
+        interrupt()
+    elif what:
+        joiners.send(words[0], signal.Signals[what])
 
 
-def moving(truth: Truth) -> list[int]:
-    """Robots that are told to move."""
-    return [row for row, command in enumerate(truth.command) if command.any()]
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_who_joins_leaves_or_is_lost(joiners, tmp_path, case):
+    joiners.before = case.before
+    joiners.first = [tuple(line.split()) for line in case.first]
+    joiners.on_change = lambda change: do(joiners, case.upon.get(f"{change.what} {change.runner}", ""))
+    steps = [
+        (lambda truth, when=when: when(joiners, truth), lambda line=line: do(joiners, line))
+        for when, line in case.steps
+    ]
+    watcher, settings = Watcher(*steps), (*case.settings, f"run.on_runner_loss={case.on_loss}")
+    result = joiners.run(
+        *settings,
+        watcher=watcher,
+        start_with=case.start_with,
+        realtime=case.realtime,
+        quantum=case.quantum,
+        out=tmp_path / "run",
+    )
+    assert not watcher.steps
+    first = [f"joined {line.split()[0]}" for line in case.first]
+    assert [" ".join(told) for told in joiners.told] == [*first, *(case.told.split(", ") if case.told else [])]
+    assert all(change.tick == -1 for change in result.runner_changes[: len(first)])
+    assert not case.reason or result.runner_changes[len(first)].reason == case.reason
+    assert result.ended == case.over
+    assert result.mode == ("realtime" if case.realtime else "lockstep")
+    told = {name: count for name, count in result.counts.items() if name.startswith("runners_")}
+    assert told == (case.counts or told)
+    assert (len(result.lost_runners) == 0) == ("lost" not in case.told)
+    for name, (code, last) in case.ends.items():
+        exit_code, said = joiners.said(name)
+        assert (exit_code, said.splitlines()[-1]) == (code, last)
+        assert said.splitlines()[0].startswith(f"{name}: joined run ")
+    if case.stopped is not None:
+        assert result.realtime is not None
+        stops = result.realtime.watchdog_stops.keys()
+        assert {f"flock-{row}" for row in case.stopped} <= stops if case.stopped else not stops
+    if case.same:
+        assert result.trajectory_sha256 == alone(joiners, *settings)
+    assert (result.inputs is None) == (not case.told)  # all follows from scenario and seed
+    if case.repeats:
+        repetition = repeat(tmp_path / "run")
+        assert repetition.same
+        assert repetition.result.ticks == result.ticks
 
 
 def alone(joiners: Joiners, *overrides: str) -> list[str]:
@@ -43,215 +230,33 @@ def alone(joiners: Joiners, *overrides: str) -> list[str]:
     return run(LOSSY, overrides=[*joiners.overrides, *overrides]).trajectory_sha256
 
 
-def test_a_run_with_agents_from_elsewhere_is_the_same_bit_for_bit(joiners):
-    joiners.first = [("a", "--names", "flock-3,flock-17"), ("b", "--robots", "6"), ("c", "--robots", "12")]
-    result = joiners.run(SHORT)
-    assert result.trajectory_sha256 == alone(joiners, SHORT)
-    assert (result.mode, result.runners, result.ended) == ("lockstep", 3, "duration")
-    assert joiners.told == [("joined", name) for name in "abc"]
-    assert all(change.tick == -1 for change in result.runner_changes)
-    assert result.inputs is None  # all follows from scenario and seed
-    for name in "abc":
-        code, said = joiners.said(name)
-        assert code == 0
-        assert said.splitlines()[0].startswith(f"{name}: joined run ")
-        assert said.splitlines()[-1] == "the run is over"
-
-
-def test_a_runner_that_is_killed_and_returns_goes_on_where_it_was(joiners, tmp_path):
-    """With `wait` the run is that in which nothing happened: its agents' State came back with their robots."""
-    joiners.first = [("a", "--robots", "8"), ("b", "--robots", "12")]
-
-    def again(change: Change) -> None:
-        if change.what == "lost":
-            joiners.said("a")
-            joiners.start("a", "--names", ",".join(change.robots))
-
-    joiners.on_change = again
-    watcher = Watcher((lambda truth: truth.tick == 11, lambda: joiners.send("a", signal.SIGKILL)))
-    result = joiners.run(SHORT, "run.on_runner_loss=wait", watcher=watcher, out=tmp_path / "run")
-    assert joiners.told[2:] == [("lost", "a"), ("returned", "a")]
-    assert [change.tick for change in result.runner_changes[2:]] == [12, 12]
-    assert result.runner_changes[2].reason == "its process or its link is gone"
-    assert result.counts["runners_lost"] == result.counts["runners_returned"] == 1
-    assert result.trajectory_sha256 == alone(joiners, SHORT)
-    assert repeat(tmp_path / "run").same
-
-
-@pytest.mark.parametrize("on_loss", ["stand", "coast"])
-def test_a_late_joiner_s_robots_wait_for_it_and_who_leaves_is_no_crash(joiners, tmp_path, on_loss):
-    joiners.first = [("a", "--robots", "5")]
-    seen: dict[str, int] = {}
-
-    def late(change: Change) -> None:
-        seen[f"{change.what} {change.runner}"] = change.tick
-
-    joiners.on_change = late
-    watcher = Watcher(
-        (lambda truth: truth.tick >= 5, lambda: joiners.start("b", "--robots", "4")),
-        (
-            lambda truth: "joined b" in seen and truth.tick > seen["joined b"] + 3,
-            lambda: joiners.send("b", signal.SIGINT),
-        ),
-        (lambda truth: "left b" in seen and truth.tick > seen["left b"] + 3, interrupt),
-    )
-    result = joiners.run(LONG, f"run.on_runner_loss={on_loss}", watcher=watcher, start_with=5, out=tmp_path / "run")
-    joined, left = seen["joined b"], seen["left b"]
-    of_b = list(range(5, 9))
-    for truth in watcher.truths:
-        acts = truth.tick > joined and (truth.tick < left or on_loss == "coast")
-        if truth.tick != left or on_loss == "coast":
-            assert moving(truth) == [*range(5), *(of_b if acts else [])], truth.tick
-    if on_loss == "coast":  # they do what they did last, to the last digit
-        last = watcher.truths[-1].command[5:9]
-        assert (watcher.truths[-3].command[5:9] == last).all()
-    assert joiners.told == [("joined", "a"), ("joined", "b"), ("left", "b")]
-    assert result.counts["runners_joined_late"] == result.counts["runners_left"] == 1
-    assert "runners_lost" not in result.counts
-    assert not result.lost_runners
-    assert result.counts["packets_without_agent"] > 0
-    assert result.inputs is not None
-    assert result.inputs.first_tick == 0
-    code, said = joiners.said("b")
-    assert (code, said.splitlines()[-1]) == (130, "left the run")
-    repetition = repeat(tmp_path / "run")
-    assert repetition.same
-    assert repetition.result.ticks == result.ticks
-
-
-def test_a_frozen_runner_is_lost_after_its_time_out_and_told_to_leave_when_it_thaws(joiners, tmp_path):
-    joiners.first = [("a", "--robots", "5"), ("b", "--robots", "15")]
-    lost: list[int] = []
-    joiners.on_change = lambda change: lost.append(change.tick) if change.what == "lost" else None
-    watcher = Watcher(
-        (lambda truth: truth.tick == 8, lambda: joiners.send("a", signal.SIGSTOP)),
-        (lambda truth: bool(lost) and truth.tick > lost[0] + 5, lambda: joiners.send("a", signal.SIGCONT)),
-        (lambda truth: truth.tick > lost[0] + 10, interrupt),
-    )
-    result = joiners.run(
-        LONG,
-        "run.on_runner_loss=stand",
-        "run.runner_timeout_s=1",
-        watcher=watcher,
-        out=tmp_path / "run",
-    )
-    assert [str(change) for change in joiners.changes[2:]] == [
-        "a was lost with flock-0 … flock-4 (5 robots) in tick 9: no answer for 1 s"
-    ]
-    assert result.counts["runners_lost"] == 1
-    assert [len(moving(truth)) for truth in watcher.truths[7:]] == [20, 20, *[15] * (result.ticks - 9)]
-    code, said = joiners.said("a")
-    assert (code, said.splitlines()[-1]) == (1, "the world let it go: no answer for 1 s")
-    assert repeat(tmp_path / "run").same
-
-
-def test_a_runner_that_leaves_a_run_that_cannot_do_without_ends_it_in_order(joiners):
-    joiners.first = [("a",)]
-    watcher = Watcher((lambda truth: truth.tick == 4, lambda: joiners.send("a", signal.SIGINT)))
-    result = joiners.run(LONG, watcher=watcher)
-    assert (result.ended, result.error) == ("left", None)
-    assert joiners.said("a")[0] == 130
-
-
-def test_a_runner_in_the_background_of_a_script_leaves_in_order_too(joiners):
-    """There a shell has Ctrl-C ignored, so a signal to end finds nothing that Ctrl-C did before."""
-    joiners.before = ("sh", "-c", "trap '' INT; exec \"$@\"", "sh")
-    joiners.first = [("a",)]
-    watcher = Watcher((lambda truth: truth.tick == 4, lambda: joiners.send("a", signal.SIGTERM)))
-    result = joiners.run(LONG, watcher=watcher)
-    assert (result.ended, result.error) == ("left", None)
-    code, said = joiners.said("a")
-    assert (code, said.splitlines()[-1]) == (130, "left the run")
-
-
 def test_who_may_not_join_is_told_why_at_both_ends_and_the_run_goes_on(joiners, tmp_path):
     other = tmp_path / "other.py"
     other.write_text(joiners.agent.read_text() + "\n")
     joiners.first = [("a", "--names", "flock-0")]
     refused = {
+        "a": (("--robots", "1"), "the name a is in use"),  # killed and back before the world noticed, or another's
         "b": (("--names", "flock-0"), "taken, by a: flock-0"),
-        "c": (
-            ("--names", "flok-1"),
-            "expected names of robots, each once (flock-0 … flock-19 (20 robots)), got flok-1",
-        ),
-        "d": (("--robots", "20"), "expected at most 19 robots, which are free, got 20"),
-        "e": (
-            ("--scenario", other),
-            "another scenario: here is 'flocking over a lossy radio', whose file has another sha256",
-        ),
-        "f": (("--agent", f"{other}:Wanderer"), "another agent for flock"),
+        "c": (("--scenario", other), "another scenario: here is"),
+        "d": (("--agent", f"{other}:Wanderer"), "another agent for flock"),
     }
-    joiners.on_change = lambda _: [joiners.start(name, *asked) for name, (asked, _) in refused.items()]
-    ends: dict[str, tuple[int, str]] = {}
+
+    def others(_: object) -> None:
+        joiners.on_change = lambda _: None
+        for name, (asked, _) in refused.items():
+            joiners.start(name, *asked, label=f"refused {name}")
 
     def after(runner: str, why: str) -> None:
         joiners.refusals.append((runner, why))
         if len(joiners.refusals) == len(refused):
-            joiners.on_change = lambda _: None
             joiners.start("z", "--robots", "19")
 
-    joiners.refused = after
+    joiners.on_change, joiners.refused = others, after
     result = joiners.run(SHORT)
     for name, (_, why) in refused.items():
-        ends[name] = joiners.said(name)
-        assert ends[name][0] == 1
-        assert ends[name][1].splitlines()[-1].startswith(f"runner {name} got no robots: {why}")
+        code, said = joiners.said(f"refused {name}")
+        assert code == 1
+        assert said.splitlines()[-1].startswith(f"runner {name} got no robots: {why}")
         assert any(runner == name and text.startswith(why) for runner, text in joiners.refusals)
     assert result.counts["refused_join"] == len(refused)
     assert result.trajectory_sha256 == alone(joiners, SHORT)
-
-
-def test_another_version_is_told_at_both_ends(joiners):
-    ends: list[str] = []
-
-    def strange(_: Change) -> None:
-        if not ends:
-            ends.append("")
-            later = "from swarmwire.comms.wire import frames; frames.VERSION += 1; "
-            program = later + "from swarmwire.agent.cli import main; raise SystemExit(main())"
-            command = [sys.executable, "-c", program, "join", joiners.endpoint, "--name", "b"]
-            joiners.processes["b"] = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-
-    joiners.first = [("a", "--robots", "5")]
-    joiners.on_change = strange
-    joiners.refused = lambda runner, why: (joiners.refusals.append((runner, why)), joiners.start("c"))
-    result = joiners.run(SHORT)
-    why = f"version: expected version {VERSION} of the frames, got {VERSION + 1}"
-    assert joiners.refusals == [("b", why)]
-    assert joiners.said("b") == (1, f"runner b got no robots: {why}\n")
-    assert result.counts["bad_join"] == 1
-
-
-def test_a_name_in_use_is_refused(joiners):
-    joiners.first = [("a", "--robots", "1")]
-    once: list[str] = []
-
-    def second(change: Change) -> None:
-        if not once:
-            once.append(change.runner)
-            first = joiners.processes.pop("a")
-            joiners.start("a", "--robots", "1")
-            joiners.processes["first a"] = first
-
-    joiners.on_change = second
-    joiners.refused = lambda runner, why: (joiners.refusals.append((runner, why)), joiners.start("b"))
-    joiners.run(SHORT)
-    assert joiners.refusals == [("a", "the name a is in use: another runner of this name plays")]
-    assert joiners.said("a")[1].splitlines()[-1] == f"runner a got no robots: {joiners.refusals[0][1]}"
-
-
-@pytest.mark.parametrize(
-    ("listening", "overrides", "why"),
-    [
-        (Listening(("tcp/0.0.0.0:0",)), [], "reaches beyond this machine"),
-        (Listening(("nonsense",)), [], "expected endpoints such as"),
-        (Listening(HERE, observed=("tcp/10.0.0.5:1",)), [], "--observe"),
-        (Listening(HERE, observed=HERE), [], "--observe: expected a run folder with it"),
-        (Listening(HERE, start_with=21), [], "expected 0 to 20"),
-        (Listening(HERE, start_with=5), [], "expected stand or coast with --start-with"),
-        (Listening(HERE, start_with=5), ["run.on_runner_loss=wait"], "expected stand or coast with --start-with"),
-    ],
-)
-def test_what_cannot_be_listened_for_is_bad_input(listening, overrides, why):
-    with pytest.raises(BadInput, match=why):
-        Simulation(LOSSY, overrides=overrides, listening=listening)

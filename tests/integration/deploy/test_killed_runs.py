@@ -3,7 +3,6 @@
 import re
 from importlib.util import find_spec
 
-import numpy as np
 import polars as pl
 import pytest
 
@@ -13,14 +12,13 @@ from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.recording_check import check_recording
 from swarmwire.metrics.verify.verify import verify
-from tests.support.deploy.commands import swarmwire
+from tests.support.deploy.commands import called
 from tests.support.deploy.recorded import record_run, started
 
-DURATION = "duration_s=20"
-TICKS = 200
+DURATION = "duration_s=12"
 KILL = 'events=[{at_s=1.0, do="kill", robots={group="flock", share=0.2}}]'
-# At random moments (fixed seed), and while the parts are joined.
-MOMENTS = [*np.random.default_rng(17).integers(0, TICKS, 3).tolist(), "ends"]
+SOME_PERIODS_NS = NS_PER_S // 2  # a recorder's period of two seconds lasts 40 ms here
+MOMENTS = [57, "ends"]  # amid its ticks, and while the parts are joined
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +55,7 @@ def test_what_a_killed_run_left_is_readable_and_true(tmp_path, whole, moment):
 
 @pytest.fixture(scope="module")
 def killed(tmp_path_factory):
-    """A long run's folder, killed amid its ticks; a tick that was over two seconds before, and the last that was."""
+    """A long run's folder, killed amid its ticks; a tick that was over some periods before, and the last that was."""
     folder, clock = tmp_path_factory.mktemp("killed"), WallClock()
     process = started(folder, "duration_s=3600", rrd=find_spec("rerun") is not None)
     before, due_ns, seen = None, 0, list[int]()
@@ -67,14 +65,14 @@ def killed(tmp_path_factory):
         for tick in ticks:
             seen.append(tick)
             if before is None and len(parts_of(folder, "ticks")) >= 3:
-                before, due_ns = tick, clock.now_ns() + 2 * NS_PER_S
+                before, due_ns = tick, clock.now_ns() + SOME_PERIODS_NS
             if before is not None and clock.now_ns() >= due_ns:
                 break
         process.kill()
         return folder, before, max(*seen, *ticks)
 
 
-def test_a_killed_run_leaves_its_recording_up_to_two_seconds_before(killed):
+def test_a_killed_run_leaves_its_recording_up_to_the_last_period(killed):
     pytest.importorskip("rerun", reason="needs the extra [view]")
     folder, before, last = killed
     state, told = check_recording(folder / "run.rrd")
@@ -84,22 +82,19 @@ def test_a_killed_run_leaves_its_recording_up_to_two_seconds_before(killed):
     assert before <= int(reach[1]) <= last + 1  # the recorder sees a tick before it is printed
 
 
-def test_verify_tells_how_far_a_killed_run_came(killed):
+def test_verify_tells_how_far_a_killed_run_came(killed, monkeypatch, capsys):
     folder, *_ = killed
     last = pl.scan_parquet(parts_of(folder, "ticks")).select(pl.col("tick").max()).collect().item()
-    told = swarmwire("verify", folder)
-    assert (told.returncode, told.stderr) == (1, "")
-    assert f"up to tick {last}" in " ".join(told.stdout.split())
-    closing = told.stdout.strip().splitlines()[-1]
-    assert closing.startswith("not whole: summary.json missing, ticks partial")
+    code, out, errors = called(monkeypatch, capsys, "verify", folder)
+    assert (code, errors) == (1, "")
+    assert f"up to tick {last}" in " ".join(out.split())
+    assert out.strip().splitlines()[-1].startswith("not whole: summary.json missing, ticks partial")
 
 
-def test_verify_is_content_with_a_whole_run_and_refuses_what_is_none(whole, tmp_path):
-    told = swarmwire("verify", whole.path)
-    assert (told.returncode, told.stderr) == (0, "")
-    assert told.stdout.strip().splitlines()[-1].startswith("whole: ")
-    none = swarmwire("verify", tmp_path)
-    assert none.returncode == 2
-    assert none.stderr.splitlines() == [
-        f"error: {tmp_path}: expected a run folder; there is nothing of a run in it",
-    ]
+def test_verify_is_content_with_a_whole_run_and_refuses_what_is_none(whole, tmp_path, monkeypatch, capsys):
+    code, out, errors = called(monkeypatch, capsys, "verify", whole.path)
+    assert (code, errors) == (0, "")
+    assert out.strip().splitlines()[-1].startswith("whole: ")
+    code, _, errors = called(monkeypatch, capsys, "verify", tmp_path)
+    assert (code, errors.count("\n")) == (2, 1)
+    assert f"{tmp_path}: expected a run folder" in errors

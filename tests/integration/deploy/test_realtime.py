@@ -1,58 +1,72 @@
-"""Runs in real time and runs that survive a lost runner, over real processes: what happens, in no set time."""
+"""Runs in real time over real processes, with a quantum and without: what happens, in no set time."""
 
-import signal
-from collections.abc import Callable
+import json
+from pathlib import Path
+from typing import Any
 
-import numpy as np
+import msgpack
 import psutil
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.deploy import run
-from tests.support.deploy.commands import LOSSY, swarmwire
+from swarmwire.deploy import repeat, run
+from swarmwire.deploy.record.inputs import LENGTH_BYTES, WITHIN
+from swarmwire.metrics.record.names import INPUTS
+from tests.support.deploy.commands import LOSSY, called
 
-STEADY = """
-from swarmwire.agent import Robots, State, VectorAgent
+RELAY = """
+from swarmwire.agent import Agent, Message, Robot, u2
 
-class Steady(VectorAgent):
-    def step(self, robots: Robots, state: State) -> None:
-        robots.drive(0.02, 0.5)
+class News(Message):
+    number: u2
+
+class Passed(Message):
+    number: u2
+
+class Relay(Agent):
+    def __init__(self) -> None:
+        self.steps = self.passed = 0
+
+    def step(self, robot: Robot) -> None:
+        self.hear(robot)
+        self.steps += 1
+        robot.note(value=self.passed)
+        robot.drive(0.05, 0.01 * self.passed)
+        if robot.draw.uniform("news") < 0.2:
+            robot.radio.send(News(number=self.steps))
+
+    def hear(self, robot: Robot) -> None:
+        for packet in robot.radio.heard(News):
+            self.passed += 1
+            robot.radio.send(Passed(number=packet.message.number))
 """
-
-
-@pytest.fixture
-def steady(tmp_path):
-    (tmp_path / "steady.py").write_text(STEADY)
-    return [f"robots.flock.agent={tmp_path / 'steady.py'}:Steady", "robots.flock.params={}"]
+OF_FIVE = 'robots = { group = "flock", count = 5 }'
+EVENTS = f"""[
+    {{ do = "kill", {OF_FIVE}, at_s = 0.2, for_s = 0.4 }},
+    {{ do = "blackout", {OF_FIVE}, at_s = 0.4, for_s = 0.3 }},
+]"""
+QUANTUM_S = 0.002
 
 
 def runners_here() -> list[psutil.Process]:
+    """The processes of the run that goes on in this one."""
     return [runner for nursery in psutil.Process().children() for runner in nursery.children()]
 
 
-class Watcher:
-    """An observer that goes from one act to the next as soon as what it waits for is true."""
-
-    def __init__(self, *steps: tuple[Callable[[Truth], bool], Callable[[], object]]) -> None:
-        self.steps = list(steps)
-        self.truths: list[Truth] = []
-
-    def begin(self, static: Static) -> None:
-        """Nothing yet."""
-
-    def see(self, truth: Truth) -> None:
-        self.truths.append(truth)
-        if self.steps and self.steps[0][0](truth):
-            self.steps.pop(0)[1]()
-
-    def end(self, last: Tally | None) -> dict[str, object]:
-        return {}
+def relays(folder: Path) -> list[str]:
+    (folder / "relay.py").write_text(RELAY)
+    agent = [f"robots.flock.agent={folder / 'relay.py'}:Relay", "robots.flock.params={}"]
+    return [*agent, "duration_s=1", "radio.latency_s=0.003", f"events={EVENTS}"]
 
 
-def still(truth: Truth) -> int:
-    """How many robots are told to stand."""
-    return int(np.count_nonzero(~truth.command.any(axis=1)))
+def frames_of(folder: Path) -> list[dict[str, Any]]:
+    """What was recorded of what came from outside, by tick."""
+    data, found = (folder / INPUTS).read_bytes(), list[dict[str, Any]]()
+    while data:
+        stop = LENGTH_BYTES + int.from_bytes(data[:LENGTH_BYTES], "little")
+        found.append(msgpack.unpackb(data[LENGTH_BYTES:stop]))
+        data = data[stop:]
+    return found
 
 
 def test_a_run_in_real_time_ends_and_its_fates_add_up():
@@ -63,87 +77,53 @@ def test_a_run_in_real_time_ends_and_its_fates_add_up():
     assert sum(result.radio.fates.values()) == result.radio.intended
     assert result.radio.fates["heard"] > 0
     assert result.realtime is not None
-    assert result.realtime.factor == 20
+    assert (result.realtime.factor, result.realtime.quantum_s) == (20, None)
     summary = result.summary()["realtime"]
     assert {"factor", "late_answers", "missed_ticks", "worst_lag_s", "frames_dropped", "watchdog_stops"} <= set(summary)
 
 
-def test_agents_in_this_process_are_paced_too_and_do_the_same():
-    short = ["duration_s=2"]
-    result = run(LOSSY, overrides=short, realtime=10)
-    assert result.mode == "realtime"
-    assert result.wall_time_s >= 0.2
-    assert result.trajectory_sha256 == run(LOSSY, overrides=short).trajectory_sha256
+@pytest.mark.parametrize("runners", [None, 2])
+def test_packets_cross_between_ticks_fates_add_up_and_the_run_is_the_same_again(tmp_path, runners):
+    folder = tmp_path / "run"
+    result = run(LOSSY, overrides=relays(tmp_path), runners=runners, realtime=1, quantum=QUANTUM_S, out=folder)
+    assert (result.mode, result.runners, result.ended, result.ticks) == ("realtime", runners or 0, "duration", 10)
+    assert result.radio is not None
+    assert sum(result.radio.fates.values()) == result.radio.intended
+    assert result.radio.fates["heard"] > 0
+    told = result.realtime
+    assert told is not None
+    assert told.delivery is not None
+    assert told.tick_jitter is not None
+    assert (told.quantum_s, told.tick_jitter.count) == (QUANTUM_S, 9)
+    assert told.delivery.count >= result.radio.fates["heard"]
+    assert result.inputs is not None
+    assert (result.inputs.first_tick, result.inputs.ticks) == (0, 10)
+    assert any(WITHIN in frame["arrays"] for frame in frames_of(folder))
+    summary = json.loads((folder / "summary.json").read_text())["realtime"]
+    assert {"count", "p50_s", "p99_s", "worst_s"} == set(summary["delivery"]) == set(summary["tick_jitter"])
+    assert json.loads((folder / "run.json").read_text())["quantum_s"] == QUANTUM_S
+    repetition = repeat(folder, out=tmp_path / "again")
+    assert repetition.same
+    assert (repetition.result.radio, repetition.result.inputs) == (result.radio, result.inputs)
+    assert repeat(tmp_path / "again").same
+    contradicting(folder)
+    with pytest.raises(BadInput, match="packets in the order in which they came"):
+        repeat(folder)
 
 
-def test_a_machine_that_cannot_keep_up_says_so_at_once_and_in_the_summary(capfd):
-    result = run(LOSSY, overrides=["duration_s=2"], realtime=1e6)
-    assert result.realtime is not None
-    assert result.realtime.missed_ticks == 20
-    assert result.realtime.worst_lag_s > 0
-    assert "does not keep up with 1e+06 x real time" in capfd.readouterr().err
+def contradicting(folder: Path) -> None:
+    """Have a tick's record tell of packets that were not there."""
+    recorded = frames_of(folder)
+    at = next(i for i, frame in enumerate(recorded) if WITHIN in frame["arrays"])
+    code, shape, numbers = recorded[at]["arrays"][WITHIN]
+    recorded[at]["arrays"][WITHIN] = (code, shape, numbers[:-8] + (99).to_bytes(8, "little"))
+    packed = [msgpack.packb(frame) for frame in recorded]
+    (folder / INPUTS).write_bytes(b"".join(len(frame).to_bytes(LENGTH_BYTES, "little") + frame for frame in packed))
 
 
-def test_a_frozen_runners_robots_stop_and_go_on_when_it_does(steady):
-    frozen: list[psutil.Process] = []
-
-    def freeze() -> None:
-        frozen.append(runners_here()[0])
-        frozen[0].suspend()
-
-    watcher = Watcher(
-        (lambda truth: not still(truth), freeze),
-        (lambda truth: still(truth) >= 5, lambda: [process.resume() for process in frozen]),
-        (lambda truth: not still(truth), lambda: signal.raise_signal(signal.SIGINT)),
-    )
-    result = run(LOSSY, overrides=[*steady, "duration_s=500"], runners=4, realtime=5, observers=[watcher])
-    assert result.ended == "interrupted"
-    assert result.realtime is not None
-    stops = result.realtime.watchdog_stops
-    assert len(stops) >= 5
-    # Five ticks or more went by without an answer from it: each came late or was passed over.
-    assert result.realtime.frames_dropped + max(result.realtime.late_answers.values(), default=0) >= 4
-    assert not result.lost_runners
-
-
-@pytest.mark.parametrize("realtime", [None, 10])
-def test_robots_of_a_runner_that_is_killed_stand_still_if_the_scenario_says_so(steady, realtime, capfd):
-    watcher = Watcher(
-        (lambda truth: not still(truth), lambda: [runner.kill() for runner in runners_here()[:1]]),
-        *[(lambda truth: still(truth) == 5, lambda: None)] * 20,
-        (lambda truth: still(truth) == 5, lambda: signal.raise_signal(signal.SIGINT)),
-    )
-    setting = [*steady, "duration_s=500", "run.on_runner_loss=dead", "run.watchdog_s=1000"]
-    result = run(LOSSY, overrides=setting, runners=4, realtime=realtime, observers=[watcher])
-    assert result.ended == "interrupted"
-    assert result.counts["runners_lost"] == 1
-    assert len(result.lost_runners) == 1
-    assert "(5 robots)" in result.lost_runners[0]
-    assert "its robots stand still" in capfd.readouterr().err
-    stood = ~watcher.truths[-1].command.any(axis=1)
-    assert not watcher.truths[-20].command[stood].any()
-
-
-@pytest.mark.parametrize("factor", [0, -1, float("nan"), float("inf"), "fast"])
-def test_a_factor_that_cannot_be_is_refused(factor):
-    with pytest.raises(BadInput, match="expected a factor above 0"):
-        run(LOSSY, realtime=factor)
-
-
-def test_a_watchdog_that_cannot_be_is_refused():
-    with pytest.raises(BadInput, match=r"run.watchdog_s: expected a number above 0"):
-        run(LOSSY, overrides=["run.watchdog_s=0"], realtime=1)
-
-
-@pytest.mark.parametrize("arguments", [["--realtime"], ["--realtime", "20"], ["--realtime=20"]])
-def test_the_factor_may_be_left_out(arguments, tmp_path):
-    ended = swarmwire("run", *arguments, LOSSY, "--set", "duration_s=0.3", "--out", tmp_path / "run")
-    assert ended.returncode == 0
-    assert f"x {20 if '20' in arguments[-1] else 1}; " in ended.stdout
-
-
-def test_the_command_refuses_a_factor_in_one_line(tmp_path):
-    for arguments in (["--realtime", "0"], ["--realtime", "-2"], ["--realtime=fast"]):
-        ended = swarmwire("run", LOSSY, *arguments, cwd=tmp_path)
-        assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1)
-        assert "--realtime: expected a factor above 0" in ended.stderr
+def test_the_command_takes_a_quantum_and_tells_how_late_packets_were(tmp_path, monkeypatch, capsys):
+    arguments = ("--realtime", "--quantum", "0.005", "--set", "duration_s=0.3", "--out", tmp_path / "run")
+    code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *arguments)
+    assert code == 0, errors
+    assert "in quanta of 5.0 ms" in " ".join(out.split())
+    assert "ticks began late" in out

@@ -1,6 +1,7 @@
 """How the processes of runners share the cores of their machine."""
 
 import os
+import socket
 from typing import Any
 
 import psutil
@@ -9,6 +10,7 @@ import pytest
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy import run
 from tests.integration.examples.test_examples import EXAMPLES
+from tests.support.deploy.commands import LOSSY
 
 SHORT = ["duration_s=0.5", "robots.flock.count=3"]
 
@@ -38,3 +40,10 @@ def test_runners_take_turns_in_lockstep_and_start_at_once_in_real_time(realtime:
     policies = Policies()
     run(EXAMPLES / "protocol" / "flock.toml", overrides=SHORT, runners=2, realtime=realtime, observers=[policies])
     assert policies.found == [getattr(os, policy)] * 2
+
+
+def test_a_socket_that_a_run_left_behind_is_taken_over(tmp_path):
+    stale = tmp_path / "s"
+    with socket.socket(socket.AF_UNIX) as dead:
+        dead.bind(str(stale))
+    assert run(LOSSY, overrides=["duration_s=0.5"], runners=1, socket=stale).ticks == 5

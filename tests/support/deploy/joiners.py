@@ -1,23 +1,69 @@
-"""Runners that tests start as processes of their own, at a world that listens."""
+"""Runners that come and go as a test says: processes at a world that listens, or protocol code in this process."""
 
 import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import zenoh
+
+from swarmwire.agent.host import layout_of
+from swarmwire.agent.loading import load_agent
+from swarmwire.agent.runner import Inbox, answers, given_robots
+from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.deploy.listening import Listening
+from swarmwire.deploy.new_terms import KEPT
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.crews.change import Change
-from tests.integration.deploy.test_realtime import Watcher
+from swarmwire.world.crews.lockstep import Lockstep
+from swarmwire.world.crews.roster import OnLoss
+from swarmwire.world.crews.terms import Terms
 from tests.support.deploy.commands import LOSSY, ROOT
 
 HERE = ("tcp/127.0.0.1:0",)
 WANDERER = ROOT / "tests/tools/soak/wanderer.py"  # a step that is lost or made twice shows in its run
+
+
+def interrupt() -> None:
+    """Ctrl-C in this process."""
+    signal.raise_signal(signal.SIGINT)
+
+
+def moving(truth: Truth) -> list[int]:
+    """Robots that are told to move."""
+    return [row for row, command in enumerate(truth.command) if command.any()]
+
+
+class Watcher:
+    """An observer that goes from one act to the next as soon as what it waits for is true."""
+
+    def __init__(self, *steps: tuple[Callable[[Truth], bool], Callable[[], object]]) -> None:
+        self.steps = list(steps)
+        self.truths: list[Truth] = []
+
+    def begin(self, static: Static) -> None:
+        """Nothing yet."""
+
+    def see(self, truth: Truth) -> None:
+        self.truths.append(truth)
+        if self.steps and self.steps[0][0](truth):
+            self.steps.pop(0)[1]()
+
+    def end(self, last: Tally | None) -> dict[str, object]:
+        return {}
 
 
 class Joiners:
@@ -26,22 +72,22 @@ class Joiners:
     def __init__(self, folder: Path) -> None:
         self.agent = Path(shutil.copy(WANDERER, folder))
         self.endpoint = ""
-        self.before: tuple[str, ...] = ()  # of each command: what starts it
-        self.processes: dict[str, subprocess.Popen[str]] = {}
+        self.before: Sequence[str] = ()  # of each command: what starts it
+        self.processes: dict[str, subprocess.Popen[str]] = {}  # by the label under which it was started
         self.changes: list[Change] = []
         self.refusals: list[tuple[str, str]] = []
-        self.first: list[tuple[str, ...]] = []  # who joins as soon as the world listens, one after the other
+        self.first: list[tuple[str | Path, ...]] = []  # who joins as soon as the world listens, one after the other
         self.on_change: Callable[[Change], object] = lambda _: None
 
     @property
     def overrides(self) -> list[str]:
         return [f"robots.flock.agent={self.agent}:Wanderer", "robots.flock.params={}", "run.runner_timeout_s=20"]
 
-    def start(self, name: str, *arguments: str | Path) -> None:
+    def start(self, name: str, *arguments: str | Path, label: str = "") -> None:
         """A runner that joins."""
         command = [sys.executable, "-m", "swarmwire.agent.cli", "join", self.endpoint, "--name", name]
         command = [*self.before, *command, *map(str, arguments)]
-        self.processes[name] = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        self.processes[label or name] = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
 
     def send(self, name: str, number: signal.Signals) -> None:
         self.processes[name].send_signal(number)
@@ -72,12 +118,16 @@ class Joiners:
     def _next(self) -> None:
         if self.first:
             name, *arguments = self.first.pop(0)
-            self.start(name, *arguments)
+            self.start(str(name), *arguments)
 
     @property
     def told(self) -> list[tuple[str, str]]:
         """What became of whom, in order."""
         return [(change.what, change.runner) for change in self.changes]
+
+    def tick_of(self, what: str) -> int | None:
+        """The tick in which this was told; None: not yet."""
+        return next((change.tick for change in self.changes if f"{change.what} {change.runner}" == what), None)
 
     def run(
         self, *overrides: str, watcher: Watcher | None = None, start_with: int | None = None, **more: Any
@@ -92,3 +142,69 @@ class Joiners:
         if watcher is not None:
             simulation.watch(watcher)
         return finished(simulation)
+
+
+class EncodedJoiners:
+    """A Crew of runners in this process that come and go as a script says; every frame is encoded and decoded.
+
+    The script says what happens in a tick, which is open then; in tick -1, before the first: "join NAME" with a number
+    of robots or their names, "leave NAME", "lose NAME", and "mute NAME": it answers no more, from this tick on.
+    """
+
+    def __init__(self, assignment: Assignment, on_loss: OnLoss, script: Mapping[int, Sequence[str]]) -> None:
+        kept = {group.name: layout_of(load_agent(group.agent)) for group in assignment.groups}
+        terms = Terms(open=True, start_with=0, memory=kept if on_loss in KEPT else None)
+        self.roster = Lockstep([assignment], on_loss, terms)
+        self._script = script
+        self._runners: dict[str, tuple[Inbox, Iterator[bytes]]] = {}
+
+    def start(self) -> None:
+        for line in self._script[-1]:
+            self._do(*line.split())
+
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+        lines = [line.split() for line in self._script.get(tick, ())]
+        for _, name in (line for line in lines if line[0] == "mute"):
+            del self._runners[name]
+        self._deliver(self.roster.open_tick(tick, senses, heard, outcomes))
+        for line in lines:
+            self._do(*line)
+        assert not self.roster.waiting, self.roster.missing
+        return self.roster.take()
+
+    def _do(self, what: str, name: str, robots: str = "") -> None:
+        if what == "join":
+            asked = {"robots": int(robots)} if robots.isdigit() else {"names": tuple(robots.split(","))}
+            given = self.roster.join(name, JoinRequest(**(asked if robots else {})).encode())
+            inbox = Inbox()
+            self._runners[name] = inbox, answers(*given_robots(given), inbox)
+            self._deliver(self.roster.answer(name, next(self._runners[name][1])))
+        elif what == "leave":
+            self.roster.answer(name, frames.encode("leave", -1, {}))
+            del self._runners[name]
+        elif what == "lose":
+            self.roster.gone(name, "its link is gone")
+            self._runners.pop(name, None)
+
+    def _deliver(self, out: Sequence[tuple[str, bytes]]) -> None:
+        for name, data in out:
+            if name in self._runners:
+                inbox, its = self._runners[name]
+                inbox.put_frame(SimpleNamespace(payload=zenoh.ZBytes(data)))
+                self._deliver(self.roster.answer(name, next(its)))
+
+    def counts(self) -> dict[str, int]:
+        return self.roster.counts()
+
+    def close(self) -> None:
+        self._runners.clear()
+
+
+def moves(truths: Sequence[Truth]) -> dict[int, list[int]]:
+    """From which tick on which robots were told to move."""
+    found = defaultdict[int, list[int]](list)
+    last: list[int] | None = None
+    for truth in truths:
+        if (now := moving(truth)) != last:
+            found[truth.tick] = last = now
+    return dict(found)

@@ -3,7 +3,10 @@
 import signal
 
 import pytest
+import typer
 
+from swarmwire.comms.errors import Interrupted
+from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
 from swarmwire.deploy.interrupt import Interrupt
 
 ASKING = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
@@ -35,3 +38,26 @@ def test_whoever_handled_signals_before_does_so_again():
     with Interrupt():
         assert all(one != other for one, other in zip(handlers(), before, strict=True))
     assert handlers() == before
+
+
+def test_a_hang_up_that_is_ignored_stays_so():
+    """As nohup starts a program."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Interrupt() as interrupt:
+            signal.raise_signal(signal.SIGHUP)
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+        assert not interrupt.asked
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_hang_up_before_the_first_tick_has_its_own_exit_code():
+    interrupt = Interrupt()
+    with pytest.raises(Interrupted), leaving_when_hung_up(interrupt):
+        raise Interrupted("interrupted while it waited for its runners")
+    interrupt.hung_up = True
+    with pytest.raises(typer.Exit) as left, leaving_when_hung_up(interrupt):
+        raise Interrupted("interrupted while it waited for its runners")
+    assert left.value.exit_code == 129

@@ -11,9 +11,8 @@ from swarmwire.deploy import run
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from tests.integration.deploy.test_realtime import Watcher
 from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.joiners import HERE, Joiners
+from tests.support.deploy.joiners import HERE, Joiners, Watcher
 from tests.support.deploy.machines.on_machines import Started, on
 
 FROZEN_S = 0.5

@@ -11,9 +11,8 @@ from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.crews.change import Change
 from tests.integration.deploy.machines.test_three_machines import lab
-from tests.integration.deploy.test_realtime import Watcher
 from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.joiners import Joiners
+from tests.support.deploy.joiners import Joiners, Watcher
 from tests.support.deploy.machines.on_machines import Started, on
 
 SHORT = ["duration_s=3", "run.on_runner_loss=wait"]

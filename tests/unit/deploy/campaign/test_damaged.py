@@ -9,10 +9,11 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaign import sweeping
+from swarmwire.deploy.campaign.campaign import read_campaign
 from swarmwire.deploy.campaign.run_again import CampaignRun
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from tests.integration.deploy.campaign.test_resume import ASKED, Killed, dying_at
 from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
+from tests.unit.deploy.campaign.test_resume import ASKED, Killed, dying_at
 
 
 @pytest.fixture(scope="module")
@@ -112,6 +113,14 @@ def test_what_campaigns_never_say_is_refused_by_its_key(whole, key, value):
     about.write_text(json.dumps({**json.loads(about.read_text()), key: value}))
     assert refused(resume, whole).startswith(f"{about}: {key}")
     assert refused(CampaignRun, whole, 0).startswith(f"{about}: {key}")
+
+
+def test_a_campaign_that_lacks_any_key_is_refused(whole):
+    about = whole / "campaign.json"
+    found = json.loads(about.read_text())
+    for key in found:
+        about.write_text(json.dumps({name: value for name, value in found.items() if name != key}))
+        assert refused(read_campaign, whole).startswith(f"{about}: ")
 
 
 def test_a_campaign_that_ended_before_its_first_run_says_what_to_do(half):

@@ -16,10 +16,12 @@ VARY = {"radio.loss": "0:0.8:2", "robots.pair.count": [2, 3]}
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
-    """A campaign by two worker processes, as it is by default."""
+    """A campaign of four points."""
     folder = tmp_path_factory.mktemp("reference")
     scenario = scenario_in(folder)
-    done = sweep(scenario, seeds=3, vary=VARY, out=folder / "c", workers=2)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
+        done = sweep(scenario, seeds=3, vary=VARY, out=folder / "c")
     assert (done.runs, done.done, done.failed, done.is_over) == (12, 12, 0, True)
     return folder
 
@@ -47,8 +49,8 @@ def test_each_run_has_a_row_that_says_what_a_run_of_its_own_would(reference):
     assert row["target_best.final"] is None
 
 
-@pytest.mark.parametrize("pack", [1, 2, None])
-def test_rows_and_series_do_not_depend_on_packs_and_workers(reference, tmp_path, here, pack):
+@pytest.mark.parametrize("pack", [1, 2])
+def test_rows_and_series_do_not_depend_on_packs(reference, tmp_path, here, pack):
     sweep(reference / "two.toml", seeds=3, vary=VARY, out=tmp_path / "c", pack=pack)
     assert rows_in(tmp_path / "c") == rows_in(reference / "c")
     assert series_in(tmp_path / "c").equals(series_in(reference / "c"), null_equal=True)
@@ -69,7 +71,6 @@ def test_series_hold_each_ticks_metrics(reference):
     rows = rows_in(reference / "c")
     last = series.filter(pl.col("tick") == 4)["order"].to_numpy()
     np.testing.assert_array_equal(last, np.float32([row["order.final"] for row in rows]))
-    assert len(list((reference / "c" / "series").iterdir())) == 2  # one of each worker
 
 
 def test_the_folder_says_what_was_run_and_holds_nothing_else(reference):

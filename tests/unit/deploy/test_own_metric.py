@@ -6,6 +6,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
 from swarmwire.metrics.drawing.film import film_of
 from tests.docs.pages import files_of
+from tests.support.deploy.layouts import run_spread
 from tests.support.metrics.packages import CODE, install
 
 FROM_ZERO = "metrics.1.from_m=0.0"
@@ -30,9 +31,9 @@ def scenario(tmp_path):
     return tmp_path / "s.toml"
 
 
-@pytest.mark.parametrize("runners", ["none", 2])
+@pytest.mark.parametrize("runners", [None, 2])
 def test_it_is_in_summary_and_table_and_in_a_repetition_from_the_run_folder_alone(tmp_path, scenario, runners):
-    result = run(scenario, runners=runners, out=tmp_path / "run")
+    result = run_spread(scenario, runners, out=tmp_path / "run")
     folder = RunFolder(tmp_path / "run")
     ticks = folder.metrics()
     assert list(folder.measured) == list(result.metrics)

@@ -1,19 +1,14 @@
 """A campaign that was ended at any moment is gone on with, and comes to what it would have come to."""
 
 import json
-import subprocess
-import sys
 
-import psutil
 import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaign import campaign_folder
 from swarmwire.deploy.campaign.campaign import read_campaign
-from tests.support.deploy.campaign.small import rows_in, scenario_in, series_in
-from tests.support.deploy.commands import ROOT
-from tests.support.waiting import until
+from tests.support.deploy.campaign.small import rows_in, series_in
 
 VARY = {"radio.loss": [0.0, 0.5]}
 ASKED = {"seeds": 4, "vary": VARY, "pack": 2}
@@ -134,55 +129,3 @@ def test_a_folder_is_for_one_process_at_a_time(whole):
     folder = campaign_folder.CampaignFolder(whole, read_campaign(whole))
     with folder.taken(), pytest.raises(BadInput, match="another process is at work"):
         resume(whole)
-
-
-KILLED = """
-import sys
-from swarmwire.deploy import sweep
-class Watcher:
-    def begin(self, campaign, done, failed): print("begins", flush=True)
-    def see(self, result): print("piece", flush=True)
-    def end(self): pass
-vary = {sys.argv[3]: [float(value) for value in sys.argv[4:]]}
-sweep(sys.argv[1], seeds=4, vary=vary, pack=1, workers=1, out=sys.argv[2], watcher=Watcher())
-"""
-
-
-def test_a_campaign_that_is_killed_leaves_no_worker_and_is_gone_on_with(tmp_path, here):
-    scenario, folder = scenario_in(tmp_path), tmp_path / "c"
-    command = [sys.executable, "-c", KILLED, str(scenario), str(folder), "radio.loss", "0.0", "0.5"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
-        assert process.stdout is not None
-        lines = iter(process.stdout)
-        assert [next(lines).strip() for _ in range(3)] == ["begins", "piece", "piece"]
-        workers = psutil.Process(process.pid).children(recursive=True)
-        assert len(workers) == 1
-        process.kill()
-        gone, alive = psutil.wait_procs(workers, timeout=60)
-    assert (len(gone), alive) == (1, [])
-    there = rows_in(folder)
-    assert 2 <= len(there) <= 8
-    assert resume(folder).is_over
-    sweep(scenario, seeds=4, vary=VARY, out=tmp_path / "whole")
-    same(folder, tmp_path / "whole")
-
-
-def test_a_worker_ends_with_its_campaign_also_in_the_middle_of_a_run(tmp_path):
-    """Of runs of half a second, and of a day, which would take minutes."""
-    asked = (str(scenario_in(tmp_path)), str(tmp_path / "c"), "duration_s", "0.5", "100000.0")
-    with subprocess.Popen(
-        [sys.executable, "-c", KILLED, *asked], stdout=subprocess.PIPE, text=True, cwd=ROOT
-    ) as process:
-        try:
-            assert process.stdout is not None
-            lines = iter(process.stdout)
-            assert [next(lines).strip() for _ in range(5)] == ["begins", *["piece"] * 4]
-            [worker] = psutil.Process(process.pid).children(recursive=True)
-            busy_s = worker.cpu_times().user + 0.2
-            until(lambda: worker.cpu_times().user > busy_s)
-        finally:
-            process.kill()
-        alive = psutil.wait_procs([worker], timeout=20)[1]
-        for one in alive:
-            one.kill()
-        assert alive == []

@@ -3,16 +3,18 @@
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.fates import FATE_NAMES, Fate
-from swarmwire.deploy import run
+from swarmwire.deploy import Recording, run
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record import table_writer
 from swarmwire.metrics.record.part_files import write_file
 from swarmwire.metrics.record.tick_recorder import TickRecorder
 from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.verify.verify import verify
+from tests.support.clocks import GoingClock
 from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.layouts import run_spread
 from tests.support.deploy.recorded import hastily, record_run
 
 EVENTS = [
@@ -97,11 +99,12 @@ def test_the_same_packets_are_sampled_in_every_layout(tmp_path):
     tables = []
     for name, options in {
         "alone": {"seed": 3},
-        "in processes": {"seed": 3, "runners": 3},
+        "in parts": {"seed": 3, "runners": 3},
         "among others": {"seeds": [9, 3]},
     }.items():
         folder = tmp_path / name
-        record_run(folder, packets=0.1, overrides=["duration_s=3"], **options)
+        record, parts = Recording(packets=0.1, rrd=False), options.pop("runners", None)
+        run_spread(LOSSY, parts, out=folder, record=record, overrides=["duration_s=3"], **options)
         arena = 1 if "seeds" in options else 0
         tables.append(RunFolder(folder).packets(arena).drop("arena"))
         summary = RunFolder(folder).summary
@@ -124,15 +127,14 @@ def test_a_full_disk_leaves_the_run_going_and_what_was_written_readable(tmp_path
 
     monkeypatch.setattr(table_writer, "write_file", full)
     metrics, keeper = Metrics(), Keeper()
-    with hastily():
-        recorder = TickRecorder(tmp_path, metrics, WallClock())
-        result = run(LOSSY, overrides=["duration_s=40"], observers=[metrics, recorder, keeper])
+    recorder = TickRecorder(tmp_path, metrics, GoingClock(NS_PER_S // 10))
+    result = run(LOSSY, overrides=["duration_s=8"], observers=[metrics, recorder, keeper])
     assert result.ended == "duration"
     assert result.counts["observer_failed_TickRecorder"] == 1
-    assert len(keeper.seen) == result.ticks == 400
+    assert len(keeper.seen) == result.ticks == 80
     errors = capfd.readouterr().err
     assert "what was written before stays; the run goes on without it" in errors
     assert "No space left on device" in errors
     ticks = RunFolder(tmp_path).ticks()
-    assert 0 < len(ticks) < 400
+    assert 0 < len(ticks) < 80
     assert ticks["tick"].to_list() == list(range(len(ticks)))

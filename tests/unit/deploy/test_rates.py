@@ -5,6 +5,7 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
 from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.layouts import PER_ROBOT, run_spread
 
 MIXED = """
 format = 1
@@ -80,8 +81,8 @@ def mixed(tmp_path):
 def test_two_groups_of_different_rates_run_alike_in_every_layout(mixed, scouts, every):
     path = mixed(scouts, every)
     local = run(path, seeds=[1, 2])
-    for runners in (1, 3, "per-robot"):
-        other = run(path, seeds=[1, 2], runners=runners)
+    for runners in (1, 3, PER_ROBOT):
+        other = run_spread(path, runners, seeds=[1, 2])
         assert other.trajectory_sha256 == local.trajectory_sha256
         assert [arena.radio for arena in other.arenas] == [arena.radio for arena in local.arenas]
     assert run(path, seed=2).trajectory_sha256[0] == local.trajectory_sha256[1]

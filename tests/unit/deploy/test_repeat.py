@@ -5,18 +5,25 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
 from swarmwire.comms.errors import AgentFailed, BadInput
-from swarmwire.deploy import Simulation, repeat, run
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.senses import Actions, Senses
+from swarmwire.deploy import Simulation, crews, repeat, run
 from swarmwire.deploy.cli import app
+from swarmwire.deploy.record.inputs import RecordedCrew
 from swarmwire.deploy.record.modules import PARTS, module_digests
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS
 from swarmwire.world.scenario.as_mapping import same_content
 from swarmwire.world.scenario.scenario_file import load_scenario
-from tests.support.deploy.commands import LOSSY, ROOT, started
+from tests.support.deploy.commands import LOSSY, ROOT
+from tests.support.deploy.joiners import Watcher, interrupt
+from tests.support.encoded_crew import EncodedCrew
 
 SHORT = ["duration_s=2"]
 FILE_AGENT = """
@@ -60,11 +67,13 @@ def copied(folder: Path) -> dict[str, str]:
     return {file["path"]: file["what"] for file in json.loads((folder / "summary.json").read_text())["files"]}
 
 
-@pytest.mark.parametrize(("then", "now"), [(None, None), (None, 2), (3, None)])
-def test_a_run_is_the_same_again_in_whatever_layout(tmp_path, then, now):
+@pytest.mark.parametrize("encoded", [False, True])
+def test_a_run_is_the_same_again_also_through_frames(tmp_path, monkeypatch, encoded):
     disrupted = ROOT / "scenarios" / "flocking-disrupted.toml"
-    run(disrupted, overrides=["duration_s=3", "radio.loss=0.4"], seed=7, runners=then, out=tmp_path / "run")
-    repetition = repeat(tmp_path / "run", runners=now)
+    run(disrupted, overrides=["duration_s=2", "radio.loss=0.4"], seed=7, out=tmp_path / "run")
+    if encoded:
+        monkeypatch.setattr(crews, "LocalCrew", EncodedCrew)
+    repetition = repeat(tmp_path / "run")
     assert repetition.same
     assert repetition.changes == ()
     assert repetition.result.arenas[0].seed == 7
@@ -121,11 +130,9 @@ def test_agent_files_are_copied_and_the_originals_are_not_needed(tmp_path, mine)
     assert (tmp_path / "run" / "files" / "mine-2.py").read_text() == (mine.parent / "other" / "mine.py").read_text()
     shutil.rmtree(mine.parent)
     moved = (tmp_path / "run").rename(tmp_path / "moved")
-    for runners in (None, 2):
-        repetition = repeat(moved, runners=runners, out=tmp_path / f"again-{runners}")
-        assert repetition.same
-        assert repetition.changes == ()
-    assert repeat(tmp_path / "again-2").same
+    repetition = repeat(moved, out=tmp_path / "again")
+    assert (repetition.same, repetition.changes) == (True, ())
+    assert repeat(tmp_path / "again").same
 
 
 def test_an_agent_file_that_was_edited_since_is_named_and_its_run_is_another(tmp_path, mine):
@@ -216,7 +223,7 @@ def test_an_agent_that_draws_by_itself_is_suspected(tmp_path, mine):
     [
         (shutil.rmtree, "there is none"),
         (lambda run: (run / "run.json").unlink(), "run.json"),
-        (lambda run: (run / "run.json").write_text("{}"), "at the start of a run"),
+        (lambda run: (run / "run.json").write_text("{}"), "run.json"),
         (lambda run: (run / "summary.json").write_text("{"), "the summary of a run"),
         (lambda run: (run / "scenario.toml").unlink(), "scenario.toml"),
     ],
@@ -246,15 +253,6 @@ def test_a_run_that_was_killed_is_compared_as_far_as_it_came(tmp_path, mine, log
     assert repetition.why_not_all == "the run left no summary.json: it was killed, or still goes on"
 
 
-def test_a_process_that_was_killed_leaves_enough_to_repeat_its_run(tmp_path, mine):
-    process = started(mine, "--set", "duration_s=100", "--out", tmp_path / "run")
-    process.kill()
-    process.communicate()
-    assert not (tmp_path / "run" / "summary.json").exists()
-    ended = called(tmp_path / "run")
-    assert "the run left no summary.json: it was killed" in ended.stdout
-
-
 def test_a_run_that_an_agent_ended_is_repeated_up_to_there(tmp_path, mine):
     path = mine.parent / "mine.py"
     failing = "        if robots.time_s > 0.45:\n            raise ValueError('enough')\n        robots.drive"
@@ -273,3 +271,36 @@ def test_the_first_tick_that_came_out_differently_is_named(tmp_path, mine):
     path.write_text(FILE_AGENT.replace("0.5)", "0.5 if robots.time_s < 0.95 else 0.6)"))
     repetition = repeat(tmp_path / "run")
     assert (repetition.same, repetition.first_difference) == (False, 10)
+
+
+def test_an_interrupted_run_is_repeated_as_far_as_it_came(tmp_path):
+    watcher = Watcher((lambda truth: truth.tick == 12, interrupt))
+    result = run(LOSSY, overrides=["duration_s=500"], out=tmp_path / "run", observers=[watcher])
+    assert (result.ended, result.ticks) == ("interrupted", 13)
+    repetition = repeat(tmp_path / "run")
+    assert repetition.same
+    assert repetition.result.ticks == 13
+
+
+class Standing:
+    """A crew whose robot stands."""
+
+    def start(self) -> None: ...
+
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> Actions:
+        return Actions(np.zeros(1, np.int64), np.ones(1, np.bool_), *np.zeros((3, 1)))
+
+    def counts(self) -> dict[str, int]:
+        return {}
+
+    def close(self) -> None: ...
+
+
+def test_a_record_that_cannot_be_written_does_not_end_the_run_and_is_counted(tmp_path):
+    (tmp_path / "inputs").write_text("in the way")
+    crew = RecordedCrew(Standing(), tmp_path, lambda tick: tick >= 2)
+    for tick in range(5):
+        crew.act(tick, {}, Heard.none(), NO_OUTCOMES)
+    record = crew.record()
+    assert record is not None
+    assert (record.first_tick, record.ticks, record.ticks_not_recorded) == (2, 0, 3)

@@ -1,57 +1,13 @@
 """A worker that says nothing any more is ended, and its task is lost with it; who was frozen itself counts nothing."""
 
-import psutil
-
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.deploy.campaign import spare_processes, worker_process
-from swarmwire.deploy.campaign.execution import execute
-from swarmwire.deploy.campaign.local_executor import LocalExecutor
+from swarmwire.deploy.campaign import spare_processes
 from swarmwire.deploy.campaign.silence import MOST_S, SAY_S, Alive, Silence
 from swarmwire.deploy.campaign.spare_processes import SpareProcess
 from swarmwire.deploy.campaign.task import Task
 from tests.support.clocks import FakeClock
 
-ONCE = """
-import os, signal
-from pathlib import Path
-from swarmwire.agent import Agent
-class FrozenOnce(Agent):
-    def step(self, robot):
-        before = Path(__file__).with_name("before")
-        if not before.exists():
-            before.touch()
-            os.kill(os.getpid(), signal.SIGSTOP)
-"""
 TASK = Task("x", (), 0, (0,), (1,))
-
-
-class WhileFrozen(FakeClock):
-    """A clock that goes on by a second with each look while a child of this process is frozen."""
-
-    def now_ns(self) -> int:
-        if any(child.status() == psutil.STATUS_STOPPED for child in psutil.Process().children()):
-            self.time_ns += NS_PER_S
-        return self.time_ns
-
-
-def test_a_worker_that_is_frozen_is_ended_and_its_runs_are_done_by_another(scenario, monkeypatch):
-    monkeypatch.setattr(worker_process, "Silence", lambda: Silence(WhileFrozen(), most_s=2.0))
-    (scenario.parent / "frozen.py").write_text(ONCE)
-    executor, rows, lost = LocalExecutor(1), [], []
-    finished = executor.finished
-    monkeypatch.setattr(executor, "finished", lambda timeout_s: _noted(finished(timeout_s), lost))
-    task = Task(str(scenario), ('robots.pair.agent="frozen.py:FrozenOnce"',), 0, (0,), (1,))
-    try:
-        assert execute([task], executor, lambda _, result: rows.extend(result.rows))
-    finally:
-        executor.close()
-    assert [row["ended"] for row in rows] == ["duration"]
-    assert [done.lost for done in lost] == ["the worker stood still for 2 s", ""]
-
-
-def _noted(found, into):
-    into.extend(found)
-    return found
 
 
 class Mute:

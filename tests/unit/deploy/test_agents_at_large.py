@@ -1,13 +1,15 @@
-"""What an agent may do to a run, and what not: the same in the world's process and in a runner."""
+"""What an agent or an observer may do to a run, and what not; agents' frames are encoded, or not."""
 
 import pytest
 
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.deploy import run
+from swarmwire.deploy import crews, run
 from tests.support.deploy.commands import LOSSY
+from tests.support.encoded_crew import EncodedCrew
 
 AGENTS = """
 import sys
+import numpy as np
 from swarmwire.agent import Message, Robots, State, VectorAgent, f8
 
 class Hello(Message):
@@ -31,10 +33,6 @@ class Leaves(VectorAgent):
     def step(self, robots: Robots, state: State) -> None:
         sys.exit(0)
 
-class Prints(VectorAgent):
-    def step(self, robots: Robots, state: State) -> None:
-        print("hello from an agent", flush=True)
-
 class Shouts(VectorAgent):
     def step(self, robots: Robots, state: State) -> None:
         robots.radio.send(Hello)
@@ -42,6 +40,14 @@ class Shouts(VectorAgent):
 class Rambles(VectorAgent):
     def step(self, robots: Robots, state: State) -> None:
         robots.radio.send(Tale, number=1.0)
+
+class Nan(VectorAgent):
+    def step(self, robots: Robots, state: State) -> None:
+        robots.drive(np.nan, np.inf)
+
+class ToNobody(VectorAgent):
+    def step(self, robots: Robots, state: State) -> None:
+        robots.radio.send(Hello, to=77)
 """
 
 
@@ -55,24 +61,25 @@ def agent(tmp_path):
     ]
 
 
-@pytest.mark.parametrize("runners", [None, 1])
-@pytest.mark.parametrize("name", ["Writes", "Rewrites"])
-def test_what_a_robot_reads_cannot_be_written_to(agent, name, runners):
-    with pytest.raises(AgentFailed, match="read-only"):
-        run(LOSSY, overrides=agent(name), runners=runners)
+@pytest.fixture(params=[False, True], ids=["directly", "encoded"])
+def _layout(request, monkeypatch):
+    if request.param:
+        monkeypatch.setattr(crews, "LocalCrew", EncodedCrew)
 
 
-@pytest.mark.parametrize("runners", [None, 1])
-def test_an_agent_that_exits_has_failed(agent, runners):
-    with pytest.raises(AgentFailed, match="SystemExit"):
-        run(LOSSY, overrides=agent("Leaves"), runners=runners)
+@pytest.mark.usefixtures("_layout")
+@pytest.mark.parametrize(
+    ("name", "why"), [("Writes", "read-only"), ("Rewrites", "read-only"), ("Leaves", "SystemExit")]
+)
+def test_an_agent_that_writes_to_what_it_reads_or_exits_has_failed(agent, name, why):
+    with pytest.raises(AgentFailed, match=why):
+        run(LOSSY, overrides=agent(name))
 
 
-@pytest.mark.parametrize("runners", [None, 2])
-def test_an_agent_may_print(agent, runners, capfd):
-    assert run(LOSSY, overrides=agent("Prints"), runners=runners).ticks == 5
-    captured = capfd.readouterr()
-    assert "hello from an agent" in captured.out + captured.err
+@pytest.mark.usefixtures("_layout")
+@pytest.mark.parametrize(("name", "count"), [("Nan", "nan_commands"), ("ToNobody", "packets_to_nobody")])
+def test_commands_that_are_no_numbers_and_packets_to_nobody_are_counted(agent, name, count):
+    assert run(LOSSY, overrides=agent(name)).counts[count] == 20 * 5
 
 
 def test_packets_without_a_radio_are_counted(agent, tmp_path):

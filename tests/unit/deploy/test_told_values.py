@@ -8,11 +8,12 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.deploy import repeat, run
+from swarmwire.deploy import repeat
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.verify.verify import verify
 from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.layouts import PER_ROBOT, run_spread
 
 AGREEING = """
 import numpy as np
@@ -71,10 +72,10 @@ def agents(tmp_path: Path) -> Path:
     return tmp_path / "agents.py"
 
 
-def kept(agents: Path, kind: str, runners: int | str | None, seeds: list[int], out: Path | None = None) -> Kept:
+def kept(agents: Path, kind: str, runners: int | None, seeds: list[int], out: Path | None = None) -> Kept:
     seen = Kept()
     setting = [f"robots.flock.agent={agents}:{kind}", "robots.flock.params={}", "duration_s=3"]
-    run(LOSSY, seeds=seeds, runners=runners, overrides=setting, observers=[seen], out=out)
+    run_spread(LOSSY, runners, seeds=seeds, overrides=setting, observers=[seen], out=out)
     return seen
 
 
@@ -83,10 +84,8 @@ def as_bytes(ticks: list[FloatArray | None]) -> list[bytes | None]:
 
 
 @pytest.mark.parametrize("kind", ["Agreeing", "Turning"])
-@pytest.mark.parametrize("runners", [3, "per-robot"])
-def test_they_are_the_same_bit_for_bit_however_the_agents_are_spread(
-    agents: Path, kind: str, runners: int | str
-) -> None:
+@pytest.mark.parametrize("runners", [3, PER_ROBOT])
+def test_they_are_the_same_bit_for_bit_however_the_agents_are_spread(agents: Path, kind: str, runners: int) -> None:
     alone, spread = (kept(agents, kind, where, [2]) for where in (None, runners))
     assert as_bytes(spread.values) == as_bytes(alone.values)
     assert alone.values[-1] is not None

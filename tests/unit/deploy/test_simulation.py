@@ -9,13 +9,13 @@ from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.deploy import Simulation, run
 from swarmwire.metrics.verify.verify import verify
 from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.layouts import run_spread
 
 SHORT = ["duration_s=2"]
 
 
-@pytest.mark.parametrize("runners", [None, 2])
-def test_steps_by_hand_make_the_same_run(runners):
-    with Simulation(LOSSY, overrides=SHORT, runners=runners) as simulation:
+def test_steps_by_hand_make_the_same_run():
+    with Simulation(LOSSY, overrides=SHORT) as simulation:
         ticks = [simulation.step().tick for _ in range(simulation.ticks)]
     assert ticks == list(range(20))
     assert simulation.result.ended == "duration"
@@ -47,14 +47,14 @@ def test_a_run_that_failed_says_why_in_its_summary(tmp_path: Path, runners):
     )
     overrides = [*SHORT, f"robots.flock.agent='{agent}:Bad'", "robots.flock.params={}"]
     with pytest.raises(AgentFailed):
-        run(LOSSY, overrides=overrides, out=tmp_path / "run", runners=runners)
+        run_spread(LOSSY, runners, overrides=overrides, out=tmp_path / "run")
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert (summary["ended"], summary["ticks"]) == ("failed", 5)
     assert "no more" in summary["error"]
 
 
 def test_an_error_of_the_caller_ends_the_run_and_comes_through(tmp_path):
-    simulation = Simulation(LOSSY, overrides=SHORT, runners=2)
+    simulation = Simulation(LOSSY, overrides=SHORT)
     with pytest.raises(ZeroDivisionError), simulation:
         raise ZeroDivisionError
     assert simulation.result.ended == "failed"

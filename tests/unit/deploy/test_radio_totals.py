@@ -9,6 +9,7 @@ from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.deploy.cli import app
 from swarmwire.metrics.verify.verify import verify
 from tests.support.deploy.commands import LOSSY, ROOT
+from tests.support.deploy.layouts import run_spread
 
 SIGNALS = ROOT / "scenarios" / "flocking-802154.toml"
 JAMMED = ROOT / "scenarios" / "jammed.toml"
@@ -20,7 +21,7 @@ def test_tables_of_the_radio_are_alike_in_one_process_and_in_many_and_agree_with
     folders = {}
     for name, runners in (("one", None), ("many", 3)):
         record = Recording(links=True, rrd=False)
-        run(scenario, overrides=["duration_s=3"], out=tmp_path / name, runners=runners, record=record)
+        run_spread(scenario, runners, overrides=["duration_s=2"], out=tmp_path / name, record=record)
         folders[name] = RunFolder(tmp_path / name)
         assert all(finding.good for finding in verify(tmp_path / name))
     for table in TABLES:

@@ -1,22 +1,10 @@
 """What fails is a row that says why, and stops nothing else."""
 
-import sys
-
-import pytest
-
-from swarmwire.comms.errors import SwarmwireError
 from swarmwire.deploy import sweep
 from swarmwire.deploy.campaign.execution import execute
 from swarmwire.deploy.campaign.executor import Finished
-from swarmwire.deploy.campaign.local_executor import LocalExecutor
 from swarmwire.deploy.campaign.task import PieceResult, Task
 from tests.support.deploy.campaign.small import rows_in, series_in
-
-DEADLY = 2  # one of the seeds that stumble
-
-
-def ignored(*_):
-    """Keeps nothing."""
 
 
 def test_an_agent_that_fails_for_some_seeds_costs_no_others(tmp_path, stumbling, here):
@@ -53,35 +41,6 @@ def test_a_metric_of_ones_own_that_raises_is_a_failed_row(tmp_path, scenario, he
     assert "no number" in rows_in(tmp_path / "c")[1]["error"]
 
 
-def tasks_of(scenario, *seeds, overrides=()):
-    return [Task(str(scenario), overrides, 0, (seed,), (seed,)) for seed in seeds]
-
-
-def test_a_worker_that_dies_is_replaced_and_a_seed_of_which_they_die_is_a_failed_row(stumbling):
-    executor, rows = LocalExecutor(1), []
-    tasks = tasks_of(stumbling, 1, DEADLY, 4, overrides=('robots.pair.params.how="kill"',))
-    try:
-        assert execute(tasks, executor, lambda _, result: rows.extend(result.rows))
-        assert len(executor.pids) == 1
-    finally:
-        executor.close()
-    assert [(row["seed"], row["ended"]) for row in rows] == [(1, "duration"), (DEADLY, "failed"), (4, "duration")]
-    assert rows[1] == {"run": 2, "point": 0, "seed": DEADLY, "ended": "failed", "error": "the worker died, signal 9"}
-
-
-def test_an_agent_that_asks_for_input_gets_none_and_takes_no_task(scenario):
-    agent = "from swarmwire.agent import Agent\nclass Asking(Agent):\n    def step(self, robot): input('go on? ')\n"
-    (scenario.parent / "asking.py").write_text(agent)
-    executor, rows = LocalExecutor(1), []
-    tasks = tasks_of(scenario, 1, 2, overrides=('robots.pair.agent="asking.py:Asking"',))
-    try:
-        assert execute(tasks, executor, lambda _, result: rows.extend(result.rows))
-    finally:
-        executor.close()
-    assert [row["ended"] for row in rows] == ["failed", "failed"]
-    assert "EOFError" in rows[0]["error"]
-
-
 def test_an_error_that_no_file_can_hold_is_told_as_far_as_it_can(tmp_path, scenario, here):
     agent = (
         "from swarmwire.agent import Agent\nclass Odd(Agent):\n    def step(self, robot): raise OSError('a\\udc80b')\n"
@@ -99,16 +58,6 @@ def test_an_agent_that_calls_itself_for_ever_fails_alike_in_any_pack(tmp_path, s
         sweep(scenario, seeds=2, out=tmp_path / f"packed{pack}", overrides=overrides, pack=pack)
     assert "RecursionError" in rows_in(tmp_path / "packed1")[0]["error"]
     assert rows_in(tmp_path / "packed1") == rows_in(tmp_path / "packed2")
-
-
-def test_workers_that_cannot_start_are_one_line(scenario, monkeypatch):
-    monkeypatch.setattr(sys, "executable", "/bin/false")
-    executor = LocalExecutor(2)
-    try:
-        with pytest.raises(SwarmwireError, match=r"^no worker can start: the worker ended, exit code 1"):
-            execute(tasks_of(scenario, 1, 2), executor, ignored)
-    finally:
-        executor.close()
 
 
 class Losing:

@@ -4,15 +4,12 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 
-import psutil
 import pytest
 
 from swarmwire.deploy.terminal import tune_progress
-from tests.support.deploy.commands import ROOT, called
-from tests.support.deploy.tuning.small import AT, scenario_in, trials_in, tuned
+from tests.support.deploy.commands import called
+from tests.support.deploy.tuning.small import AT, trials_in
 
 GOAL = ("--goal", "min bowl")
 
@@ -119,40 +116,3 @@ def test_where_all_trials_fail_it_is_a_line_and_exit_code_1(tmp_path, scenario, 
     code, out, errors = called(monkeypatch, capsys, "tune", scenario, *arguments)
     assert (code, out) == (1, "")
     assert re.fullmatch(r"error: \S+: all 2 trials failed, such as trial 0: ValueError: too fast, in tick .*\n", errors)
-
-
-KILLED = """
-import sys
-from pathlib import Path
-from swarmwire.deploy.campaign.watcher import NobodyWatches
-from swarmwire.deploy.interrupt import Interrupt
-from swarmwire.deploy.tuning.run_tuning import Onlookers, begin_tune
-from tests.support.deploy.tuning.small import plan_of
-class Watcher:
-    def begin(self, tuning, trials): print("begins", flush=True)
-    def see(self, trial): print("trial", flush=True)
-    def end(self): pass
-plan = plan_of(Path(sys.argv[1]), seeds=1, trials=5, batch=2)
-begin_tune(plan, Path(sys.argv[2]), "", 1, Onlookers(Watcher(), NobodyWatches(), Interrupt()))
-"""
-
-
-def test_a_tuning_that_is_killed_leaves_no_worker_and_is_gone_on_with(tmp_path, typed):
-    scenario, folder = scenario_in(tmp_path), tmp_path / "t"
-    command = [sys.executable, "-c", KILLED, str(scenario), str(folder)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
-        assert process.stdout is not None
-        lines = iter(process.stdout)
-        assert [next(lines).strip() for _ in range(4)] == ["begins", "trial", "trial", "trial"]
-        workers = psutil.Process(process.pid).children(recursive=True)
-        assert len(workers) == 1
-        process.kill()
-        gone, alive = psutil.wait_procs(workers, timeout=60)
-    assert (len(gone), alive) == (1, [])
-    code, out, _ = typed("tune", "--resume", folder)
-    there = re.search(r"5 trials x 1 seeds; (\d) of them are there", out)
-    assert code == 0
-    assert there is not None
-    assert int(there[1]) >= 3
-    tuned(scenario, tmp_path / "whole", seeds=1, trials=5, batch=2)
-    assert trials_in(folder).equals(trials_in(tmp_path / "whole"), null_equal=True)

@@ -1,3 +1,5 @@
+"""What agents say that they do is the same however they are spread."""
+
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -5,7 +7,7 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.deploy import run
+from tests.support.deploy.layouts import PER_ROBOT, run_spread
 
 PSO = Path(__file__).parents[3] / "scenarios" / "pso.toml"
 
@@ -25,14 +27,14 @@ class StatesSeen:
         return {}
 
 
-def states(runners: int | str | None, seeds: Sequence[int]) -> list[list[str]]:
+def states(runners: int | None, seeds: Sequence[int]) -> list[list[str]]:
     seen = StatesSeen()
-    run(PSO, seeds=seeds, runners=runners, overrides=["duration_s=15"], observers=[seen])
+    run_spread(PSO, runners, seeds=seeds, overrides=["duration_s=15"], observers=[seen])
     return seen.ticks
 
 
-@pytest.mark.parametrize("runners", [3, "per-robot"])
-def test_states_are_the_same_however_the_agents_are_spread(runners: int | str) -> None:
+@pytest.mark.parametrize("runners", [3, PER_ROBOT])
+def test_states_are_the_same_however_the_agents_are_spread(runners: int) -> None:
     alone = states(None, [2])
     assert states(runners, [2]) == alone
     assert {"to its own best", "to the neighbours' best"} <= set(alone[-1])

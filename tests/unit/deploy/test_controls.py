@@ -9,12 +9,13 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy import Result, run
+from swarmwire.deploy import simulation as simulation_module
 from swarmwire.deploy.controls import LOOK_NS, Controls
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.deploy.terminal.bindings import BINDINGS, press
 from swarmwire.world.crews.pace import Pace
-from tests.support.clocks import MS, FakeClock
+from tests.support.clocks import MS, FakeClock, GoingClock
 from tests.support.deploy.commands import LOSSY
 
 RATE_HZ = 10
@@ -197,9 +198,9 @@ def free() -> Result:
     return run(LOSSY, overrides=SHORT)
 
 
-@pytest.mark.parametrize("runners", [None, 3])
-def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, runners: int | None) -> None:
-    simulation = Simulation(LOSSY, overrides=SHORT, runners=runners)
+def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(simulation_module, "WallClock", lambda: GoingClock(MS))
+    simulation = Simulation(LOSSY, overrides=SHORT)
     controls = simulation.controls
     plan = [
         controls.toggle_pause,

@@ -6,6 +6,7 @@ import pytest
 
 from swarmwire.deploy import Result, run
 from tests.support.deploy.commands import ROOT
+from tests.support.deploy.layouts import PER_ROBOT, run_spread
 
 DISRUPTED = ROOT / "scenarios" / "flocking-disrupted.toml"
 # All that the scenario has happen in a minute, within four seconds.
@@ -22,17 +23,17 @@ def local() -> Result:
     return run(DISRUPTED, overrides=SHORT)
 
 
-@pytest.mark.parametrize("runners", [1, 3, "per-robot"])
+@pytest.mark.parametrize("runners", [1, 3, PER_ROBOT])
 def test_every_action_gives_the_same_run_in_every_layout(local, runners):
     """Per robot, runners are left with nobody alive, and get their robot back."""
-    spread = run(DISRUPTED, overrides=SHORT, runners=runners)
+    spread = run_spread(DISRUPTED, runners, overrides=SHORT)
     assert spread.trajectory_sha256 == local.trajectory_sha256
     assert (spread.radio, spread.metrics, spread.events) == (local.radio, local.metrics, local.events)
 
 
 @pytest.mark.parametrize("runners", [None, 2])
 def test_an_arena_with_events_is_the_same_alone_and_among_others(local, runners):
-    three = run(DISRUPTED, overrides=SHORT, seeds=[5, 1, 9], runners=runners)
+    three = run_spread(DISRUPTED, runners, overrides=SHORT, seeds=[5, 1, 9])
     assert three.trajectory_sha256[1] == local.trajectory_sha256[0]
     assert three.arenas[1].radio == local.radio
     assert [event.robots[1] for event in three.events] == [event.robots[0] for event in local.events]
@@ -105,12 +106,12 @@ class Speeds:
         return {}
 
 
-@pytest.mark.parametrize("runners", [None, "per-robot"])
+@pytest.mark.parametrize("runners", [None, PER_ROBOT])
 def test_a_robot_that_is_revived_starts_afresh(tmp_path, runners):
     """Its speed tells how many steps it remembers; it is dead in ticks 5 to 7."""
     (tmp_path / "mine.py").write_text(REMEMBERS)
     scenario = tmp_path / "s.toml"
     scenario.write_text(AFRESH)
     speeds = Speeds()
-    run(scenario, runners=runners, observers=[speeds])
+    run_spread(scenario, runners, observers=[speeds])
     assert speeds.seen == [[1, 1], [2, 2], [3, 3], [4, 4], [5, 5], [0, 6], [0, 7], [0, 8], [1, 9], [2, 10]]

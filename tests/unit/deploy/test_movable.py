@@ -8,9 +8,11 @@ import pytest
 from swarmwire.deploy import Recording, Simulation, run
 from swarmwire.metrics.drawing.film import film_of
 from swarmwire.metrics.run_folder import RunFolder
+from tests.support.deploy.layouts import run_spread
 
 PUSHER = """
 from swarmwire.agent import Agent
+from tests.support.deploy.layouts import run_spread
 
 
 class Pusher(Agent):
@@ -97,5 +99,5 @@ def test_the_record_and_its_pictures_show_it_where_it_is(scenario: Path, tmp_pat
 def test_runs_with_movable_obstacles_are_the_same_in_every_layout(scenario: Path) -> None:
     alone = run(scenario, seeds=[7])
     assert alone.ended == "duration"
-    assert run(scenario, seeds=[7], runners=2).trajectory_sha256 == alone.trajectory_sha256
+    assert run_spread(scenario, 2, seeds=[7]).trajectory_sha256 == alone.trajectory_sha256
     assert run(scenario, seeds=[5, 7]).trajectory_sha256[1:] == alone.trajectory_sha256

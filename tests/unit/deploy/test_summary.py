@@ -6,7 +6,8 @@ import pytest
 from scipy.stats import binomtest
 
 from swarmwire.deploy import Percentiles, run
-from tests.support.deploy.commands import LOSSY, swarmwire
+from tests.support.deploy.commands import LOSSY, called
+from tests.support.deploy.layouts import run_spread
 
 REQUIRED = {
     "scenario",
@@ -27,9 +28,9 @@ REQUIRED = {
 }
 
 
-def test_the_summary_of_the_command_is_the_result_from_python(tmp_path):
-    ended = swarmwire("run", LOSSY, "--set", "duration_s=4", "--out", tmp_path / "run", "--quiet")
-    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
+def test_the_summary_of_the_command_is_the_result_from_python(tmp_path, monkeypatch, capsys):
+    arguments = ("run", LOSSY, "--set", "duration_s=4", "--out", tmp_path / "run", "--quiet")
+    assert called(monkeypatch, capsys, *arguments) == (0, "", "")
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary.keys() >= REQUIRED
     assert set(summary["metrics"]) >= {"order", "largest_component", "components", "collisions"}
@@ -76,38 +77,31 @@ def test_without_a_radio_there_is_no_radio_part(tmp_path):
     assert result.radio is None
     assert result.metrics["order"].mean is not None
     assert result.metrics["components"].mean is None
-    assert run(scenario, overrides=diffusion, runners=2).trajectory_sha256 == result.trajectory_sha256
+    assert run_spread(scenario, 2, overrides=diffusion).trajectory_sha256 == result.trajectory_sha256
 
 
-def test_the_terminal_shows_how_it_went_and_where_to_look(tmp_path):
-    ended = swarmwire("run", LOSSY, "--set", "duration_s=4", "--out", tmp_path / "run", "--runners", "2")
-    assert ended.returncode == 0
-    for text in (
-        "tick 40/40",
-        "2 processes, lockstep",
-        "of these heard it",
-        "order",
-        "swarmwire view",
-        "--gif",
-    ):
-        assert text in ended.stdout
+def test_the_terminal_shows_how_it_went_and_where_to_look(tmp_path, monkeypatch, capsys):
+    code, out, _ = called(monkeypatch, capsys, "run", LOSSY, "--set", "duration_s=2", "--out", tmp_path / "run")
+    assert code == 0
+    for text in ("tick 20/20", "lockstep", "of these heard it", "order", "swarmwire view", "--gif"):
+        assert text in out
 
 
 @pytest.mark.parametrize("call", [["--help"], ["run", "--help"], ["check", "--help"]])
-def test_help_teaches(call):
-    ended = swarmwire(*call)
-    assert ended.returncode == 0
-    assert "scenario" in ended.stdout.lower()
+def test_help_teaches(call, monkeypatch, capsys):
+    code, out, _ = called(monkeypatch, capsys, *call)
+    assert code == 0
+    assert "scenario" in out.lower()
 
 
-def test_check_says_what_is_in_a_good_scenario():
-    ended = swarmwire("check", LOSSY)
-    assert ended.returncode == 0
-    assert "20 epuck (flock), 120 s at 10 Hz" in ended.stdout
+def test_check_says_what_is_in_a_good_scenario(monkeypatch, capsys):
+    code, out, _ = called(monkeypatch, capsys, "check", LOSSY)
+    assert code == 0
+    assert "20 epuck (flock), 120 s at 10 Hz" in out
 
 
-def test_schema_is_json_schema_with_units_and_bounds():
-    schema = json.loads(swarmwire("schema").stdout)
+def test_schema_is_json_schema_with_units_and_bounds(monkeypatch, capsys):
+    schema = json.loads(called(monkeypatch, capsys, "schema")[1])
     assert schema["properties"]["duration_s"]["exclusiveMinimum"] == 0
     assert {"time", "physics", "arena", "robots", "radio", "run"} <= set(schema["properties"])
 
@@ -150,7 +144,7 @@ def test_senses_of_light_touch_and_place_are_alike_in_every_layout_and_global_on
     (tmp_path / "lit.toml").write_text(LIT)
     alone = run(tmp_path / "lit.toml", seed=2)
     assert alone.global_senses == {"epuck-gps": ["compass", "positioning"]}
-    assert run(tmp_path / "lit.toml", seed=2, runners=3).trajectory_sha256 == alone.trajectory_sha256
+    assert run_spread(tmp_path / "lit.toml", 3, seed=2).trajectory_sha256 == alone.trajectory_sha256
     many = run(tmp_path / "lit.toml", seeds=[1, 2])
     assert many.arenas[1].trajectory_sha256 == alone.arenas[0].trajectory_sha256
 

@@ -1,0 +1,174 @@
+"""Worker processes of campaigns: what they do is the same, and they die, freeze, and end with their campaign."""
+
+import subprocess
+import sys
+
+import psutil
+import pytest
+
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.errors import SwarmwireError
+from swarmwire.deploy import resume, sweep
+from swarmwire.deploy.campaign import sweeping, worker_process
+from swarmwire.deploy.campaign.execution import execute
+from swarmwire.deploy.campaign.local_executor import LocalExecutor
+from swarmwire.deploy.campaign.silence import Silence
+from swarmwire.deploy.campaign.task import Task
+from tests.support.clocks import FakeClock
+from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
+from tests.support.deploy.commands import ROOT
+from tests.support.waiting import until
+
+VARY = {"radio.loss": [0.0, 0.5]}
+DEADLY = 2  # one of the seeds that stumble
+
+
+def test_two_workers_come_to_the_rows_and_series_of_this_process(tmp_path, stumbling, monkeypatch):
+    asked = {"seeds": 4, "vary": VARY, "pack": 1}
+    assert sweep(stumbling, out=tmp_path / "there", workers=2, **asked).is_over
+    monkeypatch.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
+    assert sweep(stumbling, out=tmp_path / "here", **asked).failed
+    same(tmp_path / "there", tmp_path / "here")
+
+
+def same(folder, whole):
+    """The same rows and series."""
+    assert rows_in(folder) == rows_in(whole)
+    assert series_in(folder).equals(series_in(whole), null_equal=True)
+
+
+def ignored(*_):
+    """Keeps nothing."""
+
+
+def tasks_of(scenario, *seeds, overrides=()):
+    return [Task(str(scenario), overrides, 0, (seed,), (seed,)) for seed in seeds]
+
+
+def test_a_worker_that_dies_is_replaced_and_a_seed_of_which_they_die_is_a_failed_row(stumbling):
+    executor, rows = LocalExecutor(1), []
+    tasks = tasks_of(stumbling, 1, DEADLY, 4, overrides=('robots.pair.params.how="kill"',))
+    try:
+        assert execute(tasks, executor, lambda _, result: rows.extend(result.rows))
+        assert len(executor.pids) == 1
+    finally:
+        executor.close()
+    assert [(row["seed"], row["ended"]) for row in rows] == [(1, "duration"), (DEADLY, "failed"), (4, "duration")]
+    assert rows[1] == {"run": 2, "point": 0, "seed": DEADLY, "ended": "failed", "error": "the worker died, signal 9"}
+
+
+def test_an_agent_that_asks_for_input_gets_none_and_takes_no_task(scenario):
+    agent = "from swarmwire.agent import Agent\nclass Asking(Agent):\n    def step(self, robot): input('go on? ')\n"
+    (scenario.parent / "asking.py").write_text(agent)
+    executor, rows = LocalExecutor(1), []
+    tasks = tasks_of(scenario, 1, 2, overrides=('robots.pair.agent="asking.py:Asking"',))
+    try:
+        assert execute(tasks, executor, lambda _, result: rows.extend(result.rows))
+    finally:
+        executor.close()
+    assert [row["ended"] for row in rows] == ["failed", "failed"]
+    assert "EOFError" in rows[0]["error"]
+
+
+def test_workers_that_cannot_start_are_one_line(scenario, monkeypatch):
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    executor = LocalExecutor(2)
+    try:
+        with pytest.raises(SwarmwireError, match=r"^no worker can start: the worker ended, exit code 1"):
+            execute(tasks_of(scenario, 1, 2), executor, ignored)
+    finally:
+        executor.close()
+
+
+ONCE = """
+import os, signal
+from pathlib import Path
+from swarmwire.agent import Agent
+class FrozenOnce(Agent):
+    def step(self, robot):
+        before = Path(__file__).with_name("before")
+        if not before.exists():
+            before.touch()
+            os.kill(os.getpid(), signal.SIGSTOP)
+"""
+
+
+class WhileFrozen(FakeClock):
+    """A clock that goes on by a second with each look while a child of this process is frozen."""
+
+    def now_ns(self) -> int:
+        if any(child.status() == psutil.STATUS_STOPPED for child in psutil.Process().children()):
+            self.time_ns += NS_PER_S
+        return self.time_ns
+
+
+def test_a_worker_that_is_frozen_is_ended_and_its_runs_are_done_by_another(scenario, monkeypatch):
+    monkeypatch.setattr(worker_process, "Silence", lambda: Silence(WhileFrozen(), most_s=2.0))
+    (scenario.parent / "frozen.py").write_text(ONCE)
+    executor, rows, lost = LocalExecutor(1), [], []
+    finished = executor.finished
+    monkeypatch.setattr(executor, "finished", lambda timeout_s: _noted(finished(timeout_s), lost))
+    task = Task(str(scenario), ('robots.pair.agent="frozen.py:FrozenOnce"',), 0, (0,), (1,))
+    try:
+        assert execute([task], executor, lambda _, result: rows.extend(result.rows))
+    finally:
+        executor.close()
+    assert [row["ended"] for row in rows] == ["duration"]
+    assert [done.lost for done in lost] == ["the worker stood still for 2 s", ""]
+
+
+def _noted(found, into):
+    into.extend(found)
+    return found
+
+
+KILLED = """
+import sys
+from swarmwire.deploy import sweep
+class Watcher:
+    def begin(self, campaign, done, failed): print("begins", flush=True)
+    def see(self, result): print("piece", flush=True)
+    def end(self): pass
+vary = {sys.argv[3]: [float(value) for value in sys.argv[4:]]}
+sweep(sys.argv[1], seeds=4, vary=vary, pack=1, workers=1, out=sys.argv[2], watcher=Watcher())
+"""
+
+
+def test_a_campaign_that_is_killed_leaves_no_worker_and_is_gone_on_with(tmp_path, here):
+    scenario, folder = scenario_in(tmp_path), tmp_path / "c"
+    command = [sys.executable, "-c", KILLED, str(scenario), str(folder), "radio.loss", "0.0", "0.5"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
+        assert process.stdout is not None
+        lines = iter(process.stdout)
+        assert [next(lines).strip() for _ in range(3)] == ["begins", "piece", "piece"]
+        workers = psutil.Process(process.pid).children(recursive=True)
+        assert len(workers) == 1
+        process.kill()
+        gone, alive = psutil.wait_procs(workers, timeout=60)
+    assert (len(gone), alive) == (1, [])
+    there = rows_in(folder)
+    assert 2 <= len(there) <= 8
+    assert resume(folder).is_over
+    sweep(scenario, seeds=4, vary=VARY, out=tmp_path / "whole")
+    same(folder, tmp_path / "whole")
+
+
+def test_a_worker_ends_with_its_campaign_also_in_the_middle_of_a_run(tmp_path):
+    """Of runs of half a second, and of a day, which would take minutes."""
+    asked = (str(scenario_in(tmp_path)), str(tmp_path / "c"), "duration_s", "0.5", "100000.0")
+    with subprocess.Popen(
+        [sys.executable, "-c", KILLED, *asked], stdout=subprocess.PIPE, text=True, cwd=ROOT
+    ) as process:
+        try:
+            assert process.stdout is not None
+            lines = iter(process.stdout)
+            assert [next(lines).strip() for _ in range(5)] == ["begins", *["piece"] * 4]
+            [worker] = psutil.Process(process.pid).children(recursive=True)
+            busy_s = worker.cpu_times().user + 0.2
+            until(lambda: worker.cpu_times().user > busy_s)
+        finally:
+            process.kill()
+        alive = psutil.wait_procs([worker], timeout=20)[1]
+        for one in alive:
+            one.kill()
+        assert alive == []

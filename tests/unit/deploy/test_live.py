@@ -1,0 +1,86 @@
+"""What a run shows of itself while it goes on, and what of it cannot be shown."""
+
+import sys
+from dataclasses import replace
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.senses import GroupSenses
+from swarmwire.deploy.commands.view import view_command
+from swarmwire.deploy.live import viewer_program
+from swarmwire.deploy.live.evened import Evened
+from swarmwire.deploy.live.sampling import Sampling, Since
+from tests.support.metrics.truths import edges, finished, static, tally, truth
+
+VIEWER = pytest.mark.skipif(find_spec("rerun") is None, reason="needs the extra [view]")
+
+
+def test_large_swarms_show_fewer_links_the_senses_of_one_and_no_flood_of_packets():
+    of = static(300)
+    senses = {"flock": GroupSenses(np.arange(300), {"compass.heading_rad": np.arange(300.0)})}
+    full = truth(of, edges=edges((0, 1)), senses=senses, finished=finished([0] * 2001, [1] * 2001))
+    sampling, values = Sampling(of, 0, of.robot_names[7]), np.zeros((1, 1))
+    shown = [sampling.glimpse(full, 1, values, at * NS_PER_S // 30).truth for at in range(30)]
+    assert sum(glimpse.edges is not None for glimpse in shown) == 5
+    assert (
+        shown[0].senses["flock"].rows.tolist() == shown[0].senses["flock"].fields["compass.heading_rad"].tolist() == [7]
+    )
+    assert shown[0].finished is None
+    few = finished([0] * 2000, [1] * 2000)
+    assert sampling.glimpse(replace(full, finished=few), 1, values, 0).truth.finished == few
+
+
+def test_ticks_are_taken_once():
+    since = Since()
+    since.add(truth(of := static(2), 0))
+    since.add(truth(of, 1))
+    together, ticks = since.take()
+    assert (together.tick, ticks) == (1, 2)
+    with pytest.raises(ValueError, match="expected a tick"):
+        since.take()
+
+
+@VIEWER
+@pytest.mark.parametrize("content", [b"", b"hello"])
+def test_what_is_no_recording_is_refused(tmp_path, content):
+    (tmp_path / "run.rrd").write_bytes(content)
+    for shown in (tmp_path, tmp_path / "run.rrd"):
+        with pytest.raises(BadInput, match=r"run\.rrd: expected a recording"):
+            view_command(shown)
+
+
+@VIEWER
+@pytest.mark.parametrize("content", [{}, {"live.json": "{}"}, {"live.json": "nothing"}])
+def test_nothing_to_see_is_refused(tmp_path, content):
+    for name, text in content.items():
+        (tmp_path / name).write_text(text)
+    for shown in (tmp_path, tmp_path / "none.rrd") if not content else (tmp_path,):
+        with pytest.raises(BadInput, match=f"{tmp_path}.*: expected ") as refused:
+            view_command(shown)
+        assert "\n" not in str(refused.value)
+
+
+def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("swarmwire.metrics.viewer.extra.find_spec", lambda _: None)
+    with pytest.raises(BadInput, match=r"view: needs rerun-sdk: install swarmwire-metrics\[view\]"):
+        view_command(tmp_path)
+
+
+def test_a_window_is_opened_only_where_there_is_a_screen(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert not viewer_program.has_screen()
+    monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
+    assert viewer_program.has_screen()
+
+
+def test_tallies_of_several_ticks_are_evened_to_single_ones_without_a_loss():
+    evened = Evened()
+    single = [evened.per_tick(tally({0: 2, 3: 1}, sent=1), 3) for _ in range(9)]
+    assert sum(one.fates[0, 0] for one in single) == 6  # nine times two thirds
+    assert sum(one.sent[0] for one in single) == sum(one.in_range[0] for one in single) / 3 == 3
