@@ -3,6 +3,7 @@
 UV := .ci/uv
 RUN := $(UV) run --no-sync
 export UV_PYTHON_DOWNLOADS := never
+unexport PYTHONDONTWRITEBYTECODE # containers often set it; each of the many processes would compile its imports anew
 export PYRIGHT_PYTHON_IGNORE_WARNINGS := 1 # does not ask the network for a newer version
 
 # Two processes; the one that has no tests left takes over from the other.

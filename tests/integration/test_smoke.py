@@ -52,7 +52,7 @@ def test_a_main_scenario_runs_from_the_command_line(name, tmp_path, monkeypatch,
 
 def test_a_recorded_run_is_intact_and_repeats_bit_for_bit(tmp_path):
     folder = tmp_path / "run"
-    done = swarmwire("run", LOSSY, "--set", "duration_s=2", "--runners", "2", "--packets", "--out", folder)
+    done = swarmwire("run", LOSSY, "--set", "duration_s=2", "--runners", "2", "--packets", "all", "--out", folder)
     assert done.returncode == 0, done.stderr
     assert RunFolder(folder).ticks["tick"].to_list() == list(range(20))
     assert swarmwire("verify", folder).returncode == 0
@@ -83,11 +83,12 @@ def test_a_driver_and_the_gateway_of_its_robot_understand_each_other():
 
 def test_a_killed_agent_process_costs_its_robots_alone(tmp_path):
     folder = tmp_path / "run"
-    process = started(LOSSY, "--runners", "2", "--set", "run.on_runner_loss='dead'", "--realtime=5", "--out", folder)
-    children = family(process)
-    os.kill(runners_of(process)[0].pid, signal.SIGKILL)
-    assert process.wait(timeout=60) == 0
+    dead = ["--set", "run.on_runner_loss='dead'", "--set", "duration_s=4"]
+    with started(LOSSY, "--runners", "2", *dead, "--realtime=2", "--out", folder) as process:
+        children = family(process)
+        os.kill(runners_of(process)[0].pid, signal.SIGKILL)
+        process.communicate(timeout=60)
+    assert process.returncode == 0
     summary = json.loads((folder / "summary.json").read_text())
-    assert summary["counts"]["runners_lost"] == 1
-    assert summary["ended"] == "duration"
+    assert (summary["ended"], summary["counts"]["runners_lost"]) == ("duration", 1)
     assert not [child for child in children if child.is_running()]
