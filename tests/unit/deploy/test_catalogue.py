@@ -1,0 +1,269 @@
+"""What `list` and `describe` know: every entry of every registry, found by its name and printed with all it takes."""
+
+import json
+from dataclasses import MISSING, fields, is_dataclass
+from io import StringIO
+from typing import Any, get_args, get_type_hints
+
+import pytest
+from rich.console import Console
+
+from swarmwire.agent import behaviours
+from swarmwire.agent.declared import REQUIRED, parameters_of
+from swarmwire.agent.turn import OUTCOMES
+from swarmwire.comms.air.parameters.gives import Gives
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.air.stages.chain import ORDER
+from swarmwire.comms.bodies.body import body_names, load_body
+from swarmwire.comms.bodies.drives import DRIVES
+from swarmwire.comms.bodies.leds import Leds
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.events.registry import ACTIONS
+from swarmwire.comms.fates import FATE_NAMES
+from swarmwire.comms.parameters import limits_of
+from swarmwire.comms.sheets import SHEETS
+from swarmwire.deploy.catalogue.entry import Entry
+from swarmwire.deploy.catalogue.find import find
+from swarmwire.deploy.catalogue.kinds import KINDS
+from swarmwire.deploy.catalogue.text import print_entry, print_list
+from swarmwire.deploy.catalogue.units import unit_of
+from swarmwire.metrics.registry import METRICS
+from swarmwire.world.scenario.scenario import PhysicsTable
+from swarmwire.world.scenario.scenario_file import scenario_schema
+from swarmwire.world.scenario.schema import written_form
+from tests.support.deploy.commands import LOSSY, ROOT, called
+from tests.support.metrics.packages import install
+
+EVENTS = {next(of.default for of in fields(kind) if of.name == "do"): kind for kind in ACTIONS}
+OF_EACH_KIND = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+HELD = {
+    "bodies": [*body_names()],
+    "senses": [*SHEETS, *(f"radio.{of.name}" for of in fields(Gives)), OUTCOMES],
+    "behaviours": behaviours.__all__,
+    "drives": [*DRIVES],
+    "engines": [*get_args(PhysicsTable.model_fields["engine"].annotation)],
+    "events": [*EVENTS],
+    "metrics": [*METRICS],
+    "stages": [module.__name__.rpartition(".")[2] for module in ORDER],
+    "fates": [*FATE_NAMES],
+}
+CLASSES: dict[str, Any] = {"radio": Radio, "leds": Leds}
+for _kind, _held in (("drive", DRIVES), ("sense", SHEETS), ("event", EVENTS), ("metric", METRICS)):
+    CLASSES |= {f"{_kind}:{name}": held for name, held in _held.items()}
+OWN = '''from swarmwire.agent import Agent
+
+class Mine(Agent):
+    """Turns on the spot.
+
+    For ever.
+    """
+
+    needs = ("compass",)
+    turn_radps: float = 0.5  # how fast: # in all
+    name: str
+
+    def step(self, robot):
+        robot.drive(0.0, self.turn_radps)
+'''
+
+
+def printed(entry: Entry, width: int | None = None) -> str:
+    """A description, piped or in a terminal of this width."""
+    out = StringIO()
+    print_entry(entry, Console(file=out, width=width, force_terminal=width is not None, color_system=None))
+    return out.getvalue()
+
+
+def lines_of(kind: Any) -> list[tuple[str, ...]]:
+    """Name, help, unit, default and choices of each parameter of a dataclass."""
+    kind = written_form(kind)
+    hints = get_type_hints(kind)
+    wanted: list[tuple[str, ...]] = []
+    for of in fields(kind):
+        limits = limits_of(of)
+        inner = [hint for hint in (hints[of.name], *get_args(hints[of.name])) if is_dataclass(hint)]
+        default = "" if of.default in (MISSING, None) or inner else json.dumps(of.default)
+        wanted.append((of.name, limits.help, limits.unit, default, *limits.choices))
+        wanted += [(f"{of.name}.{name}", *rest) for hint in inner for name, *rest in lines_of(hint)]
+    return wanted
+
+
+def assert_tells(text: str, wanted: list[tuple[str, ...]]) -> None:
+    """Every parameter has a line that starts with its name and holds all that is wanted of it."""
+    for name, *parts in wanted:
+        lines = [line for line in text.splitlines() if line.split()[:1] == [name]]
+        assert any(all(part in line for part in parts) for line in lines), (name, parts, lines)
+
+
+@OF_EACH_KIND
+def test_a_list_has_a_plain_line_for_each_entry_of_the_registry(kind):
+    names = [entry.name for entry in kind.entries()]
+    assert names == HELD.get(kind.name, names)
+    assert len({name.lower() for name in names}) == len(names) > 0
+    print_list(kind, Console(file=(out := StringIO())))
+    heading, *lines = out.getvalue().splitlines()
+    assert heading.startswith(kind.one)
+    assert [line.split("  ")[0] for line in lines] == names
+    assert all(line == line.rstrip() and line.isprintable() for line in lines)
+
+
+@OF_EACH_KIND
+def test_an_entry_is_found_by_its_name_and_printed_with_its_help_and_every_parameter(kind):
+    for entry in kind.entries():
+        assert find(f"{kind.one}:{entry.name}") == find(f"{kind.name}:{entry.name}") == entry
+        assert entry.help.strip()
+        assert "\n" not in entry.help
+        text, narrow = printed(entry), printed(entry, width=80)
+        assert entry.help in text
+        assert max(map(len, narrow.splitlines())) <= 80
+        for of in (of for table in entry.tables for of in table.parameters):
+            value = "required" if of.required else "" if of.value is None else json.dumps(of.value, ensure_ascii=False)
+            assert_tells(text, [(of.name, value, of.unit, of.help)])
+            assert f"\n{of.name} " in narrow
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_an_entry_tells_each_field_of_the_class_that_it_stands_for(name):
+    assert_tells(printed(find(name)), lines_of(CLASSES[name]))
+
+
+@pytest.mark.parametrize("name", behaviours.__all__)
+def test_a_behaviour_tells_its_needs_and_parameters(name):
+    kind, text = getattr(behaviours, name), printed(find(name))
+    assert ", ".join(kind.needs) in text
+    for of in parameters_of(kind).values():
+        default = "required" if of.default is REQUIRED else json.dumps(of.default)
+        assert_tells(text, [(of.name, default, unit_of(of.name))])
+    assert find(f"swarmwire.agent.behaviours:{name}") == find(name)
+
+
+@pytest.mark.parametrize("name", body_names())
+def test_a_body_tells_the_figures_of_its_sheet(name):
+    body, text = load_body(name), printed(find(f"body:{name}"))
+    assert all(part in text for part in (body.source, f"{body.radius_m}", f"{body.max_linear_mps:.4g} m/s"))
+    for title, sheet in [("drive", body.drive), *((f"sense: {sense}", body.senses[sense]) for sense in body.senses)]:
+        plain = [of for of in fields(sheet) if not is_dataclass(getattr(sheet, of.name))]
+        figures = [(of.name, limits_of(of).unit, json.dumps(getattr(sheet, of.name))) for of in plain]
+        assert_tells(text[text.index(f"\n{title}\n") :], figures)
+
+
+def test_metrics_and_stages_tell_what_their_code_says():
+    for name, kind in METRICS.items():
+        facts = dict(find(f"metric:{name}").facts)
+        assert (facts["unit"], facts["kind"].startswith(kind.kind)) == (kind.unit or "none", True)
+        assert facts["bounds"]
+    for module in ORDER:
+        entry = find(f"stage:{module.__name__.rpartition('.')[2]}")
+        told = {of.name for table in entry.tables for of in table.parameters}
+        assert {f"radio.{key}" for key in module.KEYS} <= told
+        assert bool(told) == bool(module.KEYS)
+
+
+def test_every_key_of_a_scenarios_schema_can_be_described():
+    entries = [entry for kind in KINDS if kind.name in ("keys", "radio") for entry in kind.entries()]
+    for table in scenario_schema()["$defs"].values():
+        for name, node in table["properties"].items():
+            text = " ".join(node.get("description", "").split("\n\n")[0].removesuffix(".").split())
+            assert any(entry.name.split(".")[-1] == name and text in entry.help for entry in entries), name
+
+
+@pytest.mark.parametrize(
+    ("name", "place"),
+    [
+        ("seed", "seed, before the first table"),
+        ("radio", "the table [radio]"),
+        ("radio.gives.range.noise_m", "noise_m in [radio.gives.range]"),
+        ("robots.*.place.radius_m", "radius_m in [robots.GROUP.place]"),
+        ("arena.lights", "the tables [[arena.lights]]"),
+        ("events.*.robots.share", "share in [events.robots]"),
+    ],
+)
+def test_a_key_tells_where_the_file_has_it(name, place):
+    assert dict(find(name).facts)["in a scenario"] == place
+
+
+@pytest.mark.parametrize(
+    ("asked", "name"),
+    [
+        ("ORDER", "order"),
+        ("loss", "radio.loss"),
+        ("robots.flock.count", "robots.*.count"),
+        ("arena.obstacles.0.shape", "arena.obstacles.*.shape"),
+        ("robots.flock", "robots.*"),
+        ("events:kill", "kill"),
+    ],
+)
+def test_a_name_may_be_short_or_that_of_ones_own_group(asked, name):
+    assert find(asked).name == name
+
+
+@pytest.mark.parametrize(
+    ("asked", "expected"),
+    [
+        ("flokking", "Flocking"),
+        ("radio.los", "radio.loss"),
+        ("metric:kill", ""),
+        ("xyzzy", ""),
+        ("blackout", "event:blackout, fate:blackout"),
+        ("size_m", "arena.size_m, arena.obstacles.*.within.size_m"),
+        ("fates", "swarmwire list fates"),
+        ("absent.toml", ""),
+        ("absent.py:Mine", ""),
+        ("absent.py", "absent.py:Class"),
+        (str(LOSSY), "swarmwire check"),
+        ("swarmwire.agent:Robot", "Agent or VectorAgent"),
+    ],
+)
+def test_a_name_of_nothing_or_of_several_things_is_refused_with_what_to_try(asked, expected):
+    with pytest.raises(BadInput) as refused:
+        find(asked)
+    assert str(refused.value).startswith(f"{asked}: ")
+    assert expected in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_body_and_an_agent_of_ones_own_are_described_as_those_that_come_along(tmp_path, monkeypatch):
+    (tmp_path / "mine.toml").write_text('like = "epuck"\nmass_kg = 0.7\n[senses.proximity]\nnoise = 0.25\n')
+    (tmp_path / "my_agent.py").write_text(OWN)
+    monkeypatch.chdir(tmp_path)
+    of = [[value for table in find(name).tables for value in table.parameters] for name in ("mine.toml", "body:epuck")]
+    changed = [(now.name, now.value) for now, was in zip(*of, strict=True) if now != was]
+    assert changed == [("mass_kg", 0.7), ("noise", 0.25)]
+    text = printed(find("my_agent.py:Mine"))
+    assert "Turns on the spot.\n\nFor ever." in text
+    assert_tells(
+        text, [("turn_radps", "rad/s", "0.5", "how fast: # in all"), ("name", "required"), ("needs", "compass")]
+    )
+    text = printed(find(str(ROOT / "examples" / "gas" / "sniffer.toml")))
+    gas, sealer = (text[text.index(f"\n{title}") :] for title in ("sense: gas", "actuator: sealer"))
+    assert_tells(gas, [("kind", "gas.py:Gas"), ("rate_hz", "5.0"), ("reach_m", "m", "1.0")])
+    assert_tells(sealer, [("kind", "gas.py:Sealer"), ("arm_m", "m", "0.3")])
+
+
+def test_metrics_of_packages_are_listed_and_described_also_if_they_do_not_import(tmp_path, monkeypatch, capsys):
+    install(tmp_path, "sky_metrics", {"east": "East"})
+    install(tmp_path, "fog_metrics", {"west": "East"}, code="raise ValueError('fog')")
+    monkeypatch.syspath_prepend(tmp_path)
+    lines = called(monkeypatch, capsys, "list", "metrics")[1].splitlines()
+    told = {line.split()[0]: line for line in lines}
+    assert "plug-in" in told["east"]
+    assert "ValueError: fog" in told["west"]
+    text = called(monkeypatch, capsys, "describe", "east")[1]
+    assert all(part in text for part in ('metric = "east"', "from_m = 0.0", "sky_metrics:East", "at least -9"))
+    assert called(monkeypatch, capsys, "describe", "west")[0] == 0
+
+
+def test_the_commands_list_and_describe(monkeypatch, capsys):
+    code, out, errors = called(monkeypatch, capsys, "list")
+    assert (code, errors) == (0, "")
+    assert all(f"{kind.name} " in out for kind in KINDS)
+    assert list(json.loads(called(monkeypatch, capsys, "list", "--json")[1])) == [kind.name for kind in KINDS]
+    found = json.loads(called(monkeypatch, capsys, "describe", "radio.loss", "--json")[1])
+    (loss,) = found["tables"][0]["parameters"]
+    assert (found["kind"], loss["value"], loss["required"]) == ("radio", 0.0, False)
+    for command, name in (("list", "nothing"), ("describe", "flokking")):
+        code, out, errors = called(monkeypatch, capsys, command, name)
+        assert (code, out, errors.count("\n")) == (2, "", 1)
+        assert errors.startswith(f"error: {name}: ")
+    for name in ("list", "describe", "new"):
+        assert f" swarmwire {name} " in called(monkeypatch, capsys, name, "--help")[1]
