@@ -1,19 +1,22 @@
 """Every command on every page runs as it stands there, one after the other, and prints what the page shows."""
 
 import os
+import re
+import shlex
 import shutil
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
 
-from swarmwire.comms.bodies.body import body_from
+from swarmwire.deploy import run
 from tests.docs.pages import PAGES, ROOT, Command, blocks_of, commands_of, files_of, first_not_printed
+from tests.support.deploy.commands import called
 
 WITH_COMMANDS = [page for page in PAGES if commands_of(page)]
 SHOWN = ("docs/getting-started.md", "docs/scenario.md", "docs/api/deploy.md")
+IN_THIS_PROCESS = re.compile(r"(?:uv run )?swarmwire (?!sweep|tune)[^|&;>]*")  # workers want a main module of their own
 UV = """#!/bin/sh
 # What `uv run` comes to here: the environment is that of the tests.
 test "$1" = run || exit 64
@@ -23,41 +26,41 @@ exec "$@"
 
 
 @pytest.fixture
-def project(tmp_path: Path) -> Path:
-    """A folder that holds what a user of the project finds there."""
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working directory, which holds what a user of the project finds there."""
     for folder in ("scenarios", "examples"):
         shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "uv").write_text(UV)
     (tmp_path / "bin" / "uv").chmod(0o755)
+    path = os.pathsep.join([str(tmp_path / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]])
+    monkeypatch.setenv("PATH", path)
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def typed(command: Command, project: Path) -> subprocess.CompletedProcess[str]:
-    path = os.pathsep.join([str(project / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]])
-    environment = {**os.environ, "PATH": path, "COLUMNS": "120"}
-    return subprocess.run(
-        ["sh", "-c", command.line],
-        cwd=project,
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-        timeout=100,
-    )
+def in_a_shell(line: str) -> tuple[object, str]:
+    """Exit code of a line and what it prints."""
+    done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False, timeout=100)
+    return done.returncode, done.stdout + done.stderr
 
 
 @pytest.mark.timeout(400)
 @pytest.mark.parametrize("page", WITH_COMMANDS)
-def test_commands_run_and_print_what_is_shown(page, project):
+def test_commands_run_and_print_what_is_shown(page, project, monkeypatch, capsys):
     for name, text in files_of(page).items():
         (project / name).write_text(text)
     for command in commands_of(page):
-        done = typed(command, project)
-        assert done.returncode == 0, f"{command.line}\n{done.stdout}"
-        missing = first_not_printed(command, done.stdout)
-        assert missing is None, f"{command.line}\nshown, but not printed: {missing}\n{done.stdout}"
+        if IN_THIS_PROCESS.fullmatch(command.line):
+            words = shlex.split(command.line.removeprefix("uv run "))[1:]
+            code, *printed = called(monkeypatch, capsys, *words)
+        else:
+            code, *printed = in_a_shell(command.line)
+        text = "".join(printed)
+        assert code == 0, f"{command.line}\n{text}"
+        missing = first_not_printed(command, text)
+        assert missing is None, f"{command.line}\nshown, but not printed: {missing}\n{text}"
 
 
 def test_the_pages_that_show_commands_are_found():
@@ -71,24 +74,17 @@ def test_what_is_shown_must_be_printed_in_its_order():
     assert first_not_printed(Command("", ("final …",)), printed) == "final …"
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if page.startswith("docs")])
-def test_code_is_in_a_file_that_the_page_names_and_uses(page):
-    files = files_of(page)
-    assert all(block.file for block in blocks_of(page, "python"))
-    for name in files:
-        users = [command.line for command in commands_of(page)] + [files[other] for other in files if other != name]
-        assert any(name in user for user in users), name
-        assert f"`{name}`" in (ROOT / page).read_text(), name
+def test_the_readmes_agent_runs_with_the_readmes_table(tmp_path):
+    (tmp_path / "shy.py").write_text(blocks_of("README.md", "python")[0].text)
+    lossy = (ROOT / "scenarios" / "flocking-lossy.toml").read_text()
+    before, after = lossy[: lossy.index("[robots.flock]")], lossy[lossy.index("[radio]") :]
+    (tmp_path / "mine.toml").write_text(f"{before}{blocks_of('README.md', 'toml')[0].text}\n{after}")
+    result = run(tmp_path / "mine.toml", overrides=["duration_s=1"], runners=2)
+    assert result.radio is not None
+    assert result.radio.fates["heard"] > 0
 
 
-def test_the_sheets_on_the_page_about_bodies_are_bodies():
-    sheets = [tomllib.loads(block.text) for block in blocks_of("docs/bodies.md", "toml")]
-    assert {"like" in sheet for sheet in sheets} == {True, False}
-    for sheet in sheets:
-        assert body_from(sheet, "docs/bodies.md").name == sheet["name"]
-
-
-@pytest.mark.parametrize("page", PAGES)
-def test_parts_of_scenarios_are_toml(page):
-    for block in blocks_of(page, "toml"):
-        tomllib.loads(block.text)
+def test_the_readmes_python_runs(monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    exec(blocks_of("README.md", "python")[1].text.replace("duration_s=20", "duration_s=1"), {})
+    assert "0." in capsys.readouterr().out

@@ -15,11 +15,9 @@ import click
 import pytest
 from typer.main import get_command
 
-from docs.pictures import robots as picture
 from swarmwire.agent.cli import _parser as agent_parser
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, SENSORS
 from swarmwire.comms.wire.access import access_of
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.swarm_keys import SwarmKeys
@@ -143,24 +141,3 @@ def test_commands_for_robots_are_ones_that_there_are(program: str, words: list[s
         name, command, words = command.resolve_command(context, words)
         assert command
         context = command.make_context(name, list(words), parent=context)
-
-
-def test_the_bytes_of_the_e_puck2_are_told_as_they_are():
-    page = (ROOT / "docs" / "epuck2.md").read_text(encoding="utf-8")
-    command, answer = page.split("## An answer")
-    rows = re.compile(r"^\| (\d+)(?:-(\d+))? \| (?:(\d+) )?([iuf]\d) \|", re.MULTILINE)
-    for text, size in ((command, COMMAND_BYTES), (answer, SENSORS.itemsize)):
-        place, told = 0, list[tuple[str, int]]()
-        for first, last, count, kind in rows.findall(text):
-            assert int(first) == place
-            place = int(last or first) + 1
-            assert place - int(first) == int(count or 1) * int(kind[1])
-            told.append((kind, int(count or 1)))
-        assert place == size
-    fields = [SENSORS[name] for name in SENSORS.names or ()]
-    assert told == [(of.base.str[1:], of.shape[0] if of.shape else 1) for of in fields]
-
-
-def test_the_picture_is_as_it_is_drawn(tmp_path):
-    picture.draw(tmp_path / "robots.svg")
-    assert (tmp_path / "robots.svg").read_bytes() == picture.TO.read_bytes(), "python -m docs.pictures.robots"

@@ -1,0 +1,185 @@
+"""Checks that the pages say what the code and the data say: `python -m docs.checks`, or `make docs-check`.
+
+Each check yields a line for each problem. They need no site and run no simulation; a figure that a command draws is
+not compared, and `make pictures` draws it again.
+"""
+
+import re
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from benchmarks.targets import TARGETS
+from docs.behaviours import places as of_behaviours
+from docs.behaviours.degradation import LATENCY, LOSS, degradation_of
+from docs.behaviours.shown import SHOWN
+from docs.experiments.digest import digests
+from docs.experiments.drawing import with_numbers
+from docs.experiments.experiment import Experiment, find_experiment
+from docs.experiments.experiment import names as experiments
+from docs.experiments.places import HERE, Places
+from docs.fault_checks import fault_tables
+from docs.pictures.radio.__main__ import FIGURES
+from docs.protocol_checks import protocol_page
+from swarmwire.agent import behaviours
+from swarmwire.comms.bodies.body import body_from
+from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, SENSORS
+from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
+from swarmwire.deploy.campaign.plan import planned
+from tests.docs.pages import PAGES, blocks_of, commands_of, files_of
+
+ROOT = Path(__file__).parents[1]
+MOST_BYTES = 150_000  # of a picture
+Problems = Iterator[str]
+
+
+def links() -> Problems:
+    """Links between files lead to files."""
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)#:]+)[^):]*\)", _text(page)):
+            if not ((ROOT / page).parent / target).exists():
+                yield f"{page}: links to {target}, which does not exist"
+
+
+def code_blocks() -> Problems:
+    """Tables are TOML, bodies are bodies, and every program is in a file that the page names and a command uses."""
+    for page in PAGES:
+        for block in blocks_of(page, "toml"):
+            try:
+                table = tomllib.loads(block.text)
+                if page == "docs/bodies.md":
+                    body_from(table, page)
+            except (tomllib.TOMLDecodeError, SwarmwireError) as error:
+                yield f"{page}: {error}"
+        if not page.startswith("docs"):
+            continue
+        files = files_of(page)
+        if not all(block.file for block in blocks_of(page, "python")):
+            yield f"{page}: a block of Python has no file name above it"
+        for name in files:
+            users = [command.line for command in commands_of(page)] + [files[other] for other in files if other != name]
+            if not any(name in user for user in users) or f"`{name}`" not in _text(page):
+                yield f"{page}: {name} is shown, but the text does not name it, or nothing uses it"
+
+
+def behaviour_pages() -> Problems:
+    """Each behaviour has a page with its pictures, a scenario and a campaign; its numbers are those of its data."""
+    places = of_behaviours.HERE
+    classes = {getattr(behaviours, name).__module__.rpartition(".")[2]: name for name in behaviours.__all__}
+    stems = [
+        sorted(file.stem for file in places.pages.glob("*.md")),
+        sorted(file.stem for file in places.data.iterdir()),
+    ]
+    if any(sorted(found) != sorted(classes) for found in (*stems, of_behaviours.names(places), SHOWN)):
+        yield f"docs/behaviours: expected a page, a campaign, data and a line in shown.py for each of {sorted(classes)}"
+        return
+    for name, kind in classes.items():
+        page, text = f"docs/behaviours/{name}.md", _text(f"docs/behaviours/{name}.md")
+        pictures = [f"{name}.png", f"{name}-degradation.svg"]
+        named = (f"```{{reference}} behaviour {kind}\n", f"uv run swarmwire run scenarios/behaviours/{name}.toml\n")
+        if re.findall(r"^!\[.+\]\((.+)\)$", text, re.MULTILINE) != pictures or not all(part in text for part in named):
+            yield f"{page}: expected {', '.join(pictures)} and {' and '.join(map(str.strip, named))}"
+        groups = tomllib.loads(_text(f"scenarios/behaviours/{name}.toml"))["robots"].values()
+        if {group["agent"] for group in groups} != {f"swarmwire.agent.behaviours:{kind}"}:
+            yield f"scenarios/behaviours/{name}.toml: has other agents than {kind}"
+        yield from _experiment(degradation_of(name, places), places, f"python -m docs.behaviours draw {name}")
+        yield from _whole_campaign(name, places)
+
+
+def _whole_campaign(name: str, places: Places) -> Problems:
+    file = places.campaigns / f"{name}.toml"
+    table = campaign_table(file)
+    plan = planned(asked_in(file, table or {}))
+    [data] = digests(degradation_of(name, places), places).values()
+    levels = [plan.vary()[path] for path in plan.vary()]
+    same = [sorted(data[LOSS].unique()), sorted(data[LATENCY].unique())] == levels
+    if not same or set(data["seed"]) != set(plan.asked.seeds) or len(data) != len(plan.points) * len(plan.asked.seeds):
+        yield f"{places.data / name}.parquet: is not of the whole campaign {file.name}"
+
+
+def experiment_pages() -> Problems:
+    """Each experiment has campaigns, data and a figure, and the numbers on its page are those of its data."""
+    for name in experiments(HERE):
+        experiment = find_experiment(name, HERE)
+        if missing := [of for of in experiment.campaigns if not (HERE.campaigns / f"{of}.toml").exists()]:
+            yield f"scenarios/papers: lacks the campaigns {missing} of {name}"
+        if f"({name}.svg)" not in _text(f"docs/experiments/{name}.md"):
+            yield f"docs/experiments/{name}.md: does not show {name}.svg"
+        yield from _experiment(experiment, HERE, f"python -m docs.experiments draw {name}")
+
+
+def _experiment(experiment: Experiment, places: Places, draw: str) -> Problems:
+    page = places.pages / f"{experiment.name}.md"
+    if page.read_text(encoding="utf-8") != with_numbers(page, experiment.told(digests(experiment, places))):
+        yield f"{page.relative_to(ROOT)}: its numbers are not those of its data: {draw}"
+    figure = places.figure_of(experiment.name)
+    if not figure.exists() or b"<svg" not in figure.read_bytes()[:1000]:
+        yield f"{figure.relative_to(ROOT)}: no figure: {draw}"
+
+
+def pictures() -> Problems:
+    """The page about the radio shows each of its figures once; pictures are small enough to be kept with the code."""
+    shown = re.findall(r"^!\[.+\]\(radio/(.+)\.svg\)$", _text("docs/radio.md"), re.MULTILINE)
+    if not sorted(shown) == sorted(FIGURES) == sorted(path.stem for path in (ROOT / "docs" / "radio").iterdir()):
+        yield f"docs/radio.md: expected each figure once: {sorted(FIGURES)}"
+    for path in (file for folder in ("radio", "behaviours") for file in (ROOT / "docs" / folder).iterdir()):
+        if path.suffix in {".svg", ".png"} and path.stat().st_size > MOST_BYTES:
+            yield f"{path.relative_to(ROOT)}: expected at most {MOST_BYTES} bytes"
+
+
+def benchmark_rows() -> Problems:
+    """The page about performance has a measured row for every target."""
+    rows = [line for line in _text("docs/performance.md").splitlines() if line.startswith("| `")]
+    measured = {row.split("`")[1] for row in rows if "| met |" in row or "**missed**" in row}
+    yield from (f"docs/performance.md: has no measured row for {name}" for name in sorted(TARGETS.keys() - measured))
+
+
+def robot_bytes() -> Problems:
+    """The tables of the bytes that an e-puck2 takes and gives add up to the packets."""
+    rows = re.compile(r"^\| (\d+)(?:-(\d+))? \| (?:(\d+) )?([iuf]\d) \|", re.MULTILINE)
+    told: list[tuple[str, int]] = []
+    for text, size in zip(
+        _text("docs/epuck2.md").split("## An answer"), (COMMAND_BYTES, SENSORS.itemsize), strict=True
+    ):
+        place = 0
+        told = [(kind, int(count or 1)) for _, _, count, kind in rows.findall(text)]
+        for (first, last, _, _), (kind, count) in zip(rows.findall(text), told, strict=True):
+            if int(first) != place or int(last or first) + 1 != place + count * int(kind[1]):
+                yield f"docs/epuck2.md: expected the row of {kind} at byte {first} to begin at {place}"
+            place = int(last or first) + 1
+        if place != size:
+            yield f"docs/epuck2.md: expected {size} bytes in a table, got {place}"
+    ours = [(SENSORS[name].base.str[1:], *(SENSORS[name].shape or (1,))) for name in SENSORS.names or ()]
+    if told != ours:
+        yield f"docs/epuck2.md: expected the answer's fields {ours}"
+
+
+CHECKS: tuple[Callable[[], Problems], ...] = (
+    links,
+    code_blocks,
+    behaviour_pages,
+    experiment_pages,
+    pictures,
+    benchmark_rows,
+    robot_bytes,
+    fault_tables,
+    protocol_page,
+)
+
+
+def main() -> int:
+    """Print a line for each problem; 1 if there is one."""
+    problems = [problem for check in CHECKS for problem in check()]
+    lines = [*problems, f"{len(CHECKS)} checks of the pages; problems: {len(problems)}"]
+    sys.stdout.write("".join(f"{line}\n" for line in lines))
+    return 1 if problems else 0
+
+
+def _text(page: str) -> str:
+    return (ROOT / page).read_text(encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,66 @@
+"""The checks of the pages find what does not fit; whether the pages fit now is what `make docs-check` says."""
+
+from pathlib import Path
+
+import pytest
+
+from docs import checks, fault_checks, protocol_checks
+
+
+@pytest.fixture
+def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The only page that there is."""
+    (tmp_path / "docs").mkdir()
+    monkeypatch.setattr(checks, "ROOT", tmp_path)
+    monkeypatch.setattr(checks, "PAGES", ["docs/page.md"])
+    monkeypatch.setattr("tests.docs.pages.ROOT", tmp_path)
+    return tmp_path / "docs" / "page.md"
+
+
+def test_a_link_that_leads_nowhere_is_a_problem(page: Path):
+    page.write_text("[here](page.md), [elsewhere](https://example.org), [a part](page.md#part)")
+    assert list(checks.links()) == []
+    page.write_text("[gone](gone.md)")
+    assert len(list(checks.links())) == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["```toml\na = \n```\n", "```python\n1\n```\n", "<!-- file: a.py -->\n```python\n1\n```\nNobody runs `a.py`.\n"],
+)
+def test_code_that_is_broken_or_unused_is_a_problem(page: Path, text: str):
+    page.write_text(text)
+    assert len(list(checks.code_blocks())) == 1
+
+
+def test_a_table_of_the_protocol_that_lacks_a_row_is_a_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    before = list(protocol_checks.protocol_page())
+    text = protocol_checks.PAGE.read_text(encoding="utf-8")
+    before_it, title, table = text.partition("<!-- table: limits -->\n")
+    head, rule, _row, *rest = table.splitlines(keepends=True)
+    (tmp_path / "protocol.md").write_text("".join([before_it, title, head, rule, *rest]))
+    monkeypatch.setattr(protocol_checks, "PAGE", tmp_path / "protocol.md")
+    assert len(list(protocol_checks.protocol_page())) > len(before)
+
+
+def test_a_fault_without_a_test_and_a_test_that_does_not_exist_are_problems(
+    page: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(fault_checks, "ROOT", page.parents[1])
+    monkeypatch.setattr(fault_checks, "PAGE", Path("docs/page.md"))
+    (page.parents[1] / "tests").mkdir()
+    (page.parents[1] / "tests" / "test_a.py").write_text("def test_b(): ...")
+    table = "### A world\n| fault | what you see |\n| --- | --- |\n| killed | nothing |\n\nTests:\n"
+    page.write_text(f"{table}- killed: `tests/test_a.py::test_b[1]`\n\n## More\n- more: `tests/test_a.py`\n")
+    assert list(fault_checks.fault_tables()) == []
+    page.write_text(f"{table}- killed: `tests/test_a.py::test_c`\n")
+    assert len(list(fault_checks.fault_tables())) == 1
+    page.write_text(f"{table}- frozen: `tests/test_a.py::test_b`\n")
+    assert len(list(fault_checks.fault_tables())) == 1
+
+
+def test_a_problem_is_a_line_and_exit_code_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    for found, code in (((), 0), (("a page: a problem",), 1)):
+        monkeypatch.setattr(checks, "CHECKS", (lambda problems=found: iter(problems),))
+        assert checks.main() == code
+        assert capsys.readouterr().out.splitlines()[:-1] == list(found)

@@ -1,0 +1,23 @@
+"""Every figure that is drawn of the code can be drawn; how it looks is for people to judge."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from docs.pictures import parts, robots, runner_states, tick_figure
+from docs.pictures.radio import sheet
+from docs.pictures.radio.__main__ import FIGURES
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_figure_of_the_radio_can_be_drawn(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(sheet, "FOLDER", tmp_path)
+    FIGURES[name]()
+    assert b"<svg" in (tmp_path / f"{name}.svg").read_bytes()[:1000]
+
+
+@pytest.mark.parametrize("draw", [parts.draw, robots.draw, runner_states.draw, tick_figure.draw])
+def test_a_figure_of_the_design_can_be_drawn(draw: Callable[[Path], None], tmp_path: Path):
+    draw(tmp_path / "figure.svg")
+    assert b"<svg" in (tmp_path / "figure.svg").read_bytes()[:1000]
