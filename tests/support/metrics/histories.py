@@ -158,8 +158,8 @@ def no_rows(table: type) -> Any:
 
 def chosen(table: Any, rows: Array, **columns: Array) -> Any:
     """These rows of a table of packets, some of its columns replaced."""
-    taken = {field.name: getattr(table, field.name) for field in fields(table)}
-    return type(table)(**{name: None if of is None else columns.get(name, of)[rows] for name, of in taken.items()})
+    taken = {field.name: getattr(table, field.name) for field in fields(table)} | columns
+    return type(table)(**{name: None if column is None else column[rows] for name, column in taken.items()})
 
 
 def placed(history: History, by_m: tuple[float, float], turn_rad: float = 0.0, mirror: bool = False) -> History:

@@ -1,13 +1,21 @@
-"""Which metrics a run measures, by what its scenario lists."""
+"""Which metrics a run measures: those of its scenario, of packages, and the user's own."""
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.errors import BadInput, OwnCodeFailed
 from swarmwire.metrics.listed import Item, listed
+from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.own_metrics import own_kind
+from swarmwire.metrics.plug_ins import GROUP, PlugIn, plug_ins
 from swarmwire.metrics.registry import METRICS, standard
 from tests.support.metrics.packages import CODE, install
+from tests.support.metrics.truths import static, truth
 
 
 @pytest.fixture
@@ -71,23 +79,23 @@ def test_what_ends_an_arena_is_measured_once_with_the_parameters_that_are_listed
 
 
 @pytest.mark.parametrize(
-    ("asked", "said"),
+    ("asked", "key", "hint"),
     [
-        (item("ordre"), "metrics.0: expected the name of a metric, as swarmwire list metrics tells them "
-                        "(did you mean order?), or a class as module:Class or file.py:Class; got 'ordre'"),
-        (item("ordre", x=1), "metrics.0.metric: expected the name of a metric, as swarmwire list metrics tells them "
-                             "(did you mean order?), or a class as module:Class or file.py:Class; got 'ordre'"),
-        (stop("ordr"), "stop.metric: expected the name of a metric, as swarmwire list metrics tells them "
-                       "(did you mean order?); got 'ordr'"),
-        (item("mine.py"), "metrics.0: expected \"package.module:Class\" or \"file.py:Class\", got 'mine.py'"),
-        (item("fragmentations", hold=1), "metrics.0.hold: unknown key; expected one of hold_s (did you mean hold_s?)"),
-        (item("fragmentations", hold_s=-1), "metrics.0.hold_s: expected at least 0 s, got -1.0"),
-        (item("fragmentations", hold_s="x"), "metrics.0.hold_s: expected a number, got 'x'"),
-        (item("order", gap_m=1), "metrics.0.gap_m: unknown key; expected none"),
+        (item("ordre"), "metrics.0", "did you mean order?"),
+        (item("ordre", x=1), "metrics.0.metric", "did you mean order?"),
+        (stop("ordr"), "stop.metric", "did you mean order?"),
+        (item("mine.py"), "metrics.0", "mine.py"),
+        (item("fragmentations", hold=1), "metrics.0.hold", "did you mean hold_s?"),
+        (item("fragmentations", hold_s=-1), "metrics.0.hold_s", "-1.0"),
+        (item("fragmentations", hold_s="x"), "metrics.0.hold_s", "'x'"),
+        (item("order", gap_m=1), "metrics.0.gap_m", "none"),
     ],
-)  # fmt: skip
-def test_what_is_no_metric_or_does_not_fit_is_refused_with_its_key(asked, said):
-    assert refused(asked) == f"s.toml: {said}"
+)
+def test_what_is_no_metric_or_does_not_fit_is_refused_with_its_key(asked, key, hint):
+    with pytest.raises(BadInput) as error:
+        listed([asked], "s.toml")
+    assert (error.value.where, error.value.key) == ("s.toml", key)
+    assert hint in error.value.expected
 
 
 def test_one_name_is_measured_once(east):
@@ -129,3 +137,106 @@ def test_a_plug_in_of_another_name_or_from_two_packages_is_refused(site):
 def test_a_name_of_swarmwires_own_stays_its_own(site):
     install(site, "taken_metrics", {"order": "East"})
     assert type(listed([item("order")], "s.toml", with_standard=False).metrics[0]) is METRICS["order"]
+
+
+def test_what_packages_bring_is_known_by_name_before_anything_is_imported(tmp_path, monkeypatch):
+    install(tmp_path, "compass_metrics", {"east": "East"}, code="raise RuntimeError")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert plug_ins()["east"] == PlugIn("east", "compass_metrics:East", "compass_metrics", twice=False)
+    assert f"[{GROUP}]" in (tmp_path / "compass_metrics-1.0.dist-info" / "entry_points.txt").read_text()
+
+
+def test_a_name_that_two_packages_bring_is_told_twice(tmp_path, monkeypatch):
+    install(tmp_path, "one_metrics", {"east": "East"})
+    install(tmp_path, "other_metrics", {"east": "East"})
+    monkeypatch.syspath_prepend(tmp_path)
+    assert plug_ins()["east"].twice
+
+
+@dataclass(frozen=True)
+class Good(Metric):
+    """The tick."""
+
+    name = "mine"
+    help = "the tick"
+    bounds = (0, None)
+
+    def begin(self, static: Any) -> Any:
+        return lambda moment: float(moment.truth.tick)
+
+
+class Plain(Metric):
+    """No dataclass."""
+
+
+@dataclass(frozen=True)
+class Endless(Metric):
+    """Begins nothing."""
+
+
+@dataclass(frozen=True)
+class BeginsBadly(Good):
+    """Raises before the first tick."""
+
+    def begin(self, static: Any) -> Any:
+        raise ValueError("no start")
+
+
+@dataclass(frozen=True)
+class Wide(Good):
+    """Has a value per robot."""
+
+    def begin(self, static: Any) -> Any:
+        return lambda moment: moment.heading_rad[0]
+
+
+def spec_of(kind: type) -> str:
+    return f"{__name__}:{kind.__name__}"
+
+
+def test_a_good_one_is_measured():
+    assert _measure(own_kind(spec_of(Good), "s.toml", "metrics.0")()).latest["mine"].tolist() == [7.0]
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        (Plain, "expected a dataclass below Metric; .*:Plain is <class"),
+        (Endless, "Endless has no begin"),
+        (str, ".* holds no such name: 'str'"),
+    ],
+)
+def test_a_class_that_is_no_metric_is_refused(kind, said):
+    with pytest.raises(BadInput, match=rf"^s.toml: metrics\.0: {said}"):
+        own_kind(spec_of(kind), "s.toml", "metrics.0")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("name", "two words", "a name of letters, digits and _; got 'two words'"),
+        ("name", "order", "a name that is not taken; got 'order'"),
+        ("name", "x_m", "a name that is not taken; got 'x_m'"),
+        ("name", "delivery", "a name that is not taken; got 'delivery'"),
+        ("unit", 3, "unit as a text; got 3"),
+        ("kind", "sum", "the kind level or count or time; got 'sum'"),
+        ("bounds", (None, 1.0), r"bounds as a number, and a number or None; got \(None, 1.0\)"),
+    ],
+)
+def test_an_attribute_that_is_wrong_is_refused(monkeypatch, name, value, said):
+    monkeypatch.setattr(Good, name, value)
+    with pytest.raises(BadInput, match=rf"^s.toml: metrics\.0: Good: expected {said}"):
+        own_kind(spec_of(Good), "s.toml", "metrics.0")
+
+
+@pytest.mark.parametrize(("kind", "said"), [(BeginsBadly, "no start"), (Wide, "could not broadcast")])
+def test_one_that_fails_is_named(kind, said):
+    with pytest.raises(OwnCodeFailed, match=rf"the metric mine \({kind.__name__}\) failed:[\s\S]*{said}"):
+        _measure(kind())
+
+
+def _measure(metric):
+    metrics, of = Metrics([metric]), static(3)
+    metrics.begin(of)
+    metrics.see(truth(of, 7, pose=np.zeros((3, 3))))
+    return metrics

@@ -4,54 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from swarmwire.comms.geometry.obstacles import is_blocked_on, obstacle_arrays
-from swarmwire.comms.truth import Light
 from swarmwire.metrics.drawing.radio_range import in_range
 from swarmwire.metrics.network.distance_counts import Places
-from swarmwire.metrics.swarm.min_gap import smallest_gap_m
 from swarmwire.metrics.torus import link_lines, shortest, whole_path
 from tests.support.metrics.films import OBSTACLES
-from tests.support.metrics.truths import measured, static, truth
+from tests.support.metrics.truths import static
 
 SIZE_M = (8.0, 6.0)
 TORUS = replace(static(4), boundary="torus")
-places = st.tuples(st.floats(-4, 4), st.floats(-3, 3), st.sampled_from([0.035, 0.085, 0.2]))
 
 
 def apart(a, b):
     away = np.abs(np.asarray(b) - a)
     return np.hypot(*np.minimum(away, SIZE_M - away).T)
-
-
-@given(st.lists(places, min_size=2, max_size=20))
-def test_the_smallest_gap_is_that_of_all_pairs_across_the_seam_too(robots):
-    x, y, radius = np.array(robots).T
-    at = np.stack([x, y], axis=1)
-    pairs = [apart(at[i], at[j]) - radius[i] - radius[j] for i in range(len(at)) for j in range(i)]
-    pose, alive, order = np.stack([x, y, 0 * x], 1), np.ones(len(x), np.bool_), np.arange(len(x))[None]
-    assert smallest_gap_m(pose, radius, np.tile([0.0, 0.1], (len(pose), 1)), alive, order, SIZE_M) == [
-        pytest.approx(min(pairs), abs=1e-9)
-    ]
-
-
-def test_the_metric_asks_for_it():
-    pose = np.zeros((4, 3))
-    pose[:, :2] = [(3.9, 2.9), (-3.9, -2.9), (0, 0), (0, 1)]
-    assert measured("min_gap", TORUS, truth(TORUS, pose=pose)) == [pytest.approx(np.hypot(0.2, 0.2) - 0.07)]
-    walled = replace(TORUS, boundary="walls")
-    assert measured("min_gap", walled, truth(walled, pose=pose)) == [pytest.approx(0.93)]
-
-
-def test_the_way_to_a_light_is_the_shortest():
-    of = replace(static(2, arenas=2, lights=((Light(3.5, 2.5, 1.0),), ())), boundary="torus")
-    pose = np.zeros((4, 3))
-    pose[:, :2] = [(-3.5, -2.5), (0.0, 0.0), (1.0, 1.0), (2.0, 2.0)]
-    best, none = measured("target_best", of, truth(of, pose=pose))
-    assert best == pytest.approx(np.sqrt(2.0))
-    assert not np.isfinite(none)
 
 
 def test_distances_between_senders_and_receivers_are_the_shortest():

@@ -1,3 +1,5 @@
+"""Fragmentation: when the radio graph fell apart, how long for, and how long it took to be whole again."""
+
 from statistics import median
 
 import numpy as np
@@ -106,23 +108,3 @@ def test_fragmented_is_the_share_of_the_time_in_events_without_their_holds(ticks
     still_open = len(ticks) - starts[-1] if lengths and lengths[-1] is None else 0
     # Who all died within the hold is counted at the first split tick after it, which is later than the hold.
     assert sum(found) == closed + still_open if "0" not in ticks else sum(found) <= closed + still_open
-
-
-def test_without_a_radio_there_are_no_events():
-    metrics, of = Metrics([*NAMES, "fragmented"]), static(2, arenas=2, radio=False)
-    metrics.begin(of)
-    for tick in range(20):
-        metrics.see(truth(of, tick))
-    for arena in metrics.end(None)["metrics"]:
-        assert all(value is None for name in (*NAMES, "fragmented") for value in arena[name].values())
-
-
-def test_arenas_have_events_of_their_own():
-    of, metrics = static(2, arenas=2), Metrics(["fragmentations", "rejoin_worst"])
-    metrics.begin(of)
-    for tick in range(40):
-        pairs = ([] if 5 <= tick < 20 else [(0, 1)]) + ([] if 10 <= tick < 35 else [(2, 3)])
-        metrics.see(truth(of, tick, edges=edges(*pairs)))
-    found = metrics.end(None)["metrics"]
-    assert [arena["rejoin_worst"]["final"] for arena in found] == [1.5, 2.5]
-    assert [arena["fragmentations"]["final"] for arena in found] == [1.0, 1.0]

@@ -1,3 +1,5 @@
+"""Metrics as they are measured in a run: values and statistics, what a tick offers them, and those that are sampled."""
+
 import json
 from dataclasses import dataclass
 
@@ -6,10 +8,11 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.parameters import parameter
-from swarmwire.comms.protocols import Observer
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.moment import Components, Moment, agreement
 from swarmwire.metrics.registry import METRICS, register
+from swarmwire.metrics.sampled import Sampled
 from swarmwire.metrics.swarm.order import Order
 from tests.support.metrics.truths import edges, poses, static, truth
 
@@ -79,12 +82,6 @@ def test_the_summary_is_plain_json():
     assert json.loads(json.dumps(found, allow_nan=False)) == found
 
 
-def test_one_object_serves_many_runs():
-    of, metrics = static(2), Metrics()
-    first = seen(metrics, of, {"contact_onsets": np.array([[5, 5]])})
-    assert seen(metrics, of, {"contact_onsets": np.array([[5, 5]])}) == first
-
-
 def test_a_metric_with_parameters_is_given_as_an_object():
     of = static(3)
     [found] = seen(Metrics(["order", Turned(above_rad=1.0)]), of, {"pose": poses([0.0, 2.0, 3.0])})
@@ -118,23 +115,83 @@ def test_a_name_given_twice_is_refused(names):
         Metrics(names)
 
 
-@pytest.mark.parametrize("name", METRICS)
-def test_a_metric_stays_within_its_bounds(name):
-    of, rng = static(5, arenas=40), np.random.default_rng(2)
-    low, high = METRICS[name].bounds
-    pairs = rng.integers(0, 5, (150, 2)) + 5 * rng.integers(0, 40, (150, 1))
-    metrics = Metrics([name])
-    fields = {
-        "pose": poses(rng.uniform(-np.pi, np.pi, 200)),
-        "alive": rng.random(200) < 0.7,
-        "edges": pairs,
-        "contact_onsets": rng.integers(0, 3, (40, 2)),
-    }
-    for found in seen(metrics, of, fields):
-        value = found[name]["final"]
-        assert value is None or low <= value <= (np.inf if high is None else high)
+def test_rows_are_folded_by_arena():
+    of = static(3, arenas=2)
+    pose, velocity = np.arange(36.0).reshape(2, 6, 3)
+    alive = np.array([True, True, False, True, False, False])
+    moment = Moment(of, truth(of, pose=pose, velocity=velocity, alive=alive))
+    assert (moment.position_m[1, 2] == pose[5, :2]).all()
+    assert (moment.velocity[1, 2, :2] == velocity[5, :2]).all()
+    assert moment.heading_rad[0, 1] == pose[1, 2]
+    assert moment.robots_alive.tolist() == moment.sum_alive(np.ones((2, 3))).tolist() == [2, 1]
+    assert moment.components is None
 
 
-def test_metrics_are_an_observer():
-    observer: Observer = Metrics()
-    assert observer.end.__doc__
+def test_components_are_those_of_the_robots_alive():
+    of = static(3, arenas=2)
+    alive = np.array([True, True, True, True, True, False])
+    found = Moment(of, truth(of, alive=alive, edges=edges((0, 1), (1, 2), (4, 5)))).components
+    assert isinstance(found, Components)
+    assert found.pieces.tolist() == [1, 2]
+    assert found.largest.tolist() == [3, 1]
+
+
+def test_vectors_agree_by_how_near_their_sum_comes_to_the_most():
+    x = np.array([[3.0, 3.0, 9.0], [1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    y = np.array([[4.0, 4.0, 9.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    alive = np.array([[1, 1, 0], [1, 1, 1], [0, 0, 0], [1, 1, 1]], np.bool_)
+    assert agreement(x, y, alive, True)[[0, 1, 3]].tolist() == [1.0, pytest.approx(1 / 3), 0.0]
+    assert agreement(x / 5, y / 5, alive, False)[[0, 1]].tolist() == [pytest.approx(1.0), pytest.approx(1 / 15)]
+    assert np.isnan(agreement(x, y, alive, True)[2])
+
+
+def test_directions_are_the_cosines_and_sines_of_headings():
+    of = static(3, arenas=2)
+    moment = Moment(of, truth(of, pose=poses([0.3, -2.0, 9.0, 0.0, 3.1, -0.1])))
+    np.testing.assert_allclose(moment.direction[0], np.cos(moment.heading_rad))
+    np.testing.assert_allclose(moment.direction[1], np.sin(moment.heading_rad))
+
+
+@dataclass(frozen=True)
+class Ticks(Sampled):
+    """The tick that was sampled."""
+
+    name = "ticks_sampled"
+    help = "the tick"
+    bounds = (0.0, None)
+
+    def sample(self, static):
+        return lambda moment: np.full(static.arenas, float(moment.truth.tick))
+
+
+def sampled_in(every_s, ticks=12):
+    of, metrics = static(2, arenas=2), Metrics([Ticks(every_s=every_s)])
+    metrics.begin(of)
+    found = []
+    for tick in range(ticks):
+        metrics.see(truth(of, tick))
+        found.append(metrics.latest["ticks_sampled"].tolist())
+    assert all(a == b for a, b in found)
+    return [int(a) for a, _ in found]
+
+
+def test_a_sampled_metric_is_measured_at_the_start_and_at_each_multiple():
+    assert sampled_in(0.5) == [0] * 5 + [5] * 5 + [10] * 2
+    assert sampled_in(1.0) == [0] * 10 + [10] * 2
+
+
+@pytest.mark.parametrize("every_s", [0.0, 0.05, 0.1])
+def test_no_time_in_between_is_every_tick(every_s):
+    assert sampled_in(every_s) == list(range(12))
+
+
+def test_what_is_no_multiple_of_a_tick_is_sampled_in_the_first_tick_after():
+    assert sampled_in(0.25) == [0, 0, 0, 3, 3, 5, 5, 5, 8, 8, 10, 10]
+
+
+def test_one_sampled_metric_serves_many_runs():
+    metrics, of = Metrics([Ticks()]), static(1)
+    for tick in (3, 7):
+        metrics.begin(of)
+        metrics.see(truth(of, tick))
+        assert metrics.latest["ticks_sampled"].tolist() == [tick]

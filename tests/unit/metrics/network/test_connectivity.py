@@ -1,0 +1,158 @@
+"""The radio graph: components, algebraic connectivity and articulation points, of known graphs and by brute force."""
+
+import networkx as nx
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.network.algebraic_connectivity import AlgebraicConnectivity, second_eigenvalue
+from swarmwire.metrics.network.articulation import cut_vertices
+from tests.support.metrics.truths import edges, measured, static, truth
+
+
+def components(of, **given_fields):
+    seen = truth(of, **given_fields)
+    return measured("components", of, seen), measured("largest_component", of, seen)
+
+
+def test_a_ring_is_one_component():
+    of = static(6)
+    assert components(of, edges=edges(*[(i, (i + 1) % 6) for i in range(6)])) == ([1.0], [1.0])
+
+
+def test_a_split_swarm_counts_its_pieces_and_the_share_of_the_largest():
+    assert components(static(8), edges=edges((0, 1), (1, 2), (3, 4), (4, 5), (5, 6))) == ([3.0], [0.5])
+
+
+@given(st.lists(st.tuples(st.integers(0, 11), st.integers(0, 11)), max_size=30))
+def test_components_are_those_found_by_merging(pairs):
+    piece = list(range(12))
+    for a, b in pairs:
+        piece = [piece[a] if p == piece[b] else p for p in piece]
+    sizes = [piece.count(p) for p in set(piece)]
+    assert components(static(12), edges=edges(*pairs)) == ([float(len(sizes))], [max(sizes) / 12])
+
+
+CONNECTIVITY = "algebraic_connectivity"
+PATH = [(i, i + 1) for i in range(200)]
+KNOWN = {
+    "complete": (lambda n: [(a, b) for b in range(n) for a in range(b)], lambda n: n),
+    "ring": (lambda n: [(0, n - 1), *PATH[: n - 1]], lambda n: 2 * (1 - np.cos(2 * np.pi / n))),
+    "path": (lambda n: PATH[: n - 1], lambda n: 2 * (1 - np.cos(np.pi / n))),
+    "star": (lambda n: [(0, i) for i in range(1, n)], lambda _: 1),
+    "cocktail party": (lambda n: [(a, b) for b in range(n) for a in range(b) if a // 2 != b // 2], lambda n: n - 2),
+}
+
+
+@pytest.mark.parametrize("most_dense", [100, 2], ids=["dense", "sparse"])
+@pytest.mark.parametrize("nodes", [4, 10, 24, 150])
+@pytest.mark.parametrize("kind", KNOWN)
+def test_connectivity_is_that_of_known_graphs(kind, nodes, most_dense):
+    made, expected = KNOWN[kind]
+    assert second_eigenvalue(edges(*made(nodes)), nodes, most_dense) == pytest.approx(expected(nodes), abs=2e-9)
+
+
+def brute_force(pairs, alive):
+    """Laplacian as the sum of (e_a - e_b)(e_a - e_b)^T over edges, of the robots alive alone."""
+    n = len(alive)
+    total = np.zeros((n, n))
+    for a, b in pairs:
+        away = np.eye(n)[a] - np.eye(n)[b]
+        total += np.outer(away, away)
+    living = np.flatnonzero(alive)
+    return np.sort(np.linalg.eigvals(total[np.ix_(living, living)]).real)[1] if len(living) > 1 else np.nan
+
+
+@st.composite
+def graphs(draw):
+    """Some arenas of the same number of robots: of each who is alive, and edges among them."""
+    robots, arenas = draw(st.integers(1, 9)), draw(st.integers(1, 3))
+    found = []
+    for _ in range(arenas):
+        alive = draw(st.lists(st.booleans() | st.just(True), min_size=robots, max_size=robots))
+        every = [(a, b) for a in range(robots) for b in range(a + 1, robots) if alive[a] and alive[b]]
+        found.append((alive, sorted(draw(st.lists(st.sampled_from(every), unique=True))) if every else []))
+    return robots, found
+
+
+@settings(max_examples=60)
+@given(graphs())
+def test_connectivity_is_that_of_each_arenas_robots_alive(drawn):
+    robots, arenas = drawn
+    of = static(robots, arenas=len(arenas))
+    alive = np.array([one for own, _ in arenas for one in own])
+    pairs = edges(*((i * robots + a, i * robots + b) for i, (_, own) in enumerate(arenas) for a, b in own))
+    expected = [brute_force(own, living) for living, own in arenas]
+    assert measured(CONNECTIVITY, of, truth(of, alive=alive, edges=pairs)) == pytest.approx(
+        expected, abs=1e-8, nan_ok=True
+    )
+
+
+def test_of_a_large_swarm_both_ways_find_the_same_connectivity():
+    of, rng = static(130), np.random.default_rng(4)
+    place = rng.uniform(0, np.sqrt(130), (130, 2))
+    near = np.argwhere(np.hypot(*(place[:, None] - place[None]).transpose(2, 0, 1)) < 2.0)
+    pairs = near[near[:, 0] < near[:, 1]]
+    [found] = measured(CONNECTIVITY, of, truth(of, edges=pairs))
+    assert found == pytest.approx(brute_force(pairs, np.ones(130, np.bool_)), abs=1e-8)
+    assert found == second_eigenvalue(pairs, 130, most_dense=130)
+    assert found > 0.01
+
+
+def test_it_is_sampled_and_held():
+    of, metrics = static(3), Metrics([AlgebraicConnectivity(every_s=0.2)])
+    metrics.begin(of)
+    found = []
+    for tick in range(4):
+        metrics.see(truth(of, tick, edges=edges((0, 1), (1, 2)) if tick < 1 else edges()))
+        found += metrics.latest[CONNECTIVITY].tolist()
+    assert found == [1.0, 1.0, 0.0, 0.0]
+
+
+NAME = "articulation"
+
+
+def points(of, pairs, **fields):
+    return measured(NAME, of, truth(of, edges=edges(*pairs), **fields))
+
+
+def test_articulation_points_of_known_graphs():
+    path = [(i, i + 1) for i in range(5)]
+    assert points(static(6), path) == [4.0]
+    assert points(static(6), [*path, (0, 5)]) == [0.0]
+    assert points(static(6), [(0, i) for i in range(1, 6)]) == [1.0]
+    assert points(static(6), [(a, b) for b in range(6) for a in range(b)]) == [0.0]
+    assert points(static(6), [(0, 1), (1, 2), (0, 2), (3, 4), (4, 5), (3, 5), (2, 3)]) == [2.0]  # a bridge has two ends
+    assert points(static(6), []) == [0.0]
+
+
+def pieces(nodes, pairs):
+    piece = {node: node for node in nodes}
+    for a, b in pairs:
+        if a in piece and b in piece:
+            piece = {node: piece[a] if p == piece[b] else p for node, p in piece.items()}
+    return len(set(piece.values()))
+
+
+@settings(max_examples=60)
+@given(st.lists(st.lists(st.tuples(st.integers(0, 7), st.integers(0, 7)), max_size=14), min_size=1, max_size=3))
+def test_articulation_points_are_those_without_which_there_are_more_pieces(drawn):
+    arenas = [sorted({(min(pair), max(pair)) for pair in own if pair[0] != pair[1]}) for own in drawn]
+    expected = []
+    for own in arenas:
+        whole = pieces(range(8), own)
+        # A robot that stood alone takes its own piece with it.
+        expected.append(sum(pieces(set(range(8)) - {robot}, own) > whole for robot in range(8)))
+    pairs = [(8 * i + a, 8 * i + b) for i, own in enumerate(arenas) for a, b in own]
+    assert points(static(8, arenas=len(arenas)), pairs) == expected
+
+
+def test_of_a_large_swarm_articulation_points_are_those_that_networkx_finds():
+    for seed, reach in ((1, 1.0), (2, 1.2), (3, 1.4)):
+        at = np.random.default_rng(seed).uniform(0, 20, (400, 2))
+        pairs = np.argwhere(np.triu(np.hypot(*(at[:, None] - at[None]).transpose(2, 0, 1)) < reach, 1))
+        expected = sorted(nx.articulation_points(nx.Graph(pairs.tolist())))
+        assert np.flatnonzero(cut_vertices(pairs, 400)).tolist() == expected
+        assert len(expected) > 5

@@ -1,0 +1,232 @@
+"""What is delivered: the accounts of arenas, robots and links, airtime and throughput, against sums over packets."""
+
+import json
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.network import link_counts
+from swarmwire.metrics.network.link_counts import LinkCounts
+from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.metrics.network.robot_counts import RobotCounts
+from tests.support.comms.air.runs import make_air, packets
+from tests.support.metrics.radio_runs import radio_runs, rows_of
+from tests.support.metrics.recorded import links
+from tests.support.metrics.truths import departed, finished, measured, static, tally, truth
+
+
+def tallied(of, *ticks, last=None):
+    observer = RadioTally()
+    observer.begin(of)
+    for tick, fields in enumerate(ticks):
+        observer.see(truth(of, tick, **fields))
+    return observer.end(last)["radio"]
+
+
+def test_fates_add_up_to_the_intended_receivers_with_what_was_in_flight():
+    ticks = [
+        {"tally": tally({Fate.HEARD: 6, Fate.LOST: 2}, {Fate.OUT_OF_RANGE: 3})},
+        {"tally": tally({Fate.HEARD: 1, Fate.BLOCKED: 4}, {})},
+    ]
+    first, second = tallied(static(arenas=2), *ticks, last=tally({Fate.IN_FLIGHT: 5}, {Fate.IN_FLIGHT: 1}, sent=0))
+    assert first["fates"] == {
+        **dict.fromkeys(FATE_NAMES, 0),
+        "heard": 7,
+        "lost": 2,
+        "blocked": 4,
+        "in_flight": 5,
+    }
+    assert sum(first["fates"].values()) == first["intended"] == 18
+    assert sum(second["fates"].values()) == second["intended"] == 4
+    assert first["sent"] == 2
+
+
+def test_the_delivery_ratio_is_heard_over_in_range_and_null_if_none_was():
+    ticks = [{"tally": tally({Fate.HEARD: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 9}, {Fate.OUT_OF_RANGE: 3})}]
+    first, second = tallied(static(arenas=2), *ticks)
+    assert first["pdr"] == 0.75
+    assert second["pdr"] is None
+
+
+def test_latency_on_air_ends_at_hearing_and_to_the_agent_at_the_tick_that_hands_it_over():
+    [found] = tallied(static(), {"tally": tally({})}, {"finished": finished([40_000_000], [65_000_000])})
+    assert found["latency_air_s"] == {p: pytest.approx(0.025, rel=0.005) for p in ("p50", "p90", "p99")}
+    assert found["latency_agent_s"] == {p: pytest.approx(0.06, rel=0.005) for p in ("p50", "p90", "p99")}
+
+
+def test_only_heard_packets_have_a_latency():
+    lost = finished([0], [50_000_000], fate=Fate.LOST)
+    [found] = tallied(static(), {"tally": tally({Fate.LOST: 1}), "finished": lost})
+    assert found["latency_air_s"] == {"p50": None, "p90": None, "p99": None}
+
+
+def test_without_a_radio_the_summary_has_no_part_of_it():
+    of, observer = static(radio=False), RadioTally()
+    observer.begin(of)
+    observer.see(truth(of))
+    assert observer.end(None) == {}
+
+
+def test_the_summary_is_plain_json():
+    found = tallied(static(), {"tally": tally({Fate.HEARD: 2}), "finished": finished([0, 0], [5, 7])})
+    assert json.loads(json.dumps(found, allow_nan=False)) == found
+
+
+@given(st.lists(st.lists(st.integers(0, 9), min_size=len(Fate), max_size=len(Fate)), max_size=5))
+def test_what_the_ticks_counted_is_what_the_run_counted(ticks):
+    table = np.array(ticks, np.int64).reshape(-1, len(Fate))
+    seen = [{"tally": tally(dict(zip(Fate, row, strict=True)))} for row in ticks]
+    [found] = tallied(static(), *seen, last=tally({}))
+    assert list(found["fates"].values()) == table.sum(axis=0).tolist()
+    assert sum(found["fates"].values()) == found["intended"]
+
+
+def test_a_robot_has_what_became_of_its_packets_and_of_those_meant_for_it():
+    counts = RobotCounts(static(3, arenas=2))
+    refused = links([2], [-1], 4, 0, fate=Fate.QUEUE_FULL, receivers=2, arena=1)
+    counts.see(departed([2], intended=2, fate=Fate.QUEUE_FULL, arena=1), refused)
+    ended = links([0, 0], [1, 2], 7, 0, fate=[Fate.HEARD, Fate.LOST], arena=1)
+    counts.see(departed([0], intended=5, out_of_range=2, on_air_at_ns=10, off_air_at_ns=40, arena=1), ended)
+    assert counts.packets.tolist() == [0, 0, 0, 1, 0, 1]
+    assert counts.packets_on_air.tolist() == [0, 0, 0, 1, 0, 0]
+    assert counts.on_air_ns.tolist() == [0, 0, 0, 30, 0, 0]
+    assert counts.intended.tolist() == [0, 0, 0, 5, 0, 2]
+    assert counts.in_flight.tolist() == [0, 0, 0, 1, 0, 0]  # heard, lost, two out of range, and one to come
+    expected = {Fate.HEARD: 1, Fate.LOST: 1, Fate.OUT_OF_RANGE: 2}
+    assert counts.as_sender[3].tolist() == [expected.get(fate, 0) for fate in Fate]
+    assert counts.as_sender[5, Fate.QUEUE_FULL] == 2
+    assert (counts.as_receiver[4, Fate.HEARD], counts.as_receiver[5, Fate.LOST]) == (1, 1)
+    assert counts.as_receiver.sum() == 2
+    assert counts.heard_bytes.tolist() == [0, 0, 0, 0, ended.size_bytes[0], 0]
+
+
+def test_a_link_has_a_row_for_each_fate_that_occurred_on_it():
+    counts = LinkCounts(static(3, arenas=2))
+    counts.see(links([2, 0, 2], [1, 1, 1], [1, 1, 2], 0, fate=[Fate.HEARD, Fate.LOST, Fate.HEARD]))
+    counts.see(links([2, 2], [1, -1], [3, 4], 0, fate=[Fate.LOST, Fate.QUEUE_FULL], arena=1))
+    rows = np.column_stack(list(counts.columns().values())).tolist()
+    assert rows == [[0, 0, 1, Fate.LOST, 1], [0, 2, 1, Fate.HEARD, 2], [1, 2, 1, Fate.LOST, 1]]
+
+
+@settings(max_examples=25)
+@given(radio_runs())
+def test_robots_have_what_counters_have(run):
+    of, seen = run
+    counts, as_sender, as_receiver, got, packets = RobotCounts(of), Counter(), Counter(), Counter(), Counter()
+    tally = np.zeros((of.arenas, len(Fate)), np.int64)
+    for one in seen:
+        counts.see(one.departed, one.finished)
+        tally += one.tally.fates
+        columns = ("arena", "sender", "receiver", "receivers", "fate", "size_bytes")
+        for arena, sender, receiver, receivers, fate, size in rows_of(one.finished, *columns):
+            as_sender[arena, sender, fate] += receivers
+            if receiver >= 0:
+                as_receiver[arena, receiver, fate] += 1
+                got[arena, receiver] += size if fate == Fate.HEARD else 0
+        for arena, sender, far in rows_of(one.departed, "arena", "sender", "out_of_range"):
+            as_sender[arena, sender, Fate.OUT_OF_RANGE] += far
+            packets[arena, sender] += 1
+    robots = [divmod(row, of.robots) for row in range(of.arenas * of.robots)]
+    assert counts.as_sender.tolist() == [[as_sender[*robot, fate] for fate in Fate] for robot in robots]
+    assert counts.as_receiver.tolist() == [[as_receiver[*robot, fate] for fate in Fate] for robot in robots]
+    assert counts.heard_bytes.tolist() == [got[robot] for robot in robots]
+    assert counts.packets.tolist() == [packets[robot] for robot in robots]
+    assert (counts.in_flight >= 0).all()
+    np.testing.assert_array_equal(counts.as_sender.reshape(of.arenas, of.robots, -1).sum(axis=1), tally)
+
+
+@pytest.mark.parametrize("waiting", [1, 20, 10**6])
+@settings(max_examples=10)
+@given(run=radio_runs())
+def test_links_have_what_a_counter_has_however_often_they_are_added_up(waiting, run):
+    of, seen = run
+    counts, expected = LinkCounts(of), Counter()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(link_counts, "WAITING_ROWS", waiting)
+        for one in seen:
+            counts.see(one.finished)
+            expected.update(row for row in rows_of(one.finished, "arena", "sender", "receiver", "fate") if row[2] >= 0)
+        found = counts.columns()
+    *link, packets = (column.tolist() for column in found.values())
+    assert dict(zip(zip(*link, strict=True), packets, strict=True)) == expected
+    assert list(zip(*link, strict=True)) == sorted(expected)
+
+
+MS = 1_000_000
+TICK_MS = 100
+
+
+def test_airtime_is_the_share_of_the_tick_that_a_robot_alive_is_on_air():
+    of = static(4, arenas=2)
+    two = departed([0, 2], on_air_at_ns=5 * MS, off_air_at_ns=15 * MS, arena=1)
+    assert measured("airtime", of, truth(of, departed=two)) == [0.0, pytest.approx(20 / (4 * TICK_MS))]
+    dead = np.array([True] * 6 + [False] * 2)
+    assert measured("airtime", of, truth(of, departed=two, alive=dead))[1] == pytest.approx(10 / (2 * TICK_MS))
+
+
+def test_of_a_packet_longer_than_a_tick_the_rest_counts_in_those_that_follow():
+    of, metrics, found = static(2), Metrics(["airtime"]), []
+    metrics.begin(of)
+    for tick, sender in enumerate(([0], [1], [], [])):
+        metrics.see(truth(of, tick, departed=departed(sender, off_air_at_ns=(250 - 200 * tick) * MS)))
+        found += metrics.latest["airtime"].tolist()
+    assert found == pytest.approx([0.5, (1.0 + 0.5) / 2, 0.25, 0.0])
+
+
+def test_throughput_counts_payload_once_for_each_that_heard_it():
+    of = static(3, arenas=2)
+    told = links([0, 0, 1], [1, 2, 0], 0, 0, fate=[Fate.HEARD, Fate.HEARD, Fate.LOST])
+    told = replace(told, size_bytes=np.array([12, 12, 50]))
+    assert measured("throughput", of, truth(of, finished=told)) == [2 * 12 * 8 * 10.0, 0.0]
+
+
+def test_of_robots_that_all_send_each_tick_they_are_what_the_radio_says():
+    """Airtime 8 x bytes x rate / bit rate; throughput n (n - 1) (1 - p) x 8 x bytes x rate, within 3 %: 5 deviations.
+
+    A packet that goes on air late in a tick counts in the next: of 30 packets of a robot that moves at most one.
+    """
+    of, size, lost, radio = static(20), 25, 0.3, Radio(range_m=50.0, loss=0.3, bit_rate_bps=20_000, overhead_bytes=5)
+    air, metrics, told = make_air(radio, of.robots, of.seeds, [()]), Metrics(["airtime", "throughput"]), []
+    air.hold(np.zeros((20, 3)), np.ones(20, np.bool_))
+    metrics.begin(of)
+    for tick in range(31):
+        news = air.advance(tick * TICK_MS * MS)
+        metrics.see(truth(of, tick, finished=news.finished, departed=news.departed))
+        told.append([metrics.latest[name][0] for name in ("airtime", "throughput")])
+        air.send(tick * TICK_MS * MS, tick, packets(np.arange(20), size=np.full(20, size)))
+    share, bits = np.mean(told[1:], axis=0)
+    assert share == pytest.approx(8 * (size + 5) * 10 / 20_000, rel=1 / 30)
+    assert bits == pytest.approx(20 * 19 * (1 - lost) * 8 * size * 10, rel=0.03)
+
+
+@settings(max_examples=25)
+@given(radio_runs())
+def test_airtime_and_throughput_are_sums_over_packets(run):
+    of, seen = run
+    metrics = Metrics(["airtime", "throughput"])
+    metrics.begin(of)
+    owed_ns = Counter()
+    for one in seen:
+        metrics.see(one)
+        for arena, sender, fate, on, off in rows_of(
+            one.departed, "arena", "sender", "fate", "on_air_at_ns", "off_air_at_ns"
+        ):
+            assert off >= on if fate == Fate.HEARD else off == on
+            owed_ns[arena, sender] += off - on
+        share, bits = np.zeros(of.arenas), np.zeros(of.arenas)
+        alive = one.alive.reshape(of.arenas, of.robots)
+        for arena, robot in list(owed_ns):
+            counted_ns = min(owed_ns[arena, robot], TICK_MS * MS)
+            owed_ns[arena, robot] -= counted_ns
+            share[arena] += counted_ns / (TICK_MS * MS) / alive[arena].sum() if alive[arena, robot] else 0.0
+        for arena, fate, size in rows_of(one.finished, "arena", "fate", "size_bytes"):
+            bits[arena] += 8 * size if fate == Fate.HEARD else 0
+        assert metrics.latest["airtime"] == pytest.approx(share)
+        assert metrics.latest["throughput"] == pytest.approx(bits * of.rate_hz)

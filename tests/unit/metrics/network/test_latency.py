@@ -1,0 +1,252 @@
+"""How late packets are, and how old what is known: PDR and latencies of a window, and the age of information."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import BROADCAST
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.network import age_of_information
+from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
+from swarmwire.metrics.network.pdr import PacketDeliveryRatio
+from swarmwire.metrics.network.windowed import Window
+from tests.support.comms.air.runs import make_air, packets
+from tests.support.metrics.radio_runs import radio_runs, rows_of
+from tests.support.metrics.recorded import links
+from tests.support.metrics.truths import finished, measured, static, tally, truth
+
+OF_WINDOWS = ("pdr", "latency_air", "latency_agent")
+MS = 1_000_000
+
+
+def told(of, seen, window_s):
+    """The three metrics in each tick, (3, ticks, arenas)."""
+    metrics = Metrics([kind(window_s=window_s) for kind in (PacketDeliveryRatio, LatencyOnAir, LatencyToAgent)])
+    metrics.begin(of)
+    found = []
+    for one in seen:
+        metrics.see(one)
+        found.append([metrics.latest[name] for name in OF_WINDOWS])
+    return np.array(found).transpose(1, 0, 2)
+
+
+@given(st.lists(st.integers(-9, 9), max_size=30), st.integers(1, 8))
+def test_a_window_holds_the_last_ticks(numbers, size):
+    of = static(1, arenas=2)
+    window = Window(of, size / of.rate_hz, 1)
+    for tick, number in enumerate(numbers):
+        own = numbers[max(0, tick + 1 - size) : tick + 1]
+        assert window.add([[number, 2 * number]]).tolist() == [[sum(own), 2 * sum(own)]]
+
+
+def test_a_window_is_rounded_up_to_whole_ticks():
+    for window_s, size in ((0.01, 1), (0.1, 1), (0.11, 2), (0.3, 3), (0.7, 7)):
+        window = Window(static(1), window_s, 1)
+        assert [int(window.add([[1]])[0, 0]) for _ in range(9)][-1] == size
+
+
+def test_the_ratio_is_of_receivers_in_range_and_of_the_window_alone():
+    of = static(arenas=2)
+    counts = [
+        tally({Fate.HEARD: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 9}, {Fate.OUT_OF_RANGE: 2}),
+        tally({Fate.HEARD: 1, Fate.COLLIDED: 3}, {}),
+        tally({}, {Fate.LOST: 4}),
+        tally({}, {}),
+    ]
+    [pdr, _, _] = told(of, [truth(of, tick, tally=one) for tick, one in enumerate(counts)], window_s=0.2)
+    nan = np.nan
+    np.testing.assert_allclose(pdr, [[0.75, nan], [0.5, nan], [0.25, 0.0], [nan, 0.0]])
+
+
+def test_latencies_end_at_hearing_and_at_the_tick_in_which_the_receiver_acts():
+    of = static()
+    third = replace(of, groups=(replace(of.groups[0], act_every_ticks=3),))
+    seen = [truth(of, 1, finished=finished([40 * MS, 0], [65 * MS, 95 * MS])), truth(of, 2, finished=finished([], []))]
+    [_, air, agent] = told(third, seen, window_s=0.2)
+    assert air.ravel().tolist() == [pytest.approx(0.06)] * 2
+    assert agent.ravel().tolist() == [pytest.approx(0.28)] * 2
+    [_, air, agent] = told(of, seen, window_s=0.1)
+    assert air.ravel().tolist() == [pytest.approx(0.06), pytest.approx(np.nan, nan_ok=True)]
+    assert agent.ravel().tolist() == [pytest.approx(0.08), pytest.approx(np.nan, nan_ok=True)]
+
+
+def test_what_was_not_heard_has_no_latency():
+    of = static()
+    assert np.isnan(measured("latency_air", of, truth(of, 1, finished=finished([0], [50 * MS], fate=Fate.LOST)))).all()
+
+
+@settings(max_examples=25)
+@given(radio_runs(), st.integers(1, 5), st.integers(1, 3))
+def test_they_are_sums_over_the_packets_of_the_window(run, size, every):
+    drawn, seen = run
+    of = replace(drawn, groups=(replace(drawn.groups[0], act_every_ticks=every),))
+    found = told(of, seen, window_s=size * 0.1)
+    for tick in range(len(seen)):
+        for arena in range(of.arenas):
+            window = seen[max(0, tick + 1 - size) : tick + 1]
+            heard = sum(int(one.tally.fates[arena, Fate.HEARD]) for one in window)
+            in_range = sum(int(one.tally.in_range[arena]) for one in window)
+            air, agent = [], []
+            for one in window:
+                acts_ns = next(tick for tick in range(one.tick, one.tick + every) if tick % every == 0) * 100 * MS
+                for its, sent, final, fate in rows_of(one.finished, "arena", "sent_at_ns", "final_at_ns", "fate"):
+                    if its == arena and fate == Fate.HEARD:
+                        air.append((final - sent) / 1e9)
+                        agent.append((acts_ns - sent) / 1e9)
+            expected = [
+                heard / in_range if in_range else np.nan,
+                np.mean(air) if air else np.nan,
+                np.mean(agent) if agent else np.nan,
+            ]
+            assert found[:, tick, arena].tolist() == pytest.approx(expected, nan_ok=True)
+
+
+LOSSES = 0.3
+OPEN = Radio(range_m=50.0, loss=LOSSES, latency_s=0.15, jitter_s=0.1)
+
+
+def test_of_independent_losses_the_ratio_is_what_is_not_lost_and_the_latency_that_of_the_radio():
+    """Of 15000 links the ratio deviates by 0.004, the mean of the jitter by 0.0003 s: five times that is let pass."""
+    of = static(20, arenas=4)
+    air = make_air(OPEN, of.robots, of.seeds, [()] * of.arenas)
+    air.hold(np.zeros((80, 3)), np.ones(80, np.bool_))
+    seen = []
+    for tick in range(16):
+        news = air.advance(tick * 100 * MS)
+        seen.append(truth(of, tick, tally=news.tally, finished=news.finished))
+        air.send(tick * 100 * MS, tick, packets(np.arange(80), np.full(80, BROADCAST), np.full(80, 10)))
+    pdr, air_s, agent_s = told(of, seen, window_s=1.0)[:, -1]
+    assert pdr.mean() == pytest.approx(1 - LOSSES, abs=0.02)
+    assert air_s.mean() == pytest.approx(0.15 + 0.5 * 0.1, abs=0.0015)
+    assert (agent_s >= air_s).all()
+    assert (agent_s < air_s + 0.1).all()
+
+
+NAME = "age_of_information"
+
+
+def ages(of, seen):
+    """The metric in each tick, (ticks, arenas)."""
+    metrics = Metrics([NAME])
+    metrics.begin(of)
+    found = []
+    for one in seen:
+        metrics.see(one)
+        found.append(metrics.latest[NAME])
+    return np.array(found)
+
+
+def links_heard(sender, receiver, sent_at_ms, fate=Fate.HEARD, arena=0):
+    return links(sender, receiver, 0, [at * MS for at in sent_at_ms], fate=fate, arena=arena)
+
+
+def test_age_is_the_mean_over_pairs_of_the_time_since_the_newest_was_sent():
+    of = static(3, arenas=2)
+    nothing = links_heard([], [], [])
+    told = [
+        nothing,
+        links_heard([0, 0], [1, 2], [30, 40]),  # at 100 ms: ages of 70 and 60 ms
+        nothing,
+        links_heard([0], [1], [210]),  # at 300 ms: 90 and 260 ms
+    ]
+    found = ages(of, [truth(of, tick, finished=one) for tick, one in enumerate(told)])
+    assert found[:, 0].tolist() == [pytest.approx(value, nan_ok=True) for value in (np.nan, 0.065, 0.165, 0.175)]
+    assert np.isnan(found[:, 1]).all()
+
+
+def test_a_pair_that_went_out_of_reach_ages_on():
+    of, nothing = static(2), links_heard([], [], [])
+    apart = np.array([(0.0, 0.0, 0.0), (7.0, 0.0, 0.0)])  # the range is 2 m
+    seen = [truth(of, 1, finished=links_heard([0], [1], [50]))]
+    seen += [truth(of, tick, finished=nothing, pose=apart) for tick in (2, 3)]
+    assert ages(of, seen).ravel().tolist() == [pytest.approx(value) for value in (0.05, 0.15, 0.25)]
+
+
+def test_what_was_overtaken_or_lost_changes_nothing_and_several_at_once_count_once():
+    of = static(2)
+    told = [
+        links_heard([0, 0, 0], [1, 1, 1], [40, 80, 50]),
+        links_heard([0, 0], [1, 1], [60, 150], fate=[Fate.HEARD, Fate.LOST]),
+    ]
+    found = ages(of, [truth(of, tick, finished=one) for tick, one in enumerate(told, 1)])
+    assert found.ravel().tolist() == [pytest.approx(0.02), pytest.approx(0.12)]
+
+
+def test_pairs_with_a_dead_robot_do_not_count_until_it_lives_again():
+    of, nothing = static(3), links_heard([], [], [])
+    dead = np.array([False, True, True])
+    seen = [
+        truth(of, 1, finished=links_heard([0, 1], [1, 2], [10, 80])),  # ages of 90 and 20 ms
+        truth(of, 2, finished=nothing, alive=dead),
+        truth(of, 3, finished=links_heard([0], [2], [250]), alive=dead),  # still on its way when its sender died
+        truth(of, 4, finished=nothing),  # 390, 320 and 150 ms
+    ]
+    assert ages(of, seen).ravel().tolist() == [pytest.approx(value) for value in (0.055, 0.12, 0.22, 0.86 / 3)]
+
+
+def test_of_many_robots_every_nth_counts_as_a_receiver(monkeypatch):
+    monkeypatch.setattr(age_of_information, "MOST_PAIRS", 20)  # 6 x 6 / 20: every second
+    of = static(6)
+    told = links_heard([0, 0, 0], [1, 2, 4], [90, 80, 60])
+    assert ages(of, [truth(of, 1, finished=told)]).ravel().tolist() == [pytest.approx(0.03)]
+
+
+def test_a_run_so_long_that_times_add_up_beyond_64_bits_has_its_mean():
+    of, long_ns = static(4), 10**18
+    pairs = [(a, b) for a in range(4) for b in range(4) if a != b]
+    told = [links_heard(*np.transpose(some), [long_ns // MS] * 6) for some in (pairs[:6], pairs[6:])]
+    seen = [truth(of, tick, time_ns=(tick + 2) * long_ns, finished=one) for tick, one in enumerate(told)]
+    assert ages(of, seen).ravel().tolist() == [pytest.approx(1e9), pytest.approx(2e9)]
+    dead = np.array([False, True, True, True])
+    seen.append(truth(of, 2, time_ns=4 * long_ns, finished=links_heard([], [], []), alive=dead))
+    assert ages(of, seen)[2, 0] == pytest.approx(3e9)
+
+
+@settings(max_examples=25)
+@given(radio_runs())
+def test_age_is_that_of_a_dictionary_of_what_each_has_heard(run):
+    of, seen = run
+    newest, expected = {}, []
+    for one in seen:
+        for arena, sender, receiver, sent, fate in rows_of(
+            one.finished, "arena", "sender", "receiver", "sent_at_ns", "fate"
+        ):
+            if fate == Fate.HEARD:
+                pair = arena, sender, receiver
+                newest[pair] = max(newest.get(pair, sent), sent)
+        alive = one.alive.reshape(of.arenas, of.robots)
+        own = [
+            [
+                one.time_ns - sent
+                for (arena, a, b), sent in newest.items()
+                if arena == each and alive[each][[a, b]].all()
+            ]
+            for each in range(of.arenas)
+        ]
+        expected.append([sum(times) / len(times) / NS_PER_S if times else np.nan for times in own])
+    np.testing.assert_allclose(ages(of, seen), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.3, 0.6])
+def test_of_independent_losses_age_is_what_the_renewals_say(lost):
+    """Mean d + T (1 + p) / (2 (1 - p)): of 40,000 periods it deviates by a hundredth at most."""
+    rng, arenas, periods, delay_ms, period_ms = np.random.default_rng(3), 100, 400, 50, 300
+    of, found = static(2, arenas=arenas), []
+    metrics = Metrics([NAME])
+    metrics.begin(of)
+    for tick in range(1, 3 * periods):
+        arrived = np.flatnonzero(rng.random(arenas) >= lost) if tick % 3 == 1 else np.arange(0)
+        none = np.zeros(len(arrived), np.int64)
+        told = links_heard(none, none + 1, none + (tick - 1) * 100, arena=arrived)
+        metrics.see(truth(of, tick, finished=told))
+        found.append(metrics.latest[NAME])
+    mean_s = np.mean(found[100:])
+    # Known from the tick after: seen at 0.1, 0.2, … s of age, whose mean is that of 0.05 s of delay.
+    expected_s = (delay_ms + period_ms * (1 + lost) / (2 * (1 - lost))) / 1000
+    assert mean_s == pytest.approx(expected_s, rel=0.02)

@@ -1,0 +1,172 @@
+"""Pairs of robots near each other, the nearest neighbour and the smallest gap: against all pairs."""
+
+from dataclasses import replace
+from math import lgamma
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.swarm.min_gap import smallest_gap_m
+from swarmwire.metrics.swarm.near_pairs import NearPairs
+from tests.support.metrics.swarm.swarms import Swarm, rolled, said, stand, swarms
+from tests.support.metrics.truths import measured, static, truth
+
+
+def pairs_found(swarm: Swarm, reach_m, finder=None):
+    pairs = (finder or NearPairs(swarm.of, reach_m)).of(Moment(swarm.of, swarm.seen()))
+    return sorted(tuple(sorted(pair)) for pair in pairs.tolist())
+
+
+def all_pairs(swarm: Swarm, reach_m):
+    n = swarm.of.robots
+    pairs = []
+    for first in range(0, len(swarm.pose), n):
+        apart_m = swarm.apart_m(swarm.pose[first : first + n])
+        near = apart_m < reach_m[:, None] + reach_m[None, :]
+        living = swarm.alive[first : first + n]
+        pairs += [(first + i, first + j) for j in range(n) for i in range(j) if near[i, j] and living[i] and living[j]]
+    return sorted(pairs)
+
+
+@settings(max_examples=150)
+@given(swarms(least=5), st.sampled_from([0.02, 0.2, 0.9, 1.3, 2.1, 9.0]), st.integers(0, 1000))
+def test_near_pairs_are_those_of_all_pairs_each_once_whatever_the_reaches(swarm, reach_m, seed):
+    reaches_m = reach_m * np.random.default_rng(seed).choice([0.3, 1.0, 1.01], swarm.of.robots)
+    assert pairs_found(swarm, reaches_m) == all_pairs(swarm, reaches_m)
+
+
+@pytest.mark.parametrize("boundary", ["walls", "torus"])
+def test_of_many_robots_that_move_they_are_found_tick_by_tick(boundary):
+    rng = np.random.default_rng(1)
+    place = rng.uniform([-4.0, -3.0], [4.0, 3.0], (200, 2))
+    reach_m = rng.choice([0.02, 0.3], 200)
+    finder = NearPairs(stand(*place, boundary=boundary).of, reach_m)
+    for _ in range(5):
+        place = rolled(place + rng.normal(0.0, 0.2, place.shape))
+        swarm = stand(*place, boundary=boundary)
+        assert pairs_found(swarm, reach_m, finder) == all_pairs(swarm, reach_m)
+
+
+@pytest.mark.parametrize("x", [-4.0, -3.0, -1.0, 0.0])
+def test_half_a_torus_apart_is_one_pair_not_two(x):
+    half = stand((x, 1.0), (x + 4.0, 1.0), boundary="torus")
+    assert pairs_found(half, np.full(2, 2.5)) == [(0, 1)]
+
+
+def test_robots_far_outside_an_open_arena_are_found():
+    swarm = stand((0.0, 0.0), (900.0, -500.0), (900.1, -500.0), (-7.0, 2.0), boundary="open")
+    assert pairs_found(swarm, np.full(4, 0.1)) == [(1, 2)]
+
+
+def test_they_are_found_once_a_tick_for_all_who_ask_by_the_same_reaches_alone():
+    swarm = stand((0.0, 0.0), (1.0, 0.0))
+    wide, as_wide, narrow = (NearPairs(swarm.of, np.full(2, reach_m)) for reach_m in (0.6, 0.6, 0.4))
+    moment = Moment(swarm.of, swarm.seen())
+    assert as_wide.of(moment) is wide.of(moment)
+    assert (len(wide.of(moment)), len(narrow.of(moment))) == (1, 0)
+    assert wide.of(Moment(swarm.of, swarm.seen(1))) is not wide.of(moment)
+
+
+def mean_nearest_m(swarm):
+    values = []
+    for pose, _ in swarm.arenas:
+        apart_m = swarm.apart_m(pose)
+        np.fill_diagonal(apart_m, np.inf)
+        values.append(apart_m.min(axis=1).mean() if len(pose) > 1 else np.nan)
+    return values
+
+
+@settings(max_examples=150)
+@given(swarms(least=9, most=40))
+def test_the_nearest_neighbour_is_that_of_all_pairs(swarm):
+    assert said("nearest_neighbour", swarm) == pytest.approx(mean_nearest_m(swarm), abs=1e-12, nan_ok=True)
+
+
+@pytest.mark.parametrize("boundary", ["walls", "torus"])
+def test_neighbours_of_the_tick_before_change_nothing(boundary):
+    rng = np.random.default_rng(1)
+    metrics = Metrics(["nearest_neighbour"])
+    metrics.begin(stand(*np.zeros((150, 2)), boundary=boundary).of)
+    for tick in range(5):
+        swarm = stand(*rng.uniform([-4.0, -3.0], [4.0, 3.0], (150, 2)), boundary=boundary)
+        metrics.see(swarm.seen(tick))
+        assert metrics.latest["nearest_neighbour"].tolist() == pytest.approx(mean_nearest_m(swarm), abs=1e-12)
+
+
+def test_a_lattice_of_triangles_has_its_spacing_and_a_torus_goes_on():
+    lattice = [(x + 0.5 * (row % 2) - 4.0, 0.75 * row - 3.0) for row in range(8) for x in range(8)]
+    assert said("nearest_neighbour", stand(*lattice, boundary="torus")) == [pytest.approx(np.hypot(0.5, 0.75))]
+    corners = (-3.9, 0.0), (3.9, 2.9), (3.9, -2.9)
+    assert said("nearest_neighbour", stand(*corners)) == [pytest.approx((5.8 * 2 + np.hypot(7.8, 2.9)) / 3)]
+    across = said("nearest_neighbour", stand(*corners, boundary="torus"))
+    assert across == [pytest.approx((0.2 * 2 + np.hypot(0.2, 2.9)) / 3)]
+
+
+def test_robots_at_random_have_the_known_mean():
+    """sqrt(A) / 2 x Gamma(N) / Gamma(N + 1/2), near 1 / (2 sqrt(n)), with a variance near (4 - pi) / (4 pi n).
+
+    5 standard errors of 100 x 48 robots, their square doubled since neighbours share distances: false alarm below 6e-7.
+    """
+    arenas, robots = 100, 48
+    place = np.random.default_rng(1).uniform([-4.0, -3.0], [4.0, 3.0], (arenas * robots, 2))
+    found = np.array(said("nearest_neighbour", stand(*place, boundary="torus", arenas=arenas)))
+    exact = 0.5 * np.sqrt(48.0) * np.exp(lgamma(robots) - lgamma(robots + 0.5))
+    error = np.sqrt((4.0 - np.pi) / (4.0 * np.pi * robots / 48.0) / (arenas * robots) * 2.0)
+    assert found.mean() == pytest.approx(exact, abs=5.0 * error)
+
+
+SPANS = (0.0, 0.1), (0.05, 0.3), (0.1, 0.4), (1.0, 1.05)  # the first and third meet, and do not overlap
+places = st.tuples(st.floats(-4, 4), st.floats(-3, 3), st.sampled_from([0.035, 0.085, 0.2]), st.sampled_from(SPANS))
+
+
+def gap(*at, arenas=1, **fields):
+    of = static(len(at) // arenas, arenas=arenas)
+    pose = np.zeros((len(at), 3))
+    pose[:, :2] = at
+    return measured("min_gap", of, truth(of, pose=pose, **fields))
+
+
+def test_a_gap_is_from_surface_to_surface():
+    assert gap((0, 0), (3, 4), (0.3, 0.4)) == [pytest.approx(0.5 - 0.07)]
+
+
+@given(st.lists(places, min_size=2, max_size=20))
+def test_the_smallest_gap_is_that_of_all_pairs_also_of_different_bodies(robots):
+    x, y, radius = np.array([robot[:3] for robot in robots]).T
+    span = np.array([robot[3] for robot in robots])
+    pairs = [
+        np.hypot(x[i] - x[j], y[i] - y[j]) - radius[i] - radius[j]
+        for i in range(len(robots))
+        for j in range(i)
+        if max(span[i, 0], span[j, 0]) < min(span[i, 1], span[j, 1])
+    ]
+    pose, alive, order = np.stack([x, y, 0 * x], 1), np.ones(len(x), np.bool_), np.arange(len(x))[None]
+    nearest = min(pairs, default=np.nan)
+    (told,) = smallest_gap_m(pose, radius, span, alive, order).tolist()
+    assert told == pytest.approx(nearest, abs=1e-12, nan_ok=True)
+
+
+def test_a_drone_above_a_robot_is_not_near_it():
+    of = static(2)
+    (flock,) = of.groups
+    drone = replace(flock, name="air", body=replace(flock.body, altitude_m=1.0), start=2, stop=4)
+    both = replace(of, groups=(flock, drone), robot_names=(*of.robot_names, "air-0", "air-1"))
+    pose = np.zeros((4, 3))
+    pose[:, :2] = (0, 0), (2, 0), (0, 0), (1, 0)
+    assert measured("min_gap", both, truth(both, pose=pose)) == [pytest.approx(0.93)]
+    alone = np.array([True, False, True, False])
+    assert np.isnan(measured("min_gap", both, truth(both, pose=pose, alive=alone))).all()
+
+
+def test_the_order_of_the_tick_before_changes_no_gap():
+    of, rng = static(30, arenas=2), np.random.default_rng(1)
+    metrics = Metrics(["min_gap"])
+    metrics.begin(of)
+    for tick in range(20):
+        seen = truth(of, tick, pose=rng.uniform(-2.0, 2.0, (60, 3)), alive=rng.random(60) < 0.8)
+        metrics.see(seen)
+        assert metrics.latest["min_gap"].tolist() == measured("min_gap", of, seen)
