@@ -1,35 +1,38 @@
-"""What is fuzzed: a door, samples of what rightly goes through it, and the refusals that it may answer with."""
+"""Fuzzing targets: an entry point of the product, samples that it accepts, and the errors that it may refuse with."""
 
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
-import msgpack
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
 
 from swarmwire.comms.errors import BadFrame, BadInput
-from tests.tools.fuzz.byte_changes import changed_bytes
-from tests.tools.fuzz.dice import Dice
-from tests.tools.fuzz.tree_changes import changed_tree
+from tests.tools.fuzz.mutations import CODECS, MSGPACK, Codec, mutated_bytes, mutated_document, one_in, pick
 
 ACCEPTED = "accepted"
-MOST_LETTERS = 2000  # of a refusal: it is for people
+MAX_LINE = 2000  # characters of a refusal
 
 
 class Target(ABC):
-    """One door. A case is what is handed in; samples are cases that must be accepted.
+    """An entry point. A case is one input; what it must not do raises AssertionError.
 
     Attributes:
-        name: as the command line has it.
-        refusals: errors by which the door refuses; any other, and any warning, is a finding.
-        quick: cases in the quick tests.
+        name: as on the command line.
+        refusals: errors that refuse a case; any other error, and any warning, is a finding.
+        quick: about how many cases in the test suite.
+        soak: at least how many in a soak.
+        per_example: most cases of an example of Hypothesis, which by itself costs more than most cases.
         limit_s: of processor time for a case.
     """
 
     name: ClassVar[str]
     refusals: ClassVar[tuple[type[Exception], ...]] = (BadFrame,)
-    quick: ClassVar[int] = 300
+    quick: ClassVar[int] = 120
+    soak: ClassVar[int] = 100_000
+    per_example: ClassVar[int] = 20
     limit_s: ClassVar[float] = 5.0
 
     def __init__(self, folder: Path) -> None:
@@ -39,110 +42,124 @@ class Target(ABC):
 
     @abstractmethod
     def make_samples(self) -> Sequence[Any]:
-        """What rightly goes through the door."""
+        """Cases that raise no finding, and of which some are accepted."""
 
     @abstractmethod
-    def case(self, dice: Dice) -> Any:
-        """A sample, changed."""
+    def mutated(self, draw: DrawFn) -> Any:
+        """A sample, mutated."""
 
     @abstractmethod
-    def door(self, case: Any) -> str | None:
-        """Hand a case in: what became of it in a word, or None if it was accepted. Refusals may be raised."""
+    def feed(self, case: Any) -> str | None:
+        """Hand a case in: in a word why it was refused, or None. Refusals may be raised."""
+
+    def cases(self) -> SearchStrategy[Any]:
+        """Mutated samples."""
+        return st.composite(self.mutated)()
 
 
 class ByteTarget(Target):
     """Of bytes, such as a packet."""
 
-    def case(self, dice: Dice) -> bytes:
-        """A sample's bytes, changed."""
-        return changed_bytes(dice, dice.pick(self.samples), self.samples)
+    def mutated(self, draw: DrawFn) -> Any:
+        return mutated_bytes(draw, pick(draw, self.samples), self.samples)
 
 
-class PackedTarget(Target):
-    """Of bytes that hold a tree (msgpack, JSON, TOML): half of the cases change the tree, so that they get further in.
+class DocumentTarget(Target):
+    """Of documents: most cases mutate their tree, so that they get past the codec."""
 
-    Attributes:
-        trees: of the samples, in their order.
-        inner: keys of a tree in whose values most of it is.
-    """
+    codec: ClassVar[Codec] = MSGPACK
+    inner: ClassVar[tuple[str, ...]] = ()  # keys below which most of a document is
 
-    trees: Sequence[Any]
-    inner: ClassVar[tuple[str, ...]] = ()
-
-    def __init__(self, folder: Path) -> None:
-        super().__init__(folder)
-        self.trees = [self.unpack(sample) for sample in self.samples]
-
-    @abstractmethod
-    def pack(self, tree: Any) -> bytes:
-        """The bytes of a tree; ValueError, TypeError or OverflowError if it cannot be told in them."""
-
-    @abstractmethod
-    def unpack(self, data: bytes) -> Any:
-        """The tree in these bytes."""
-
-    def case(self, dice: Dice) -> bytes:
-        """A sample's bytes, or its tree, changed."""
-        if dice.chance(0.35):
-            return changed_bytes(dice, dice.pick(self.samples), self.samples)
-        at = dice.below(len(self.trees))
-        try:
-            return self.pack(changed_inside(dice, self.trees[at], self.trees, self.inner))
-        except (ValueError, TypeError, OverflowError):  # what cannot be told cannot arrive
-            return changed_bytes(dice, self.samples[at], self.samples)
+    def mutated(self, draw: DrawFn) -> Any:
+        return mutated_document(draw, pick(draw, self.samples), self.samples, self.codec, self.inner)
 
 
-def changed_inside(dice: Dice, tree: Any, trees: Sequence[Any], inner: Sequence[str]) -> Any:
-    """The tree with something in it changed: mostly what stands at the keys `inner`, if any."""
-    some = [key for key in inner if isinstance(tree, dict) and tree.get(key)]
-    if some and dice.chance(0.7):
-        key = dice.pick(some)
-        return {
-            **tree,
-            key: changed_tree(
-                dice, tree[key], [other[key] for other in trees if isinstance(other, dict) and key in other]
-            ),
-        }
-    return changed_tree(dice, tree, trees)
-
-
-def refusal_name(error: Exception) -> str:
-    """Under which name a refusal is counted: its class, and the first words of what was expected."""
-    text = error.expected if isinstance(error, BadInput) else str(error)
-    words = re.sub(r"'[^']*'|\"[^\"]*\"|\S*[\d/_]\S*", "…", text.splitlines()[0] if text else "").split()
-    return " ".join((type(error).__name__, *words[:5]))
-
-
-def check_line(error: Exception, *must_name: str) -> None:
-    """A refusal is one line that names these."""
-    text = str(error)
-    if "\n" in text or not text.isprintable() or len(text) > MOST_LETTERS:
-        raise AssertionError(f"a refusal that is no line for people: {text[:300]!r}")
-    for name in must_name:
-        if name not in text:
-            raise AssertionError(f"a refusal that does not name {name}: {text[:300]!r}")
-
-
-def check_file_line(error: BadInput) -> None:
-    """A refusal of a file is one line that names the file."""
-    check_line(error)
-    if not error.where:
-        raise AssertionError(f"a refusal that names no file: {error}")
-
-
-class MsgpackTarget(PackedTarget):
-    """Of msgpack."""
-
-    def pack(self, tree: Any) -> bytes:
-        """As msgpack."""
-        return msgpack.packb(tree)
-
-    def unpack(self, data: bytes) -> Any:
-        """From msgpack."""
-        return msgpack.unpackb(data)
-
-
-class FrameTarget(MsgpackTarget):
+class FrameTarget(DocumentTarget):
     """Of frames."""
 
     inner = ("arrays", "arrays", "values")
+
+
+class File(NamedTuple):
+    """A file of a folder; without data it is missing."""
+
+    name: str
+    data: bytes | None
+    deep: bool = False  # whether the case goes on to what costs most
+
+
+class FolderTarget(Target):
+    """Of a folder, in which a case changes one file."""
+
+    refusals = (BadInput,)
+    inner: ClassVar[tuple[str, ...]] = ()
+    deep: ClassVar[int] = 50  # one case of so many is deep
+    quick = 20
+    per_example = 1
+
+    def make_samples(self) -> Sequence[File]:
+        self.path = self.folder / "sample"
+        self.make(self.path)
+        paths = sorted(path for path in self.path.rglob("*") if path.is_file() and self.is_read(path))
+        self.files = [File(str(path.relative_to(self.path)), path.read_bytes(), deep=True) for path in paths]
+        return self.files[:1]  # the folder as it is
+
+    @abstractmethod
+    def make(self, folder: Path) -> None:
+        """Fill the folder, which does not exist."""
+
+    @abstractmethod
+    def read(self, folder: Path, *, deep: bool) -> str | None:
+        """Read the folder; BadInput names the file."""
+
+    def is_read(self, path: Path) -> bool:
+        """Whether a file of the folder is read at all."""
+        return path.suffix in (".json", ".jsonl", ".toml", ".csv", ".parquet", ".bin", ".pem", ".txt", ".log")
+
+    def mutated(self, draw: DrawFn) -> Any:
+        file = pick(draw, self.files)
+        if one_in(draw, 100):
+            return File(file.name, None)
+        return File(file.name, mutated_file(draw, file, self.files, self.inner), one_in(draw, self.deep))
+
+    def feed(self, case: File) -> str | None:
+        path = self.path / case.name
+        before = path.read_bytes()
+        try:
+            path.unlink() if case.data is None else path.write_bytes(case.data)
+            return self.read(self.path, deep=case.deep)
+        except BadInput as error:
+            check_refusal(error)
+            raise
+        finally:
+            path.write_bytes(before)
+
+
+def mutated_file(draw: DrawFn, file: File, files: Sequence[File], inner: Sequence[str]) -> bytes:
+    """The data of one of these files, mutated as its format is."""
+    suffix, data = Path(file.name).suffix, file.data or b""
+    corpus = [other.data or b"" for other in files if Path(other.name).suffix == suffix]
+    if suffix in CODECS:
+        return mutated_document(draw, data, corpus, CODECS[suffix], inner)
+    return mutated_bytes(draw, data, corpus)
+
+
+def refusal_kind(error: Exception) -> str:
+    """The class of a refusal and the first words of what it says, without names and numbers."""
+    text = error.expected if isinstance(error, BadInput) else str(error)
+    words = re.sub(r"'[^']*'|\"[^\"]*\"|\S*[\d/_]\S*", "…", text.partition("\n")[0]).split()
+    return " ".join((type(error).__name__, *words[:5]))
+
+
+def check_line(error: BadInput) -> None:
+    """A refusal is one printable line of bounded length."""
+    text = str(error)
+    if not text.isprintable() or len(text) > MAX_LINE:
+        raise AssertionError(f"a refusal that is not one readable line: {text[:300]!r}")
+
+
+def check_refusal(error: BadInput, named: str = "") -> None:
+    """A refusal of a file is such a line, and names the file."""
+    check_line(error)
+    if named not in str(error) or not error.where:
+        raise AssertionError(f"a refusal that does not name {named or 'a file'}: {str(error)[:300]!r}")

@@ -1,36 +1,120 @@
-"""Packets between robots, poses from a tracker, and questions of operators: all that robots hear in their network."""
+"""Packets and poses of robots, questions of operators, and what crosses between a world's radio and robots."""
 
 import json
 from typing import Any, NamedTuple
 
+import numpy as np
 import zenoh
+from hypothesis.strategies import DrawFn
 
+from swarmwire.agent.radios.air_radio import AirRadio, _Arrival
 from swarmwire.agent.radios.control import ControlPoint
 from swarmwire.agent.radios.packet_header import PacketHeader
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.agent.radios.zenoh_radio import ZenohRadio
-from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.outcomes import Outcomes
+from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.senses import Actions
+from swarmwire.comms.wire.air_frames import encode_air
+from swarmwire.comms.wire.air_terms import AirTerms
+from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.poses import Pose, encode_pose
 from swarmwire.comms.wire.swarm_keys import SwarmKeys
+from swarmwire.comms.wire.tick_frames import encode_actions
+from swarmwire.world.gateways.air_bridge import AirBridge, LentAir
 from tests.support.agent.players import Other, Word
-from tests.tools.fuzz.dice import Dice
-from tests.tools.fuzz.magic import TEXTS
-from tests.tools.fuzz.target import ByteTarget
-from tests.tools.fuzz.targets.air import StillClock
+from tests.tools.fuzz.mutations import TEXTS, mutated_bytes, one_in, pick
+from tests.tools.fuzz.small_run import small_run
+from tests.tools.fuzz.target import ByteTarget, DocumentTarget, FrameTarget
 
-KEYS, ROBOTS, OWN = SwarmKeys("test"), ("flock-0", "flock-1", "flock-2"), "flock-0"
-MOST_BYTES = 100
+KEYS, ROBOTS, SELF = SwarmKeys("test"), ("flock-0", "flock-1", "flock-2"), "flock-0"
+MEASURES = ("range_m", "bearing_rad")
+MAX_PAYLOAD_BYTES = 100
 
 
-class Keyed(NamedTuple):
-    """Bytes under a key."""
+class FixedClock:
+    """The time never changes."""
+
+    def now_ns(self) -> int:
+        return 5_000_000_000
+
+    def utc_ns(self) -> int:
+        return 1_767_225_600_000_000_000
+
+    def sleep_until(self, time_ns: int) -> None:
+        pass
+
+
+CLOCK: Any = FixedClock()
+
+
+class Terms(DocumentTarget):
+    """The terms that a robot gets when it joins a world's radio."""
+
+    name = "terms"
+
+    def make_samples(self) -> list[bytes]:
+        return [AirTerms(row, ("a", "b", "c"), 10, 100, MEASURES, ("radio.range",)).encode() for row in (0, 2)]
+
+    def feed(self, case: bytes) -> None:
+        AirTerms.decode(case)
+
+
+class AirReceived(FrameTarget):
+    """What a robot receives of a world's radio: taken or counted."""
+
+    name = "air-received"
+
+    def make_samples(self) -> list[bytes]:
+        run, row = small_run(), 1
+        self.robots = run.world.static.robot_names
+        self.terms = AirTerms(row, self.robots, 10, 100, MEASURES, ())
+        received = run.heard.select(np.flatnonzero(run.heard.receiver == row)).compacted()
+        assert len(received), "the robot received something"
+        statuses = Outcomes(np.array([row]), np.array([4]), np.array([1]))
+        nothing = received.select(np.array([], np.int64))
+        return [encode_air(11, row, received, statuses), encode_air(12, row, nothing, statuses)]
+
+    def feed(self, case: bytes) -> str | None:
+        radio = AirRadio(None, KEYS, self.robots, self.robots[1], CLOCK)
+        radio.terms, radio.gives = self.terms, MEASURES
+        radio._inbox.put(_Arrival(case, CLOCK.now_ns(), CLOCK.utc_ns()))
+        radio.heard(3_000_000_000)
+        return " ".join(name for name in radio.counts() if name.startswith("frames_")) or None
+
+
+class AirSent(FrameTarget):
+    """What a robot sends through a world's radio: taken or counted, and of that robot alone."""
+
+    name = "air-sent"
+
+    def make_samples(self) -> list[bytes]:
+        row, zero = np.array([1]), np.zeros(1)
+        packets = Sent(np.array([1, 1]), np.array([BROADCAST, 2]), Payloads.of([b"abc", b"defg"]))
+        self.bridge = AirBridge(Network(), KEYS, {"b": 1}, LentAir(("a", "b", "c"), 10, 100, MEASURES, ()))
+        return [encode_actions(7, Actions(row, np.zeros(1, np.bool_), zero, zero, zero, packets))]
+
+    def feed(self, case: bytes) -> str | None:
+        self.bridge._counted.clear()
+        self.bridge._inbox.put((1, case))
+        sent = self.bridge.take()
+        if (sent.sender != 1).any():
+            raise AssertionError("a packet of another robot")
+        faults = [name for name in self.bridge.counts() if name.startswith("frames_")]
+        if faults and len(sent):
+            raise AssertionError("counted as refused, and taken")
+        return " ".join(faults) or None
+
+
+class KeyedPacket(NamedTuple):
+    """The bytes of a packet under a zenoh key."""
 
     key: str
     data: bytes
 
 
 class Sample(NamedTuple):
-    """As zenoh hands it over."""
+    """In place of zenoh's."""
 
     key_expr: str
     payload: Any
@@ -38,89 +122,76 @@ class Sample(NamedTuple):
 
 
 class Payload(bytes):
-    """As zenoh hands it over."""
+    """In place of zenoh's."""
 
     def to_bytes(self) -> bytes:
-        """The bytes."""
         return bytes(self)
 
 
-class Radio(ByteTarget):
-    """Packets, from the network's thread to what the agent hears."""
+class Packets(ByteTarget):
+    """Packets of other robots: received, overheard or refused, and each counted exactly once."""
 
     name = "radio"
-    quick = 500
+    quick = 200
 
     def make_samples(self) -> list[Any]:
-        """To all and to one, of two kinds, and one that stands under a wrong key."""
         self.tracker = Tracker(None, KEYS, ROBOTS)
         for robot in ROBOTS:
-            self.tracker._newest[robot] = (StillClock().utc_ns(), Pose(1.0, 0.5, 0.1))
+            self.tracker._newest[robot] = (CLOCK.utc_ns(), Pose(1.0, 0.5, 0.1))
         messages = [(Word(number=1.5), BROADCAST), (Other(number=-7), 0), (Word(number=float("nan")), 2)]
         return [
-            Keyed(
-                KEYS.radio("flock-1", message.tag),
-                PacketHeader(to, 7, StillClock().utc_ns()).encode() + message.encode(),
+            KeyedPacket(
+                KEYS.radio("flock-1", message.tag), PacketHeader(to, 7, CLOCK.utc_ns()).encode() + message.encode()
             )
             for message, to in messages
         ]
 
-    def case(self, dice: Dice) -> Any:
-        """A packet with its bytes changed, now and then its key."""
-        sample: Keyed = dice.pick(self.samples)
-        key = sample.key
-        if dice.chance(0.2):
-            part, parts = dice.below(4), key.split("/")
-            parts[part % len(parts)] = dice.pick((*TEXTS, *ROBOTS, "ffff", "0000"))
+    def mutated(self, draw: DrawFn) -> Any:
+        key, data = pick(draw, self.samples)
+        if one_in(draw, 5):
+            parts = key.split("/")
+            parts[pick(draw, range(len(parts)))] = pick(draw, (*TEXTS, *ROBOTS, "ffff", "0000"))
             key = "/".join(parts)
-        from tests.tools.fuzz.byte_changes import changed_bytes
+        return KeyedPacket(key, mutated_bytes(draw, data, [sample.data for sample in self.samples]))
 
-        return Keyed(key, changed_bytes(dice, sample.data, [one.data for one in self.samples]))
-
-    def door(self, case: Keyed) -> str | None:
-        """The radio: what it takes is heard, or counted as overheard; what it refuses is counted."""
-        clock: Any = StillClock()
-        radio = ZenohRadio(None, KEYS, ROBOTS, OWN, MOST_BYTES, clock, self.tracker)
+    def feed(self, case: KeyedPacket) -> str | None:
+        radio = ZenohRadio(None, KEYS, ROBOTS, SELF, MAX_PAYLOAD_BYTES, CLOCK, self.tracker)
         radio._arrive(Sample(case.key, Payload(case.data)))
-        heard, _ = radio.heard(3_000_000_000)
-        heard.payloads.tags()
+        received, _ = radio.heard(3_000_000_000)
+        received.payloads.tags()
         counts = radio.counts()
         if sum(counts.values()) != 1:
-            raise AssertionError(f"a packet that is counted otherwise than once: {counts}")
-        if len(heard) != counts.get("packets_heard", 0):
-            raise AssertionError("heard, and not counted")
-        for link in radio.links.values():
-            assert 0.0 <= link.delivery <= 1.0
-        return None if len(heard) else next(iter(counts))
+            raise AssertionError(f"a packet that is not counted exactly once: {counts}")
+        if len(received) != counts.get("packets_heard", 0):
+            raise AssertionError("received, and not counted")
+        if not all(0.0 <= link.delivery <= 1.0 for link in radio.links.values()):
+            raise AssertionError("a delivery ratio that is none")
+        return None if len(received) else next(iter(counts))
 
 
 class Poses(ByteTarget):
-    """Poses, from the network's thread to the tracker of a robot."""
+    """Poses of the tracker: kept or counted."""
 
     name = "poses"
 
     def make_samples(self) -> list[bytes]:
-        """Of the present, and of 1970."""
-        now_ns = StillClock().utc_ns()
-        return [encode_pose(Pose(1.0, -0.5, 3.0), now_ns), encode_pose(Pose(0.0, 0.0, 0.0), 0)]
+        return [encode_pose(Pose(1.0, -0.5, 3.0), CLOCK.utc_ns()), encode_pose(Pose(0.0, 0.0, 0.0), 0)]
 
-    def door(self, case: bytes) -> str | None:
-        """The tracker: it keeps the pose, or counts it."""
+    def feed(self, case: bytes) -> str | None:
         tracker = Tracker(None, KEYS, ROBOTS)
         tracker._keep(Sample(KEYS.pose("flock-1"), Payload(case)))
-        tracker.pose("flock-1", StillClock().utc_ns())
+        tracker.pose("flock-1", CLOCK.utc_ns())
         if tracker.malformed + len(tracker._newest) != 1:
             raise AssertionError("neither kept nor counted")
         return "poses_malformed" if tracker.malformed else None
 
 
 class Questions(ByteTarget):
-    """What operators ask of a robot."""
+    """Questions of operators to a robot: it stops exactly when it is told to, and replies once."""
 
     name = "questions"
 
     def make_samples(self) -> list[bytes]:
-        """Both questions."""
         self.stops = 0
         return [b"estop", b"status"]
 
@@ -132,10 +203,9 @@ class Questions(ByteTarget):
         """As the robot."""
         return {"tick": 3}
 
-    def door(self, case: bytes) -> str | None:
-        """The control point: it stops the robot exactly when it is told to."""
-        self.stops, replies = 0, []
-        point = ControlPoint(None, KEYS, OWN, self)
+    def feed(self, case: bytes) -> str | None:
+        self.stops, replies = 0, list[str]()
+        point = ControlPoint(None, KEYS, SELF, self)
 
         class Query:
             payload = Payload(case)

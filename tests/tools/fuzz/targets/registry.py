@@ -1,29 +1,15 @@
-"""All targets, by name."""
+"""All targets by name."""
 
 from tests.tools.fuzz.target import Target
-from tests.tools.fuzz.targets.air import AirSent, Heard, Terms
-from tests.tools.fuzz.targets.campaign_folders import CampaignFolders
-from tests.tools.fuzz.targets.control import Control, Page, Replies
-from tests.tools.fuzz.targets.epuck2 import Commands as Epuck2Commands
-from tests.tools.fuzz.targets.epuck2 import Sensed as Epuck2Answers
-from tests.tools.fuzz.targets.join import Given, Join, Offered
-from tests.tools.fuzz.targets.measured import RadioLogs, RobotLogs, Traces
-from tests.tools.fuzz.targets.observed import Glimpses, Scenes
-from tests.tools.fuzz.targets.radio import Poses, Questions, Radio
-from tests.tools.fuzz.targets.ros2 import Commanded, Told
-from tests.tools.fuzz.targets.run_folders import RunFolders
-from tests.tools.fuzz.targets.runner_frames import RunnerFrames
-from tests.tools.fuzz.targets.scenarios import Bodies, Campaigns, Scenarios
-from tests.tools.fuzz.targets.settings import Certificates, Fleets, Settings
-from tests.tools.fuzz.targets.world_frames import WorldFrames
+from tests.tools.fuzz.targets import folders, joining, radio, robots, settings, wire
 
-ALL: tuple[type[Target], ...] = (
-    *(WorldFrames, RunnerFrames, Join, Offered, Given),
-    *(Scenes, Glimpses, Control, Replies, Page),
-    *(Scenarios, Bodies, Campaigns),
-    *(Epuck2Commands, Epuck2Answers, Told, Commanded),
-    *(RunFolders, CampaignFolders, Traces, RadioLogs, RobotLogs),
-    *(Fleets, Settings, Certificates),
-    *(Terms, Heard, AirSent, Radio, Poses, Questions),
+_ALL: tuple[type[Target], ...] = (
+    *(wire.WorldFrames, wire.RunnerFrames, wire.Scenes, wire.Truths),
+    *(joining.Join, joining.Offers, joining.Assignments, joining.Control, joining.Replies, joining.PageOrders),
+    *(radio.Terms, radio.AirReceived, radio.AirSent, radio.Packets, radio.Poses, radio.Questions),
+    *(robots.Epuck2Commands, robots.Epuck2Answers, robots.Ros2Sensors, robots.Ros2Commands),
+    *(settings.Scenarios, settings.Bodies, settings.Campaigns),
+    *(settings.Fleets, settings.RobotSettings, settings.Certificates),
+    *(folders.RunFolders, folders.CampaignFolders, folders.Traces, folders.RadioLogs, folders.RobotLogs),
 )
-TARGETS = {target.name: target for target in ALL}
+TARGETS = {target.name: target for target in _ALL}

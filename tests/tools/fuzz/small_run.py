@@ -1,7 +1,4 @@
-"""A world of six robots with a lossy radio, two runners' worth of agents, and all that crosses between them.
-
-The frames are real: of agents that use all that there is, in a world that goes on.
-"""
+"""A small run in one process: six robots of two runners, a lossy radio, and every frame that crosses between them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -21,7 +18,7 @@ from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import Actions, Senses
 from swarmwire.comms.truth import Truth
 from swarmwire.comms.values import Values
-from swarmwire.comms.wire import frames
+from swarmwire.comms.wire import frames as frame_codec
 from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.deploy.new_air import new_air
@@ -38,7 +35,7 @@ RUNNERS = ("one", "two")
 JOIN = JoinRequest().encode()
 SCENARIO: dict[str, Any] = {
     "format": 1,
-    "name": "miniature",
+    "name": "small",
     "seed": 1,
     "duration_s": 60.0,
     "time": {"rate_hz": 10},
@@ -68,20 +65,19 @@ SCENARIO: dict[str, Any] = {
 }
 
 
-class Miniature:
-    """The world, its air, and who plays which robots.
+class SmallRun:
+    """The run, and itself the crew of its loop.
 
     Attributes:
         parts: the robots of each runner.
-        layouts: what is remembered of each group's robots.
-        senses: of the last tick; `heard` likewise.
-        told: frames to each runner, tick by tick.
-        answers: its frames.
-        truths: what observers saw.
+        layouts: of the memory of each group's robots.
+        senses: of the last tick; `heard` and `outcomes` likewise.
+        frames: to each runner, tick by tick; `answers`: from it.
+        truths: what observers see.
     """
 
     def __init__(self) -> None:
-        scenario = scenario_from(SCENARIO, "miniature.toml")
+        scenario = scenario_from(SCENARIO, "small.toml")
         agents = {name: group.agent for name, group in scenario.robots.items()}
         kinds = {name: load_agent(agent) for name, agent in agents.items()}
         self.world = World(scenario, (1,), {name: kind.needs for name, kind in kinds.items()})
@@ -92,25 +88,24 @@ class Miniature:
         self.senses: Senses = {}
         self.heard = Heard.none()
         self.outcomes: Outcomes = NO_OUTCOMES
-        self.told: dict[str, list[bytes]] = {name: [] for name in RUNNERS}
+        self.frames: dict[str, list[bytes]] = {name: [] for name in RUNNERS}
         self.answers: dict[str, list[bytes]] = {name: [] for name in RUNNERS}
         self.truths: list[Truth] = []
-        self.given: Actions | None = None  # in place of what the agents would do
+        self.given: Actions | None = None  # in place of the agents' actions
         self._hosts = dict(zip(RUNNERS, map(Host, self.parts), strict=True))
-        self._roster = playing(Lockstep(list(self.parts), terms=Terms(memory=self.layouts)))
+        self._roster = joined(Lockstep(list(self.parts), terms=Terms(memory=self.layouts)))
 
     def do(self, actions: Actions) -> Truth:
-        """A tick in which the robots do this."""
+        """A tick with these actions."""
         self.given = actions
         return self.loop.step()
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
-        """What the robots do: as a crew."""
         if self.given is not None:
             return self.given
         self.senses, self.heard, self.outcomes = senses, heard, outcomes
         for runner, data in self._roster.open_tick(tick, senses, heard, outcomes):
-            self.told[runner].append(data)
+            self.frames[runner].append(data)
             answer = self._answer(runner, data)
             self.answers[runner].append(answer)
             self._roster.answer(runner, answer)
@@ -118,35 +113,34 @@ class Miniature:
         return self._roster.take()
 
     def counts(self) -> dict[str, int]:
-        """Nothing is wrong with it: as a crew."""
         return {}
 
     def _answer(self, runner: str, data: bytes) -> bytes:
-        host, frame = self._hosts[runner], frames.decode(data)
+        host, frame = self._hosts[runner], frame_codec.decode(data)
         senses, heard, outcomes = decode_tick(frame, self.whole.gives or (), senses_of(self.parts, runner))
         actions = host.act(frame.tick, senses, heard, outcomes)
         return encode_actions(frame.tick, with_all(actions), memory=host.memory(senses))
 
 
 @cache
-def begun() -> Miniature:
-    """The miniature after its first ticks, the same for all who only look at it."""
-    made = Miniature()
-    made.truths = [made.loop.step() for _ in range(TICKS)]
-    return made
+def small_run() -> SmallRun:
+    """The run after its first ticks."""
+    run = SmallRun()
+    run.truths = [run.loop.step() for _ in range(TICKS)]
+    return run
 
 
-def playing(roster: Any, *, ready: bool = True) -> Any:
-    """A roster whose runners have joined, and built their agents."""
+def joined(roster: Any, *, ready: bool = True) -> Any:
+    """A roster whose runners have joined and, if ready, have built their agents."""
     for name in RUNNERS:
         roster.join(name, JOIN)
         if ready:
-            roster.answer(name, frames.encode("ready", -1, {}))
+            roster.answer(name, frame_codec.encode("ready", -1, {}))
     return roster
 
 
 def with_all(actions: Actions) -> Actions:
-    """Actions with all that agents may do beside: a note, an actuator of their own, a number that is told."""
+    """The actions with a note, a custom actuator and a custom value."""
     one = actions.rows[:1]
     note = Notes(one, np.zeros(1, np.int64), ("searching",))
     own = Actuations(one, np.zeros(1, np.int64), np.array([0.5]))
@@ -154,5 +148,5 @@ def with_all(actions: Actions) -> Actions:
 
 
 def senses_of(parts: Sequence[Assignment], runner: str) -> set[str]:
-    """The groups that a runner plays robots of."""
+    """The groups of a runner's robots."""
     return {group.name for group in parts[RUNNERS.index(runner)].groups}

@@ -1,0 +1,158 @@
+"""Folders of runs and campaigns, and what was measured elsewhere: link traces, radio logs, logs of real robots."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy import Recording, Simulation
+from swarmwire.deploy.radio.link_trace_file import read_link_traces
+from swarmwire.deploy.repetition import RepeatedRun
+from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.metrics.radio_fit.network_log import is_network_table, network_log_of_robots, network_log_of_table
+from swarmwire.metrics.radio_fit.read_log import read_log
+from swarmwire.metrics.real_log.clock_offsets import in_step
+from swarmwire.metrics.real_log.real_logs import read_real_logs
+from swarmwire.metrics.real_log.truths import real_run
+from swarmwire.metrics.record.names import RECORDING, SCENARIO
+from swarmwire.metrics.report.run_data import read_run
+from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.verify.verify import verify
+from tests.support.deploy.commands import LOSSY
+from tests.support.metrics.campaign.campaigns import write_campaign
+from tests.support.metrics.real_log.as_logs import as_logs
+from tests.support.metrics.real_log.emulated import watched
+from tests.tools.fuzz.target import FolderTarget, check_refusal
+
+TABLES: tuple[Callable[[RunFolder], Any], ...] = (
+    *(RunFolder.ticks, RunFolder.robots, RunFolder.metrics, RunFolder.packets),
+    *(RunFolder.events, RunFolder.radio_robots, RunFolder.radio_distances),
+)
+SHORT_RUN = ("duration_s=2", "robots.flock.count=4", 'metrics=["order", "pdr", "collisions"]')
+RADIO_TABLES = {
+    "strengths.csv": """t_s,tx,rx,seq,rssi_dbm,distance_m
+0.0,a,b,0,-60.5,1.0
+0.1,a,b,1,,1.5
+0.2,a,b,3,-70,2.5
+0.1,b,a,0,-61,1.5
+0.3,b,a,2,-72.25,3.0
+""",
+    "places.csv": """t_s,tx,rx,seq,rssi_dbm,tx_x_m,tx_y_m,rx_x_m,rx_y_m
+0.0,a,b,0,-60.5,0,0,1,0
+0.1,a,b,1,,0,0,1,1
+0.2,a,b,2,-70,0,0,2,1
+""",
+    "network.csv": """t_s,tx,rx,seq,latency_s,distance_m
+0.0,a,b,0,0.01,1.0
+0.1,a,b,1,0.02,
+0.3,a,b,3,0.01,2.5
+0.1,b,a,0,0.015,1.5
+0.3,b,a,2,,3.0
+""",
+}
+
+
+class RunFolders(FolderTarget):
+    """A short run with a live event: its tables are read and verified; deep cases are reported and repeated."""
+
+    name = "run-folder"
+    quick = 6
+    soak = 2000
+    limit_s = 20.0
+
+    def make(self, folder: Path) -> None:
+        simulation = Simulation(LOSSY, overrides=SHORT_RUN, out=folder, record=Recording(packets=1.0, rrd=False))
+        with simulation:
+            for tick in range(simulation.ticks):
+                if tick == 5:
+                    simulation.intervene({"do": "kill", "robots": {"count": 1}, "for_s": 0.5})
+                simulation.step()
+        assert not (folder / RECORDING).exists()
+
+    def is_read(self, path: Path) -> bool:
+        return path.name != SCENARIO and super().is_read(path)  # the scenario's copies have targets of their own
+
+    def read(self, folder: Path, *, deep: bool) -> str | None:
+        run, refused = RunFolder(folder), list[BadInput]()
+        for read in TABLES:
+            try:
+                read(run)
+            except BadInput as error:
+                check_refusal(error, str(folder))
+                refused.append(error)
+        for finding in verify(folder):
+            repr(finding)
+        if deep:
+            read_run(folder)
+            RepeatedRun(folder)
+        if refused:
+            raise refused[0]
+        return None
+
+
+class CampaignFolders(FolderTarget):
+    """A campaign over two parameters: every sample of every response."""
+
+    name = "campaign-folder"
+    soak = 10_000
+
+    def make(self, folder: Path) -> None:
+        write_campaign(folder)
+
+    def read(self, folder: Path, *, deep: bool) -> str | None:
+        campaign = CampaignFolder(folder)
+        for outcome in campaign.outcomes:
+            for point in range(len(campaign.points)):
+                campaign.sample(outcome.column, point)
+        return None if campaign.finished else "unfinished"
+
+
+class Traces(FolderTarget):
+    """Measured links that a scenario replays."""
+
+    name = "traces"
+
+    def make(self, folder: Path) -> None:
+        folder.mkdir()
+        lines = Path("scenarios/replayed-links.csv").read_text().splitlines()
+        (folder / "links.csv").write_text("\n".join(lines[:200]) + "\n")
+        self.robots = sorted({name for line in lines[1:] for name in line.split(",")[1:3]})
+
+    def read(self, folder: Path, *, deep: bool) -> None:
+        read_link_traces(folder / "links.csv", self.robots)
+
+
+class RadioLogs(FolderTarget):
+    """Tables of packets, with signal strengths or latencies."""
+
+    name = "radio-logs"
+    soak = 20_000
+
+    def make(self, folder: Path) -> None:
+        folder.mkdir()
+        for name, text in RADIO_TABLES.items():
+            (folder / name).write_text(text)
+
+    def read(self, folder: Path, *, deep: bool) -> None:
+        for path in sorted(folder.iterdir()):
+            network_log_of_table(path) if is_network_table(path) else read_log(path)
+
+
+class RobotLogs(FolderTarget):
+    """Logs of three emulated robots; deep cases become a run."""
+
+    name = "robot-logs"
+    quick = 10
+    soak = 5000
+    limit_s = 20.0
+    inner = ("robots", "body", "params")
+    deep = 10
+
+    def make(self, folder: Path) -> None:
+        as_logs(watched("duration_s=2", "robots.flock.count=3"), folder)
+
+    def read(self, folder: Path, *, deep: bool) -> None:
+        logs = read_real_logs(folder)
+        if deep:
+            real_run(in_step(logs))
+            network_log_of_robots(logs)

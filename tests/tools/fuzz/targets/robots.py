@@ -1,0 +1,220 @@
+"""Protocols of robots at both ends: the e-puck2's commands and answers, ROS 2's messages."""
+
+from collections import Counter
+from typing import Any, NamedTuple
+
+import numpy as np
+from hypothesis.strategies import DrawFn
+
+from swarmwire.agent.drivers.driver import DriverLost
+from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver
+from swarmwire.agent.drivers.epuck2.link import Link
+from swarmwire.agent.drivers.epuck2.options import Epuck2Options
+from swarmwire.agent.drivers.ros2.feed import Feed
+from swarmwire.agent.drivers.ros2.readers import BatteryReader, ImuReader, LaserReader, LightReader, OdometryReader
+from swarmwire.comms.bodies.body import body_from, load_body
+from swarmwire.comms.robots.epuck2.command import RobotCommand
+from swarmwire.comms.robots.epuck2.packets import Request, Settings
+from swarmwire.comms.robots.epuck2.streams import Answers
+from swarmwire.comms.robots.ros2.attachment import attachment, publisher_id
+from swarmwire.comms.robots.ros2.inlet import Inlet
+from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.robots.ros2.twist import Velocities, decode_either, encode_twist, encode_twist_stamped
+from swarmwire.world.gateways.epuck2 import Epuck2Gateway
+from swarmwire.world.gateways.epuck2.emulated_robot import Connection
+from swarmwire.world.gateways.epuck2.options import Epuck2GatewayOptions
+from swarmwire.world.gateways.ros2 import Ros2GatewayOptions
+from swarmwire.world.gateways.ros2.command_inbox import CommandInbox
+from swarmwire.world.gateways.ros2.tellers import tellers_of
+from tests.support.robots.ros2.ros2_rig import AT_START
+from tests.tools.fuzz.mutations import mutated_bytes, pick
+from tests.tools.fuzz.target import ByteTarget
+from tests.tools.fuzz.targets.radio import CLOCK, Payload
+
+CHUNK_BYTES = (1, 7, 21, 64, 1 << 20)
+EPUCK2 = load_body("epuck2")
+UTC_NS = 1_767_225_600_000_000_000
+
+
+class Transport:
+    """In place of asyncio's: it keeps what is written."""
+
+    def __init__(self) -> None:
+        self.written, self.closed = b"", False
+
+    def write(self, data: bytes) -> None:
+        self.written += data
+
+    def abort(self) -> None:
+        self.closed = True
+
+    def is_closing(self) -> bool:
+        return self.closed
+
+    def get_write_buffer_size(self) -> int:
+        return 0
+
+    def resume_reading(self) -> None:
+        pass
+
+    def pause_reading(self) -> None:
+        pass
+
+
+class Epuck2Commands(ByteTarget):
+    """Commands to an emulated e-puck2: the loop gets speeds that are numbers, or the robot hangs up."""
+
+    name = "epuck2-robot"
+
+    def make_samples(self) -> list[bytes]:
+        one, two = (RobotCommand(100, -200, request=of).encoded() for of in (Request.NOTHING, Request.SENSORS))
+        steps = RobotCommand(3, 4, request=Request.SENSORS, settings=Settings.SET_STEPS).encoded()
+        return [one, two, steps, one + two + one + two]
+
+    def feed(self, case: bytes) -> str | None:
+        gateway = Epuck2Gateway(["a-0"], EPUCK2, "", Epuck2GatewayOptions(), CLOCK)
+        robot, transport = gateway._robot(0), Transport()
+        connection: Any = Connection(robot)
+        connection.transport = transport
+        robot.knock(connection)
+        for chunk in chunks(case):
+            if transport.closed:
+                break
+            robot.hear(connection, chunk)
+        robot.miss(connection)
+        commands = gateway.take()
+        if not (np.isfinite(commands.linear_mps).all() and np.isfinite(commands.angular_radps).all()):
+            raise AssertionError("a speed that is not finite")
+        list(Answers().fed(transport.written))
+        return "hung up" if transport.closed else None
+
+
+class Epuck2Answers(ByteTarget):
+    """Answers of an e-puck2 to its driver, up to the readings that an agent gets."""
+
+    name = "epuck2-driver"
+
+    def make_samples(self) -> list[bytes]:
+        sensors = Epuck2Gateway(["a-0"], EPUCK2, "", Epuck2GatewayOptions(), CLOCK)._answers[0]
+        return [b"\x03", sensors, sensors * 3]
+
+    def feed(self, case: bytes) -> str | None:
+        driver = Epuck2Driver("127.0.0.1", EPUCK2, Epuck2Options(north_deg=30.0), CLOCK)
+        arriving = chunks(case)
+        driver._link, refused = link_of(arriving), None
+        try:
+            for _ in range(len(arriving)):
+                driver._link.receive(0.0)
+        except DriverLost:
+            refused = "lost"
+        driver._take(driver._link)
+        for name, value in driver._readings.of(driver._told_sensors, driver.gives).items():
+            if value.dtype != np.float64:
+                raise AssertionError(f"{name} of {value.dtype}")
+        return refused
+
+
+def chunks(data: bytes) -> list[bytes]:
+    """The bytes as a network cuts them, which depends on them alone."""
+    size = CHUNK_BYTES[sum(data) % len(CHUNK_BYTES)]
+    return [data[at : at + size] for at in range(0, len(data), size)]
+
+
+def link_of(arriving: list[bytes]) -> Any:
+    """A link whose other end sends these chunks, and takes them off the list."""
+
+    class Socket:
+        def recv(self, _max_bytes: int) -> bytes:
+            return arriving.pop(0)
+
+        def poll(self, _timeout_ms: float) -> bool:
+            return bool(arriving)
+
+    link: Any = object.__new__(Link)
+    link._counts, link._answers, link.sent, link.answered, link.newest = Counter(), Answers(), 1, 0, None
+    link._socket = link._arriving = Socket()
+    return link
+
+
+PROXIMITY = {
+    "angles_deg": [0.0, 90.0, 180.0, 270.0],
+    "range_m": 0.5,
+    "response": {"kind": "quadratic", "a": 298.7, "b": -36.9, "c": 1.08, "reach_m": 0.05},
+}
+SENSORS = {"scan": {"rate_hz": 0.0}, "light": {"angles_deg": [0, 180]}, "proximity": PROXIMITY}
+
+
+class Ros2Message(NamedTuple):
+    """An encoded message, and its kind."""
+
+    kind: str
+    data: bytes
+
+
+class Ros2Sensors(ByteTarget):
+    """Messages of a ROS 2 base to its driver: whatever comes, the readings keep their shapes."""
+
+    name = "ros2-driver"
+
+    def make_samples(self) -> list[Any]:
+        self.messages = Messages("jazzy")
+        self.body = body_from({"like": "turtlebot3-burger", "senses": SENSORS}, "turtlebot.toml")
+        fields = {**AT_START, "proximity.value": np.zeros((1, 4))}
+        samples: list[Ros2Message] = []
+        for tick in range(3):
+            for teller in tellers_of(self.body, 1, Ros2GatewayOptions(north_deg=30.0)):
+                teller.follow(100_000_000 * tick, fields)
+                message = teller.message(self.messages, fields, 0, UTC_NS + tick)
+                if message is not None:
+                    samples.append(Ros2Message(teller.kind, self.messages.encode(teller.kind, message)))
+        return samples
+
+    def mutated(self, draw: DrawFn) -> Any:
+        kind, data = pick(draw, self.samples)
+        return Ros2Message(kind, mutated_bytes(draw, data, [one.data for one in self.samples if one.kind == kind]))
+
+    def feed(self, case: Ros2Message) -> str | None:
+        body, garbage = self.body, 0
+        odometry, battery = OdometryReader(body.wheels.wheel_base_m, 0.22), BatteryReader(body.senses["battery"])
+        light = LightReader(np.zeros((1, 2)), 0, 1000.0)
+        for reader in (LaserReader(body, 0.0), odometry, ImuReader(30.0), battery, light):
+            if reader.kind != case.kind:
+                continue
+            feed = Feed(reader, self.messages, CLOCK)
+            shapes = {name: value.shape for name, value in reader.fields.items()}
+            feed.take(case.data)
+            if {name: value.shape for name, value in feed.look().items()} != shapes:
+                raise AssertionError("readings of another shape")
+            garbage += feed.garbage
+        return "garbage" if garbage else None
+
+
+class AttachedSample(NamedTuple):
+    """In place of zenoh's."""
+
+    attachment: Payload
+    payload: Payload
+
+
+class Ros2Commands(ByteTarget):
+    """Commands to an emulated ROS 2 base, with the attachment of rmw_zenoh: taken or counted, and finite."""
+
+    name = "ros2-base"
+
+    def make_samples(self) -> list[Any]:
+        command, attached = Velocities(0.2, -0.5), attachment(7, UTC_NS, publisher_id("token"))
+        return [attached + encode_twist(command), attached + encode_twist_stamped(command, UTC_NS, "base_link")]
+
+    def feed(self, case: bytes) -> str | None:
+        inbox = CommandInbox(1_000_000_000, CLOCK)
+        inlet: Any = object.__new__(Inlet)
+        inlet._attached, inlet._refuse = True, inbox.refuse
+        inlet._take = lambda payload: inbox.take(payload, decode_either)
+        size = len(attachment(0, 0, bytes(16)))
+        inlet._receive(AttachedSample(Payload(case[:size]), Payload(case[size:])))
+        newest, refused = inbox.newest(), sum(inbox.counts().values())
+        if (newest is None) != (refused == 1):
+            raise AssertionError("neither taken nor counted")
+        if newest is not None and not np.isfinite(newest).all():
+            raise AssertionError("a speed that is not finite")
+        return next(iter(inbox.counts()), None)

@@ -1,0 +1,236 @@
+"""Frames between a world, its runners and its observers."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from hypothesis.strategies import DrawFn
+
+from swarmwire.agent.host import Host
+from swarmwire.agent.runner import Inbox
+from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted
+from swarmwire.comms.glimpse import Glimpse, Scene, Series
+from swarmwire.comms.senses import Senses
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.in_time_frames import encode_packets, encode_sent
+from swarmwire.comms.wire.scene_frames import decode_scene, encode_scene
+from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick
+from swarmwire.comms.wire.truth_frames import decode_truth, encode_truth
+from swarmwire.world.crews.lockstep import Lockstep
+from swarmwire.world.crews.realtime import RealTime
+from swarmwire.world.crews.roster import Roster
+from swarmwire.world.crews.terms import Terms
+from tests.support.agent.hosts import PLAYERS
+from tests.tools.fuzz.mutations import one_in, pick
+from tests.tools.fuzz.small_run import RUNNERS, joined, senses_of, small_run
+from tests.tools.fuzz.target import FrameTarget
+from tests.unit.comms.wire.test_truth_frames import SCENE
+
+TICK = 11  # that is open: the last of the small run
+STAGES = ("lockstep", "lockstep", "real time", "real time", "building")
+
+
+class RunnerFrame(NamedTuple):
+    """A frame of a runner, and the stage of the run at which it comes."""
+
+    stage: str
+    runner: str
+    data: bytes
+    carried_out: bool
+
+
+class WorldFrames(FrameTarget):
+    """Frames to a world: actions, sent, ready, failed, leave. A refused one is counted and changes nothing."""
+
+    name = "world-frames"
+    quick = 600
+    soak = 1_000_000
+    refusals = (BadFrame, AgentFailed, Interrupted)  # the last two: a runner said so
+
+    def make_samples(self) -> list[bytes]:
+        self.run = small_run()
+        self.valid = {name: answers[-1] for name, answers in self.run.answers.items()}
+        self.rosters: dict[str, Roster[Any]] = {}
+        rows = np.sort(np.concatenate([group.rows for group in self.run.parts[0].groups]))
+        sent = decode_actions(frames.decode(self.valid["one"]), rows).sent
+        return [
+            *(answers[at] for answers in self.run.answers.values() for at in (-1, -2)),
+            encode_sent(TICK, sent, missed=1),
+            frames.encode("ready", -1, {}),
+            frames.encode("failed", -1, {}, {"robots": "flock-0", "traceback": "ValueError\n"}),
+            frames.encode("leave", -1, {}),
+        ]
+
+    def mutated(self, draw: DrawFn) -> Any:
+        stage, runner = pick(draw, STAGES), pick(draw, (*RUNNERS, *RUNNERS, "nobody"))
+        # A tick takes a hundred times as long as the rest of a case.
+        return RunnerFrame(stage, runner, super().mutated(draw), one_in(draw, 50))
+
+    def feed(self, case: RunnerFrame | bytes) -> str | None:
+        case = case if isinstance(case, RunnerFrame) else RunnerFrame("lockstep", "one", case, True)
+        roster = self._roster(case.stage)
+        try:
+            return self._answer(roster, case)
+        except BaseException:
+            self.rosters.pop(case.stage, None)  # so that the next case finds a new one
+            raise
+
+    def _answer(self, roster: Any, case: RunnerFrame) -> str | None:
+        before, counted = _state(roster), sum(roster.counts().values())
+        roster.answer(case.runner, case.data)
+        faults = {name for name in roster.counts() if name.endswith("_frames") and name != "frames_dropped_by_runners"}
+        if _state(roster) == before:
+            if sum(roster.counts().values()) == counted:
+                raise AssertionError("a frame that was neither taken nor counted")
+            roster._counts.clear()
+            return " ".join(sorted(faults))
+        if faults & {"malformed_frames", "oversized_frames", "wrong_tick_frames", "unknown_runner_frames"}:
+            raise AssertionError(f"a frame that was refused, and changed the state: {roster.counts()}")
+        if case.stage == "building":
+            del self.rosters[case.stage]
+            return "ready"
+        self._close_tick(roster, case)
+        return None
+
+    def _close_tick(self, roster: Any, case: RunnerFrame) -> None:
+        """Let the other runner answer, take all actions, and open the tick again."""
+        other = RUNNERS[1 - RUNNERS.index(case.runner)]
+        roster.answer(other, self.valid[other])
+        if roster.waiting:  # in real time also packets between ticks are taken
+            roster.answer(case.runner, self.valid[case.runner])
+        actions = roster.take()
+        if case.carried_out:
+            self.run.do(actions)
+        roster._counts.clear()
+        self._open_tick(roster)
+
+    def _roster(self, stage: str) -> Any:
+        if stage not in self.rosters:
+            parts, terms = list(self.run.parts), Terms(memory=self.run.layouts)
+            made: Any = RealTime(parts, 0.5, 30.0, "stop", terms, quantum=True) if stage == "real time" else None
+            roster = joined(made or Lockstep(parts, terms=terms), ready=stage != "building")
+            if stage != "building":
+                self._open_tick(roster)
+            self.rosters[stage] = roster
+        return self.rosters[stage]
+
+    def _open_tick(self, roster: Any) -> None:
+        inputs = (self.run.senses, self.run.heard, self.run.outcomes)
+        roster.open_tick(*((TICK, 0) if isinstance(roster, RealTime) else (TICK,)), *inputs)
+
+
+def _state(roster: Any) -> Any:
+    """All that a frame might change."""
+    slots = [
+        (slot.runner, slot.state, id(getattr(slot, "actions", None)), id(slot.memory), len(getattr(slot, "asked", ())))
+        for slot in roster._slots
+    ]
+    if isinstance(roster, RealTime):
+        arrays = (roster._asked_ns, roster._stopped, roster._drive, roster._command, roster.late)
+        kept = (roster._sent, roster._notes, roster._leds, roster._own, roster._values)
+        return slots, [array.tobytes() for array in arrays], [len(one) for one in kept], dict(roster._numbers)
+    return slots, sorted(roster._by_runner), roster._tick
+
+
+class QueueEmpty(Exception):
+    """The inbox has taken in all that arrived."""
+
+
+class Payload(NamedTuple):
+    data: bytes
+
+    def to_bytes(self) -> bytes:
+        return self.data
+
+
+class Sample(NamedTuple):
+    payload: Payload
+
+
+class Arrivals:
+    """In place of the inbox's queue: it raises QueueEmpty where the queue would wait."""
+
+    def __init__(self, data: bytes) -> None:
+        self._items = [Sample(Payload(data))]
+
+    def empty(self) -> bool:
+        return not self._items
+
+    def get(self) -> Sample:
+        if not self._items:
+            raise QueueEmpty
+        return self._items.pop()
+
+
+class RunnerFrames(FrameTarget):
+    """Frames to a runner: tick, packets, end. The agents can act on those that its inbox takes."""
+
+    name = "runner-frames"
+    quick = 250
+
+    def make_samples(self) -> list[bytes]:
+        self.run = run = small_run()
+        self.host: Host | None = None
+        decoded = decode_tick(frames.decode(run.frames["one"][-1]), run.whole.gives or (), senses_of(run.parts, "one"))
+        self.shapes = _shapes(decoded[0])
+        between = encode_packets(11, 1_150_000_000, 3, run.heard, run.outcomes)
+        end = frames.encode("end", -1, {}, {"why": "it sent far more than it was asked for"})
+        return [*run.frames["one"][-3:], between, end]
+
+    def feed(self, case: bytes) -> str | None:
+        inbox, part, refused = Inbox(), self.run.parts[0], None
+        inbox._arrived = Arrivals(case)
+        host = self.host = self.host or Host(part)
+        try:
+            for inputs in inbox.ticks(part, host.receive):
+                self.host = None  # its agents may now remember what no world sends
+                refused = self._act(host, inputs)
+        except QueueEmpty:
+            return "dropped" if inbox.dropped else refused
+        return inbox.ended.how
+
+    def _act(self, host: Host, inputs: Any) -> str | None:
+        """Only the agents' own code may fail, or all that misses a reading that the world does not give."""
+        try:
+            host.hear(*inputs) if len(inputs) == 2 else host.act(*inputs)
+        except AgentFailed as error:
+            lines = [line for line in error.traceback.splitlines() if line.startswith('  File "')]
+            if str(PLAYERS) not in lines[-1] and (len(inputs) == 2 or _shapes(inputs[1]) == self.shapes):
+                raise AssertionError(error.traceback[-1500:]) from error
+            return "the agents fail"
+        return None
+
+
+def _shapes(senses: Senses) -> Any:
+    return {(name, sense): column.shape[1:] for name, group in senses.items() for sense, column in group.fields.items()}
+
+
+class Scenes(FrameTarget):
+    """Scenes for observers, one with obstacles and a floor."""
+
+    name = "scene"
+    inner = ("values",)
+
+    def make_samples(self) -> list[bytes]:
+        return [encode_scene(_scene()), encode_scene(SCENE)]
+
+    def feed(self, case: bytes) -> None:
+        decode_scene(frames.decode(case))
+
+
+class Truths(FrameTarget):
+    """Ticks for observers; what is decoded can be encoded again."""
+
+    name = "truth"
+
+    def make_samples(self) -> list[bytes]:
+        self.scene, truths = _scene(), small_run().truths
+        glimpses = [Glimpse(truth, at, len(truths), np.array([[0.5]])) for at, truth in enumerate(truths)]
+        return list(map(encode_truth, glimpses[-3:]))
+
+    def feed(self, case: bytes) -> None:
+        encode_truth(decode_truth(frames.decode(case), self.scene))
+
+
+def _scene() -> Scene:
+    static = small_run().world.static
+    return Scene(static, (Series("order", "", (0.0, 1.0)),), static.robot_names[0])
