@@ -10,37 +10,28 @@ from swarmwire.world.scenario.metric_tables import MetricTable
 from swarmwire.world.scenario.scenario_file import scenario_from
 from tests.support.world.samples import changed
 
-ONE_COMPARISON = "expected just one of at_least, at_most, above, below"
 FAULTS: list[tuple[str, Any, str]] = [
-    ("standard_metrics", 1, "standard_metrics: expected true or false, got 1"),
-    ("metrics", "order", "metrics: expected a list, got 'order'"),
-    ("metrics", ["order", 5], "metrics.1: expected a text that is not empty or a table, got 5"),
-    ("metrics", [""], "metrics.0: expected a text that is not empty, got ''"),
-    ("metrics", [{"gap_m": 1}], "metrics.0.metric: is missing; expected a text that is not empty"),
-    ("stop", 3, "stop: expected a table or a list, got 3"),
-    ("stop", [3], "stop.0: expected a table, got 3"),
-    ("stop", {"above": 1}, "stop.metric: is missing; expected a text that is not empty"),
-    ("stop", {"metric": "order"}, f"stop: {ONE_COMPARISON}; got none"),
-    ("stop", [{"metric": "order", "above": 1, "below": 2}], f"stop.0: {ONE_COMPARISON}; got above and below"),
-    ("stop", {"metric": "order", "above": "x"}, "stop.above: expected a number, got 'x'"),
-    (
-        "stop",
-        {"metric": "order", "abov": 1},
-        "stop.abov: unknown key; expected one of metric, at_least, at_most, above, below, hold_s (did you mean above?)",
-    ),
-    (
-        "stop",
-        [{"metric": "order", "above": 1, "hold_s": -1}],
-        "stop.0.hold_s: expected a number of at least 0 and at most 1000000000 (s), got -1",
-    ),
+    ("standard_metrics", 1, "standard_metrics"),
+    ("metrics", "order", "metrics"),
+    ("metrics", ["order", 5], "metrics.1"),
+    ("metrics", [""], "metrics.0"),
+    ("metrics", [{"gap_m": 1}], "metrics.0.metric"),
+    ("stop", 3, "stop"),
+    ("stop", [3], "stop.0"),
+    ("stop", {"above": 1}, "stop.metric"),
+    ("stop", {"metric": "order"}, "stop"),
+    ("stop", [{"metric": "order", "above": 1, "below": 2}], "stop.0"),
+    ("stop", {"metric": "order", "above": "x"}, "stop.above"),
+    ("stop", {"metric": "order", "abov": 1}, "stop.abov"),
+    ("stop", [{"metric": "order", "above": 1, "hold_s": -1}], "stop.0.hold_s"),
 ]
 
 
-@pytest.mark.parametrize(("path", "value", "text"), FAULTS)
-def test_a_fault_of_what_is_measured_names_its_key_and_what_was_expected(path: str, value: Any, text: str) -> None:
+@pytest.mark.parametrize(("path", "value", "key"), FAULTS)
+def test_a_fault_of_what_is_measured_is_refused_with_its_key(path: str, value: Any, key: str) -> None:
     with pytest.raises(BadInput) as caught:
         scenario_from(changed(path, value), "file.toml")
-    assert str(caught.value) == f"file.toml: {text}"
+    assert (caught.value.where, caught.value.key) == ("file.toml", key)
 
 
 def test_a_condition_that_ends_arenas_is_a_table_or_a_list_of_tables_and_may_be_none() -> None:

@@ -79,62 +79,41 @@ def test_spells_left_out_have_their_usual_length() -> None:
 
 SIGNAL = {"model": "log-distance"}
 FAULTS: list[tuple[dict[str, Any], str]] = [
-    ({}, "radio.range_m: is missing"),
-    ({"preset": "nothing"}, "radio.preset: expected one of ideal, disk"),
-    ({"range_m": 2.0, "access": {}}, "radio.access: expected a model with signals"),
-    ({"range_m": 2.0, "reception": {}}, "radio.reception: expected a model with signals"),
-    ({"range_m": 2.0, "gives": {"rssi": {}}}, "radio.gives.rssi: expected a model with signals"),
-    ({"preset": "disk", "fading": {}}, "radio.fading: expected a model with signals"),
-    ({**SIGNAL, "two_ray": {}}, 'radio.two_ray: expected model = "two-ray"'),
-    ({**SIGNAL, "bit_rate_bps": 0}, "radio.bit_rate_bps: expected a whole number of at least 1"),
-    ({**SIGNAL, "walls": {}, "line_of_sight": True}, "radio.walls: expected no line_of_sight"),
-    ({**SIGNAL, "bodies_block": True}, "radio.bodies_block: expected the model disk"),
-    ({**SIGNAL, "access": {"method": "dcf"}}, "radio.access.method: expected a frame of IEEE 802.11"),
-    ({**SIGNAL, "frame": "802.11b"}, "radio.bit_rate_bps: 802.11b has 1000000"),
-    ({**SIGNAL, "reception": {"model": "table"}}, "radio.reception.table: is missing"),
+    ({}, "radio.range_m"),
+    ({"preset": "nothing"}, "radio.preset"),
+    ({"range_m": 2.0, "access": {}}, "radio.access"),
+    ({"range_m": 2.0, "reception": {}}, "radio.reception"),
+    ({"range_m": 2.0, "gives": {"rssi": {}}}, "radio.gives.rssi"),
+    ({"preset": "disk", "fading": {}}, "radio.fading"),
+    ({**SIGNAL, "two_ray": {}}, "radio.two_ray"),
+    ({**SIGNAL, "bit_rate_bps": 0}, "radio.bit_rate_bps"),
+    ({**SIGNAL, "walls": {}, "line_of_sight": True}, "radio.walls"),
+    ({**SIGNAL, "bodies_block": True}, "radio.bodies_block"),
+    ({**SIGNAL, "access": {"method": "dcf"}}, "radio.access.method"),
+    ({**SIGNAL, "frame": "802.11b"}, "radio.bit_rate_bps"),
+    ({**SIGNAL, "reception": {"model": "table"}}, "radio.reception.table"),
     ({**SIGNAL, "delays": {"distribution": "uniform", "deviation_s": 1.0}}, "radio.delays.deviation_s"),
-    ({"preset": "ieee802154", "model": "disk", "range_m": 1.0}, "radio.antenna: expected a model with signals"),
-    (
-        {**SIGNAL, "bursts": {"p": 0.1, "r": 0.5, "interval_s": 0.1, "bad_s": 1.0}},
-        "radio.bursts.p: expected either bad_s with good_s or mean_loss, or p, r and interval_s; got bad_s and p and r",
-    ),
-    (
-        {"preset": "gilbert", "bursts": {"r": 0.5}},
-        "radio.bursts.r: expected either bad_s with good_s or mean_loss, or p",
-    ),
-    ({**SIGNAL, "bursts": {"p": 0.1, "r": 0.5}}, "radio.bursts.interval_s: is missing; expected p, r and"),
-    ({**SIGNAL, "bursts": {"interval_s": 0.1}}, "radio.bursts.p: is missing; expected p, r and"),
-    ({**SIGNAL, "bursts": {"p": 0.5, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.r: expected less than 1 - p"),
-    ({**SIGNAL, "bursts": {"p": 1.0, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.p: expected a number above 0 and"),
-    (
-        {**SIGNAL, "bursts": {"mean_loss": 0.1, "good_s": 1.0}},
-        "radio.bursts.mean_loss: expected either good_s or mean_loss, got both",
-    ),
-    (
-        {**SIGNAL, "bursts": {"mean_loss": 0.1, "p": 0.1}},
-        "radio.bursts.p: expected either bad_s with good_s or mean_loss, or p, r and interval_s; got mean_loss and p",
-    ),
-    ({**SIGNAL, "bursts": {"mean_loss": 1.0}}, "radio.bursts.mean_loss: expected a number"),
-    (
-        {**SIGNAL, "bursts": {"mean_loss": 0.5, "loss_bad": 0.5}},
-        "radio.bursts.mean_loss: expected at least loss_good, 0, and less than loss_bad, 0.5; got 0.5",
-    ),
-    ({**SIGNAL, "bursts": {"mean_loss": 0.1, "loss_good": 0.2}}, "radio.bursts.mean_loss: expected at least loss_good"),
-    ({**SIGNAL, "bursts": {"mean_loss": 1e-9}}, "radio.bursts.mean_loss: expected loss_good, 0, or more above it"),
-    ({"range_m": 2.0, "cut_off_db": 3.0}, "radio.cut_off_db: expected a model with signals"),
-    (
-        {**SIGNAL, "bursts": {"loss_bad": 0.1, "loss_good": 0.2}},
-        "radio.bursts.loss_bad: expected at least loss_good",
-    ),
-    ({**SIGNAL, "access": {"method": "aloha", "most_retries": 3}}, "radio.access.most_retries: expected method csma-"),
-    ({**SIGNAL, "access": {"method": "none", "busy_dbm": -70.0}}, "radio.access.busy_dbm: expected method csma-802154"),
-    ({**SIGNAL, "reception": {"least_sinr_db": 3.0}}, 'radio.reception.least_sinr_db: expected "threshold" with it'),
-    ({**SIGNAL, "fading": {"distribution": "nakagami", "k": 3.0}}, 'radio.fading.k: expected "rician" with it'),
-    ({**SIGNAL, "fading": {"distribution": "rician", "m": 1.0}}, 'radio.fading.m: expected "nakagami" with it'),
-    (
-        {"preset": "wifi-b-1M", "reception": {"model": "802.15.4"}},
-        "radio.reception.model: expected one of threshold, table, 802.11b for frames of 802.11b; got 802.15.4",
-    ),
+    ({"preset": "ieee802154", "model": "disk", "range_m": 1.0}, "radio.antenna"),
+    ({**SIGNAL, "bursts": {"p": 0.1, "r": 0.5, "interval_s": 0.1, "bad_s": 1.0}}, "radio.bursts.p"),
+    ({"preset": "gilbert", "bursts": {"r": 0.5}}, "radio.bursts.r"),
+    ({**SIGNAL, "bursts": {"p": 0.1, "r": 0.5}}, "radio.bursts.interval_s"),
+    ({**SIGNAL, "bursts": {"interval_s": 0.1}}, "radio.bursts.p"),
+    ({**SIGNAL, "bursts": {"p": 0.5, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.r"),
+    ({**SIGNAL, "bursts": {"p": 1.0, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.p"),
+    ({**SIGNAL, "bursts": {"mean_loss": 0.1, "good_s": 1.0}}, "radio.bursts.mean_loss"),
+    ({**SIGNAL, "bursts": {"mean_loss": 0.1, "p": 0.1}}, "radio.bursts.p"),
+    ({**SIGNAL, "bursts": {"mean_loss": 1.0}}, "radio.bursts.mean_loss"),
+    ({**SIGNAL, "bursts": {"mean_loss": 0.5, "loss_bad": 0.5}}, "radio.bursts.mean_loss"),
+    ({**SIGNAL, "bursts": {"mean_loss": 0.1, "loss_good": 0.2}}, "radio.bursts.mean_loss"),
+    ({**SIGNAL, "bursts": {"mean_loss": 1e-9}}, "radio.bursts.mean_loss"),
+    ({"range_m": 2.0, "cut_off_db": 3.0}, "radio.cut_off_db"),
+    ({**SIGNAL, "bursts": {"loss_bad": 0.1, "loss_good": 0.2}}, "radio.bursts.loss_bad"),
+    ({**SIGNAL, "access": {"method": "aloha", "most_retries": 3}}, "radio.access.most_retries"),
+    ({**SIGNAL, "access": {"method": "none", "busy_dbm": -70.0}}, "radio.access.busy_dbm"),
+    ({**SIGNAL, "reception": {"least_sinr_db": 3.0}}, "radio.reception.least_sinr_db"),
+    ({**SIGNAL, "fading": {"distribution": "nakagami", "k": 3.0}}, "radio.fading.k"),
+    ({**SIGNAL, "fading": {"distribution": "rician", "m": 1.0}}, "radio.fading.m"),
+    ({"preset": "wifi-b-1M", "reception": {"model": "802.15.4"}}, "radio.reception.model"),
 ]
 
 
@@ -144,11 +123,11 @@ def test_another_model_than_the_presets_takes_the_presets_path_loss_with_it() ->
     assert radio.access_or_default.method == "csma-802154"
 
 
-@pytest.mark.parametrize(("table", "text"), FAULTS)
-def test_a_contradiction_is_refused_with_its_key(table: dict[str, Any], text: str) -> None:
+@pytest.mark.parametrize(("table", "key"), FAULTS)
+def test_a_contradiction_is_refused_with_its_key(table: dict[str, Any], key: str) -> None:
     with pytest.raises(BadInput) as caught:
         radio_of(table)
-    assert str(caught.value).startswith(f"f: {text}")
+    assert (caught.value.where, caught.value.key) == ("f", key)
 
 
 def test_groups_may_have_their_own_power_and_gain_of_a_radio_with_signals() -> None:
@@ -157,13 +136,13 @@ def test_groups_may_have_their_own_power_and_gain_of_a_radio_with_signals() -> N
     scenario = scenario_from({**table, "robots": own}, "f")
     assert scenario.robots["big"].radio == OwnAntenna(power_dbm=-10.0)
     assert scenario.robots["flock"].radio is None
-    with pytest.raises(
-        BadInput, match=r"^f: robots\.big\.radio: expected a radio with signals: a disk knows no strength"
-    ):
-        scenario_from({**SAMPLE, "robots": own}, "f")
     mute = {key: value for key, value in SAMPLE.items() if key != "radio"}
-    with pytest.raises(BadInput, match=r"^f: robots\.big\.radio: expected a radio with signals: there is no \[radio\]"):
-        scenario_from({**mute, "robots": own}, "f")
-    own["big"]["radio"] = {"power_dbm": 1000.0}
-    with pytest.raises(BadInput, match=r"^f: robots\.big\.radio\.power_dbm: expected a number of at least -100"):
-        scenario_from({**table, "robots": own}, "f")
+    strong = {**own, "big": {**own["big"], "radio": {"power_dbm": 1000.0}}}
+    for refused, key in (
+        ({**SAMPLE, "robots": own}, "robots.big.radio"),
+        ({**mute, "robots": own}, "robots.big.radio"),
+        ({**table, "robots": strong}, "robots.big.radio.power_dbm"),
+    ):
+        with pytest.raises(BadInput) as caught:
+            scenario_from(refused, "f")
+        assert caught.value.key == key

@@ -1,4 +1,4 @@
-"""A scenario is refused at the door, in one line that names the file, the key and what was expected."""
+"""A scenario is read whole, or refused with the file and the key; overrides change it by path."""
 
 from pathlib import Path
 from typing import Any
@@ -7,203 +7,106 @@ import pytest
 
 from swarmwire.comms.air.parameters.gives import BearingGiven, Gives, RangeGiven
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.bodies.body import body_names
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.scenario_file import load_scenario, scenario_from, scenario_schema
 from tests.support.world.samples import SAMPLE, changed, without
 
-COUNT = "expected a whole number of at least 1 and at most 1000000"
-OFFSET = "expected uniform, tick, or an offset in s from 0 to below the period of a tick"
-NUMBER = "expected a number above 0 and at most 10000 (m)"
-STEPS = "so that a robot of flock at full speed moves at most a quarter of its radius in one step"
-GAP = "expected a number of at least 0 and at most 10000 (m)"
-HEADING = "expected a number of at least -7 and at most 7 (rad)"
-RANDOM_ALONE = 'expected place = "random" with within or apart_m, not at = [x, y]'
-CONVEX = "expected the corners of a convex polygon in order"
 POLYGON = {"shape": "polygon", "at": [0.0, 0.0]}
+FLAT = [[0, 0], [1, 0], [2, 0]]
+WIDE = {"shape": "polygon", "points": [[0, 0], [6.1, 0], [0, 1]]}
 FAULTS: list[tuple[str, Any, str]] = [
-    ("name", "", "name: expected a text that is not empty, got ''"),
-    ("seed", -1, "seed: expected a whole number of at least 0 and at most 9223372036854775807, got -1"),
-    ("duration_s", float("inf"), "duration_s: expected a number above 0 and at most 1000000000 (s), got inf"),
-    ("time.rate_hz", 1001, "time.rate_hz: expected a whole number of at least 1 and at most 1000 (Hz), got 1001"),
-    ("physics.engine", "bullet", "physics.engine: expected one of auto, discs, pymunk, kinematic, got 'bullet'"),
-    ("physics.steps", 1, f"physics.steps: expected at least 2, {STEPS}; got 1"),
-    ("arena.size_m", 3, "arena.size_m: expected a list of 2 numbers above 0 and at most 10000 (m), got 3"),
-    ("arena.size_m", [1.0], f"arena.size_m.1: is missing; {NUMBER}"),
-    ("arena.size_m", [1.0, float("nan")], f"arena.size_m.1: {NUMBER}, got nan"),
-    ("arena.boundary", "sea", "arena.boundary: expected one of walls, open, torus, got 'sea'"),
-    (
-        "arena.windows",
-        [],
-        "arena.windows: unknown key; expected one of size_m, boundary, obstacles, lights, map, ground",
-    ),
-    ("arena.lights", [{"at": [0, 0]}], f"arena.lights.0.intensity: is missing; {NUMBER}"),
-    ("arena.lights", [{"intensity": 1.0}], 'arena.lights.0: expected either at = [x, y] or place = "random"'),
-    ("arena.lights", [{"intensity": 1, "at": [0, 0], "apart_m": 0.1}], f"arena.lights.0: {RANDOM_ALONE}"),
-    (
-        "arena.lights.0.within",
-        {"how": "arena"},
-        "arena.lights.0.within.how: expected one of box, disc, ring; got 'arena'",
-    ),
-    ("arena.obstacles.1.within", {"how": "disc", "radius_m": 1.0}, f"arena.obstacles.1: {RANDOM_ALONE}"),
-    ("arena.obstacles.1.height_m", 0, f"arena.obstacles.1.height_m: {NUMBER}, got 0"),
-    ("arena.map", {"image": "", "resolution_m": 1}, "arena.map.image: expected a text that is not empty, got ''"),
-    ("arena.map", {"image": "maze.png", "resolution_m": -1}, f"arena.map.resolution_m: {NUMBER}, got -1"),
-    ("arena.ground.shade", 2, "arena.ground.shade: expected a number of at least 0 and at most 1, got 2"),
+    ("name", "", "name"),
+    ("seed", -1, "seed"),
+    ("duration_s", float("inf"), "duration_s"),
+    ("time.rate_hz", 1001, "time.rate_hz"),
+    ("physics.engine", "bullet", "physics.engine"),
+    ("physics.steps", 1, "physics.steps"),
+    ("arena.size_m", 3, "arena.size_m"),
+    ("arena.size_m", [1.0], "arena.size_m.1"),
+    ("arena.size_m", [1.0, float("nan")], "arena.size_m.1"),
+    ("arena.boundary", "sea", "arena.boundary"),
+    ("arena.windows", [], "arena.windows"),
+    ("arena.lights", [{"at": [0, 0]}], "arena.lights.0.intensity"),
+    ("arena.lights", [{"intensity": 1.0}], "arena.lights.0"),
+    ("arena.lights", [{"intensity": 1, "at": [0, 0], "apart_m": 0.1}], "arena.lights.0"),
+    ("arena.lights.0.within", {"how": "arena"}, "arena.lights.0.within.how"),
+    ("arena.obstacles.1.within", {"how": "disc", "radius_m": 1.0}, "arena.obstacles.1"),
+    ("arena.obstacles.1.height_m", 0, "arena.obstacles.1.height_m"),
+    ("arena.map", {"image": "", "resolution_m": 1}, "arena.map.image"),
+    ("arena.map", {"image": "maze.png", "resolution_m": -1}, "arena.map.resolution_m"),
+    ("arena.ground.shade", 2, "arena.ground.shade"),
     (
         "arena.ground.patches",
         [{"shape": "polygon", "points": [[0, 0], [1, 0], [2, 0]], "shade": 0}],
-        f"arena.ground.patches.0.points: {CONVEX}; (0, 0) lies on or beyond the side from (2, 0) to (1, 0)",
+        "arena.ground.patches.0.points",
     ),
-    (
-        "arena.ground.patches",
-        [{"shape": "disc", "at": [0, 0], "shade": 0}],
-        f"arena.ground.patches.0.radius_m: is missing; {NUMBER}",
-    ),
-    ("arena.lights", [{"intensity": 0, "at": [0, 0]}], f"arena.lights.0.intensity: {NUMBER}, got 0"),
-    ("arena.obstacles.0", {**POLYGON, "points": 3}, "arena.obstacles.0.points: expected a list (m), got 3"),
-    (
-        "arena.obstacles.0",
-        {**POLYGON, "points": [[0, 0], [1, 0]]},
-        "arena.obstacles.0.points: expected 3 to 100 points, got 2",
-    ),
-    (
-        "arena.obstacles.0",
-        {**POLYGON, "points": [[0, 0], [1, 0], [0.2, 0.2], [0, 1]]},
-        f"arena.obstacles.0.points: {CONVEX}; (0, 1) lies on or beyond the side from (1, 0) to (0.2, 0.2)",
-    ),
-    (
-        "arena.obstacles.0",
-        {**POLYGON, "points": [[0, 0], [1, 0], [2, 0]]},
-        f"arena.obstacles.0.points: {CONVEX}; (0, 0) lies on or beyond the side from (2, 0) to (1, 0)",
-    ),
-    (
-        "arena.obstacles.0",
-        {**POLYGON, "points": [[0, 0], [3, 0], [0, 1]], "at": [0.1, 0.0]},
-        "arena.obstacles.0: expected the polygon to lie within the arena of 6 x 4 m",
-    ),
+    ("arena.ground.patches", [{"shape": "disc", "at": [0, 0], "shade": 0}], "arena.ground.patches.0.radius_m"),
+    ("arena.lights", [{"intensity": 0, "at": [0, 0]}], "arena.lights.0.intensity"),
+    ("arena.obstacles.0", {**POLYGON, "points": 3}, "arena.obstacles.0.points"),
+    ("arena.obstacles.0", {**POLYGON, "points": [[0, 0], [1, 0]]}, "arena.obstacles.0.points"),
+    ("arena.obstacles.0", {**POLYGON, "points": [[0, 0], [1, 0], [0.2, 0.2], [0, 1]]}, "arena.obstacles.0.points"),
+    ("arena.obstacles.0", {**POLYGON, "points": FLAT}, "arena.obstacles.0.points"),
+    ("arena.obstacles.0", {**POLYGON, "points": [[0, 0], [3, 0], [0, 1]], "at": [0.1, 0.0]}, "arena.obstacles.0"),
     (
         "arena.obstacles.0",
         {"shape": "polygon", "points": [[0, 0], [6.1, 0], [0, 1]], "place": "random"},
-        "arena.obstacles.0: expected the polygon to lie within the arena of 6 x 4 m",
+        "arena.obstacles.0",
     ),
-    ("arena.obstacles.0.shape", "ring", "arena.obstacles.0.shape: expected one of box, cylinder, polygon; got 'ring'"),
-    (
-        "arena.obstacles.0.size_m",
-        [1, 1],
-        "arena.obstacles.0.size_m: unknown key; expected one of "
-        "at, place, count, within, apart_m, height_m, movable, mass_kg, shape, radius_m",
-    ),
-    ("arena.obstacles.0.at", [1, 1], 'arena.obstacles.0: expected either at = [x, y] or place = "random"'),
-    (
-        "arena.obstacles.1.count",
-        4,
-        'arena.obstacles.1: expected place = "random" with a count; at = [x, y] sets only one',
-    ),
-    ("arena.obstacles.1.at", [2.9, 0], "arena.obstacles.1: expected the box to lie within the arena of 6 x 4 m"),
-    ("arena.obstacles.0.radius_m", 3, "arena.obstacles.0: expected the cylinder to lie within the arena of 6 x 4 m"),
-    ("robots", {}, "robots: expected a table that is not empty, got {}"),
-    (
-        "robots.9x",
-        SAMPLE["robots"]["big"],
-        "robots.9x: expected a name of at most 40 letters, digits and _ that starts with a letter, got '9x'",
-    ),
-    ("robots.flock.count", "x", f"robots.flock.count: {COUNT}, got 'x'"),
-    ("robots.flock.count", 0, f"robots.flock.count: {COUNT}, got 0"),
-    ("robots.flock.count", True, f"robots.flock.count: {COUNT}, got True"),
-    (
-        "robots.flock.body",
-        "\0.toml",
-        "robots.flock.body: expected the name of a body or of a file, got a text with a zero byte",
-    ),
-    ("robots.flock.body", "car", f"robots.flock.body: expected one of {', '.join(body_names())}; got 'car'"),
-    (
-        "robots.flock.colour",
-        "red",
-        "robots.flock.colour: unknown key; expected one of body, sheet, count, agent, act_every_ticks, params, radio, "
-        "place",
-    ),
-    (
-        "robots.flock.place",
-        "random",
-        "robots.flock.place: expected a table with how = one of arena, box, disc, grid, poses, ring; got 'random'",
-    ),
-    ("robots.count", 3, "robots.count: expected a table for each group, [robots.GROUP], got 3"),
-    (
-        "radio.preset",
-        "wifi",
-        "radio.preset: expected one of ideal, disk, bernoulli, gilbert, argos-rab, infrared-epuck, ieee802154, "
-        "wifi-b-1M, wifi-a-6M, ble-1M, gz-rfcomms, subt, kilobot, acoustic (did you mean wifi-b-1M?), got 'wifi'",
-    ),
-    (
-        "physics.engine",
-        "disc",
-        "physics.engine: expected one of auto, discs, pymunk, kinematic (did you mean discs?), got 'disc'",
-    ),
-    (
-        "robots.flock.place",
-        {},
-        "robots.flock.place.how: is missing; expected one of arena, box, disc, grid, poses, ring",
-    ),
-    (
-        "robots.flock.place.how",
-        "heap",
-        "robots.flock.place.how: expected one of arena, box, disc, grid, poses, ring; got 'heap'",
-    ),
-    (
-        "robots.flock.place",
-        {"how": "ring", "inner_radius_m": 2.0, "radius_m": 1.0},
-        "robots.flock.place: expected an inner_radius_m of at most radius_m, 1.0; got 2.0",
-    ),
-    ("robots.flock.place.apart_m", -1, f"robots.flock.place.apart_m: {GAP}, got -1"),
-    ("robots.flock.place.heading_rad", "east", f"robots.flock.place.heading_rad: {HEADING}, got 'east'"),
-    ("robots.flock.place.radius_m", "a", f"robots.flock.place.radius_m: {NUMBER}, got 'a'"),
-    (
-        "robots.flock.place",
-        {"how": "poses", "poses": [[0, 0, 0]]},
-        "robots.flock: expected a pose for each of the 12 robots, got 1 poses",
-    ),
-    ("radio.loss", 2, "radio.loss: expected a number of at least 0 and at most 1, got 2"),
-    ("radio.model", "x", "radio.model: expected one of disk, log-distance, friis, two-ray, itu-indoor, got 'x'"),
-    ("radio.gives.range.noise_m", -1, "radio.gives.range.noise_m: expected a number of at least 0 (m), got -1"),
-    ("radio.send_offset", "x", f"radio.send_offset: {OFFSET}; got 'x'"),
-    ("radio.send_offset", 0.1, f"radio.send_offset: {OFFSET}; got 0.1"),
-    ("run.on_runner_loss", "hope", "run.on_runner_loss: expected one of stop, dead, wait, stand, coast, got 'hope'"),
-    ("run.watchdog_s", 0, "run.watchdog_s: expected a number above 0 and at most 86400 (s), got 0"),
-    (
-        "wind",
-        [],
-        "wind: unknown key; expected one of "
-        "format, name, seed, duration_s, time, physics, arena, robots, radio, events, "
-        "standard_metrics, metrics, stop, run",
-    ),
+    ("arena.obstacles.0.shape", "ring", "arena.obstacles.0.shape"),
+    ("arena.obstacles.0.size_m", [1, 1], "arena.obstacles.0.size_m"),
+    ("arena.obstacles.0.at", [1, 1], "arena.obstacles.0"),
+    ("arena.obstacles.1.count", 4, "arena.obstacles.1"),
+    ("arena.obstacles.1.at", [2.9, 0], "arena.obstacles.1"),
+    ("arena.obstacles.0.radius_m", 3, "arena.obstacles.0"),
+    ("robots", {}, "robots"),
+    ("robots.9x", SAMPLE["robots"]["big"], "robots.9x"),
+    ("robots.flock.count", "x", "robots.flock.count"),
+    ("robots.flock.count", 0, "robots.flock.count"),
+    ("robots.flock.count", True, "robots.flock.count"),
+    ("robots.flock.body", "\0.toml", "robots.flock.body"),
+    ("robots.flock.body", "car", "robots.flock.body"),
+    ("robots.flock.colour", "red", "robots.flock.colour"),
+    ("robots.flock.place", "random", "robots.flock.place"),
+    ("robots.count", 3, "robots.count"),
+    ("radio.preset", "wifi", "radio.preset"),
+    ("physics.engine", "disc", "physics.engine"),
+    ("robots.flock.place", {}, "robots.flock.place.how"),
+    ("robots.flock.place.how", "heap", "robots.flock.place.how"),
+    ("robots.flock.place", {"how": "ring", "inner_radius_m": 2.0, "radius_m": 1.0}, "robots.flock.place"),
+    ("robots.flock.place.apart_m", -1, "robots.flock.place.apart_m"),
+    ("robots.flock.place.heading_rad", "east", "robots.flock.place.heading_rad"),
+    ("robots.flock.place.radius_m", "a", "robots.flock.place.radius_m"),
+    ("robots.flock.place", {"how": "poses", "poses": [[0, 0, 0]]}, "robots.flock"),
+    ("radio.loss", 2, "radio.loss"),
+    ("radio.model", "x", "radio.model"),
+    ("radio.gives.range.noise_m", -1, "radio.gives.range.noise_m"),
+    ("radio.send_offset", "x", "radio.send_offset"),
+    ("radio.send_offset", 0.1, "radio.send_offset"),
+    ("run.on_runner_loss", "hope", "run.on_runner_loss"),
+    ("run.watchdog_s", 0, "run.watchdog_s"),
+    ("wind", [], "wind"),
 ]
 
 
-@pytest.mark.parametrize(("path", "value", "text"), FAULTS)
-def test_a_fault_is_one_line_with_file_key_and_what_was_expected(path: str, value: Any, text: str) -> None:
+@pytest.mark.parametrize(("path", "value", "key"), FAULTS)
+def test_a_fault_is_refused_with_its_key(path: str, value: Any, key: str) -> None:
     with pytest.raises(BadInput) as caught:
         scenario_from(changed(path, value), "file.toml")
-    assert str(caught.value) == f"file.toml: {text}"
+    assert (caught.value.where, caught.value.key) == ("file.toml", key)
+    assert "\n" not in str(caught.value)
 
 
-def test_a_missing_key_says_what_it_should_hold() -> None:
-    with pytest.raises(BadInput) as caught:
-        scenario_from(without("robots.flock.count"), "file.toml")
-    assert str(caught.value) == f"file.toml: robots.flock.count: is missing; {COUNT}"
-
-
-def test_an_arena_has_a_size_or_a_map() -> None:
-    with pytest.raises(BadInput) as caught:
-        scenario_from(without("arena.size_m"), "file.toml")
-    expected = "expected a list of 2 numbers above 0 and at most 10000 (m), or a map"
-    assert str(caught.value) == f"file.toml: arena.size_m: is missing; {expected}"
+@pytest.mark.parametrize("key", ["robots.flock.count", "arena.size_m"])
+def test_a_missing_key_is_named(key: str) -> None:
+    with pytest.raises(BadInput, match="is missing") as caught:
+        scenario_from(without(key), "file.toml")
+    assert caught.value.key == key
 
 
 def test_the_keys_of_further_faults_are_named_up_to_six() -> None:
     mapping = {**changed("seed", -1), "name": "", "duration_s": 0}
-    with pytest.raises(BadInput, match=r"^f: name: expected .*, got '' \(also wrong: seed, duration_s\)$"):
+    with pytest.raises(BadInput, match=r"\(also wrong: seed, duration_s\)$"):
         scenario_from(mapping, "f")
     with pytest.raises(BadInput, match=r"\(also wrong: b, c, d, e, f, g, …\)$"):
         scenario_from({**SAMPLE, **dict.fromkeys("abcdefgh", 1)}, "f")
@@ -265,44 +168,44 @@ def test_a_file_is_read_and_overrides_are_toml_values_or_else_texts(tmp_path: Pa
     assert scenario.source == str(path)
 
 
-OVERRIDE_FAULTS = [
-    ("robots.flok.count=3", "--set robots.flok.count=3: robots.flok.body: is missing; expected a text"),
-    ("radio={}", "--set radio={}: radio.range_m: is missing"),
-    ("robots.flock.count=many", f"--set robots.flock.count=many: robots.flock.count: {COUNT}, got 'many'"),
-    ("radio.foo=1", "--set radio.foo=1: radio.foo: unknown key; expected one of range_m"),
-    ("seed", "--set seed: expected path=value, such as robots.flock.count=30"),
-    ("name.x=1", "--set name.x=1: name.x: name holds no keys"),
-    ("arena.obstacles.3.radius_m=1", "arena.obstacles.3: expected a place in a list of 1, counted from 0"),
-]
-
-
-@pytest.mark.parametrize(("override", "text"), OVERRIDE_FAULTS)
-def test_a_faulty_override_is_named(tmp_path: Path, override: str, text: str) -> None:
+@pytest.mark.parametrize(
+    ("override", "key"),
+    [
+        ("robots.flok.count=3", "robots.flok.body"),
+        ("radio={}", "radio.range_m"),
+        ("robots.flock.count=many", "robots.flock.count"),
+        ("radio.foo=1", "radio.foo"),
+        ("seed", ""),
+        ("name.x=1", "name.x"),
+        ("arena.obstacles.3.radius_m=1", "arena.obstacles.3"),
+    ],
+)
+def test_a_faulty_override_is_named(tmp_path: Path, override: str, key: str) -> None:
     path = written(tmp_path, MINIMAL + "radio = { range_m = 1 }\n")
     with pytest.raises(BadInput) as caught:
         load_scenario(path, [override])
-    assert text in str(caught.value)
+    assert (caught.value.where, caught.value.key) == (f"--set {override}", key)
     assert "\n" not in str(caught.value)
 
 
 def test_what_an_override_does_not_touch_is_the_file_s_fault(tmp_path: Path) -> None:
     path = written(tmp_path, MINIMAL.replace("count = 2", "count = 0"))
-    with pytest.raises(BadInput, match=r"s.toml: robots.flock.count: expected"):
+    with pytest.raises(BadInput) as caught:
         load_scenario(path, ["robots.flock.body=footbot"])
+    assert (caught.value.where, caught.value.key) == (str(path), "robots.flock.count")
 
 
 def test_a_mark_of_byte_order_before_the_text_does_no_harm(tmp_path: Path) -> None:
     assert load_scenario(written(tmp_path, "\ufeff" + MINIMAL)).name == "small"
 
 
-def test_unreadable_files_are_bad_input_too(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"none.toml: expected a readable file: No such file or directory$"):
-        load_scenario(tmp_path / "none.toml")
-    with pytest.raises(BadInput, match=r"s.toml: expected TOML: Invalid value \(at line 1, column 8\)$"):
-        load_scenario(written(tmp_path, "seed = x"))
-    (tmp_path / "s.toml").write_bytes(b"\xff\xfe")
-    with pytest.raises(BadInput, match="expected TOML, which is UTF-8 text$"):
+@pytest.mark.parametrize("content", [None, b"seed = x", b"\xff\xfe"])
+def test_an_unreadable_file_is_refused_by_its_name(tmp_path: Path, content: bytes | None) -> None:
+    if content is not None:
+        (tmp_path / "s.toml").write_bytes(content)
+    with pytest.raises(BadInput) as caught:
         load_scenario(tmp_path / "s.toml")
+    assert caught.value.where == str(tmp_path / "s.toml")
 
 
 def test_a_scenario_cannot_be_changed() -> None:

@@ -1,4 +1,4 @@
-"""A scenario can be taken back to the mapping that describes it."""
+"""A scenario as a mapping again, and its schema in words."""
 
 import tomllib
 
@@ -6,6 +6,7 @@ import pytest
 
 from swarmwire.world.scenario.as_mapping import mapping_of, same_content
 from swarmwire.world.scenario.scenario_file import load_scenario, scenario_from
+from swarmwire.world.scenario.schema_words import Node, plain, words
 from tests.support.deploy.commands import LOSSY, ROOT
 
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
@@ -34,3 +35,29 @@ def test_the_mapping_is_the_callers_own():
     scenario = load_scenario(LOSSY)
     mapping_of(scenario)["robots"]["flock"]["count"] = 1
     assert mapping_of(scenario)["robots"]["flock"]["count"] == 20
+
+
+SCHEMA: Node = {"$defs": {"Disc": {"type": "object", "properties": {"radius_m": {"type": "number"}}}}}
+
+
+@pytest.mark.parametrize(
+    ("node", "said"),
+    [
+        ({"type": "integer", "minimum": 1, "maximum": 1000}, "a whole number of at least 1 and at most 1000"),
+        ({"type": "number", "exclusiveMinimum": 0, "unit": "s"}, "a number above 0 (s)"),
+        ({"enum": ["walls", "open"]}, "one of walls, open"),
+        ({"const": 1}, "1"),
+        ({"type": "string", "minLength": 1}, "a text that is not empty"),
+        ({"anyOf": [{"type": "boolean"}, {"type": "string"}]}, "true or false or a text"),
+        ({"anyOf": [{"type": "boolean"}, {"type": "null"}]}, "true or false"),
+        ({"type": "array", "prefixItems": [{"type": "number"}, {"type": "number"}]}, "a list of 2 numbers"),
+        ({"$ref": "#/$defs/Disc"}, "a table"),
+    ],
+)
+def test_a_key_is_told_in_words(node, said):
+    assert words(node, SCHEMA) == said
+
+
+def test_a_reference_that_may_be_null_leads_to_its_table():
+    node = {"anyOf": [{"$ref": "#/$defs/Disc"}, {"type": "null"}], "default": None}
+    assert plain(node, SCHEMA) == SCHEMA["$defs"]["Disc"]
