@@ -28,6 +28,7 @@ from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, SENSORS
 from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
 from swarmwire.deploy.campaign.plan import planned
+from swarmwire.deploy.fleet.fleet_keys import OF_FLEET, OF_ROBOT
 from tests.docs.pages import PAGES, blocks_of, commands_of, files_of
 
 ROOT = Path(__file__).parents[1]
@@ -136,6 +137,13 @@ def benchmark_rows() -> Problems:
     yield from (f"docs/performance.md: has no measured row for {name}" for name in sorted(TARGETS.keys() - measured))
 
 
+def fleet_keys() -> Problems:
+    """The page about fleets has a row for every key of `fleet.toml`."""
+    rows = [line.split("|")[1] for line in _text("docs/fleet.md").splitlines() if line.startswith("| `")]
+    told = {name for row in rows for name in row.split("`")[1::2]}
+    yield from (f"docs/fleet.md: has no row for {key}" for key in sorted({*OF_FLEET, *OF_ROBOT} - told))
+
+
 def robot_bytes() -> Problems:
     """The tables of the bytes that an e-puck2 takes and gives add up to the packets."""
     rows = re.compile(r"^\| (\d+)(?:-(\d+))? \| (?:(\d+) )?([iuf]\d) \|", re.MULTILINE)
@@ -163,6 +171,7 @@ CHECKS: tuple[Callable[[], Problems], ...] = (
     experiment_pages,
     pictures,
     benchmark_rows,
+    fleet_keys,
     robot_bytes,
     fault_tables,
     protocol_page,
