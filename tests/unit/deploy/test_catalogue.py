@@ -47,9 +47,12 @@ HELD = {
     "stages": [module.__name__.rpartition(".")[2] for module in ORDER],
     "fates": [*FATE_NAMES],
 }
-CLASSES: dict[str, Any] = {"radio": Radio, "leds": Leds}
-for _kind, _held in (("drive", DRIVES), ("sense", SHEETS), ("event", EVENTS), ("metric", METRICS)):
-    CLASSES |= {f"{_kind}:{name}": held for name, held in _held.items()}
+REGISTRIES = {"drive": DRIVES, "sense": SHEETS, "event": EVENTS, "metric": METRICS}
+CLASSES: dict[str, Any] = {
+    "radio": Radio,
+    "leds": Leds,
+    **{f"{kind}:{name}": held for kind, registry in REGISTRIES.items() for name, held in registry.items()},
+}
 OWN = '''from swarmwire.agent import Agent
 
 class Mine(Agent):

@@ -13,7 +13,7 @@ from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.fleet.fleet_keys import OF_FLEET, OF_ROBOT
 from swarmwire.deploy.fleet.release import release_entries
 from swarmwire.deploy.fleet.robot_settings import operator_network, robot_settings
-from tests.docs.pages import ROOT
+from tests.support.deploy.commands import ROOT
 
 EXAMPLE = ROOT / "examples" / "fleet" / "fleet.toml"
 LEAST: dict[str, Any] = {
@@ -71,10 +71,9 @@ def test_robots_at_one_address_get_ports_one_after_the_other(tmp_path):
     endpoints = [robot.endpoint for robot in read(tmp_path, robots=robots).robots]
     assert endpoints == ["tcp/h:7557", "tcp/h:7558", "tcp/i:7557", "tcp/h:9000"]
     robots["d"]["network_port"] = 7557
-    with pytest.raises(
-        BadInput, match=r"robots\.d\.network_port: expected a port that a, at the same address, has not"
-    ):
+    with pytest.raises(BadInput) as refused:
         read(tmp_path, robots=robots)
+    assert refused.value.key == "robots.d.network_port"
 
 
 def test_every_two_robots_are_linked_by_one_of_them(tmp_path):
@@ -119,54 +118,46 @@ def test_files_are_beside_the_robots_settings(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changed", "expected"),
+    ("changed", "key"),
     [
-        ({"swarm": None}, "swarm: is missing"),
-        ({"swarm": "a/*"}, "swarm: expected 1 to 63 letters"),
-        ({"robot": {}}, r"robot: unknown key; expected .*\(did you mean robots\?\)"),
-        ({"robots": {}}, r"robots: expected at least one robot, such as \[robots.flock-0\]"),
-        ({"robots": {"a b": {"address": "h"}}}, "robots.a b: expected 1 to 63 letters"),
-        ({"robots": {"env": {"address": "h"}}}, "robots.env: expected another name: on hosts ~/swarmwire/env is not"),
-        ({"robots": {"a": {}}}, "robots.a.address: is missing, here and in defaults"),
-        ({"robots": {"a": {"adress": "h"}}}, r"robots.a.adress: unknown key; .*\(did you mean address\?\)"),
-        ({"robots": {"a": 3}}, "robots.a: expected a table, got 3"),
-        ({"robots": {"a": {"address": 3}}}, "robots.a.address: expected a text, got 3"),
-        ({"robots": {"a": {"address": ""}}}, "robots.a.address: expected a text that is not empty"),
-        ({"robots": {"a": {"address": "h", "port": 0}}}, "robots.a.port: expected a port, 1 to 65535, got 0"),
-        ({"robots": {"a": {"address": "h", "port": True}}}, "robots.a.port: expected a whole number, got True"),
-        (
-            {"robots": {"a": {"address": "h", "groups": ["rad"]}}},
-            r"robots.a.groups: .*\(did you mean red\?\); got 'rad'",
-        ),
-        ({"robots": {"a": {"address": "h", "groups": [1]}}}, r"robots.a.groups: expected a list of texts, got \[1\]"),
-        (
-            {"robots": {"a": {"address": "h"}, "b": {"address": "h", "python": "p"}}},
-            "robots.b: expected the python and",
-        ),
-        ({"defaults": {"user": "pi", "address": "h"}}, "defaults.address: unknown key"),
-        ({"groups": {"red": {"groups": ["blue"]}}}, "groups.red.groups: unknown key"),
-        ({"groups": {"red": {"rate_hz": 1.5}}}, "groups.red.rate_hz: expected a whole number, got 1.5"),
-        ({"insecure": None}, "certificates: expected the folder of `swarmwire certs`, or insecure = true"),
-        ({"certificates": "certs"}, "insecure: expected either certificates or insecure = true"),
+        ({"swarm": None}, "swarm"),
+        ({"swarm": "a/*"}, "swarm"),
+        ({"robot": {}}, "robot"),
+        ({"robots": {}}, "robots"),
+        ({"robots": {"a b": {"address": "h"}}}, "robots.a b"),
+        ({"robots": {"env": {"address": "h"}}}, "robots.env"),
+        ({"robots": {"a": {}}}, "robots.a.address"),
+        ({"robots": {"a": {"adress": "h"}}}, "robots.a.adress"),
+        ({"robots": {"a": 3}}, "robots.a"),
+        ({"robots": {"a": {"address": 3}}}, "robots.a.address"),
+        ({"robots": {"a": {"address": ""}}}, "robots.a.address"),
+        ({"robots": {"a": {"address": "h", "port": 0}}}, "robots.a.port"),
+        ({"robots": {"a": {"address": "h", "port": True}}}, "robots.a.port"),
+        ({"robots": {"a": {"address": "h", "groups": ["rad"]}}}, "robots.a.groups"),
+        ({"robots": {"a": {"address": "h", "groups": [1]}}}, "robots.a.groups"),
+        ({"robots": {"a": {"address": "h"}, "b": {"address": "h", "python": "p"}}}, "robots.b"),
+        ({"defaults": {"user": "pi", "address": "h"}}, "defaults.address"),
+        ({"groups": {"red": {"groups": ["blue"]}}}, "groups.red.groups"),
+        ({"groups": {"red": {"rate_hz": 1.5}}}, "groups.red.rate_hz"),
+        ({"insecure": None}, "certificates"),
+        ({"certificates": "certs"}, "insecure"),
     ],
 )
-def test_what_is_wrong_is_refused_in_one_line(tmp_path, changed, expected):
-    with pytest.raises(BadInput, match=rf"^{tmp_path}/fleet\.toml: {expected}"):
+def test_what_is_wrong_is_refused_with_its_key(tmp_path, changed, key):
+    with pytest.raises(BadInput, match="^[^\n]*$") as refused:
         read(tmp_path, **changed)
+    assert (refused.value.where, refused.value.key) == (str(tmp_path / "fleet.toml"), key)
 
 
-@pytest.mark.parametrize(("text", "expected"), [("a = ", "expected TOML"), (None, "expected a readable file")])
-def test_what_is_no_file_of_a_fleet_is_refused(tmp_path, text, expected):
+@pytest.mark.parametrize("text", ["a = ", None])
+def test_what_is_no_file_of_a_fleet_is_refused(tmp_path, text):
     if text is not None:
         (tmp_path / "fleet.toml").write_text(text)
-    with pytest.raises(BadInput, match=expected):
+    with pytest.raises(BadInput) as refused:
         read_fleet(tmp_path / "fleet.toml")
+    assert refused.value.where == str(tmp_path / "fleet.toml")
 
 
-def test_every_key_stands_on_the_page_and_in_the_example():
-    page, example = (ROOT / "docs" / "fleet.md").read_text(), EXAMPLE.read_text()
-    rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
-    told = {name for row in rows for name in row.split("`")[1::2]}
-    assert {*OF_FLEET, *OF_ROBOT} <= told
-    in_example = {line.lstrip("# ").split(" ")[0] for line in example.splitlines() if " = " in line}
+def test_the_example_shows_every_key():
+    in_example = {line.lstrip("# ").split(" ")[0] for line in EXAMPLE.read_text().splitlines() if " = " in line}
     assert {*OF_ROBOT, *OF_FLEET} - in_example == {"defaults", "robots", "groups", "insecure", "seed"} - in_example

@@ -136,22 +136,23 @@ def test_the_picture_has_distances_to_read_off(here, monkeypatch, capsys, farthe
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "where"),
     [
-        (["log.csv", "--power-dbm", "nan"], "--power-dbm: expected at least -100 dBm, got nan"),
-        (["log.csv", "--gain-dbi", "nan"], "--gain-dbi: expected at least -100 dBi, got nan"),
-        (["log.csv", "--power-dbm", "inf"], "--power-dbm: expected at most 100 dBm, got inf"),
-        (["absent.csv"], "absent.csv: expected a log: there is no such file or folder"),
-        (["log.csv", "--write", "radio.json"], "radio.json: expected a file name that ends in .toml"),
-        (["log.csv", "--write", "absent/radio.toml"], "absent/radio.toml: expected a path in a folder that exists"),
-        (["log.csv", "--to", "fit.bmp"], "fit.bmp: expected a file name that ends in .png or .svg or .pdf"),
-        (["log.csv", "--within", "0.5"], "--within: expected a distance within which there are packets, got 0.5 m"),
+        (["log.csv", "--power-dbm", "nan"], "--power-dbm"),
+        (["log.csv", "--gain-dbi", "nan"], "--gain-dbi"),
+        (["log.csv", "--power-dbm", "inf"], "--power-dbm"),
+        (["absent.csv"], "absent.csv"),
+        (["log.csv", "--write", "radio.json"], "radio.json"),
+        (["log.csv", "--write", "absent/radio.toml"], "absent/radio.toml"),
+        (["log.csv", "--to", "fit.bmp"], "fit.bmp"),
+        (["log.csv", "--within", "0.5"], "--within"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(here, monkeypatch, capsys, arguments, told):
+def test_what_cannot_be_is_refused_in_one_line(here, monkeypatch, capsys, arguments, where):
     (here / "log.csv").write_text(SMALL)
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", *arguments)
-    assert (code, out, errors) == (2, "", f"error: {told}\n")
+    assert (code, out, errors.count("\n")) == (2, "", 1)
+    assert errors.startswith(f"error: {where}: ")
 
 
 def test_brackets_in_notes_are_printed_as_they_are(here, monkeypatch, capsys):
