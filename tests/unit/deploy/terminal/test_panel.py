@@ -49,18 +49,30 @@ def shown(figures: Figures, controls: Controls, health: RunnerHealth | None, col
     return console.file.getvalue().splitlines()
 
 
-@pytest.mark.parametrize(("columns", "rows"), [(80, 24), (120, 40), (60, 24)])
-@pytest.mark.parametrize("radio", [True, False])
-@pytest.mark.parametrize("arenas", [1, 8])
-@pytest.mark.parametrize("health", [HEALTH, None])
-@pytest.mark.parametrize("factor", [None, 1.5])
+@pytest.mark.parametrize(
+    ("columns", "rows", "radio", "arenas", "health", "factor"),
+    [  # every two values of any two columns are together in a row
+        (80, 24, True, 1, HEALTH, None),
+        (80, 24, True, 8, None, 1.5),
+        (80, 24, False, 1, None, 1.5),
+        (80, 24, False, 8, HEALTH, None),
+        (120, 40, True, 1, None, None),
+        (120, 40, True, 8, HEALTH, 1.5),
+        (120, 40, False, 1, HEALTH, 1.5),
+        (120, 40, False, 8, None, None),
+        (60, 24, True, 1, HEALTH, 1.5),
+        (60, 24, True, 8, None, None),
+        (60, 24, False, 1, None, None),
+        (60, 24, False, 8, HEALTH, 1.5),
+    ],
+)
 def test_the_panel_is_as_wide_as_the_terminal_and_as_high_all_the_time(columns, rows, radio, arenas, health, factor):
     clock = FakeClock()
     pace = None if factor is None else Pace(clock, 10, factor, lambda _: None)
     controls = Controls(clock, 10, pace)
     of = static(20, arenas, radio)
     heights = set()
-    for ticks in (0, 1, 15, 900):
+    for ticks in (0, 1, 15, 100):
         figures = seen(of, ticks, clock)
         for ask in (controls.toggle_help, controls.toggle_pause, controls.toggle_help, controls.toggle_pause):
             lines = shown(figures, controls, health, columns, rows)
@@ -103,6 +115,20 @@ def test_figures_are_those_of_the_last_second_and_of_the_whole_run():
     assert figures.speed(1.0) == pytest.approx(0.5)
     assert figures.speed(10.0) == pytest.approx(4.0 / 5.0, rel=0.02)
     assert figures.levels == ("order", "components")
+
+
+def test_arenas_that_have_stopped_are_told_once_there_are_any():
+    of, metrics = static(2, arenas=3), Metrics(["order"])
+    figures = Figures(10, metrics, FakeClock())
+    metrics.begin(of)
+    figures.begin(of)
+    told = []
+    for tick, running in enumerate(([1, 1, 1], [1, 0, 1], [0, 0, 1])):
+        now = truth(of, tick, running=np.array(running, np.bool_))
+        metrics.see(now)
+        figures.see(now)
+        told.append(figures.gone)
+    assert told == ["", ", 2 of 3 arenas go on", ", 1 of 3 arenas go on"]
 
 
 def test_what_is_averaged_together_stays_so_as_the_minute_moves_on():
