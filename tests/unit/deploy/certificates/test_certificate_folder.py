@@ -29,7 +29,7 @@ def refusal(folder: Path, clock: DatedFakeClock, *names: str) -> str:
 def test_a_good_certificate_is_replaced_only_where_that_is_asked_for(folder: Path, clock: DatedFakeClock):
     issue(folder, [wanted("flock-0", ("10.0.0.5",))], 365, clock)
     old = (folder / "flock-0.key").read_bytes()
-    assert "has a certificate until 2027-06-01T12:00:00Z" in refusal(folder, clock, "flock-0")
+    assert "2027-06-01T12:00:00Z" in refusal(folder, clock, "flock-0")
     (again,) = issued(folder, clock, "flock-0", renew=True)
     assert again.hosts == ("10.0.0.5",)
     assert (folder / REPLACED / "flock-0.1.key").read_bytes() == old != (folder / "flock-0.key").read_bytes()
@@ -69,14 +69,13 @@ def test_a_revoked_name_is_listed_and_never_issued_again(folder: Path, clock: Da
     serials = {of.serial_number for of in listed}
     assert serials == {int(of.serial, 16) for of in register.certificates if of.name == "flock-0"}
     clock.pass_days(400)  # nor when all its certificates have ended
-    said = refusal(folder, clock, "flock-2", "flock-0")
-    assert "flock-0 is revoked" in said
-    assert f"swarmwire certs init --renew {folder}" in said
+    assert "flock-0 is revoked" in refusal(folder, clock, "flock-2", "flock-0")
 
 
 def test_a_name_without_certificate_cannot_be_revoked(folder: Path, clock: DatedFakeClock):
-    with pytest.raises(BadInput, match="flock-9: has no certificate"):
+    with pytest.raises(BadInput) as refused:
         revoke(folder, "flock-9", clock)
+    assert (refused.value.where, refused.value.key) == (str(folder), "flock-9")
 
 
 def test_a_renewed_ca_knows_no_names_and_the_old_one_is_kept(folder: Path, clock: DatedFakeClock):
@@ -90,8 +89,9 @@ def test_a_renewed_ca_knows_no_names_and_the_old_one_is_kept(folder: Path, clock
 
 
 def test_a_ca_is_begun_in_no_folder_that_has_something(folder: Path, clock: DatedFakeClock):
-    with pytest.raises(BadInput, match="expected a new or empty folder"):
+    with pytest.raises(BadInput) as refused:
         begin_authority(folder, clock)
+    assert refused.value.where == str(folder)
 
 
 def test_what_a_killed_process_left_behind_is_put_aside_and_kept(
@@ -119,32 +119,30 @@ def test_a_key_that_others_may_read_is_refused_with_the_cure(folder: Path, clock
 
 def test_a_ca_that_has_ended_or_not_begun_issues_nothing(folder: Path, clock: DatedFakeClock):
     clock.pass_days(-2)
-    assert "before the CA began, 2026-05-31T12:00:00Z: set the clock" in refusal(folder, clock, "flock-0")
+    assert "began, 2026-05-31T12:00:00Z" in refusal(folder, clock, "flock-0")
     clock.pass_days(2 + 3652)
-    assert f"the CA ended on 2036-05-31T12:00:00Z: swarmwire certs init --renew {folder}" in refusal(
-        folder, clock, "flock-0"
-    )
+    assert "ended on 2036-05-31T12:00:00Z" in refusal(folder, clock, "flock-0")
 
 
 def test_a_clock_that_was_never_set_dates_nothing(tmp_path: Path):
-    with pytest.raises(BadInput, match="the clock of this machine: shows 1970-01-01T00:00:05Z: set it first"):
+    with pytest.raises(BadInput, match="1970-01-01T00:00:05Z"):
         begin_authority(tmp_path / "ca", DatedFakeClock("1970-01-01T00:00:05Z"))
     assert not (tmp_path / "ca").exists()
 
 
 @pytest.mark.parametrize(
-    ("damage", "expected"),
+    ("damage", "where"),
     [
-        ("remove", "expected a CA's folder: swarmwire certs init"),
-        ("remove-key", "ca.key: expected a readable key: No such file"),
-        ("other-key", "ca.key: expected the key of ca.pem"),
-        ("no-pem", "expected PEM in ca.pem and ca.key"),
-        ("no-register", "expected a CA's folder: swarmwire certs init"),
-        ("half-register", f"{REGISTER}: expected the register that `swarmwire certs` keeps"),
+        ("remove", ""),
+        ("remove-key", "ca.key"),
+        ("other-key", "ca.key"),
+        ("no-pem", ""),
+        ("no-register", ""),
+        ("half-register", REGISTER),
     ],
 )
-def test_a_folder_that_is_damaged_is_told_as_such(
-    folder: Path, clock: DatedFakeClock, tmp_path: Path, damage: str, expected: str
+def test_what_is_damaged_in_a_folder_is_named(
+    folder: Path, clock: DatedFakeClock, tmp_path: Path, damage: str, where: str
 ):
     register, key = folder / REGISTER, folder / "ca.key"
     if damage == "remove":
@@ -160,22 +158,22 @@ def test_a_folder_that_is_damaged_is_told_as_such(
         register.unlink()
     else:
         register.write_text(register.read_text()[:-20])
-    assert expected in refusal(folder, clock, "flock-0")
+    assert refusal(folder, clock, "flock-0").startswith(f"{folder / where}: ")
 
 
 @pytest.mark.parametrize("name", ["", "radio/*", "a b", "-a", "a-", "0", "ä", "a" * 64, "a\n", "ca", "CA", "../x"])
 def test_a_bad_name_is_refused(name: str):
-    with pytest.raises(BadInput, match="NAME: expected"):
+    with pytest.raises(BadInput, match="^NAME: "):
         wanted(name)
 
 
 @pytest.mark.parametrize("host", ["", "tls/10.0.0.5", "10.0.0.5:7447", "10.0.0.256", "10.0", "a b", "*.lab"])
 def test_a_bad_host_is_refused(host: str):
-    with pytest.raises(BadInput, match="--host: expected an IP address or the name of a host"):
+    with pytest.raises(BadInput, match="^--host: "):
         wanted("flock-0", (host,))
 
 
 def test_names_that_one_file_might_hold_are_refused(folder: Path, clock: DatedFakeClock):
-    assert "expected each name once" in refusal(folder, clock, "flock-0", "Flock-0")
+    assert refusal(folder, clock, "flock-0", "Flock-0").startswith("NAME: ")
     issued(folder, clock, "flock-0")
-    assert "differs from flock-0 in more than capital letters" in refusal(folder, clock, "FLOCK-0")
+    assert refusal(folder, clock, "FLOCK-0").startswith("NAME: ")

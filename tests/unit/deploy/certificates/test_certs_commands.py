@@ -67,7 +67,7 @@ def test_it_warns_of_certificates_that_are_about_to_end(certs: Certs):
     issue(certs.folder, [wanted("old")], 1, past)
     issue(certs.folder, [wanted("gone")], 1, past)
     certs("revoke", "gone")
-    assert certs("list")[1] == f"warning: to be renewed: swarmwire certs issue {certs.folder} old\n"
+    assert certs("list")[1].endswith(f": swarmwire certs issue {certs.folder} old\n")
     certs("issue", "old")
     assert certs("list")[1] == ""
 
@@ -98,10 +98,7 @@ def names_written(out: str) -> list[str]:
 
 
 def test_a_bad_call_is_one_line(certs: Certs):
-    assert (
-        certs("issue", "a")[1]
-        == f"2 error: {certs.folder}: expected a CA's folder: swarmwire certs init {certs.folder}\n"
-    )
+    assert certs("issue", "a")[1].startswith(f"2 error: {certs.folder}: ")
     certs("init")
     for arguments in ((), ("a/b",), ("a", "--host", "b/c"), ("--fleet", "none.toml"), ("a", "--fleet", "none.toml")):
         errors = certs("issue", *arguments)[1]
@@ -111,6 +108,7 @@ def test_a_bad_call_is_one_line(certs: Certs):
 
 def test_what_to_install_is_said_in_one_line(certs: Certs, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("swarmwire.deploy.commands.certs.needed.find_spec", lambda _: None)
-    expected = '1 error: certs needs cryptography, which is not installed: pip install "swarmwire[fleet]"\n'
-    assert certs("init")[1] == expected
+    errors = certs("init")[1]
+    assert errors.startswith("1 error: ")
+    assert 'pip install "swarmwire[fleet]"' in errors
     assert not certs.folder.exists()

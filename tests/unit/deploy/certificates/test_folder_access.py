@@ -47,7 +47,7 @@ def test_a_certificate_is_found_by_its_name_or_as_the_only_one_for_that_purpose(
     assert name_in(network_in(issued, "world")) == "world"
     network = network_in(issued, "runner", "laptop-2")
     assert (name_in(network), network.ca, network.proves) == ("laptop-2", issued / "ca.pem", True)
-    with pytest.raises(BadInput, match="laptop-1, laptop-2 are there: name one"):
+    with pytest.raises(BadInput, match="laptop-1, laptop-2"):
         network_in(issued, "runner")
     with pytest.raises(BadInput, match="nobody"):
         network_in(issued, "runner", "nobody")
@@ -56,8 +56,9 @@ def test_a_certificate_is_found_by_its_name_or_as_the_only_one_for_that_purpose(
 def test_a_machine_with_its_own_files_alone_needs_no_register(issued, tmp_path):
     own = tmp_path / "own"
     own.mkdir()
-    with pytest.raises(BadInput, match="there is none"):
+    with pytest.raises(BadInput) as refused:
         network_in(own, "runner")
+    assert refused.value.where == str(own)
     for name in ("ca.pem", "laptop-1.pem", "laptop-1.key"):
         (own / name).write_bytes((issued / name).read_bytes())
     (own / "laptop-1.key").chmod(0o600)

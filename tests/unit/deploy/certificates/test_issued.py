@@ -1,20 +1,16 @@
 """What a CA issues: its own certificate, those of others, and their keys, as other programs read them."""
 
-import shutil
 import stat
-import subprocess
 from ipaddress import ip_address
 from pathlib import Path
 
-import pytest
 from cryptography import x509
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue, revoke
+from swarmwire.deploy.certificates.certificate_folder import issue
 from swarmwire.deploy.certificates.dates import DAY, date_now
-from swarmwire.deploy.certificates.files import REVOKED
 from swarmwire.deploy.certificates.wanted import wanted
 from tests.support.deploy.certificates.dated import DatedFakeClock
 from tests.support.deploy.certificates.made import certificate, issued
@@ -56,22 +52,3 @@ def test_a_key_is_its_certificates_on_p256_and_its_owners_alone(folder: Path, cl
         assert key.public_key() == certificate(folder, name).public_key()
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
         assert path.read_text().startswith("-----BEGIN PRIVATE KEY-----")  # PKCS#8
-
-
-@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed")
-def test_openssl_takes_what_is_good_and_refuses_what_is_revoked(folder: Path):
-    from swarmwire.comms.clock import WallClock
-
-    shutil.rmtree(folder)  # openssl knows only today
-    begin_authority(folder, WallClock())
-    issue(folder, [wanted(name, ("10.0.0.5",)) for name in ("flock-0", "flock-1")], 30, WallClock())
-    revoke(folder, "flock-1", WallClock())
-
-    def verified(name: str, *more: str) -> bool:
-        command = ["openssl", "verify", "-x509_strict", "-crl_check", "-CRLfile", REVOKED, "-CAfile", "ca.pem", *more]
-        return not subprocess.run([*command, f"{name}.pem"], cwd=folder, capture_output=True, check=False).returncode
-
-    assert verified("flock-0", "-purpose", "sslserver", "-verify_ip", "10.0.0.5")
-    assert verified("flock-0", "-purpose", "sslclient", "-verify_hostname", "flock-0")
-    assert not verified("flock-0", "-verify_ip", "10.0.0.6")
-    assert not verified("flock-1")
