@@ -1,6 +1,6 @@
 """Fuzzing at length: `python -m tests.tools.fuzz [TARGET…] --cases N --seed S --seconds S`.
 
-Prints a table, and exits with 1 if there are findings. `--reproduce BLOB` runs the case of a finding again.
+Prints a table row by row, and exits with 1 if there are findings. `--reproduce BLOB` runs the case of a finding again.
 """
 
 import argparse
@@ -23,17 +23,20 @@ def main() -> int:
     """Fuzz the targets."""
     options = _options()
     warnings.simplefilter("error")
-    reports: list[Report] = []
+    columns = ("cases", "accepted", "refused", "kinds", "findings", "slowest", "CPU", "growth")
+    print(f"{'target':<18}" + "".join(f"{column:>10}" for column in columns))
+    found = 0
     for name in options.targets or list(TARGETS):
         with tempfile.TemporaryDirectory(prefix="fuzz-") as folder:
             target = TARGETS[name](Path(folder))
             if options.reproduce:
-                reports.append(fuzz(target, SOAK, 1, blob=options.reproduce))
+                report = fuzz(target, SOAK, 1, blob=options.reproduce)
             else:
-                reports.append(_soak(target, options.cases or target.soak, options.seed, options.seconds))
+                report = _soak(target, options.cases or target.soak, options.seed, options.seconds)
+        _show(report, options.refusals)
+        found += len(report.findings)
     faulthandler.cancel_dump_traceback_later()
-    _show(reports, options.refusals)
-    return int(any(report.findings for report in reports))
+    return int(found > 0)
 
 
 def _options() -> argparse.Namespace:
@@ -59,22 +62,16 @@ def _soak(target: Target, cases: int, seed: int, seconds: float) -> Report:
     return soak(target, cases, seed, go_on)
 
 
-def _show(reports: list[Report], refusals: bool) -> None:
-    for report in reports:
-        for finding in report.findings:
-            print(f"\n{finding}")
-    columns = ("target", "cases", "accepted", "refused", "kinds", "findings", "slowest", "CPU", "growth")
-    print(f"\n{columns[0]:<18}" + "".join(f"{column:>10}" for column in columns[1:]))
-    for report in reports:
-        refused = report.cases - report.accepted - report.kinds["finding"]
-        kinds = len(report.kinds.keys() - {ACCEPTED, "finding"})
-        counts = (report.cases, report.accepted, refused, kinds, len(report.findings))
-        print(f"{report.target:<18}" + "".join(f"{count:>10}" for count in counts), end="")
-        print(f"{report.slowest_s * 1000:>7.0f} ms{report.cpu_s:>8.0f} s{report.growth_mb:>7.0f} MB")
-    for report in reports if refusals else ():
-        print(f"\n{report.target}")
-        for kind, count in report.kinds.most_common():
-            print(f"{count:>9} {kind}")
+def _show(report: Report, refusals: bool) -> None:
+    for finding in report.findings:
+        print(f"\n{finding}\n")
+    refused = report.cases - report.accepted - report.kinds["finding"]
+    kinds = len(report.kinds.keys() - {ACCEPTED, "finding"})
+    counts = (report.cases, report.accepted, refused, kinds, len(report.findings))
+    print(f"{report.target:<18}" + "".join(f"{count:>10}" for count in counts), end="")
+    print(f"{report.slowest_s * 1000:>7.0f} ms{report.cpu_s:>8.0f} s{report.growth_mb:>7.0f} MB", flush=True)
+    for kind, count in report.kinds.most_common() if refusals else ():
+        print(f"{count:>28} {kind}")
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ _SHARED: dict[str, Any] = {
 QUICK = settings(derandomize=True, **_SHARED)  # for the test suite
 SOAK = settings(derandomize=False, **_SHARED)
 AVERAGE_CASES = 6  # of an example, if it may have 20
-BATCH = 600  # cases for which Hypothesis remembers what it tried; between two looks at the time and the memory
+BATCH = 600  # cases, at most a hundredth of a soak: Hypothesis then forgets what it tried, time and memory are checked
 MAX_FINDINGS = 5  # of a target: more say the same
 MAX_CASE_MB = 300  # that the peak of the process may grow by in one case
 MAX_GROWTH_MB = 64.0  # from a quarter of the cases to their end
@@ -98,8 +98,9 @@ def fuzz(target: Target, profile: settings, cases: int, seed: str = "", blob: st
 def soak(target: Target, cases: int, seed: int, go_on: Callable[[Report], bool]) -> Report:
     """Run at least so many cases in batches, for as long as `go_on` says so, and measure the growth of memory."""
     report, base_mb, batch = Report(target.name), 0.0, 0
+    size = min(BATCH, target.soak // 100, cases)
     while report.cases < cases and len(report.findings) < MAX_FINDINGS and go_on(report):
-        part = fuzz(target, SOAK, min(BATCH, cases - report.cases), f"{seed}/{target.name}/{batch}")
+        part = fuzz(target, SOAK, size, f"{seed}/{target.name}/{batch}")
         report.kinds += part.kinds
         report.findings += part.findings
         report.cpu_s += part.cpu_s

@@ -101,13 +101,14 @@ class Epuck2Answers(ByteTarget):
     def feed(self, case: bytes) -> str | None:
         driver = Epuck2Driver("127.0.0.1", EPUCK2, Epuck2Options(north_deg=30.0), CLOCK)
         arriving = chunks(case)
-        driver._link, refused = link_of(arriving), None
+        link, refused = link_of(arriving), None
+        driver._link = link
         try:
             for _ in range(len(arriving)):
-                driver._link.receive(0.0)
+                link.receive(0.0)
         except DriverLost:
             refused = "lost"
-        driver._take(driver._link)
+        driver._take(link)
         for name, value in driver._readings.of(driver._told_sensors, driver.gives).items():
             if value.dtype != np.float64:
                 raise AssertionError(f"{name} of {value.dtype}")
