@@ -14,7 +14,7 @@ from msgpack.exceptions import UnpackException
 
 from swarmwire.comms.errors import BadFrame
 
-UNCOUNTED_BYTES = 64 * 1024  # become a few MB at most
+UNCOUNTED_BYTES = 64 * 1024  # become a few MB at most; pragma: no mutate (only memory differs)
 MOST_ITEMS = 500_000  # lists, maps and what is in them: some 40 MB; of a frame's arrays each is one
 
 

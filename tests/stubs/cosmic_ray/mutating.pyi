@@ -1,3 +1,0 @@
-from cosmic_ray.plugins import Operator
-
-def mutate_code(code: str, operator: Operator, occurrence: int) -> str: ...
