@@ -15,7 +15,7 @@ import pytest
 from swarmwire.agent.joining import Joining, join
 from swarmwire.agent.runner import Inbox
 from swarmwire.comms.errors import RunnerLost
-from swarmwire.deploy import RunFolder, run
+from swarmwire.deploy import RunFolder, repeat, run
 from tests.support.deploy.commands import LOSSY, called, swarmwire
 from tests.support.deploy.pseudo_terminal import terminal
 
@@ -77,7 +77,7 @@ def test_two_terminals_make_the_same_run_as_one(tmp_path):
     assert summary is not None
     assert summary["trajectory_sha256"] == run(LOSSY, overrides=["duration_s=2"]).trajectory_sha256
     assert [change["what"] for change in summary["runner_changes"]] == ["joined", "joined"]
-    assert swarmwire("repeat", folder).returncode == 0
+    assert repeat(folder).same
 
 
 def test_a_run_that_cannot_be_observed_as_wanted_is_refused_before_anybody_joins(tmp_path):
@@ -105,12 +105,13 @@ def test_certificates_are_asked_for_beyond_this_machine(tmp_path, monkeypatch, c
 
 
 @pytest.fixture
-def certs(tmp_path) -> Path:
+def certs(tmp_path, monkeypatch, capsys) -> Path:
     folder = tmp_path / "certs"
-    assert swarmwire("certs", "init", folder).returncode == 0
+    assert called(monkeypatch, capsys, "certs", "init", folder)[0] == 0
     for name, purpose in (("world", "world"), ("r1", "runner"), ("r2", "runner"), ("eye", "observer")):
-        done = swarmwire("certs", "issue", folder, name, "--for", purpose, "--host", "127.0.0.1")
-        assert done.returncode == 0, done.stderr
+        issue = ("certs", "issue", folder, name, "--for", purpose, "--host", "127.0.0.1")
+        code, _, errors = called(monkeypatch, capsys, *issue)
+        assert code == 0, errors
     return folder
 
 

@@ -278,7 +278,7 @@ def test_every_metric_ends_where_its_arena_does(tmp_path: Path) -> None:
 
 def test_a_record_holds_of_an_arena_what_it_holds_of_one_alone(tmp_path: Path) -> None:
     path, what = scenario(tmp_path, "disk"), Recording(packets=1.0, links=True, rrd=False)
-    result = packed(path, (3, 5, 1), out=tmp_path / "together", record=replace(what, rrd=True))
+    packed(path, (3, 5, 1), out=tmp_path / "together", record=what)
     for at, seed in ((0, 3), (2, 1)):
         alone(path, seed, out=tmp_path / f"{seed}", record=what)
         for name in ("ticks", "packets", "events", "radio_robots", "radio_distances", "radio_links"):
@@ -288,6 +288,10 @@ def test_a_record_holds_of_an_arena_what_it_holds_of_one_alone(tmp_path: Path) -
                 table = table.head(len(own))  # which are as many in all arenas
             assert table.equals(own), name
     assert RunFolder(tmp_path / "together").ticks().height == 11 + TICKS + 6
+
+
+def test_a_run_that_arenas_left_is_recorded_whole_and_repeated(tmp_path: Path) -> None:
+    result = packed(scenario(tmp_path, "disk"), (3, 5, 1), out=tmp_path / "together")
     assert [found.part for found in verify(tmp_path / "together") if not found.good] == []
     rerun = RepeatedRun(tmp_path / "together")
     rerun.simulation.judge = Stops((3, 5, 1), OVER)

@@ -29,7 +29,7 @@ class StatesSeen:
 
 def states(runners: int | None, seeds: Sequence[int]) -> list[list[str]]:
     seen = StatesSeen()
-    run_spread(PSO, runners, seeds=seeds, overrides=["duration_s=15"], observers=[seen])
+    run_spread(PSO, runners, seeds=seeds, overrides=["duration_s=10"], observers=[seen])
     return seen.ticks
 
 

@@ -80,12 +80,13 @@ def mixed(tmp_path):
 @pytest.mark.parametrize(("scouts", "every"), [(1, 3), (2, 5)])
 def test_two_groups_of_different_rates_run_alike_in_every_layout(mixed, scouts, every):
     path = mixed(scouts, every)
-    local = run(path, seeds=[1, 2])
+    short = ["duration_s=3"]
+    local = run(path, seeds=[1, 2], overrides=short)
     for runners in (1, 3, PER_ROBOT):
-        other = run_spread(path, runners, seeds=[1, 2])
+        other = run_spread(path, runners, seeds=[1, 2], overrides=short)
         assert other.trajectory_sha256 == local.trajectory_sha256
         assert [arena.radio for arena in other.arenas] == [arena.radio for arena in local.arenas]
-    assert run(path, seed=2).trajectory_sha256[0] == local.trajectory_sha256[1]
+    assert run(path, seed=2, overrides=short).trajectory_sha256[0] == local.trajectory_sha256[1]
 
 
 def test_a_group_sends_as_often_as_it_acts(mixed):

@@ -8,7 +8,7 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.deploy import repeat
+from swarmwire.deploy import Recording, repeat
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.verify.verify import verify
@@ -46,6 +46,9 @@ class Turning(VectorAgent):
 """
 
 
+LEAN = Recording(rrd=False)
+
+
 class Kept:
     """Observer that keeps the numbers of all ticks, and how far they are apart."""
 
@@ -75,7 +78,7 @@ def agents(tmp_path: Path) -> Path:
 def kept(agents: Path, kind: str, runners: int | None, seeds: list[int], out: Path | None = None) -> Kept:
     seen = Kept()
     setting = [f"robots.flock.agent={agents}:{kind}", "robots.flock.params={}", "duration_s=3"]
-    run_spread(LOSSY, runners, seeds=seeds, overrides=setting, observers=[seen], out=out)
+    run_spread(LOSSY, runners, seeds=seeds, overrides=setting, observers=[seen], out=out, record=LEAN)
     return seen
 
 
@@ -114,5 +117,5 @@ def test_they_are_recorded_from_the_first_on_and_a_repetition_is_the_same(agents
     ]
     assert table["value"].to_list() == expected
     assert seen.values[0] is None
-    assert repeat(folder, out=tmp_path / "again").same
+    assert repeat(folder, out=tmp_path / "again", record=LEAN).same
     assert RunFolder(tmp_path / "again").ticks(1)["value"].to_list() == expected

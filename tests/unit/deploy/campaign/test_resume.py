@@ -1,14 +1,15 @@
 """A campaign that was ended at any moment is gone on with, and comes to what it would have come to."""
 
 import json
+from shutil import copytree
 
 import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign import campaign_folder
+from swarmwire.deploy.campaign import campaign_folder, sweeping
 from swarmwire.deploy.campaign.campaign import read_campaign
-from tests.support.deploy.campaign.small import rows_in, series_in
+from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
 
 VARY = {"radio.loss": [0.0, 0.5]}
 ASKED = {"seeds": 4, "vary": VARY, "pack": 2}
@@ -18,11 +19,20 @@ class Killed(BaseException):
     """Stands for a process that is no more."""
 
 
-@pytest.fixture
-def whole(tmp_path, stumbling, here):
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
     """A campaign that was left alone."""
-    sweep(stumbling, out=tmp_path / "whole", **ASKED)
-    return tmp_path / "whole"
+    folder = tmp_path_factory.mktemp("undisturbed")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
+        sweep(scenario_in(folder, "stumbling.py:Stumbling"), out=folder / "whole", **ASKED)
+    return folder / "whole"
+
+
+@pytest.fixture
+def whole(undisturbed, tmp_path, here):
+    """A copy of it."""
+    return copytree(undisturbed, tmp_path / "whole")
 
 
 def dying_at(monkeypatch, count, error):
@@ -48,29 +58,26 @@ def same(folder, whole):
 WRITES = 9  # four pieces of rows and series each, and the table
 
 
-def test_whichever_write_was_the_last_nothing_is_lost_or_there_twice(tmp_path, stumbling, whole, monkeypatch):
-    tried = []
-    for count in range(WRITES):
-        folder = tmp_path / f"died{count}"
-        with monkeypatch.context() as patched:
-            tried = dying_at(patched, count, Killed())
-            with pytest.raises(Killed):
-                sweep(stumbling, out=folder, **ASKED)
-        before = rows_in(folder)
-        assert len(before) == 2 * (count // 2)
-        assert all(row in rows_in(whole) for row in before)
-        done = resume(folder)
-        assert done.is_over
-        same(folder, whole)
-    assert len(tried) == WRITES
+@pytest.mark.parametrize("count", [0, 1, 4, WRITES - 2, WRITES - 1])
+def test_whichever_write_was_the_last_nothing_is_lost_or_there_twice(tmp_path, stumbling, whole, monkeypatch, count):
+    folder = tmp_path / "died"
+    with monkeypatch.context() as patched:
+        tried = dying_at(patched, count, Killed())
+        with pytest.raises(Killed):
+            sweep(stumbling, out=folder, **ASKED)
+    assert len(tried) == count + 1
+    before, rows = rows_in(folder), rows_in(whole)
+    assert len(before) == 2 * (count // 2)
+    assert all(row in rows for row in before)
+    assert resume(folder).is_over
+    same(folder, whole)
 
 
-def test_only_what_is_missing_is_run(tmp_path, whole, here):
+def test_only_what_is_missing_is_run(whole, here):
     (whole / "summary.parquet").unlink()
     assert resume(whole).done == 8
     assert resume(whole).is_over
-    (tmp_path / "stumbling.py").unlink()  # the folder holds its own
-    assert [len(executor.tasks) for executor in here] == [0, 0, 0]
+    assert [len(executor.tasks) for executor in here] == [0, 0]
 
 
 def test_failed_runs_stay_unless_they_are_to_be_tried_again(tmp_path, whole):

@@ -49,9 +49,8 @@ def test_each_run_has_a_row_that_says_what_a_run_of_its_own_would(reference):
     assert row["target_best.final"] is None
 
 
-@pytest.mark.parametrize("pack", [1, 2])
-def test_rows_and_series_do_not_depend_on_packs(reference, tmp_path, here, pack):
-    sweep(reference / "two.toml", seeds=3, vary=VARY, out=tmp_path / "c", pack=pack)
+def test_rows_and_series_do_not_depend_on_packs(reference, tmp_path, here):
+    sweep(reference / "two.toml", seeds=3, vary=VARY, out=tmp_path / "c", pack=2)
     assert rows_in(tmp_path / "c") == rows_in(reference / "c")
     assert series_in(tmp_path / "c").equals(series_in(reference / "c"), null_equal=True)
     assert here[0].closed
@@ -108,12 +107,12 @@ def test_files_that_points_name_are_kept_with_the_campaign(tmp_path, scenario, h
 
 
 def test_chosen_seeds_are_recorded_in_full(tmp_path, scenario, here):
-    sweep(scenario, seeds=3, vary={"radio.loss": [0.0, 0.5]}, out=tmp_path / "c", record_seeds=[2])
-    assert sorted(path.name for path in (tmp_path / "c" / "runs").iterdir()) == ["run-000001", "run-000004"]
-    recorded = RunFolder(tmp_path / "c" / "runs" / "run-000004")
+    sweep(scenario, seeds=2, vary={"radio.loss": [0.0, 0.5]}, out=tmp_path / "c", record_seeds=[2])
+    assert sorted(path.name for path in (tmp_path / "c" / "runs").iterdir()) == ["run-000001", "run-000003"]
+    recorded = RunFolder(tmp_path / "c" / "runs" / "run-000003")
     assert (recorded.path / "run.rrd").exists()
     assert recorded.summary is not None
-    assert recorded.summary["trajectory_sha256"] == [rows_in(tmp_path / "c")[4]["trajectory_sha256"]]
+    assert recorded.summary["trajectory_sha256"] == [rows_in(tmp_path / "c")[3]["trajectory_sha256"]]
 
 
 def test_where_workers_cannot_write_here_recorded_runs_are_done_on_this_machine_at_the_end(
