@@ -7,10 +7,12 @@ import pytest
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.geometry.obstacles import is_blocked, obstacle_arrays
 from swarmwire.comms.truth import Group, Obstacle, Static
 from swarmwire.metrics.drawing.film import NO_STATE, Film
 from swarmwire.metrics.drawing.film_figure import FilmFigure
 from swarmwire.metrics.drawing.looks import DEAD, OTHER_STATE, STATE_COLORS
+from swarmwire.metrics.drawing.radio_range import in_range
 from swarmwire.metrics.drawing.scenario_sheet import _facts
 from swarmwire.metrics.palette import robot_color
 from tests.support.metrics.films import LIGHT, OBSTACLES, film, two_groups
@@ -163,14 +165,6 @@ def test_a_saved_picture_shows_what_the_frame_does(tmp_path, index):
     np.testing.assert_array_equal(saved, frame)
 
 
-def test_equal_pictures_are_equal_bytes(tmp_path):
-    for suffix in ("png", "svg", "pdf"):
-        paths = [tmp_path / f"{i}.{suffix}" for i in range(2)]
-        for path in paths:
-            FilmFigure(film(), 300).save(5, path)
-        assert paths[0].read_bytes() == paths[1].read_bytes()
-
-
 def test_the_sides_of_a_frame_are_even_whatever_its_size():
     for size_px in (101, 333, 480):
         height, width, _ = FilmFigure(film(), size_px).frame(0).shape
@@ -232,3 +226,25 @@ def test_a_path_that_cannot_be_written_is_refused(tmp_path, name):
     with pytest.raises(BadInput, match="expected a"):
         FilmFigure(film(), 300).save(0, tmp_path / name)
     assert not any(tmp_path.iterdir())
+
+
+def test_pairs_are_of_those_alive_that_are_near_enough():
+    position_m = np.array([[0.0, 0.0], [1.0, 0.0], [2.5, 0.0], [0.0, 1.0]])
+    alive = np.array([True, True, True, False])
+    assert in_range(position_m, alive, 1.5, ()).tolist() == [[0, 1], [1, 2]]
+    assert in_range(position_m, alive, 1.4, ()).tolist() == [[0, 1]]
+    assert in_range(position_m, ~alive, 9.0, ()).tolist() == []
+    assert in_range(position_m, np.zeros(4, np.bool_), 9.0, ()).tolist() == []
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES, ids=lambda obstacle: obstacle.shape)
+def test_obstacles_are_in_the_way_as_they_are_in_the_air(obstacle: Obstacle):
+    centre = np.array([obstacle.x_m, obstacle.y_m])
+    position_m = centre + np.random.default_rng(4).uniform(-1.0, 1.0, (60, 2))
+    kernel = obstacle_arrays(((obstacle,),))
+    expected = {
+        (i, j) for i in range(60) for j in range(i + 1, 60) if not is_blocked(kernel, 0, *position_m[i], *position_m[j])
+    }
+    found = in_range(position_m, np.ones(60, np.bool_), 9.0, (obstacle,))
+    assert {(min(pair), max(pair)) for pair in found.tolist()} == expected
+    assert 0 < len(expected) < 60 * 59 / 2

@@ -1,6 +1,7 @@
-"""Whether a log lies where emulated runs do. Seeds are fixed; nothing is drawn."""
+"""Whether a log lies where emulated runs do, and what the tables say of it. Seeds are fixed; nothing is drawn."""
 
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 import pytest
@@ -8,11 +9,21 @@ import pytest
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.parity.emulated_runs import EmulatedRun, EmulatedRuns, runs_of_folder
-from swarmwire.metrics.parity.parity import Parity, parity
-from swarmwire.metrics.parity.parity_texts import left_out, meanings, verdict
+from swarmwire.metrics.parity.parity import MetricRow, Parity, RadioRow, Spread, parity
+from swarmwire.metrics.parity.parity_texts import (
+    COLUMNS,
+    RADIO_COLUMNS,
+    left_out,
+    meanings,
+    metric_cells,
+    radio_cells,
+    verdict,
+)
+from swarmwire.metrics.parity.radio_values import RadioValue
 from swarmwire.metrics.real_log.measured_log import measured_log
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.statistics.interval import UNKNOWN
 from tests.support.metrics.real_log.as_logs import BEGAN_S, Watched, as_logs
 from tests.support.metrics.real_log.emulated import watched
 
@@ -197,3 +208,30 @@ def test_two_runs_have_no_spread(runs, tmp_path):
     found = compared(two, watched(seed=11), tmp_path)
     assert not found.judged
     assert verdict(found) == "2 runs have no spread: give 3 seeds or more."
+
+
+NOTHING = np.empty(0)
+
+
+def test_a_metric_has_a_text_for_each_column():
+    row = MetricRow(METRICS["min_gap"](), Spread(0.1, 0.2, 0.3), 0.25, 0.125, 0.05, 0.04, UNKNOWN, (NOTHING,), NOTHING)
+    cells = dict(zip(COLUMNS, metric_cells(row), strict=True))
+    assert cells["metric"].startswith("min_gap")
+    assert cells["emulated"] == "0.2 (0.1 to 0.3)"
+    assert (cells["log"], cells["distance"], cells["spread"], cells["KS"]) == ("0.25", "0.05", "0.04", "0.125")
+    assert cells["within"] == "no"
+
+
+def test_a_single_run_has_a_value_and_no_spread():
+    row = MetricRow(METRICS["order"](), Spread(0.5, 0.5, 0.5), 0.5, 0.0, 0.0, nan, UNKNOWN, (NOTHING,), NOTHING)
+    cells = dict(zip(COLUMNS, metric_cells(row), strict=True))
+    assert cells["emulated"] == "0.5"
+    assert cells["within"] not in ("yes", "no")
+
+
+def test_a_number_of_the_radio_has_a_text_for_each_column():
+    value = RadioValue("latency, median", "s", "how long", (0.01, 0.02, 0.03), log=0.02, grain=0.0)
+    row = RadioRow(value, Spread(0.01, 0.02, 0.03), 3)
+    cells = dict(zip(RADIO_COLUMNS, radio_cells(row), strict=True))
+    assert cells["radio"] == "latency, median [s]"
+    assert (cells["log"], cells["within"]) == ("0.02", "yes")

@@ -1,3 +1,5 @@
+"""The tables of packets and of events."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +10,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import Payloads
 from swarmwire.comms.truth import Happened
+from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.record import packet_recorder
+from swarmwire.metrics.record.event_recorder import EventRecorder
 from swarmwire.metrics.record.packet_columns import PacketSample
 from swarmwire.metrics.record.packet_recorder import PacketRecorder
 from tests.support.clocks import StillClock
@@ -114,3 +118,41 @@ def test_an_event_has_a_row_in_each_arena_with_the_robots_it_changed(tmp_path):
         (0.35, 6, 0.6, "kill", "", True, 0, []),
         (0.35, 6, 0.6, "kill", "", True, 1, []),
     ]
+
+
+def kill(*changed: bool, ended: bool = False) -> Happened:
+    return Happened(0, 0.15, "kill", ended, np.array(changed))
+
+
+def test_the_summary_names_the_robots_of_each_arena():
+    log, of = EventLog(), static(2, arenas=2)
+    log.begin(of)
+    log.see(truth(of, 1))
+    log.see(truth(of, 2, events=(kill(True, False, True, True), kill(False, True, False, False, ended=True))))
+    first, second = log.end(None)["events"]
+    robots = [["flock-0"], ["flock-0", "flock-1"]]
+    expected = {"at_s": 0.15, "tick": 2, "do": "kill", "part": "", "ended": False, "singly": False, "robots": robots}
+    assert first == expected
+    assert (second["ended"], second["robots"]) == (True, [["flock-1"], []])
+
+
+def broken(*changed: bool) -> Happened:
+    return Happened(1, 0.2, "fail", False, np.array(changed), "motors", singly=True)
+
+
+def test_what_failed_is_told_with_its_part():
+    log, of = EventLog(), static(2)
+    log.begin(of)
+    log.see(truth(of, 2, events=(broken(True, False),)))
+    (told,) = log.end(None)["events"]
+    assert (told["do"], told["part"], told["singly"]) == ("fail", "motors", True)
+    assert [event.words for event in (broken(True, True), kill(True, ended=True))] == ["fail motors", "kill ended"]
+
+
+def test_what_happens_singly_has_rows_of_those_arenas_alone_in_which_somebody_changed(tmp_path):
+    of, recorder = static(2, arenas=2), EventRecorder(tmp_path)
+    recorder.begin(of)
+    recorder.see(truth(of, 2, events=(broken(False, False, False, True), kill(True, False, False, False))))
+    assert recorder.end(None)["record_events"]["rows"] == 3
+    rows = pl.read_parquet(tmp_path / "events.parquet").select("do", "part", "arena", "robots").rows()
+    assert rows == [("fail", "motors", 1, ["flock-1"]), ("kill", "", 0, ["flock-0"]), ("kill", "", 1, [])]

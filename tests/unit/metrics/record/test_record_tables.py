@@ -1,13 +1,20 @@
+"""Tables are written in parts, each once it is large or old, and joined at the end; the log beside them."""
+
+from itertools import pairwise
 from threading import Event
 
 import numpy as np
 import polars as pl
 import pytest
 
+from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import RecordFailed
 from swarmwire.metrics.record import table_writer
+from swarmwire.metrics.record.chunk_limit import ChunkLimit
 from swarmwire.metrics.record.part_files import join_parts, parts_of, write_file
+from swarmwire.metrics.record.run_log import RunLog
 from swarmwire.metrics.record.table_writer import WAITING_CHUNKS, Chunk, TableWriter
+from tests.support.clocks import StillClock
 
 SCHEMA = {"number": pl.Int64, "name": pl.String}
 
@@ -143,3 +150,61 @@ def test_a_frame_that_cannot_be_written_leaves_nothing_aside(tmp_path):
     with pytest.raises(OSError):
         write_file(pl.DataFrame({"a": np.arange(3)}), tmp_path / "nowhere" / "a.parquet")
     assert list(tmp_path.iterdir()) == []
+
+
+def times_due(limit: ChunkLimit, clock: StillClock, seconds: int) -> list[int]:
+    """When chunks that stay small are due."""
+    due: list[int] = []
+    for second in range(1, seconds + 1):
+        clock.time_ns += NS_PER_S
+        if limit.reached(0):
+            due.append(second)
+            limit.restart()
+    return due
+
+
+def test_a_large_chunk_is_due_at_once() -> None:
+    limit = ChunkLimit(10, StillClock())
+    assert not limit.reached(9)
+    assert limit.reached(10)
+
+
+def test_a_small_one_is_due_every_two_seconds() -> None:
+    clock = StillClock()
+    assert times_due(ChunkLimit(10, clock), clock, 1000) == list(range(2, 1001, 2))
+
+
+def test_with_a_share_chunks_of_a_long_run_become_few() -> None:
+    clock = StillClock()
+    due = times_due(ChunkLimit(10, clock, 0.01), clock, 24 * 3600)
+    assert due[:100] == list(range(2, 201, 2))
+    assert len(due) < 800
+    assert all(after - before <= max(2, 1 + 0.01 * before) for before, after in pairwise(due))
+
+
+class Noon:
+    def utc_stamp(self):
+        return "20261121T120000Z"
+
+
+def test_each_text_is_in_the_file_at_once_with_its_time(tmp_path):
+    log = RunLog(tmp_path, Noon())
+    log.say("begins")
+    log.say("observer X failed:\nTraceback\nOSError\n")
+    assert (tmp_path / "log.txt").read_text().splitlines() == [
+        "20261121T120000Z begins",
+        "20261121T120000Z observer X failed:",
+        "    Traceback",
+        "    OSError",
+    ]
+    log.close()
+    log.close()
+
+
+def test_a_log_that_cannot_be_written_counts_its_lines_and_disturbs_nobody(tmp_path):
+    (tmp_path / "log.txt").symlink_to("/dev/full")
+    log = RunLog(tmp_path, Noon())
+    log.say("one")
+    log.say("two")
+    assert log.lost == 2
+    log.close()

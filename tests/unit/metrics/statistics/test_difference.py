@@ -1,4 +1,4 @@
-"""Differences: in pairs where seeds are shared, as wholes where not, open where times were not watched long enough."""
+"""Differences of samples, their distances and effect sizes: known values, brute force and scipy."""
 
 import math
 
@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import stats
 
 from swarmwire.metrics.statistics.difference import difference
+from swarmwire.metrics.statistics.distances import kolmogorov_smirnov, wasserstein_1
+from swarmwire.metrics.statistics.effect_size import cliffs_delta, hedges_g
+from swarmwire.metrics.statistics.log_rank import log_rank
 from swarmwire.metrics.statistics.sample import time_sample
 from tests.support.metrics.statistics.samples import number_samples, numbers, placebo, time_samples, times, treated
 
@@ -37,7 +41,7 @@ def test_what_seeds_share_does_not_blur_a_difference():
     assert (apart.pairs, apart.test) == (0, "Mann-Whitney")
 
 
-@settings(max_examples=25)
+@settings(max_examples=4)  # each resamples two samples, twice
 @given(number_samples, number_samples)
 def test_turning_the_two_turns_the_sign(one, other):
     there, back = difference(one, other), difference(other, one)
@@ -112,3 +116,93 @@ def test_intervals_of_differences_cover_as_often_as_they_say(shared):
     assert 0.905 <= covered["means"] / 300 <= 0.985
     assert covered["numbers"] / 300 >= 0.905
     assert covered["times"] / 300 >= 0.905
+
+
+DRAWS = np.random.default_rng(1)
+PAIRS = {
+    "apart": (DRAWS.normal(0.0, 1.0, 300), DRAWS.normal(0.5, 2.0, 170)),
+    "with ties": (DRAWS.integers(0, 5, 200) * 1.0, DRAWS.integers(1, 7, 90) * 1.0),
+    "one value": (np.array([2.0]), np.array([2.0, 3.0, 7.0])),
+    "constants": (np.full(10, 4.0), np.full(3, 4.0)),
+}
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_distances_are_those_of_scipy(name):
+    a, b = PAIRS[name]
+    assert kolmogorov_smirnov(a, b) == pytest.approx(stats.ks_2samp(a, b, method="asymp").statistic, abs=1e-12)
+    assert wasserstein_1(a, b) == pytest.approx(stats.wasserstein_distance(a, b), rel=1e-9, abs=1e-12)
+
+
+def test_a_shift_is_a_distance_in_the_values_unit():
+    a = DRAWS.normal(size=500)
+    assert wasserstein_1(a, a + 0.25) == pytest.approx(0.25)
+    assert kolmogorov_smirnov(a, a + 100.0) == 1.0
+    assert kolmogorov_smirnov(a, a[::-1]) == wasserstein_1(a, a[::-1]) == 0.0
+
+
+def test_nothing_has_no_distance():
+    assert np.isnan(kolmogorov_smirnov(np.zeros(0), np.ones(3)))
+    assert np.isnan(wasserstein_1(np.ones(3), np.zeros(0)))
+
+
+def surely_greater(one, other, i, j):
+    if one.observed[i]:
+        return bool(other.observed[j] and one.value[i] > other.value[j])
+    return bool(other.observed[j] and one.value[i] >= other.value[j])
+
+
+def brute_force(one, other):
+    pairs = [(i, j) for i in range(len(one)) for j in range(len(other))]
+    return sum(surely_greater(one, other, i, j) - surely_greater(other, one, j, i) for i, j in pairs) / len(pairs)
+
+
+@given(st.one_of(st.tuples(number_samples, number_samples), st.tuples(time_samples, time_samples)))
+def test_cliffs_delta_is_what_counting_all_pairs_gives(pair):
+    assert cliffs_delta(*pair) == pytest.approx(brute_force(*pair), abs=1e-12)
+
+
+@given(number_samples, number_samples)
+def test_cliffs_delta_turns_with_its_samples_and_stays_under_what_keeps_the_order(one, other):
+    delta = cliffs_delta(one, other)
+    assert cliffs_delta(other, one) == -delta
+    assert cliffs_delta(numbers(one.value**3), numbers(other.value**3)) == delta
+    assert cliffs_delta(one, one) == 0.0
+
+
+def test_samples_that_do_not_overlap_are_at_the_end_of_the_scale():
+    assert cliffs_delta(numbers([5.0, 6.0]), numbers([1.0, 2.0, 3.0])) == 1.0
+    assert cliffs_delta(times([9.0, 9.0], [False, False]), times([9.0, 1.0])) == 1.0
+    assert cliffs_delta(times([9.0], [False]), times([9.0], [False])) == 0.0
+    assert math.isnan(cliffs_delta(numbers([]), numbers([1.0])))
+
+
+def test_hedges_g_is_the_difference_in_standard_deviations_less_what_small_samples_add():
+    first, second = np.array([3.0, 5.0, 7.0]), np.array([2.0, 4.0, 6.0])  # both have a standard deviation of 2
+    assert hedges_g(first, second) == pytest.approx(0.5 * (1.0 - 3.0 / 15.0))
+    assert hedges_g(second, first) == -hedges_g(first, second)
+
+
+@pytest.mark.parametrize("pair", [([], [1.0]), ([1.0], [2.0]), ([1.0, 1.0], [1.0, 1.0])])
+def test_hedges_g_is_none_where_nothing_varies(pair):
+    assert math.isnan(hedges_g(np.array(pair[0]), np.array(pair[1])))
+
+
+def test_the_log_rank_test_of_the_leukaemia_trial_is_that_of_the_textbooks():
+    found = log_rank(treated(), placebo())
+    assert found.z**2 == pytest.approx(16.79, abs=0.005)
+    assert found.z < 0.0
+    assert found.p == pytest.approx(4.17e-5, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "pair",
+    [
+        (times([]), times([1.0])),
+        (times([3.0], [False]), times([3.0], [False])),
+        (times([1.0]), times([1.0])),
+        (times([1.0, 2.0], [False, False]), times([3.0, 4.0])),
+    ],
+)
+def test_the_log_rank_test_is_none_where_nothing_tells_samples_apart(pair):
+    assert math.isnan(log_rank(*pair).p)

@@ -1,8 +1,12 @@
-"""Figures can be drawn of whatever comes: of one value, of equal ones, of none, and of nothing but censored ones."""
+"""Parts of a campaign's report: numbers, values of a parameter as groups, and figures of whatever comes."""
+
+import math
 
 import numpy as np
 import pytest
 
+from swarmwire.metrics.report.campaign.levels import MOST_LEVELS, levels_of
+from swarmwire.metrics.report.campaign.rounding import rounding_of
 from swarmwire.metrics.report.figures.distributions import Group, distributions
 from swarmwire.metrics.report.figures.heat_map import heat_map
 from swarmwire.metrics.report.figures.log_axis import fits_log
@@ -11,6 +15,63 @@ from swarmwire.metrics.report.figures.response_curve import Jump, Response, resp
 from swarmwire.metrics.report.figures.scaling_curve import scaling_curve
 from swarmwire.metrics.report.figures.survival_curves import SurvivalCurve, survival_curves
 from swarmwire.metrics.report.svg import as_svg
+
+
+@pytest.mark.parametrize(
+    ("values", "spreads", "written"),
+    [
+        ([0.94123, 0.5], [0.051], ["0.941", "0.500"]),
+        ([123.456, 7.0], [20.0], ["123", "7"]),
+        ([3.0, 12345.0], [], ["3", "12,345"]),
+        ([0.5, 12345.678], [], ["0", "12,346"]),
+        ([1.5, 2.25], [], ["1.50", "2.25"]),
+        ([-0.25, -0.0001], [0.1], ["−0.25", "0.00"]),
+        ([1e-9, 3e-9], [], ["1.00e−09", "3.00e−09"]),
+        ([2.5e8], [], ["2.50e+08"]),
+        ([0.0, 0.0], [0.0], ["0", "0"]),
+        ([math.nan, math.inf, 2.5], [math.nan], ["–", "–", "2.50"]),
+        ([], [], []),
+    ],
+)
+def test_decimals_follow_the_spread_or_else_the_size(values, spreads, written):
+    rounding = rounding_of(values, spreads)
+    assert [rounding.text(value) for value in values] == written
+
+
+def test_numbers_are_in_ascending_order_and_names_as_they_were_asked_for():
+    points = tuple({"x": x, "who": who} for x, who in ((0.5, "pso"), (0.1, "flocking"), (0.5, "flocking")))
+    numbers, names = levels_of("x", points), levels_of("who", points)
+    assert (numbers.labels, numbers.of_point.tolist()) == (("0.1", "0.5"), [1, 0, 1])
+    assert (names.labels, names.of_point.tolist(), names.number) == (("pso", "flocking"), [0, 1, 1], None)
+    assert numbers.points(1) == [0, 2]
+
+
+def test_true_and_lists_are_names():
+    points = tuple({"x": value} for value in (True, [1, 2.5], None, True))
+    levels = levels_of("x", points)
+    assert (levels.labels, levels.number) == (("true", "[1, 2.5]", "null"), None)
+
+
+def test_as_many_values_as_can_be_shown_stay_apart():
+    levels = levels_of("x", tuple({"x": x} for x in range(MOST_LEVELS)))
+    assert (len(levels), levels.means) == (MOST_LEVELS, ())
+
+
+@pytest.mark.parametrize("values", [[x / 100 for x in range(100)], [0.0] * 50 + [x * x for x in range(50)]])
+def test_more_values_become_ranges_that_hold_every_point_once(values):
+    levels = levels_of("x", tuple({"x": x} for x in values))
+    assert levels.number is not None
+    found = sorted(point for level in range(len(levels)) for point in levels.points(level))
+    assert found == list(range(100))
+    assert len(levels) <= 8
+    for level, label in enumerate(levels.labels):
+        part = [values[point] for point in levels.points(level)]
+        low, high = map(float, label.split("–"))
+        assert abs(low - min(part)) <= 1.0
+        assert abs(high - max(part)) <= 1.0
+        assert levels.number[level] == pytest.approx(sum(part) / len(part))
+    assert (np.diff(levels.number) > 0.0).all()
+
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
 NONE = (np.nan, np.nan, np.nan)

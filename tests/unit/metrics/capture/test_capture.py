@@ -1,0 +1,148 @@
+"""Packets as a capture: frames of the table, link headers and blocks, byte by byte as specified."""
+
+import struct
+from typing import Any
+
+import polars as pl
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.air.radio import Radio
+from swarmwire.metrics.capture import pcapng
+from swarmwire.metrics.capture.frame import Frame
+from swarmwire.metrics.capture.frames_on_air import frames_on_air
+from swarmwire.metrics.capture.link_headers import link_of
+from swarmwire.metrics.record.packet_columns import packet_schema
+from tests.support.metrics.capture.reading import Captured, read
+from tests.unit.world.scenario.test_radio_tables import radio_of
+
+NAMES = ("a-0", "a-1", "a-2")
+
+
+def table(*rows: dict[str, object]) -> pl.DataFrame:
+    usual = {"arena": 0, "sender": 0, "receivers": 1, "sequence": 0, "size_bytes": 4, "topic": "Beacon"}
+    whole = [{**dict.fromkeys(packet_schema()), **usual, **row} for row in rows]
+    return pl.DataFrame(whole, schema=packet_schema())
+
+
+def test_a_packet_is_one_frame_with_the_fate_at_each_receiver():
+    one = {"on_air_at_ns": 70, "payload": b"told"}
+    seen = table(
+        {**one, "receiver": 2, "fate": "collided", "rssi_dbm": -80.0},
+        {**one, "receiver": 1, "fate": "heard", "rssi_dbm": -61.5},
+        {"sequence": 1, "receiver": None, "fate": "channel_busy", "on_air_at_ns": 90},
+    )
+    told = ("a-0 to all: Beacon, packet 0", "heard: a-1 -61.5 dBm", "collided: a-2 -80.0 dBm")
+    assert list(frames_on_air(seen, NAMES)) == [Frame(70, 0, None, 0, 4, b"told", -61.5, told)]
+
+
+def test_frames_are_in_the_order_of_time_and_addressed_ones_say_to_whom():
+    seen = table(
+        {"sequence": 7, "receiver": 1, "to": 1, "fate": "lost", "on_air_at_ns": 5},
+        {"sender": 2, "receiver": 0, "fate": "heard", "on_air_at_ns": 3},
+        {"sender": 1, "receiver": 0, "fate": "heard", "on_air_at_ns": 3},
+    )
+    found = list(frames_on_air(seen, NAMES))
+    assert [(frame.on_air_at_ns, frame.sender, frame.to) for frame in found] == [(3, 1, None), (3, 2, None), (5, 0, 1)]
+    assert found[2].comments == ("a-0 to a-1: Beacon, packet 7", "lost: a-1")
+    assert (found[2].payload, found[2].rssi_dbm) == (b"", None)
+
+
+def header(radio: Radio, **fields: Any) -> str:
+    known: dict[str, Any] = {"on_air_at_ns": 0, "sender": 0x17, "to": None, "sequence": 0x1234, "size_bytes": 6}
+    return link_of(radio).header(Frame(**{**known, **fields})).hex()
+
+
+def joined(*parts: str) -> str:
+    return "".join(parts).replace(" ", "")
+
+
+FCS_NONE, RATE, CHANNEL_18 = "0000 0100 00 000000", "0200 0400 90d00300", "0300 0300 1200 00 00"
+
+
+def test_ieee_802_15_4_has_a_tap_header_and_short_addresses():
+    radio = radio_of({"preset": "ieee802154"})
+    assert link_of(radio).link_type == 283
+    # RSS: -64.0 as a float is 0xc2800000. MAC: data 0x8841, sequence, PAN "WS", everybody, sender.
+    tap, mac = joined("00 00 2400", FCS_NONE, "0100 0400 000080c2", RATE, CHANNEL_18), joined("4188 34 5753 ffff 1700")
+    assert header(radio, rssi_dbm=-64.0) == tap + mac
+    assert header(radio) == joined("00 00 1c00", FCS_NONE, RATE, CHANNEL_18) + mac
+    assert header(radio, to=0x0203).endswith(joined("6188 34 5753 0302 1700"))  # asks for an acknowledgement
+    silent = radio_of({"preset": "ieee802154", "access": {"acknowledged": False}})
+    assert header(silent, to=0x0203).endswith(joined("4188 34 5753 0302 1700"))
+
+
+@pytest.mark.parametrize(("frequency_hz", "channel"), [(2.405e9, "0b00"), (2.480e9, "1a00"), (868.3e6, None)])
+def test_the_channel_is_told_where_the_band_has_channels(frequency_hz: float, channel: str | None):
+    found = header(radio_of({"preset": "ieee802154", "frequency_hz": frequency_hz}))
+    if channel is None:
+        assert found.startswith(joined("00 00 1400", FCS_NONE, RATE, "4188"))
+    else:
+        assert joined("0300 0300", channel, "00 00") in found
+
+
+def test_ieee_802_11_has_a_radiotap_header_and_udp():
+    radio = radio_of({"preset": "wifi-b-1M"})
+    assert link_of(radio).link_type == 127
+    # Flags, rate 2 x 500 kbit/s, 2412 MHz, CCK at 2 GHz, -61 dBm.
+    radiotap = joined("00 00 0f00 2e000000 00 02 6c09 a000 c3")
+    mac = joined("0800 0000", "ff" * 6, "025357000018", "025357000000", "4023")
+    # IPv4: 34 bytes, identification 0x1234, 64 hops, UDP, 10.0.0.24 to all. Words: 4500 + 0022 + 1234 + 0000 + 4011
+    # + 0a00 + 0018 + ffff + ffff = 0x2a17d, folded a17f; its complement is 5e80.
+    ip, udp = joined("4500 0022 1234 0000 40 11 5e80 0a000018 ffffffff"), "c000c000000e0000"
+    assert header(radio, rssi_dbm=-61.4) == radiotap + mac + "aaaa030000000800" + ip + udp
+    assert header(radio).startswith(joined("00 00 0e00 0e000000 00 02 6c09 a000 0800"))
+
+
+@pytest.mark.parametrize(("preset", "duration_us"), [("wifi-b-1M", 10 + 192 + 112), ("wifi-a-6M", 16 + 44)])
+def test_an_addressed_frame_keeps_the_air_for_its_acknowledgement(preset: str, duration_us: int):
+    found = bytes.fromhex(header(radio_of({"preset": preset}), to=2))
+    assert found[14:24] == struct.pack("<HH", 8, duration_us) + bytes.fromhex("025357000003")
+    words = struct.unpack(">10H", found[14 + 24 + 8 :][:20])
+    assert sum(words) % 0xFFFF == 0
+
+
+def test_a_radio_without_a_standard_has_a_plain_header():
+    for preset in ("disk", "kilobot", "ble-1M", "gz-rfcomms", "acoustic"):
+        radio = radio_of({"preset": preset})
+        assert link_of(radio).link_type == 147
+        assert header(radio, to=3, rssi_dbm=-64.0) == joined("00 14 0000 17000000 03000000 34120000 000080c2")
+    assert header(radio_of({"preset": "disk"})) == joined("00 14 0000 17000000 ffffffff 34120000 0000c07f")
+
+
+def test_blocks_are_those_of_the_specification():
+    section = "0a0d0d0a 28000000 4d3c2b1a 0100 0000 ffffffffffffffff 0400 0200 73770000 00000000 28000000"
+    assert pcapng.section("sw").hex() == section.replace(" ", "")
+    interface = (
+        "01000000 30000000 1b01 0000 00000000"
+        " 0200 0300 61697200 0300 0200 68690000 0900 0100 09000000 00000000 30000000"
+    )
+    assert pcapng.interface(283, "air", "hi").hex() == interface.replace(" ", "")
+    packet = "06000000 28000000 00000000 01000000 02000000 05000000 09000000 0102030405000000 28000000"
+    assert pcapng.packet(2**32 + 2, bytes([1, 2, 3, 4, 5]), 9).hex() == packet.replace(" ", "")
+
+
+PACKETS = st.lists(
+    st.builds(
+        Captured, st.integers(0, 2**63), st.binary(max_size=40), st.integers(40, 99), st.lists(st.text(), max_size=3)
+    )
+)
+
+
+@given(PACKETS)
+def test_what_was_written_is_read_back(tmp_path_factory, packets: list[Captured]):
+    path = tmp_path_factory.mktemp("capture") / "some.pcapng"
+    blocks = [pcapng.packet(one.at_ns, one.data, one.length, one.comments) for one in packets]
+    path.write_bytes(pcapng.section("s") + pcapng.interface(147, "n", "d") + b"".join(blocks))
+    found = read(path)
+    assert (found.section, found.interface) == ({4: [b"s"]}, {2: [b"n"], 3: [b"d"], 9: [b"\x09"]})
+    assert (found.link_type, found.packets) == (147, packets)
+
+
+def test_a_comment_too_long_for_an_option_is_cut_between_characters(tmp_path):
+    path = tmp_path / "long.pcapng"
+    path.write_bytes(
+        pcapng.section("s") + pcapng.interface(147, "n", "d") + pcapng.packet(0, b"", 0, ["é" * 40_000, "next"])
+    )
+    assert read(path).packets[0].comments == ["é" * 32_767, "next"]

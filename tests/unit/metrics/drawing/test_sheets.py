@@ -1,0 +1,196 @@
+"""Pictures of a robot, of a radio's coverage and of delivery over distance show what they are drawn from."""
+
+import struct
+import sys
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swarmwire.comms.air.probe.survey import Band, ByDistance, CoverageMap
+from swarmwire.comms.bodies.body import body_from, body_names, load_body
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.drawing import canvas, coverage_sheet, distance_sheet
+from swarmwire.metrics.drawing.body_facts import facts_of
+from swarmwire.metrics.drawing.body_sheet import draw_body
+from swarmwire.metrics.drawing.coverage_sheet import draw_coverage
+from swarmwire.metrics.drawing.distance_sheet import draw_distances
+from swarmwire.metrics.drawing.mp4 import write_mp4
+from swarmwire.metrics.drawing.view_from_above import draw_from_above
+from swarmwire.metrics.run_folder import RunFolder
+from tests.support.metrics.radio_runs import DISK, ticks
+from tests.support.metrics.recorded import links, record
+from tests.support.metrics.truths import departed, static, truth
+
+pytest.importorskip("matplotlib", reason="needs the extra [report]")
+
+
+@pytest.mark.parametrize("name", body_names())
+def test_every_body_that_comes_along_can_be_drawn(tmp_path, name):
+    from PIL import Image
+
+    draw_body(load_body(name), tmp_path / "a.png", 400)
+    with Image.open(tmp_path / "a.png") as image:
+        assert max(image.size) == 400
+        assert len(np.unique(np.asarray(image).reshape(-1, 4), axis=0)) > 50
+
+
+def test_a_body_without_any_sense_can_be_drawn(tmp_path):
+    drive = {"wheel_base_m": 0.1, "max_wheel_mps": 0.2, "max_force_n": 1.0, "max_torque_nm": 1.0}
+    sheet = {"name": "bare", "source": "a test", "radius_m": 0.1, "height_m": 0.1, "mass_kg": 1.0, "drive": drive}
+    draw_body(body_from(sheet, "bare.toml"), tmp_path / "a.svg", 400)
+    assert (tmp_path / "a.svg").read_text().startswith("<?xml")
+
+
+def test_rays_start_at_the_rim_and_end_at_their_range_with_the_front_up():
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
+
+    body, axes = load_body("epuck"), Figure().add_axes((0, 0, 1, 1))
+    draw_from_above(axes, body)
+    [rays] = [artist for artist in axes.collections if isinstance(artist, LineCollection)]
+    ends = np.array([path.vertices for path in rays.get_paths()])  # (rays, 2, 2)
+    assert body.proximity
+    distance_m = np.linalg.norm(ends, axis=2)
+    np.testing.assert_allclose(distance_m, [[body.radius_m, body.radius_m + body.proximity.range_m]] * len(ends))
+    ahead_deg = np.degrees(np.arctan2(-ends[:, 1, 0], ends[:, 1, 1])) % 360  # counter-clockwise from up
+    np.testing.assert_allclose(ahead_deg, body.proximity.angles_deg)
+
+
+@pytest.mark.parametrize(("range_m", "faint"), [(0.12, 1.0), (2.0, 0.1)])
+def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells_their_range(range_m, faint):
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
+
+    senses = {"scan": {"rays": 1, "range_m": range_m}}
+    axes = Figure().add_axes((0, 0, 1, 1))
+    draw_from_above(axes, body_from({"like": "epuck", "name": "a", "senses": senses}, "a.toml"))
+    drawn = [artist for artist in axes.collections if isinstance(artist, LineCollection)][1:]
+    assert min(part.get_alpha() for part in drawn) == pytest.approx(faint)
+    legend = axes.get_legend()
+    assert legend
+    assert f"range finder, to {range_m:g} m" in [text.get_text() for text in legend.get_texts()]
+
+
+def test_the_facts_are_those_of_the_data_sheet():
+    facts = dict(facts_of(load_body("epuck")))
+    assert facts["size"] == "7 cm across, 8.6 cm high"
+    assert facts["wheels"] == "5.3 cm apart"
+    assert facts["proximity"] == "8 rays of 10 cm"
+    assert facts["odometry"] == "slip 5 %, step 0.13 mm"
+    assert "positioning" not in facts
+    assert dict(facts_of(load_body("epuck-gps")))["positioning"] == "error 1 cm"
+
+
+def test_each_fact_has_a_name_of_its_own():
+    for name in body_names():
+        names = [fact for fact, _ in facts_of(load_body(name)) if fact]
+        assert len(names) == len(set(names)), name
+    assert dict(facts_of(load_body("footbot")))["LEDs"] == "13, the last a beacon"
+
+
+def test_own_senses_and_actuators_are_facts_by_their_class():
+    sheet = {"like": "epuck", "name": "sealer", "actuators": {"sealer": {"kind": "gas.py:Sealer"}}}
+    sheet["senses"] = {"gas": {"kind": "gas.py:Sniffer"}}
+    facts = dict(facts_of(body_from(sheet, "sealer.toml")))
+    assert (facts["gas"], facts["sealer"]) == ("by gas.py:Sniffer", "by gas.py:Sealer")
+
+
+def test_only_a_body_that_flies_is_told_to():
+    flying = body_from({"like": "epuck", "name": "flying", "altitude_m": 1.0}, "flying.toml")
+    assert dict(facts_of(flying))["flies"] == "1 m up"
+    assert "flies" not in dict(facts_of(load_body("epuck")))
+
+
+def test_a_size_that_nobody_could_look_at_is_refused(tmp_path):
+    with pytest.raises(BadInput, match="--size: expected 100 to 8000 pixels, got 9000"):
+        draw_body(load_body("epuck"), tmp_path / "a.png", 9000)
+
+
+X_M, Y_M = np.linspace(-3.5, 3.5, 8), np.linspace(-2.5, 2.5, 6)
+NEAR = np.hypot(X_M, Y_M[:, None]) < 2.0
+SIGNALS = CoverageMap((0.0, 0.0), X_M, Y_M, np.where(NEAR, -60.0, -95.0), NEAR, NEAR * 1.0, np.ones_like(NEAR))
+DISTANCES = np.array([0.5, 1.5, 2.5])
+DELIVERY = Band(*np.array([[1.0, 0.8, 0.0], [1.0, 0.5, 0.0], [1.0, 1.0, 0.0]]))
+STRENGTH = Band(*np.array([[-50.0, -70.0, -90.0]] * 3))
+
+
+@pytest.mark.parametrize("signals", [True, False])
+def test_coverage_of_signals_has_a_map_of_strength_and_that_of_a_disk_of_reach(tmp_path, monkeypatch, signals):
+    drawn = []
+    monkeypatch.setattr(coverage_sheet, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
+    found = SIGNALS if signals else replace(SIGNALS, mean_dbm=None)
+    distances = ByDistance(DISTANCES, DELIVERY, STRENGTH if signals else None)
+    draw_coverage(static(3), found, distances, -90.0 if signals else None, "a radio", tmp_path / "coverage.png", 400)
+    [figure] = drawn
+    place, *others = figure.axes
+    assert figure.texts[0].get_text() == "a radio"
+    assert (place.get_xlim(), place.get_ylim()) == ((-4.0, 4.0), (-3.0, 3.0))
+    np.testing.assert_array_equal(place.images[0].get_array().mask, ~NEAR)
+    curves = [axes.lines[0].get_ydata().tolist() for axes in others if axes.lines]
+    assert curves == [DELIVERY.mean.tolist(), STRENGTH.mean.tolist()][: 1 + signals]
+    assert (tmp_path / "coverage.png").stat().st_size > 1000
+
+
+def test_the_curve_is_that_of_the_table_up_to_somewhat_beyond_what_was_heard(tmp_path, monkeypatch):
+    of, drawn = static(6, arenas=2), []
+    record(tmp_path, of, ticks(DISK, of, 3, count=20))
+    monkeypatch.setattr(distance_sheet, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
+    draw_distances(RunFolder(tmp_path), 1, tmp_path / "pdr.png", 640)
+    [figure] = drawn
+    upper, lower = figure.axes
+    middle_m, ratio = upper.lines[0].get_data()
+    table = RunFolder(tmp_path).radio_distances(1)
+    np.testing.assert_allclose(ratio, table["pdr"].cast(float).to_numpy()[: len(ratio)])
+    np.testing.assert_allclose(middle_m, (table["from_m"] + table["to_m"]).to_numpy()[: len(ratio)] / 2)
+    last_m = table.filter(table["heard"] > 0)["to_m"][-1]
+    assert upper.get_xlim() == lower.get_xlim()
+    assert upper.get_xlim()[1] == pytest.approx(1.5 * last_m, abs=0.1)
+    assert "seed 2" in figure.texts[0].get_text()
+    assert struct.unpack(">I", (tmp_path / "pdr.png").read_bytes()[16:20]) == (640,)
+
+
+def test_distances_that_cannot_be_drawn_are_refused(tmp_path):
+    of = static(2)
+    record(tmp_path, of, [truth(of, departed=departed([]), finished=links([], [], 0, 0))])
+    with pytest.raises(BadInput, match="--pdr: expected a run in which packets went on air"):
+        draw_distances(RunFolder(tmp_path), 0, tmp_path / "pdr.png", 640)
+    with pytest.raises(BadInput, match="--arena: expected 0 to 0, got 1"):
+        draw_distances(RunFolder(tmp_path), 1, tmp_path / "pdr.png", 640)
+    (tmp_path / "radio_distances.parquet").unlink()
+    with pytest.raises(BadInput, match="radio_distances: expected this table"):
+        draw_distances(RunFolder(tmp_path), 0, tmp_path / "pdr.png", 640)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (pl.col("pdr").cast(pl.String), "pdr is of type String, expected Float64"),
+        (pl.lit(None, pl.Float64).alias("from_m"), r"from_m is null in \d+ rows"),
+        (pl.lit(7.0).alias("pdr"), r"pdr is not heard / intended in \d+ rows"),
+        (None, "no column pdr"),
+    ],
+)
+def test_a_damaged_table_is_refused_with_file_and_fault(tmp_path, change, text):
+    of = static(6)
+    record(tmp_path, of, ticks(DISK, of, 3, count=20))
+    file = tmp_path / "radio_distances.parquet"
+    table = pl.read_parquet(file)
+    (table.drop("pdr") if change is None else table.with_columns(change)).write_parquet(file)
+    with pytest.raises(BadInput, match=rf"radio_distances\.parquet: expected a table as a run writes it, but {text}"):
+        draw_distances(RunFolder(tmp_path), 0, tmp_path / "pdr.png", 640)
+    assert not (tmp_path / "pdr.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("module", "name"), [("matplotlib", "matplotlib"), ("imageio_ffmpeg", "imageio-ffmpeg"), ("jinja2", "jinja2")]
+)
+def test_who_lacks_the_extra_is_told_how_to_get_it(tmp_path, monkeypatch, module, name):
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(BadInput) as error:
+        draw_body(load_body("epuck"), tmp_path / "a.png", 300)
+    assert str(error.value) == f"pictures: needs {name}: install swarmwire-metrics[report]"
+    with pytest.raises(BadInput, match="films: needs"):
+        write_mp4(tmp_path / "a.mp4", iter(()), 10.0)
+    assert not any(tmp_path.iterdir())
