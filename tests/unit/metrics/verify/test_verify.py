@@ -254,11 +254,11 @@ def test_what_is_no_run_folder_is_refused(tmp_path):
 
 def test_a_recording_is_read_to_its_end(tmp_path):
     pytest.importorskip("rerun", reason="needs the extra [view]")
-    from tests.unit.metrics.viewer import test_rerun_recording as recording
+    from tests.support.metrics import recordings
 
     fill(tmp_path)
     of = static(3)
-    recording.record(tmp_path / "run.rrd", of, recording.moving(of, 7))
+    recordings.record(tmp_path / "run.rrd", of, recordings.moving(of, 7))
     assert states(tmp_path) == {}
     assert "up to tick 6" in text_of(tmp_path, "run.rrd")
     whole = (tmp_path / "run.rrd").read_bytes()

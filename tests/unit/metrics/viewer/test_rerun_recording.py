@@ -1,5 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from swarmwire.metrics.verify.recording_check import check_recording
 from swarmwire.metrics.viewer.colors import DEAD, FATES, packed
 from swarmwire.metrics.viewer.recording import RerunRecording
 from tests.support.clocks import StillClock
+from tests.support.metrics.recordings import class_names, column, moving, record, series
 from tests.support.metrics.truths import edges, static, tally, truth
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
@@ -30,42 +30,11 @@ def strict():
     rerun.set_strict_mode(False)
 
 
-def record(path: Path, of, ticks, arena=0):
-    metrics = Metrics()
-    recording = RerunRecording(path, metrics, StillClock(), arena)
-    observers = (metrics, recording)
-    for observer in observers:
-        observer.begin(of)
-    for seen in ticks:
-        for observer in observers:
-            observer.see(seen)
-    assert recording.end(None)["record_rrd"]["dropped"] == 0
-
-
-def moving(of, ticks, **fields):
-    rng = np.random.default_rng(5)
-    for tick in range(ticks):
-        pose = rng.uniform(-3.0, 3.0, (of.arenas * of.robots, 3))
-        yield truth(of, tick, pose=pose, **fields)
-
-
-def column(path, entity, component):
-    """What was logged of a component, by tick (None: once for the run): an array per row."""
-    found = {}
-    for chunk in rerun.chunk.RrdReader(str(path)).stream().filter(content=entity):
-        batch = chunk.to_record_batch()
-        if component in batch.schema.names:
-            ticks = batch["tick"].to_pylist() if "tick" in batch.schema.names else [None] * batch.num_rows
-            rows = batch[component].to_pylist()
-            found.update({tick: row for tick, row in zip(ticks, rows, strict=True) if row is not None})
-    return dict(sorted(found.items(), key=lambda item: -1 if item[0] is None else item[0]))
-
-
 @pytest.mark.parametrize("arena", [0, 1])
 def test_a_recording_holds_the_positions_and_headings_of_its_arena(tmp_path, arena):
     of = static(3, arenas=2, obstacles=OBSTACLES)
     ticks = list(moving(of, 40, edges=edges((0, 1), (4, 5))))
-    record(tmp_path / "run.rrd", of, ticks, arena)
+    record(tmp_path / "run.rrd", of, ticks, arena=arena)
     positions = column(tmp_path / "run.rrd", "/world/robots", "Points2D:positions")
     vectors = column(tmp_path / "run.rrd", "/world/headings", "Arrows2D:vectors")
     assert list(positions) == list(vectors) == list(range(40))
@@ -106,17 +75,6 @@ def test_links_of_large_swarms_are_thinned(tmp_path, robots, expected):
     assert list(column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips")) == expected
 
 
-def series(path, plot):
-    """Every line of a plot: {name: {tick: value}}, of the ticks in which it was drawn."""
-    found = {}
-    for before in range(20):
-        entity = f"/plots/{plot}/since_{before}"
-        for names in column(path, entity, "SeriesLines:names").values():
-            rows = column(path, entity, "Scalars:scalars").items()
-            found |= {name: {tick: row[i] for tick, row in rows} for i, name in enumerate(names)}
-    return found
-
-
 def test_plots_hold_what_the_metrics_measured_in_each_tick(tmp_path):
     of, metrics = static(4), Metrics()
     expected = {metric.name: {} for metric in metrics.metrics}
@@ -155,13 +113,6 @@ def test_packets_are_drawn_by_fate_as_receivers_per_second_once_a_fate_occurs(tm
         sum(sum(count[f] for f in fates) for count in counts[-10:]) for fates in ([Fate.HEARD], [Fate.HEARD, Fate.LOST])
     )
     assert delivery[39] == pytest.approx(heard / in_range)
-
-
-def class_names(path):
-    """{class: (name, colour)} of the robots."""
-    (context,) = column(path, "/world", "AnnotationContext:context").values()
-    infos = [item["class_description"]["info"] for item in context[0]]
-    return {info["id"]: (info["label"], info["color"]) for info in infos}
 
 
 def test_robots_are_told_apart_by_group_and_state_and_the_dead_are_grey(tmp_path):
@@ -221,13 +172,19 @@ def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_pa
     assert [color >> 8 for color in colors] == [packed(FATES[fate], 0) >> 8 for fate in (Fate.LOST, Fate.BLOCKED)]
 
 
-def test_events_are_told_and_marked_where_they_take_effect(tmp_path):
-    of = static(2)
-    kill = Happened(0, 0.15, "kill", False, np.array([False, True]))
-    record(tmp_path / "run.rrd", of, [truth(of), truth(of, 1), truth(of, 2, events=(kill,))])
+def test_events_of_its_arena_are_told_and_marked_where_they_take_effect(tmp_path):
+    of = static(2, arenas=2)
+    kill = Happened(0, 0.15, "kill", False, np.array([True, False, True, True]))
+    elsewhere, here = (
+        Happened(1, 0.2, "fail", False, np.array(changed), "motors", singly=True)
+        for changed in ([True, True, False, False], [False, False, True, False])
+    )
+    happened = truth(of, 1, events=(kill, elsewhere)), truth(of, 3, events=(here, elsewhere))
+    record(tmp_path / "run.rrd", of, [truth(of), happened[0], truth(of, 2), happened[1]], arena=1)
     told = column(tmp_path / "run.rrd", "/events", "TextLog:text")
-    assert told == {0: ["the run begins: 2 robots"], 2: ["kill: flock-1"]}
-    assert list(column(tmp_path / "run.rrd", "/plots/shares/event", "Scalars:scalars")) == [2]
+    assert told[0][0].startswith("the run begins: 2 robots")
+    assert (told[1], told[3], len(told)) == (["kill: flock-0, flock-1"], ["fail motors: flock-0"], 3)
+    assert list(column(tmp_path / "run.rrd", "/plots/shares/event", "Scalars:scalars")) == [1, 3]
 
 
 def test_an_entity_is_sent_at_once_for_all_ticks_of_two_seconds_of_the_clock(tmp_path, monkeypatch):

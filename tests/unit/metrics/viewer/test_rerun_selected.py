@@ -1,4 +1,4 @@
-"""The robot that a recording shows in detail."""
+"""The robot that a recording shows in detail, and the viewer's text on it."""
 
 from dataclasses import replace
 
@@ -9,30 +9,16 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.senses import GroupSenses
 from swarmwire.comms.truth import Group
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.metrics.viewer.about import about
 from swarmwire.metrics.viewer.selected import selected_robot
-from tests.support.clocks import StillClock
+from tests.support.metrics.recordings import column, record
 from tests.support.metrics.truths import static, truth
-from tests.unit.metrics.viewer.test_rerun_recording import column
 
 pytest.importorskip("rerun", reason="needs the extra [view]")
-
 EPUCK = load_body("epuck")
 assert EPUCK.proximity is not None
 RESPONSE = EPUCK.proximity.response
 LOOKS = np.deg2rad([17, 50, 90, 150, 210, 270, 310, 343])
-
-
-def record(path, of, ticks, **options):
-    metrics = Metrics()
-    recording = RerunRecording(path, metrics, StillClock(), **options)
-    for observer in (metrics, recording):
-        observer.begin(of)
-    for seen in ticks:
-        for observer in (metrics, recording):
-            observer.see(seen)
-    recording.end(None)
 
 
 def rays(path):
@@ -126,3 +112,12 @@ def test_the_first_robot_with_rays_is_selected_unless_another_is_named():
 def test_a_robot_that_is_not_there_cannot_be_selected(tmp_path):
     with pytest.raises(BadInput, match=r"run\.rrd: selected: expected a robot such as flock-0; got 'nobody'"):
         record(tmp_path / "run.rrd", static(2), [], selected="nobody")
+
+
+@pytest.mark.parametrize(
+    ("body", "rays", "light"), [("epuck", True, True), ("kilobot", False, True), ("point", False, False)]
+)
+def test_rays_and_light_are_told_of_only_if_the_selected_body_has_them(body, rays, light):
+    text = about(static(body=load_body(body)), 0, "flock-1", 1)
+    assert "The ring marks flock-1." in text
+    assert ("rays" in text, "light" in text) == (rays, light)
