@@ -2,15 +2,18 @@
 
 import pytest
 
-from swarmwire.deploy import repeat, run
+from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling, only_run_at
 from swarmwire.deploy.live.following import RunGone
 from swarmwire.deploy.live.live_file import read_live
+from swarmwire.metrics.record.names import INTERVENTIONS
+from swarmwire.metrics.run_folder import RunFolder
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.control.going import at_tick, going
 from tests.support.waiting import until
 
 SHORT = "duration_s=5"
+KILL = {"do": "kill", "robots": {"names": ["flock-1", "flock-2"]}}
 
 
 def test_the_status_tells_how_the_run_is_doing(tmp_path):
@@ -100,3 +103,20 @@ def test_an_interactive_session_in_real_time_is_repeated(tmp_path):
     repetition = repeat(tmp_path / "run")
     assert repetition.same
     assert repetition.result.events == simulation.result.events
+
+
+def test_what_people_did_from_python_and_an_altered_record_are_noticed(tmp_path):
+    with Simulation(LOSSY, overrides=[SHORT], out=tmp_path / "run") as simulation:
+        simulation.run(5)
+        number = simulation.intervene(KILL)
+        simulation.run(9)
+        simulation.interventions.end(number)
+        simulation.run()
+    assert repeat(tmp_path / "run").same
+    rows = RunFolder(tmp_path / "run").events().select("tick", "do", "ended").rows()
+    assert rows == [(5, "kill", False), (9, "kill", True)]
+    path = tmp_path / "run" / INTERVENTIONS
+    path.write_text(path.read_text().replace("flock-2", "flock-3"))
+    repetition = repeat(tmp_path / "run")
+    assert (repetition.same, repetition.first_difference) == (False, 5)
+    assert repetition.changes == (f"{INTERVENTIONS} is not as the run left it: its sha256 differs",)
