@@ -42,6 +42,8 @@ from swarmwire.comms.wire.tick_frames import check_rows, decode_tick, encode_act
 JOIN_S = 30.0
 FAREWELL_S = 3.0
 NO_ROBOTS = ""
+TIMED_OUT = "Timeout"  # what zenoh says for a world that says nothing
+NO_ANSWER = f"the world did not answer to join within {JOIN_S:g} s: it stands still, or this machine is too busy"
 
 
 class Ended(NamedTuple):
@@ -62,10 +64,10 @@ class Asked:
 PLAIN = Asked()  # the next part that is free, with the world's own agents
 
 
-def run(endpoint: str, run_id: str, runner: str) -> Ended:
+def run(endpoint: str, run_id: str, runner: str, joined: Callable[[Assignment], None] = lambda _: None) -> Ended:
     """Play robots of the run at `endpoint` until it ends; RunnerLost if there is no world or it gives no robots."""
     with closed_after(open_runner(endpoint)) as session:
-        return play(session, Keys(run_id), runner, Inbox(), lambda: PLAIN)
+        return play(session, Keys(run_id), runner, Inbox(), lambda: PLAIN, joined)
 
 
 def play(
@@ -213,7 +215,8 @@ def _join(session: zenoh.Session, keys: Keys, runner: str, asked: Asked) -> tupl
     """The robots that the world gives, and what is remembered of them; None: nothing is to be kept."""
     for reply in session.get(keys.join(runner), payload=asked.request.encode(), timeout=JOIN_S):
         if reply.ok is None:
-            raise RunnerLost(runner, NO_ROBOTS, reply.err.payload.to_string() if reply.err else "no answer to join")
+            why = reply.err.payload.to_string() if reply.err else TIMED_OUT
+            raise RunnerLost(runner, NO_ROBOTS, NO_ANSWER if why == TIMED_OUT else why)
         try:
             assignment, kept = given_robots(reply.ok.payload.to_bytes(), asked.agents)
         except BadFrame as fault:

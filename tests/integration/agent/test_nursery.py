@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import psutil
@@ -16,13 +16,19 @@ from tests.support.waiting import until
 
 END = frames.encode("end", -1, {})
 PATIENCE_S = 60.0
+TWO_AT_ONCE = """
+import sys
+from swarmwire.agent import nursery
+nursery.AT_ONCE = 2
+sys.exit(nursery.main(sys.argv[1:]))
+"""
 
 
 class Nursery:
-    """A nursery with a pipe to its life line and one from its reports."""
+    """A nursery with a pipe to its life line and one from its reports; `program` starts it."""
 
-    def __init__(self, endpoint: str, *names: str) -> None:
-        command = [sys.executable, "-m", "swarmwire.agent.nursery", endpoint, "run1", spec("Counter"), *names]
+    def __init__(self, endpoint: str, *names: str, program: Sequence[str] = ("-m", "swarmwire.agent.nursery")) -> None:
+        command = [sys.executable, *program, endpoint, "run1", spec("Counter"), *names]
         self.process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
@@ -53,6 +59,24 @@ def test_runners_that_play_to_the_end_are_not_reported(started: list[Nursery]) -
         world.to_send = [END, END]
         started.append(nursery := Nursery(world.endpoint, "r1", "r2"))
         assert nursery.ended() == (0, "", "")
+
+
+def test_only_some_ask_for_robots_at_a_time_and_the_others_follow_as_these_have_theirs(started: list[Nursery]) -> None:
+    names = [f"r{i}" for i in range(5)]
+    with made_up_world() as world:
+        world.holds = True
+        started.append(nursery := Nursery(world.endpoint, *names, program=("-c", TWO_AT_ONCE)))
+        until(lambda: len(world.asked) == 2)
+        assert len(psutil.Process(nursery.process.pid).children()) == 2  # the others were not even forked
+        world.go_on()
+        ready(world, len(names))
+        assert len(world.asked) == len(names)
+
+
+def test_who_cannot_join_makes_room_for_the_next(started: list[Nursery]) -> None:
+    with made_up_world(join=None) as world:
+        started.append(nursery := Nursery(world.endpoint, "r1", "r2", "r3", program=("-c", TWO_AT_ONCE)))
+        assert sorted(nursery.ended()[1].splitlines()) == ["r1 1", "r2 1", "r3 1"]
 
 
 def test_runners_that_end_badly_are_reported_by_name(started: list[Nursery]) -> None:

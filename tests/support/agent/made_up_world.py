@@ -31,13 +31,18 @@ def given(**change: Any) -> bytes:
 
 
 class MadeUpWorld:
-    """Answers with the offer and the robots that it is told; None: it refuses. Frames follow once a runner is ready."""
+    """Answers with the offer and the robots that it is told; None: it refuses. Frames follow once a runner is ready.
+
+    Attributes:
+        holds: whether it keeps those who ask for robots waiting, until `go_on`.
+    """
 
     def __init__(self, session: zenoh.Session, run: str, offer: bytes | None, join: bytes | None) -> None:
         self.keys, self.endpoint = Keys(run), listens_at(session)[0]
         self.asked: list[bytes] = []
         self.answers: list[frames.Frame] = []
         self.to_send: list[bytes] = []
+        self.holds, self._held = False, list[zenoh.Query]()
         self._session, self._replies = session, {self.keys.any_offer: offer, self.keys.any_join: join}
         self._declared = (
             session.declare_queryable(self.keys.any_offer, Callback(self._offer, indirect=False)),
@@ -51,8 +56,17 @@ class MadeUpWorld:
 
     def _join(self, query: zenoh.Query) -> None:
         assert query.payload is not None
+        if self.holds:
+            self._held.append(query)
         self.asked.append(query.payload.to_bytes())
-        self._reply(query, self.keys.any_join)
+        if not self.holds:
+            self._reply(query, self.keys.any_join)
+
+    def go_on(self) -> None:
+        """Answer all who were kept waiting, and whoever comes."""
+        self.holds = False
+        while self._held:
+            self._reply(self._held.pop(), self.keys.any_join)
 
     def _reply(self, query: zenoh.Query, key: str) -> None:
         answer = self._replies[key]

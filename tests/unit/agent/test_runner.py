@@ -7,12 +7,13 @@ import msgpack
 import numpy as np
 import pytest
 
-from swarmwire.agent.runner import Inbox, given_robots
-from swarmwire.comms.errors import BadFrame
+from swarmwire.agent.runner import PLAIN, Inbox, _join, given_robots
+from swarmwire.comms.errors import BadFrame, RunnerLost
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.in_time_frames import encode_packets
+from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.tick_frames import encode_tick
 from tests.support.agent.hosts import GIVES, assignment, group, heard_from, senses
 
@@ -148,3 +149,26 @@ def test_robots_that_a_world_cannot_give_are_refused(wrong: dict[str, Any]) -> N
     assert given_robots(msgpack.packb(given))[0].robot_names == ("flock-0",)
     with pytest.raises(BadFrame):
         given_robots(msgpack.packb({**given, **wrong}))
+
+
+class NoAnswer:
+    """A session and an answer in one: a query whose time is up, as zenoh tells of it."""
+
+    ok = None
+
+    def __init__(self) -> None:
+        self.err = self.payload = self
+
+    def get(self, _key: str, *, payload: bytes, timeout: float) -> list["NoAnswer"]:
+        assert payload
+        assert timeout
+        return [self]
+
+    def to_string(self) -> str:
+        return "Timeout"
+
+
+def test_a_world_that_takes_too_long_to_answer_is_named_as_what_is_wrong() -> None:
+    with pytest.raises(RunnerLost, match="the world did not answer to join within 30 s") as lost:
+        _join(NoAnswer(), Keys("run1"), "r7", PLAIN)  # pyright: ignore[reportArgumentType]
+    assert lost.value.runner == "r7"

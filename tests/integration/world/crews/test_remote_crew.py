@@ -8,6 +8,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Generator, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
@@ -25,10 +26,12 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join_request import JoinRequest
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
+from swarmwire.world.crews import runner_crew
 from swarmwire.world.crews.remote_crew import RemoteCrew
 from swarmwire.world.crews.runner_crew import Surroundings
 from swarmwire.world.crews.runner_health import RunnerHealth
 from tests.support.agent.hosts import GIVES, assignment, group, heard_from, one_group, plain, spec
+from tests.support.waiting import PATIENCE_S
 
 RUN = "r1"
 ROWS = [0, 1, 2, 3, 4]
@@ -218,6 +221,20 @@ def test_a_runner_may_come_before_its_world(endpoint: str) -> None:
             with opened(endpoint, parts("Counter", [0])) as crew:
                 crew.start()
             assert ends.get(timeout=20.0) is None
+
+
+def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many_more(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runner_crew, "POLL_S", PATIENCE_S)  # it would answer nobody while it waits for more to come
+    keys, slots = Keys(RUN), parts("Counter", *([row] for row in ROWS))
+    with opened(endpoint, slots) as crew, ThreadPoolExecutor() as others, open_runner(endpoint) as asking:
+        started = others.submit(crew.start)
+        for row in ROWS:
+            (reply,) = asking.get(keys.join(f"r{row}"), payload=JoinRequest().encode(), timeout=TIMEOUT_S)
+            assert reply.ok is not None
+            asking.put(keys.answer(f"r{row}"), frames.encode("ready", -1, {}))
+        started.result(PATIENCE_S)
 
 
 def test_when_nobody_joins_the_wait_ends_at_the_time_out(endpoint: str) -> None:

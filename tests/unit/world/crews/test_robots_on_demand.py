@@ -1,5 +1,6 @@
 """Runners that ask for robots, leave and come back: who gets what, and what is counted, in lockstep and real time."""
 
+import sys
 from typing import Any
 
 import msgpack
@@ -17,6 +18,7 @@ from swarmwire.world.crews.lockstep import Lockstep
 from swarmwire.world.crews.realtime import RealTime
 from swarmwire.world.crews.roster import OnLoss
 from swarmwire.world.crews.terms import Terms
+from tests.support.agent.hosts import assignment, group
 from tests.support.world.locksteps import FLOCK, SCOUTS, parts, ready, request, state
 
 Made = Lockstep | RealTime
@@ -260,3 +262,26 @@ def test_so_does_what_it_says_of_its_failure() -> None:
     assert failed.value.robots.isprintable()
     assert failed.value.traceback.startswith("at line 1:\n\tboom\\x1b[2Jx")
     assert len(str(failed.value)) < 200_000
+
+
+def calls_of_joining(robots: int, wanted: dict[str, Any]) -> int:
+    """How many functions, of Python's and of C's, the first to join calls: work that no other process changes."""
+    roster, called = Lockstep([assignment(group("unused:Agent", [row])) for row in range(robots)]), 0
+
+    def count(_frame: object, event: str, _argument: object) -> None:
+        nonlocal called
+        called += event in ("call", "c_call")
+
+    before = sys.getprofile()
+    sys.setprofile(count)
+    try:
+        roster.join("r", request(**wanted))
+    finally:
+        sys.setprofile(before)
+    return called
+
+
+@pytest.mark.parametrize("wanted", [{}, {"names": ["flock-0"]}])
+def test_one_of_many_runners_joins_with_about_the_work_of_one_of_few(wanted: dict[str, Any]) -> None:
+    calls_of_joining(20, wanted)  # the first may import modules
+    assert calls_of_joining(400, wanted) < 5 * calls_of_joining(20, wanted)

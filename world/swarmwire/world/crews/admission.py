@@ -54,7 +54,7 @@ def granted(asked: JoinRequest, slots: Slots[S], terms: Terms) -> IntArray:
     most = terms.limits.robots_per_runner
     if terms.open and len(rows) > most:
         raise Refused(f"expected at most {most} robots for one runner, got {len(rows)}")
-    groups = [group for assignment in slots.assignments for group in assignment.groups]
+    groups = [group for slot in slots.holding(rows) for group in slot.assignment.groups]
     _check_agents(asked, terms, [group.name for group in groups if np.isin(group.rows, rows).any()])
     return rows
 
@@ -81,10 +81,9 @@ def _named(names: Sequence[str], slots: Slots[S]) -> IntArray:
             f"expected names of robots, each once ({robots_text(list(row_of))}), got {robots_text(list(names))}"
         )
     rows = np.sort(np.array([row_of[name] for name in names], np.int64))
-    for slot in slots:
-        theirs = np.isin(rows, slot.all_rows)
-        if theirs.any() and not slot.may("joins"):
-            taken = robots_text([name for name in names if row_of[name] in rows[theirs]])
+    for slot in slots.holding(rows):
+        if not slot.may("joins"):
+            taken = robots_text([name for name in names if row_of[name] in slot.all_rows])
             raise Refused(f"taken, by {slot.runner}: {taken}" if slot.runner else f"given up: {taken}")
     return rows
 

@@ -154,7 +154,7 @@ class RunnerCrew(ABC, Generic[R]):
         """Take in what arrives until every runner is ready; one that takes too long is lost.
 
         Samples are handled together once there may be one from each runner: one by one, the caches of this process
-        would be cold for each, since the runners use the cores in between.
+        would be cold for each, since the runners use the cores in between. A question is answered at once.
         """
         self._allow_time()
         self._waits_since_ns = self._looked_ns
@@ -171,6 +171,8 @@ class RunnerCrew(ABC, Generic[R]):
                 if item is None:
                     break
                 arrived.append(item)
+                if isinstance(item, zenoh.Query):
+                    break
             if not arrived and self._around.stopped():
                 raise Interrupted("interrupted while it waited for its runners")
             trouble = None if arrived else self._trouble()

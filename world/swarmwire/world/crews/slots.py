@@ -47,9 +47,13 @@ class Slots(Generic[S]):
         """Those whose robots a runner may have."""
         return [slot for slot in self._slots if slot.may("joins")]
 
+    def holding(self, rows: IntArray) -> list[S]:
+        """The slots that hold any of these robots; it takes no longer where there are a thousand slots."""
+        return [self._slots[place] for place in np.unique(self.owner[rows]).tolist()]
+
     def cut(self, rows: IntArray) -> S:
         """A free slot of exactly these robots, (n,) rising, all of which are in slots that are free."""
-        olds = [slot for slot in self.free if np.isin(slot.all_rows, rows).any()]
+        olds = self.holding(rows)
         if len(olds) == 1 and len(olds[0].all_rows) == len(rows):
             return olds[0]
         slot = self._slot_of(merged([part_of(old.assignment, rows) for old in olds]))
@@ -72,9 +76,9 @@ class Slots(Generic[S]):
 
     def _owners(self) -> IntArray:
         rows = [slot.all_rows for slot in self._slots]
-        owner = np.full(1 + max(int(own.max()) for own in rows), NOBODY)
-        for place, own in enumerate(rows):
-            owner[own] = place
+        every = np.concatenate(rows)
+        owner = np.full(1 + int(every.max()), NOBODY)
+        owner[every] = np.repeat(np.arange(len(rows)), [len(own) for own in rows])
         return owner
 
 
