@@ -58,14 +58,14 @@ bench: sync ## measure; ONLY=name for one of them, ENGINE=pymunk for the figures
 	$(RUN) python -m benchmarks $(if $(ENGINE),--engine $(ENGINE)) $(ONLY)
 
 .PHONY: soak
-soak: sync ## fuzz every door at length, then random faults, then an hour of a hundred processes
+soak: sync ## fuzz every input at length, then random faults, then an hour of a hundred processes
 	$(RUN) python -m tests.tools.fuzz
 	$(RUN) python -m tests.tools.soak
 
 .PHONY: mutants
-mutants: ## change the code in small ways, one by one: do tests notice? ONLY=module for one
+mutants: ## change the code in small ways, one by one: does a test notice? ONLY=codec, draws or fates
 	@.ci/sync --group mutants
-	$(RUN) python -m tests.tools.mutants $(ONLY)
+	@for group in $(or $(ONLY),codec draws fates); do $(RUN) tests/tools/mutants/try.sh $$group || exit 1; done
 
 .PHONY: sync
 sync: # the locked packages, exactly
