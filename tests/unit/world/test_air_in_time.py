@@ -21,7 +21,7 @@ from swarmwire.world.scenario.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.support.comms.air.runs import RATE_HZ, TICK_NS, make_air, scattered
 from tests.support.world.samples import SAMPLE
-from tests.unit.comms.air.test_accounts import RADIOS
+from tests.support.comms.air.traffic import RADIOS
 
 MS = 1_000_000
 AIRTIME_NS = 96_000  # of a packet's three bytes

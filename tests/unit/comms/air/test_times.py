@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.air.radio import Radio
@@ -14,7 +14,6 @@ PAIR = at((0, 0), (1, 0))
 AIRTIME_NS = 320_000  # 10 bytes at 250 kbit/s
 
 
-@settings(max_examples=40)
 @given(
     st.floats(0.0, 0.3),
     st.sampled_from([0.0, 0.02, 0.2]),

@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swarmwire.comms.air.antennas import Antennas
 from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.parameters.gives import Gives, RangeGiven
+from swarmwire.comms.air.parameters.propagation import Antenna, OwnAntenna
 from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.burst_states import BurstStates
 from swarmwire.comms.air.tuning import check_number, number_of, numbers_of
@@ -127,3 +129,19 @@ def test_the_numbers_of_a_radio_are_those_that_a_ramp_may_move():
     for key, value in numbers.items():
         check_number(radio, f"radio.{key}", value)
         assert number_of(radio, f"radio.{key}") == value
+
+
+RADIO = Antenna(10.0, 2.0)
+
+
+def test_robots_without_anything_of_their_own_have_the_radios():
+    alike = Antennas.alike(2)
+    assert alike.send_dbm(RADIO).tolist() == [12.0, 12.0]
+    assert alike.receive_dbi(RADIO).tolist() == [2.0, 2.0]
+
+
+def test_groups_have_their_own_power_or_gain_or_both():
+    groups = [(1, OwnAntenna(power_dbm=0.0)), (2, OwnAntenna(gain_dbi=-1.0)), (1, None), (1, OwnAntenna(1.0, 1.0))]
+    mixed = Antennas.of_groups(groups)
+    assert mixed.send_dbm(RADIO).tolist() == [2.0, 9.0, 9.0, 12.0, 2.0]
+    assert mixed.receive_dbi(RADIO).tolist() == [2.0, -1.0, -1.0, 2.0, 1.0]

@@ -3,7 +3,9 @@
 from dataclasses import replace
 
 from swarmwire.comms.air.parameters.access import Access
+from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.parameters.gives import BearingGiven, Gives, RangeGiven, RssiGiven
+from swarmwire.comms.air.parameters.propagation import Fading, Shadowing
 from swarmwire.comms.air.parameters.reception import Reception
 from swarmwire.comms.air.propagation.log_distance import LogDistance
 from swarmwire.comms.air.radio import Radio
@@ -33,3 +35,17 @@ METHODS = ("none", "aloha", "csma-802154", "dcf")
 def with_access(method: str, radio: Radio = IEEE_802_15_4) -> Radio:
     """A radio with this method; of IEEE 802.11 for dcf."""
     return replace(WIFI_B if method == "dcf" else radio, access=Access(method))
+
+
+def drawing(method: str) -> Radio:
+    """A radio with this method and everything that draws."""
+    return replace(
+        with_access(method),
+        send_offset="uniform",
+        loss=0.1,
+        jitter_s=0.05,
+        shadowing=Shadowing(),
+        fading=Fading(),
+        bursts=Bursts(0.2, 0.4),
+        gives=ALL_GIVEN,
+    )

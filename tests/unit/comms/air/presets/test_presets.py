@@ -1,7 +1,8 @@
-"""Presets do what their sources say: airtimes, reach and sensitivity, the simulators' formulas, contention."""
+"""Presets do what their sources say; defaults of parameters are within their limits, and each has help."""
 
 import math
-from dataclasses import replace
+from dataclasses import MISSING, fields, is_dataclass, replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.air.reception.receiver import chunk_success
 from swarmwire.comms.air.signal.levels import range_of, receiver_for, sensitivity_of
 from swarmwire.comms.air.timing.frames import acknowledgement_bytes, airtime_ns
+from swarmwire.comms.parameters import fault_of, limits_of
+from tests.support.comms.air.parameter_modules import MODULES
 from tests.support.comms.air.runs import at, make_air, packets, run
 from tests.unit.world.scenario.test_radio_tables import radio_of
 
@@ -155,3 +158,24 @@ def test_modems_that_call_at_once_hear_nothing_of_each_other():
 @pytest.mark.parametrize("name", NEW)
 def test_what_a_preset_leaves_out_is_told(name: str):
     assert PRESETS[name].otherwise
+
+
+PARAMETERS = {
+    thing
+    for module in MODULES
+    for thing in vars(import_module(module)).values()
+    if isinstance(thing, type) and is_dataclass(thing) and thing.__module__ == module
+}
+
+
+@pytest.mark.parametrize("kind", sorted(PARAMETERS, key=lambda one: one.__name__))
+def test_defaults_are_within_limits_and_every_parameter_has_help(kind: type):
+    for field in fields(kind):
+        limits = limits_of(field)
+        if "limits" not in field.metadata:
+            continue
+        assert limits.help, field.name
+        if isinstance(field.default, int | float):
+            assert fault_of(field.default, limits) is None, field.name
+        if limits.choices and field.default not in (MISSING, None):
+            assert field.default in limits.choices, field.name

@@ -1,20 +1,19 @@
-"""Shadowing: what the field's definition says of variance and correlation, and that both directions agree.
-
-Keys are fixed. Each statistic is taken over independent arenas and held to 4.4 standard errors (false alarm
-1 in 90 000).
-"""
+"""Shadowing: what the field's definition says of variance and correlation, and that both directions agree."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba import njit
 from scipy import stats
 
 from swarmwire.comms.air.parameters.propagation import Shadowing
 from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves, shadowing_db
-from swarmwire.comms.air.propagation.waves import cosine, sine
+from swarmwire.comms.air.propagation.waves import SUMS, cosine, sine, total
 from swarmwire.comms.draws import derive_key
 
+# Keys are fixed. Each statistic is taken over independent arenas and held to 4.4 standard errors (false alarm
+# 1 in 90 000).
 ARENAS = 3000
 DELTA_M = 5.0
 UNIT = Shadowing(deviation_db=1.0, correlation_m=DELTA_M)
@@ -175,3 +174,13 @@ def test_the_waves_sines_agree_with_the_librarys(turns: float):
     assert abs(cosine(turns) - np.cos(2.0 * np.pi * rest)) < 3e-11
     assert sine(-turns) == -sine(turns)
     assert cosine(-turns) == cosine(turns)
+
+
+@njit  # pyright: ignore[reportUntypedFunctionDecorator] - numba is untyped
+def total_of(s):
+    return total(s)
+
+
+def test_a_total_has_each_of_the_sums_once():
+    powers = 2.0 ** np.arange(SUMS)
+    assert total_of(powers) == 2.0**SUMS - 1.0
