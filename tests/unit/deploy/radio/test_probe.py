@@ -72,17 +72,6 @@ def test_a_robot_that_sends_does_so_with_the_power_of_its_group():
     assert by_distance[1][5] == pytest.approx(by_distance[0][5] + 20.0)
 
 
-def test_people_get_a_table_and_a_picture(tmp_path):
-    text = said(WALLED, "--to", tmp_path / "coverage.png", "--size", "400")
-    assert "sensitivity -101.0 dBm" in text
-    assert "% of the arena in range" in text
-    assert max(len(line) for line in text.splitlines() if "│" in line) <= 80
-    assert text.splitlines()[-1] == f"written: {tmp_path / 'coverage.png'}"
-    assert (tmp_path / "coverage.png").read_bytes().startswith(b"\x89PNG")
-    json.loads(said(LOSSY, "--json", "--to", tmp_path / "disk.svg").splitlines()[0])
-    assert "</svg>" in (tmp_path / "disk.svg").read_text()
-
-
 @pytest.mark.parametrize(
     ("arguments", "where", "key"),
     [

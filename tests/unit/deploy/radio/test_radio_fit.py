@@ -5,11 +5,8 @@ import tomllib
 
 import pytest
 
-from swarmwire.comms.air.parameters.bursts import Bursts
-from swarmwire.comms.air.parameters.propagation import Shadowing
 from swarmwire.world.scenario.scenario_file import scenario_from
 from tests.support.deploy.commands import ROOT, called
-from tests.support.metrics.radio_fit.synthetic import csv_of, made
 
 HEAD = "t_s,tx,rx,seq,rssi_dbm,distance_m\n"
 SMALL = HEAD + "".join(f"{i},a,b,{i},{-50 - i},{1 + i}\n" for i in range(20))
@@ -19,21 +16,6 @@ SMALL = HEAD + "".join(f"{i},a,b,{i},{-50 - i},{1 + i}\n" for i in range(20))
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def test_a_log_becomes_a_table_a_picture_and_what_stands_in_a_scenario(here, monkeypatch, capsys):
-    pytest.importorskip("matplotlib", reason="needs the extra [report]")
-    (here / "log.csv").write_text(csv_of(made(1, Shadowing(4.0, 5.0), Bursts(0.5, 5.0), packets=60)))
-    to = ["--to", "fit.png", "--write", "radio.toml", "--power-dbm", "4", "--size", "400"]
-    code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", *to)
-    assert (code, errors) == (0, "")
-    for said in ("path loss exponent", "standard error", "correlation distance", "bursts: mean", "root mean square"):
-        assert said in out
-    assert out.endswith("written: fit.png\nwritten: radio.toml\n")
-    assert (here / "fit.png").read_bytes().startswith(b"\x89PNG")
-    radio = tomllib.loads((here / "radio.toml").read_text())["radio"]
-    assert sorted(radio) == ["antenna", "bursts", "log_distance", "model", "shadowing"]
-    assert 42.0 < radio["log_distance"]["reference_loss_db"] < 46.0
 
 
 def test_without_a_file_the_table_is_printed_and_what_is_left_out_is_named(here, monkeypatch, capsys):
@@ -117,22 +99,6 @@ def test_a_fit_beyond_what_a_scenario_takes_is_refused_with_the_key(here, monkey
 def test_one_packet_is_no_packets(here, monkeypatch, capsys):
     (here / "log.csv").write_text(SMALL)
     assert "20 packets on 1 link, 20 received" in called(monkeypatch, capsys, "radio", "fit", "log.csv")[1]
-
-
-@pytest.mark.parametrize("farthest_m", [2.0, 9.0, 15.5, 400.0, 1e6])
-def test_the_picture_has_distances_to_read_off(here, monkeypatch, capsys, farthest_m):
-    pytest.importorskip("matplotlib", reason="needs the extra [report]")
-    from swarmwire.metrics.drawing import canvas, radio_fit_sheet
-
-    drawn = []
-    monkeypatch.setattr(radio_fit_sheet, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
-    step = math.log10(farthest_m / 1.2) / 19
-    (here / "log.csv").write_text(rows(20, lambda i: -50 - 30 * step * i, lambda i: 1.2 * 10.0 ** (step * i)))
-    code, _, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--to", "fit.png", "--size", "400")
-    assert (code, errors) == (0, "")
-    axis, (low, high) = drawn[0].axes[0].xaxis, drawn[0].axes[0].get_xlim()
-    shown = [label.get_text() for label in axis.get_ticklabels() if low <= label.get_position()[0] <= high]
-    assert 2 <= len([text for text in shown if text]) <= 20
 
 
 @pytest.mark.parametrize(
