@@ -5,14 +5,20 @@ from typing import Any
 
 import numpy as np
 
+from swarmwire.agent.host import Hosted, hosted
+from swarmwire.agent.loading import AgentClass
 from swarmwire.comms import draws
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import Heard, Sent
+from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
+from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions, GroupSenses, Senses
+from tests.support.agent.players import Word
 
 PLAYERS = Path(__file__).with_name("players.py")
 GIVES = ("range_m", "bearing_rad")
+PERIOD_NS = 100_000_000
+SILENCE = Heard.none(GIVES)
 
 
 def spec(name: str) -> str:
@@ -72,3 +78,19 @@ def plain(actions: Actions) -> list[Any]:
 
 def one_group(tick: int, rows: list[int]) -> Senses:
     return {"flock": senses(tick, rows)}
+
+
+def host_of(kind: AgentClass, rows: list[int]) -> Hosted:
+    """Whatever runs an agent of this class for these rows."""
+    return hosted(group("", rows), kind)
+
+
+def step(host: Hosted, tick: int, rows: list[int], heard: Heard = SILENCE, told: Outcomes = NO_OUTCOMES) -> Actions:
+    """One step of the robots in these rows."""
+    return host.act((tick, tick * PERIOD_NS, PERIOD_NS), senses(tick, rows), heard, told)
+
+
+def words(*senders: int) -> Sent:
+    """A broadcast from each of these, which says who sent it."""
+    payloads = [Word(number=float(sender)).encode() for sender in senders]
+    return Sent(np.array(senders), np.full(len(senders), BROADCAST), Payloads.of(payloads))

@@ -8,16 +8,9 @@ from swarmwire.agent.host import Host, _Single
 from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
-from tests.support.agent.hosts import GIVES, assignment, group, heard_from, senses, spec
+from swarmwire.comms.packets import Sent
+from tests.support.agent.hosts import SILENCE, assignment, group, heard_from, senses, spec, words
 from tests.support.agent.players import Word
-
-SILENCE = Heard.none(GIVES)
-
-
-def words(*senders: int) -> Sent:
-    payloads = Payloads.of([Word(number=float(sender)).encode() for sender in senders])
-    return Sent(np.array(senders), np.full(len(senders), BROADCAST), payloads)
 
 
 def numbers(sent: Sent) -> list[tuple[int, float]]:

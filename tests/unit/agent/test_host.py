@@ -8,26 +8,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
-from swarmwire.agent.host import Host, Hosted, hosted
+from swarmwire.agent.host import Host
 from swarmwire.agent.loading import AgentClass
 from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.messages import encode_dict
 from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions
-from tests.support.agent.hosts import GIVES, assignment, group, heard_from, one_group, plain, senses, spec
+from tests.support.agent.hosts import (
+    SILENCE,
+    assignment,
+    group,
+    heard_from,
+    host_of,
+    one_group,
+    plain,
+    senses,
+    spec,
+    step,
+    words,
+)
 from tests.support.agent.players import Chatter, Counter, Failing, Other, Unmade, VectorCounter, Word
-
-PERIOD_NS = 100_000_000
-SILENCE = Heard.none(GIVES)
-
-
-def host_of(kind: AgentClass, rows: list[int]) -> Hosted:
-    return hosted(group("", rows), kind)
-
-
-def step(host: Hosted, tick: int, rows: list[int], heard: Heard = SILENCE) -> Actions:
-    return host.act((tick, tick * PERIOD_NS, PERIOD_NS), senses(tick, rows), heard)
 
 
 def once(kind: AgentClass, rows: list[int], heard: Heard = SILENCE, tick: int = 0) -> Actions:
@@ -38,11 +39,6 @@ def failure(kind: AgentClass, heard: Heard = SILENCE) -> AgentFailed:
     with pytest.raises(AgentFailed) as caught:
         once(kind, [2, 5], heard)
     return caught.value
-
-
-def words(*senders: int) -> Sent:
-    payloads = [Word(number=float(s)).encode() for s in senders]
-    return Sent(np.array(senders), np.full(len(senders), BROADCAST), Payloads.of(payloads))
 
 
 READS = {

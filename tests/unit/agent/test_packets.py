@@ -1,16 +1,21 @@
-"""Packets come to one robot as `Packet`, to n robots as `Packets` with `Columns`, and say the same."""
+"""What agents hear and learn: packets of one robot and columns of n, and what became of those that they sent."""
+
+from typing import ClassVar
 
 import numpy as np
+import pytest
 
-from swarmwire.agent import Agent, Packet, VectorAgent
+from swarmwire.agent import Agent, Outcome, Packet, Robot, Robots, SendResult, State, VectorAgent
 from swarmwire.agent.packet import Columns, Packets
+from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
+from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.messages import DICT_TAG, encode_dict
+from swarmwire.comms.outcomes import Outcomes
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
-from tests.support.agent.hosts import heard_from
-from tests.support.agent.players import Word
-from tests.unit.agent.test_host import host_of, step, words
+from tests.support.agent.hosts import heard_from, host_of, step, words
+from tests.support.agent.players import Insistence, Insisting, Other, VectorInsisting, Word
 
-told = {}
+said = {}
 DICTS = (b"", b"\xc1", b"\x81", b"\x01", b"\x93\x01\x02\x03", b"\x81\x91\x01\x01", b"\x80\x00", b"\x91" * 600)
 
 
@@ -20,7 +25,7 @@ class Alone(Agent):
     def step(self, robot):
         packets: list[Packet[Word]] = robot.radio.heard(Word)
         assert all(isinstance(packet, Packet) for packet in packets)
-        told["alone"] = [(packet.sender, packet.range_m, packet.message.number) for packet in packets]
+        said["alone"] = [(packet.sender, packet.range_m, packet.message.number) for packet in packets]
 
 
 class Rows(VectorAgent):
@@ -30,14 +35,14 @@ class Rows(VectorAgent):
         packets: Packets[Word] = robots.radio.heard(Word)
         assert isinstance(packets.message, Columns)
         columns = (packets.sender, packets.range_m, packets.message.number)
-        told["rows"] = list(zip(*(column.tolist() for column in columns), strict=True))
+        said["rows"] = list(zip(*(column.tolist() for column in columns), strict=True))
 
 
 def test_one_robot_hears_in_packets_what_n_robots_hear_in_columns():
     for kind in (Alone, Rows):
         step(host_of(kind, [5]), 0, [5], heard_from(words(0, 2), [5]))
-    assert told["alone"] == told["rows"]
-    assert [sender for sender, _, _ in told["alone"]] == [0, 2]
+    assert said["alone"] == said["rows"]
+    assert [sender for sender, _, _ in said["alone"]] == [0, 2]
 
 
 def test_what_bears_the_tag_of_a_dict_and_is_none_is_not_heard():
@@ -45,10 +50,123 @@ def test_what_bears_the_tag_of_a_dict_and_is_none_is_not_heard():
 
     class Hears(Agent):
         def step(self, robot):
-            told["dicts"] = [packet.message for packet in robot.radio.heard(dict)]
+            said["dicts"] = [packet.message for packet in robot.radio.heard(dict)]
 
     tag = DICT_TAG.to_bytes(2, "little")
     payloads = Payloads.of([*(tag + data for data in DICTS), encode_dict({"x": 1})])
     sender = np.zeros(len(payloads), np.int64)
     step(host_of(Hears, [5]), 0, [5], heard_from(Sent(sender, sender + BROADCAST, payloads), [5]))
-    assert told["dicts"] == [{"x": 1}]
+    assert said["dicts"] == [{"x": 1}]
+
+
+TRIALS = [Trial(), Trial(robots=1), Trial(robots=30, ticks=20, seed=7)]
+
+
+class Keeps(Agent):
+    """Sends to all, to robot 0 and to robot 1, and keeps what it is told."""
+
+    needs = ("radio.outcomes",)
+    told: ClassVar[list[list[Outcome]]] = []
+    ids: ClassVar[list[int]] = []
+
+    def step(self, robot: Robot) -> None:
+        self.told.append(robot.radio.outcomes)
+        self.ids.extend(robot.radio.send(Other(number=1), to=to) for to in (None, 0, 1))
+
+
+@pytest.fixture
+def keeps() -> type[Keeps]:
+    return type("Fresh", (Keeps,), {"told": [], "ids": []})
+
+
+def outcomes(*rows: tuple[int, int, int]) -> Outcomes:
+    """Robot row, id, result."""
+    return Outcomes(*np.array(rows, np.int64).reshape(-1, 3).T)
+
+
+def test_an_agent_is_told_of_its_own_packets_by_the_id_that_send_returned(keeps: type[Keeps]):
+    host = host_of(keeps, [2, 5])
+    sent = step(host, 0, [2, 5]).sent
+    assert keeps.ids == [0, 1, 2, 0, 1, 2]
+    asked = dict(zip(zip(sent.sender.tolist(), sent.to.tolist(), strict=True), sent.outcome_ids.tolist(), strict=True))
+    assert asked == {(2, -1): -1, (2, 0): 1, (2, 1): 2, (5, -1): -1, (5, 0): 1, (5, 1): 2}
+    step(host, 1, [2, 5], told=outcomes((1, 0, 0), (2, 1, 0), (2, 2, 3), (5, 2, 1), (9, 0, 0)))
+    assert keeps.told[2:] == [
+        [Outcome(1, SendResult.ACKNOWLEDGED), Outcome(2, SendResult.QUEUE_FULL)],
+        [Outcome(2, SendResult.NO_ACKNOWLEDGEMENT)],
+    ]
+    assert [one.acknowledged for one in keeps.told[2]] == [True, False]
+    assert (step(host, 2, [2, 5]).rows.tolist(), keeps.told[4:]) == ([2, 5], [[], []])
+
+
+def test_a_vector_agent_reads_the_same_as_columns():
+    seen: list[Outcomes] = []
+
+    class Reads(VectorAgent):
+        needs: ClassVar[tuple[str, ...]] = ("radio.outcomes",)
+
+        def step(self, robots: Robots, state: State) -> None:
+            seen.append(robots.radio.outcomes)
+            robots.radio.send(Other, to=np.arange(robots.n) + 1, number=1.0)
+
+    host = host_of(Reads, [2, 5, 8])
+    assert step(host, 0, [2, 5, 8]).sent.outcome_ids.tolist() == [0, 0, 0]
+    step(host, 1, [2, 5, 8], told=outcomes((5, 0, 2), (8, 0, 0)))
+    assert (seen[1].row.tolist(), seen[1].id.tolist(), seen[1].result.tolist()) == ([1, 2], [0, 0], [2, 0])
+    assert seen[1].acknowledged.tolist() == [False, True]
+
+
+def test_who_does_not_declare_it_neither_asks_nor_reads():
+    class Silent(Agent):
+        def step(self, robot: Robot) -> None:
+            assert robot.radio.send(Other(number=1), to=0) == 0
+
+    class Reads(Agent):
+        needs = ("radio.rssi",)
+
+        def step(self, robot: Robot) -> None:
+            print(robot.radio.outcomes)
+
+    assert step(host_of(Silent, [2]), 0, [2]).sent.outcome_id is None
+    with pytest.raises(AgentFailed, match="reads 'radio.outcomes', which its needs do not name: radio.rssi"):
+        step(host_of(Reads, [2]), 0, [2])
+
+
+def test_a_robot_that_starts_afresh_is_not_told_of_packets_from_before(keeps: type[Keeps]):
+    host = host_of(keeps, [2, 5])
+    step(host, 0, [2, 5])
+    step(host, 1, [5])
+    step(host, 2, [2, 5], told=outcomes((2, 1, 0), (5, 1, 0), (5, 5, 0)))
+    assert [[one.id for one in told] for told in keeps.told[3:]] == [[], [1, 5]]
+    assert keeps.ids[-6:-3] == [3, 4, 5]
+    step(host, 3, [2, 5], told=outcomes((2, 2, 1), (2, 4, 0)))
+    assert [[one.id for one in told] for told in keeps.told[5:]] == [[4], []]
+
+
+def test_an_agent_that_took_over_is_not_told_of_packets_that_it_never_sent(keeps: type[Keeps]):
+    step(host_of(keeps, [2]), 7, [2], told=outcomes((2, 1, 0), (2, 30, 1)))
+    assert keeps.told == [[]]
+
+
+@pytest.mark.parametrize("trial", TRIALS, ids=repr)
+def test_both_kinds_of_agent_are_told_the_same(trial: Trial):
+    assert_equivalent(Insisting, VectorInsisting, trial)
+    assert_rows_independent(VectorInsisting, trial)
+
+
+def test_the_trial_tells_of_every_result_and_catches_who_takes_it_otherwise():
+    class Credulous(VectorInsisting):
+        def step(self, robots: Robots, state: Insistence) -> None:
+            super().step(robots, state)
+            told = robots.radio.outcomes
+            state.number[told.row[told.result == SendResult.TOO_LARGE]] += 1
+
+    class Peeking(VectorInsisting):
+        def step(self, robots: Robots, state: Insistence) -> None:
+            super().step(robots, state)
+            robots.drive(float(len(robots.radio.outcomes)), 0.0)
+
+    with pytest.raises(AssertionError, match="Insisting and Credulous differ"):
+        assert_equivalent(Insisting, Credulous)
+    with pytest.raises(AssertionError, match="rows of Peeking are not independent"):
+        assert_rows_independent(Peeking)

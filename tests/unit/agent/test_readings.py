@@ -1,15 +1,21 @@
-"""Both kinds of agent read the same of every sense; single robots get plain numbers."""
+"""Both kinds of agent read the same of every sense, their own senses too, and set own actuators alike."""
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from swarmwire.agent import Agent, VectorAgent
+from swarmwire.agent.host import hosted
 from swarmwire.agent.readings import Blob
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
+from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
+from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.sheets import Battery, Imu, OwnSheet
+from tests.support.agent.hosts import GIVES, group, senses
 
 
 class Moth(Agent):
@@ -134,3 +140,124 @@ def test_a_sense_that_is_not_declared_is_refused(sense: str) -> None:
 
     with pytest.raises(AgentFailed, match="NotDeclared"):
         assert_rows_independent(Peeks, Trial(body="epuck-gps"))
+
+
+EPUCK = load_body("epuck")
+BODY = replace(
+    EPUCK,
+    senses={
+        **EPUCK.senses,
+        "gas": OwnSheet(kind="a:B", params={}, fields={"level": 0, "cells": 3}),
+        "imu": Imu(),
+        "battery": Battery(capacity_wh=1.0),
+    },
+    actuators={"horn": ActuatorSheet("a:C", {}, 1), "arm": ActuatorSheet("a:D", {}, 3)},
+)
+TRIAL = Trial(body=BODY)
+
+
+class Sniffer(Agent):
+    """Uses all of it."""
+
+    needs: ClassVar[tuple[str, ...]] = ("gas", "imu", "battery")
+
+    def step(self, robot) -> None:
+        gas, imu = robot.sense("gas"), robot.imu
+        assert type(gas.level) is type(imu.turn_radps) is type(robot.battery.charge) is float
+        assert gas.cells.shape == (3,)
+        robot.drive(0.01 * gas.level * robot.battery.voltage_v, imu.forward_mps2 + imu.left_mps2 + imu.turn_radps)
+        if gas.level > 0.5:
+            robot.actuate("horn", gas.level)
+        robot.actuate("arm", gas.cells * robot.battery.charge)
+
+
+class VectorSniffer(VectorAgent):
+    """The same rule for n robots."""
+
+    needs: ClassVar[tuple[str, ...]] = ("gas", "imu", "battery")
+
+    def step(self, robots, state) -> None:
+        gas, imu = robots.sense("gas"), robots.imu
+        assert gas.cells.shape == (robots.n, 3)
+        turn = imu.forward_mps2 + imu.left_mps2 + imu.turn_radps
+        robots.drive(0.01 * gas.level * robots.battery.voltage_v, turn)
+        robots.actuate("horn", gas.level, rows=gas.level > 0.5)
+        robots.actuate("arm", gas.cells * robots.battery.charge[:, None])
+
+
+def test_one_robot_and_many_do_the_same() -> None:
+    assert_equivalent(Sniffer, VectorSniffer, TRIAL)
+    assert_rows_independent(VectorSniffer, TRIAL)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda robots: robots.sense("gas").colour, "the sense gas has the fields level, cells, not colour"),
+        (lambda robots: robots.sense("compass"), "NotDeclared"),
+        (lambda robots: robots.actuate("leg", 1.0), "NotFitted.* no actuator 'leg' of its own: it has horn, arm"),
+        (lambda robots: robots.actuate("arm", [1.0, 2.0]), "expected 3 numbers, got the shape"),
+        (lambda robots: robots.actuate("horn", np.zeros((2, 2))), "expected 1 numbers, got the shape"),
+        (lambda robots: robots.actuate("horn", np.nan), "expected finite numbers, got nan"),
+        *(
+            (lambda robots, values=values: robots.actuate("arm", values, rows=np.arange(robots.n) > 0), said)
+            for values, said in (
+                ([1.0, 2.0], r"ValueError: .*expected 3 numbers, got the shape \(2,\)"),
+                (np.zeros((2, 3)), r"ValueError: .*expected 3 numbers, got the shape \(2, 3\)"),
+                (np.zeros((2, 2, 3)), r"ValueError: .*expected 3 numbers, got the shape \(2, 2, 3\)"),
+                ([1.0, 2.0, np.inf], "ValueError: .*expected finite numbers"),
+            )
+        ),
+        (
+            lambda robots: robots.actuate("horn", np.zeros(robots.n + 1), rows=np.arange(robots.n) > 0),
+            "ValueError: .*expected 1 numbers, got the shape",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_refused(call, said: str) -> None:
+    class Wrong(VectorAgent):
+        needs: ClassVar[tuple[str, ...]] = ("gas",)
+
+        def step(self, robots, state) -> None:
+            call(robots)
+
+    with pytest.raises(AgentFailed, match=said):
+        assert_rows_independent(Wrong, TRIAL)
+
+
+def test_one_number_or_a_vector_goes_for_all_robots() -> None:
+    class One(VectorAgent):
+        def step(self, robots, state) -> None:
+            robots.actuate("horn", 0.5)
+            robots.actuate("arm", [1.0, 2.0, 3.0])
+
+    class Many(VectorAgent):
+        def step(self, robots, state) -> None:
+            robots.actuate("horn", np.full(robots.n, 0.5))
+            robots.actuate("arm", np.tile([1.0, 2.0, 3.0], (robots.n, 1)))
+
+    class Each(Agent):
+        def step(self, robot) -> None:
+            robot.actuate("horn", 0.5)
+            robot.actuate("arm", (1.0, 2.0, 3.0))
+
+    for vector in (One, Many):
+        assert_equivalent(Each, vector, TRIAL)
+
+
+def test_a_mask_takes_all_that_goes_for_all_robots_and_looks_at_its_own_alone() -> None:
+    def acted(values) -> list[tuple[int, int, float]]:
+        class Some(VectorAgent):
+            def step(self, robots, state) -> None:
+                robots.actuate("arm", values, rows=np.arange(robots.n) != 1)
+
+        rows = [2, 3, 5]
+        host = hosted(replace(group("", rows), body=BODY), Some)
+        own = host.act((0, 0, 100_000_000), senses(0, rows), Heard.none(GIVES)).own
+        return list(zip(own.rows.tolist(), own.place.tolist(), own.value.tolist(), strict=True))
+
+    arm = [1.0, 2.0, 3.0]
+    each = [(row, 1 + k, arm[k]) for row in (2, 5) for k in range(3)]
+    assert acted(arm) == each  # three numbers, and three robots: never a number for each robot
+    assert acted(np.array([arm, [np.nan] * 3, arm])) == each
+    assert acted(1.0) == [(row, 1 + k, 1.0) for row in (2, 5) for k in range(3)]

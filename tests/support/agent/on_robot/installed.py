@@ -5,6 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.support.agent.on_robot.scripted import PLAYERS
+
+DRIVING = f"{PLAYERS}:Driving"
 DRIVER = '''
 import os
 from dataclasses import dataclass
@@ -119,3 +122,8 @@ def deeds(file: Path) -> list[tuple[int, str]]:
         return []
     pairs = (line.partition(" ") for line in file.read_text().splitlines())
     return [(int(process), deed) for process, _, deed in pairs]
+
+
+def robot_flags(file: Path, *more: str) -> list[str]:
+    """Flags that name this driver and the file that it writes into."""
+    return ["--driver", "written", "--address", str(file), *more]

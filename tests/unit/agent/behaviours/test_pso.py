@@ -1,13 +1,15 @@
-"""Particle swarm search: the rule itself, on one e-puck with positioning that stands where a test puts it."""
+"""Particle swarms: the rule, neighbourhoods, noise, and the point-particle model."""
 
 from typing import Any
 
 import numpy as np
 import pytest
 
-from swarmwire.agent.behaviours import PsoSearch, PsoSearchPositioned
+from swarmwire.agent.behaviours import PsoModel, PsoSearch, PsoSearchPositioned
 from swarmwire.agent.behaviours.pso.particle_swarm import ParticleSwarm
 from swarmwire.agent.behaviours.pso_search import BestVector
+from swarmwire.agent.declared import BadParameter, checked
+from swarmwire.agent.testing import Trial, assert_rows_independent
 from tests.support.agent.behaviours.one_particle import HERE, One, place
 
 FURTHEST_M = 0.1 * 10.0  # speed x time between two updates
@@ -141,3 +143,159 @@ def test_on_its_way_a_robot_turns_from_what_is_near_ahead(ray: int, side: float)
     actions = one.step()
     assert np.sign(actions.angular_radps[0]) == -side
     assert actions.linear_mps[0] < free.linear_mps[0]
+
+
+OFTEN = {"update_every_ticks": 3, "tell_before_ticks": 1}
+RING = {"ring_count": 7, "ring_index": [0, 1, 2, 3, 4, 5, 6]}
+
+
+@pytest.mark.parametrize(
+    ("index", "width", "heeded"), [(0, 1, 9), (0, 4, 6), (0, 5, 5), (4, 1, 5), (3, 1, 4), (2, 2, 4)]
+)
+def test_on_a_ring_only_those_next_to_a_robot_count(index: int, width: int, heeded: int) -> None:
+    """Of senders 1 to 9 the nearer to 5 is the brighter, above 5 a little more so than below."""
+    one = One(ring_count=10, ring_index=index, ring_width=width)
+    one.step(*(place(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
+    assert one.vector("best")[0] == pytest.approx(heeded - 1.0)
+
+
+def test_without_a_ring_all_who_are_heard_count() -> None:
+    one = One()
+    one.step(*(place(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
+    assert one.vector("best")[0] == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(
+    ("params", "key", "text"),
+    [
+        ({"ring_count": -1}, "ring_count", "expected 0 .no ring. or how many"),
+        ({"ring_count": 10, "ring_width": 0}, "ring_width", "at least 1 neighbour on each side, got 0"),
+        ({"ring_count": 10}, "ring_index", "a list with the index in the arena of each robot, 0 to 9, got 0"),
+        ({"ring_count": 2, "ring_index": [0, 1, 2]}, "ring_index", "0 to 1, got"),
+        ({"ring_count": 3, "ring_index": [0, 1]}, "ring_index", "one for each of the 3 robots"),
+    ],
+)
+def test_what_is_no_ring_is_refused_before_anything_runs(params: dict[str, Any], key: str, text: str) -> None:
+    with pytest.raises(BadParameter, match=text) as caught:
+        checked(PsoSearch, params, robots=3)
+    assert caught.value.key == key
+
+
+def test_the_ring_of_a_class_by_default_is_checked_as_one_that_is_given() -> None:
+    class Ringed(PsoSearch):
+        ring_count: int = 10
+
+    with pytest.raises(BadParameter, match="0 to 9, got 0"):
+        checked(Ringed, {}, robots=3)
+    assert checked(Ringed, {"ring_index": [0, 1, 9]}, robots=3) == {"ring_index": [0, 1, 9]}
+    assert checked(Ringed, {"ring_count": 0}, robots=3) == {"ring_count": 0}
+
+
+def test_one_robot_of_a_ring_is_told_its_index_alone() -> None:
+    assert checked(PsoSearch, {"ring_count": 3, "ring_index": 2})["ring_index"] == 2
+
+
+def test_what_was_heard_is_forgotten_after_the_update_that_it_was_told_for_unless_it_is_kept() -> None:
+    kept, asked = One(), One(keeps_heard=False)
+    for one in (kept, asked):
+        one.steps(199)
+        one.step(place(9.0, 2.0, 2.0))
+        assert one.memory.best_brightness[0] == 9.0
+        one.step()
+    assert kept.vector("velocity") == asked.vector("velocity")
+    assert kept.memory.best_brightness[0] == 9.0
+    assert asked.memory.best_brightness[0] < 0.0
+
+
+@pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned, PsoModel])
+@pytest.mark.parametrize("more", [{}, RING, {"keeps_heard": False, "again_m": 0.5}])
+def test_each_robot_decides_for_itself(kind: Any, more: dict[str, Any]) -> None:
+    assert_rows_independent(kind, Trial(body="epuck-gps", params={**OFTEN, **more}))
+
+
+AGAIN_M = 0.1
+
+
+def test_by_itself_the_brightest_reading_counts() -> None:
+    one = One()
+    for brightness in (0.5, 0.9, 0.4, 0.6):
+        one.brightness = brightness
+        one.step()
+    assert one.memory.own_brightness[0] == pytest.approx(0.9)
+    assert one.memory.own_readings[0] == 1
+
+
+def test_readings_near_the_own_best_are_averaged_and_it_stays_where_it_was() -> None:
+    one = One(again_m=AGAIN_M)
+    for away_m, brightness in ((0.0, 0.5), (0.05, 0.9), (0.09, 0.4)):
+        one.place, one.brightness = (HERE[0] + away_m, HERE[1]), brightness
+        one.step()
+    assert one.memory.own_brightness[0] == pytest.approx(0.6)
+    assert one.memory.own_readings[0] == 3
+    assert one.vector("own") == pytest.approx((-0.09, 0.0))
+
+
+def test_farther_away_only_what_is_brighter_than_the_mean_takes_its_place() -> None:
+    one = One(again_m=AGAIN_M)
+    for brightness in (0.9, 0.5):
+        one.brightness = brightness
+        one.step()
+    one.place, one.brightness = (HERE[0] + 0.2, HERE[1]), 0.6
+    one.step()
+    assert one.memory.own_readings[0] == 2
+    one.brightness = 0.8  # less than the best reading, more than the mean
+    one.step()
+    assert one.vector("own") == (0.0, 0.0)
+    assert (one.memory.own_brightness[0], one.memory.own_readings[0]) == (pytest.approx(0.8), 1)
+
+
+def test_who_comes_back_measures_the_own_best_again_and_tells_its_mean() -> None:
+    one = One(again_m=AGAIN_M, update_every_ticks=5, tell_before_ticks=1)
+    one.brightness = 1.0
+    one.step()
+    one.place, one.brightness = (HERE[0] + 1.0, HERE[1]), 0.1
+    one.steps(2)
+    one.place, one.brightness = HERE, 0.5
+    one.step()
+    (told,) = [actions.sent.payloads.row(0) for actions in one.steps(1)]
+    assert told == place((1.0 + 0.5 + 0.5) / 3.0, *HERE).encode()
+
+
+SPEED_MPS, PERIOD_S = 0.1, 0.1
+
+
+@pytest.mark.parametrize("heading_rad", [0.0, 2.0, -2.0])
+def test_a_particle_flies_straight_to_its_target_whatever_its_heading(heading_rad: float) -> None:
+    one = One(PsoModel)
+    one.step()
+    one.heading_rad = heading_rad
+    actions = one.step()
+    forward, left = actions.linear_mps[0], actions.lateral_mps[0]
+    cos, sin = np.cos(heading_rad), np.sin(heading_rad)
+    x, y = one.vector("target")
+    away_m = np.hypot(x, y)
+    assert (forward * cos - left * sin, forward * sin + left * cos) == pytest.approx(
+        (SPEED_MPS * x / away_m, SPEED_MPS * y / away_m)
+    )
+    assert actions.angular_radps[0] == 0.0
+
+
+def test_a_particle_stops_at_its_target() -> None:
+    one = One(PsoModel)
+    one.step()
+    x, y = one.vector("target")
+    away_m = np.hypot(x, y)
+    short_m = 0.4 * SPEED_MPS * PERIOD_S
+    one.place = (HERE[0] + x * (1.0 - short_m / away_m), HERE[1] + y * (1.0 - short_m / away_m))
+    actions = one.step()
+    assert np.hypot(actions.linear_mps[0], actions.lateral_mps[0]) * PERIOD_S == pytest.approx(short_m)
+    one.place = (HERE[0] + x, HERE[1] + y)
+    assert one.step().linear_mps[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_particle_does_not_avoid_anything() -> None:
+    free, blocked = One(PsoModel), One(PsoModel)
+    blocked.rays[:] = 1.0
+    for _ in range(3):
+        one, other = free.step(), blocked.step()
+        assert one.linear_mps[0] == other.linear_mps[0]

@@ -128,13 +128,12 @@ def test_by_rays_each_robot_decides_alone(kind: type[VectorAgent]) -> None:
 
 
 def test_in_a_corridor_the_rule_deadlocks_and_its_cure_does_not() -> None:
-    stuck = {
-        kind: [arena.metrics["deadlocked"].final for arena in run(CORRIDOR, seeds=[1, 2], overrides=overrides).arenas]
+    rule, cure = (
+        run(CORRIDOR, seeds=[1], overrides=["duration_s=40", f"robots.crowd.agent='swarmwire.agent.behaviours:{kind}'"])
         for kind in ("ThresholdRule", "SmoothedAvoidance")
-        for overrides in [["duration_s=60", f"robots.crowd.agent='swarmwire.agent.behaviours:{kind}'"]]
-    }
-    assert all(share is not None and share >= 0.5 for share in stuck["ThresholdRule"])
-    assert stuck["SmoothedAvoidance"] == [0.0, 0.0]
+    )
+    assert (rule.metrics["deadlocked"].final or 0.0) >= 0.5
+    assert cure.metrics["deadlocked"].final == 0.0
 
 
 def test_by_rays_the_cure_meets_nobody_where_the_rule_does() -> None:

@@ -1,12 +1,23 @@
+"""What an agent on a robot would run with: drivers, needs, limits, parameters and body."""
+
 import hashlib
+import math
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from swarmwire.agent.drivers.driver import Command, Driver
+from swarmwire.agent.on_robot.driver_registry import GROUP, driver_names, load_driver
+from swarmwire.agent.on_robot.limits import SpeedLimits, limits_for
 from swarmwire.agent.on_robot.mind import Mind, group_of
+from swarmwire.agent.on_robot.needs import OF_POSES, Offer, check_needs, tracked
 from swarmwire.agent.on_robot.plan import Plan, agent_sha256, plan_of
 from swarmwire.agent.on_robot.settings_file import read_settings
+from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.outcomes import NO_OUTCOMES
 from swarmwire.comms.packets import Heard
@@ -72,3 +83,114 @@ def test_what_a_worlds_air_tells_is_not_judged_before_it_was_joined():
     assert _plan("Ranging", **air).settings.radio.kind == "air"
     with pytest.raises(BadInput, match="a real radio does not tell: expected tracker = true"):
         _plan("Ranging", **{**air, "radio.kind": "zenoh"})
+
+
+ROOT = Path(__file__).parents[4]
+
+
+def test_those_that_come_along_are_there():
+    shipped = tomllib.loads((ROOT / "agent" / "pyproject.toml").read_text("utf-8"))["project"]["entry-points"][GROUP]
+    assert set(shipped) <= set(driver_names())
+    for name in shipped:
+        kind = load_driver(name, "robot.toml", "driver.name")
+        assert issubclass(kind, Driver)
+        assert f"{kind.__module__}:{kind.__name__}".startswith("swarmwire.agent.drivers.")
+
+
+def test_an_unknown_one_is_refused_with_those_that_are_there():
+    with pytest.raises(BadInput, match=r"robot.toml: driver.name: .*epuck2.*ros2") as refused:
+        load_driver("epuck3", "robot.toml", "driver.name")
+    assert "epuck3" in str(refused.value)
+
+
+BODY = load_body("epuck2")  # it has a compass, and no positioning
+FOOTBOT = load_body("footbot")
+
+
+def _offer(driver: tuple[str, ...] = ("proximity",), radio: str = "none", tracker: bool = False, body=BODY) -> Offer:
+    tells = frozenset(OF_POSES) if radio == "zenoh" and tracker else frozenset[str]()
+    return Offer(body, "epuck2", frozenset(driver), radio, tells, tracker)
+
+
+MET = {
+    "of the driver": (("proximity",), _offer()),
+    "nothing": ((), _offer(())),
+    "the compass from the tracker": (("compass",), _offer(tracker=True)),
+    "range and bearing from the tracker": (OF_POSES, _offer(radio="zenoh", tracker=True)),
+}
+
+
+@pytest.mark.parametrize("case", MET)
+def test_what_is_there_is_taken(case):
+    check_needs("Mine", *MET[case], "robot.toml")
+
+
+UNMET = {
+    "ground": (_offer(), "the driver epuck2 does not give (it gives proximity)"),
+    "compass": (_offer(), "does not give (it gives proximity): expected tracker = true"),
+    "camera": (_offer(), "the body epuck2 lacks: it has proximity"),
+    "positioning": (_offer(tracker=True), "the body epuck2 lacks"),
+    "radio.range": (_offer(), 'only a radio tells: expected radio.kind "zenoh" or "air"'),
+    "radio.bearing": (_offer(radio="zenoh"), "a real radio does not tell: expected tracker = true"),
+    "radio.outcomes": (_offer(radio="zenoh", tracker=True), "the radio zenoh does not tell: it tells radio.bearing"),
+    "radio.rssi": (_offer(radio="air"), "the radio air does not tell: it tells nothing"),
+}
+
+
+@pytest.mark.parametrize("need", UNMET)
+def test_what_is_not_there_is_refused_with_what_would_give_it(need):
+    offer, told = UNMET[need]
+    with pytest.raises(BadInput) as refused:
+        check_needs("Mine", ("proximity", need), offer, "robot.toml")
+    assert str(refused.value).startswith(f"robot.toml: agent: Mine needs {need!r}, which ")
+    assert told in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_tracker_stands_in_only_for_what_the_driver_does_not_give():
+    needs = ("compass", "positioning", "proximity")
+    assert tracked(needs, _offer(("compass",), tracker=True)) == {"positioning"}
+    assert tracked(needs, _offer(("compass",))) == frozenset()
+
+
+EPUCK2 = load_body("epuck2")
+SPEEDS = st.floats(-1e3, 1e3)
+LIMITS = SpeedLimits(0.1, 2.0, wheel_mps=0.12, wheel_base_m=0.053)
+
+
+def test_limits_are_half_the_bodys_unless_the_settings_say_otherwise():
+    limits = limits_for(EPUCK2, None, None, "robot.toml")
+    assert limits.linear_mps == pytest.approx(0.0691)
+    assert limits.angular_radps == pytest.approx(0.1382 / 0.053)
+    raised = limits_for(EPUCK2, 0.1382, 5.0, "robot.toml")
+    assert (raised.linear_mps, raised.angular_radps) == (0.1382, 5.0)
+
+
+@pytest.mark.parametrize(("given", "key"), [((0.14, None), "max_linear_mps"), ((None, 5.3), "max_angular_radps")])
+def test_limits_above_the_bodys_are_refused(given, key):
+    with pytest.raises(BadInput, match=f"robot.toml: {key}: expected at most .* which the epuck2 can do"):
+        limits_for(EPUCK2, *given, "robot.toml")
+
+
+@given(SPEEDS, SPEEDS, SPEEDS)
+def test_no_command_is_faster_than_the_limits_and_each_keeps_its_curve(linear, angular, lateral):
+    asked = Command(linear, angular, lateral, {0: 3})
+    got = LIMITS.clipped(asked)
+    slack = 1.0 + 1e-9
+    assert math.hypot(got.linear_mps, got.lateral_mps) <= 0.1 * slack
+    assert abs(got.angular_radps) <= 2.0 * slack
+    assert abs(got.linear_mps) + 0.5 * 0.053 * abs(got.angular_radps) <= 0.12 * slack
+    assert got.linear_mps * angular == pytest.approx(got.angular_radps * linear)
+    assert got.leds == {0: 3}
+    assert got is asked or got != asked
+
+
+def test_a_command_within_the_limits_is_left_alone():
+    asked = Command(0.05, -1.0)
+    assert LIMITS.clipped(asked) is asked
+
+
+def test_infinite_speeds_keep_their_direction():
+    got = LIMITS.clipped(Command(math.inf, 1.0))
+    assert got.linear_mps == pytest.approx(0.1)
+    assert abs(got.angular_radps) < 1e-3

@@ -1,17 +1,26 @@
+"""The loop on a robot: every tick at its start, losses, stops; the pacer; what of an agent's deeds no driver moves."""
+
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 
 from swarmwire.agent.drivers.driver import STOP, Command, DriverLost
 from swarmwire.agent.on_robot.control import STOPPED
-from swarmwire.agent.on_robot.limits import SpeedLimits
+from swarmwire.agent.on_robot.limits import SpeedLimits, limits_for
+from swarmwire.agent.on_robot.mind import Mind, group_of
+from swarmwire.agent.on_robot.pacer import Pacer
 from swarmwire.agent.on_robot.robot_loop import LOST, RUNNING
+from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.outcomes import NO_OUTCOMES
+from swarmwire.comms.packets import BROADCAST, Heard
 from swarmwire.comms.wire.poses import Pose
 from tests.support.agent.on_robot.robot_players import Count
-from tests.support.agent.on_robot.scripted import PERIOD_NS, UTC_NS, Rig, ScriptedRadio, lost
-from tests.support.clocks import MS, ORIGIN_NS
+from tests.support.agent.on_robot.scripted import PERIOD_NS, PLAYERS, RATE_HZ, UTC_NS, Rig, ScriptedRadio, lost
+from tests.support.clocks import MS, ORIGIN_NS, FakeClock
 
 
 def test_a_step_is_taken_at_every_tick_of_the_clock():
@@ -254,3 +263,59 @@ def test_an_agent_that_writes_to_a_reading_fails_as_in_emulation():
     rig = Rig("Scribbling", needs=("proximity",))
     with pytest.raises(AgentFailed, match="read-only"):
         rig.run(1)
+
+
+class _Oversleeping(FakeClock):
+    """A clock on which whoever sleeps wakes so much later, once each."""
+
+    def __init__(self, later_ms: list[int]) -> None:
+        super().__init__()
+        self._later_ms = later_ms
+
+    def sleep_until(self, at_ns: int) -> None:
+        super().sleep_until(at_ns)
+        self.time_ns += self._later_ms.pop(0) * MS if self._later_ms else 0
+
+
+@pytest.mark.parametrize("rate_hz", [1, 3, 7, 10, 30, 1000])
+def test_every_tick_is_met_at_its_start_whatever_the_rate(rate_hz):
+    clock = FakeClock()
+    pacer = Pacer(clock, rate_hz)
+    ticks = [(*pacer.wait(), clock.now_ns()) for _ in range(50)]
+    assert ticks == [(tick, False, ORIGIN_NS + tick_start_ns(tick, rate_hz)) for tick in range(50)]
+    assert (pacer.late, pacer.skipped) == (0, 0)
+
+
+def test_a_tick_of_which_half_a_period_is_gone_takes_the_next_ones_place():
+    clock = _Oversleeping([0, 40, 0, 60, 0])
+    pacer = Pacer(clock, 10)
+    began = [(pacer.wait()[0], (clock.now_ns() - ORIGIN_NS) // MS) for _ in range(5)]
+    assert began == [(0, 0), (1, 140), (2, 200), (3, 360), (5, 500)]
+    assert (pacer.late, pacer.skipped) == (0, 1)
+
+
+def test_a_tick_that_begins_a_period_too_late_is_late_and_the_newest_is_taken():
+    clock = _Oversleeping([0, 310])
+    pacer = Pacer(clock, 10)
+    assert [pacer.wait() for _ in range(3)] == [(0, False), (4, True), (5, False)]
+    assert (pacer.late, pacer.skipped) == (1, 3)
+
+
+def test_ticks_of_a_pause_that_was_meant_are_neither_late_nor_skipped():
+    clock = FakeClock()
+    pacer = Pacer(clock, 10)
+    pacer.wait()
+    clock.time_ns += 340 * MS
+    assert pacer.resume() == 3
+    assert pacer.wait() == (4, False)
+    assert (pacer.late, pacer.skipped) == (0, 0)
+    assert pacer.resume() == 0
+
+
+def test_what_is_told_to_actuators_of_the_users_own_is_counted_since_no_driver_moves_them():
+    body = replace(load_body("epuck2"), actuators={"arm": ActuatorSheet("a:Arm", {}, 3)})
+    group = group_of("robot-0", 0, f"{PLAYERS}:Painting", {}, body, seed=0)
+    mind = Mind(group, RATE_HZ, None, limits_for(body, None, None, ""))
+    for tick in range(2):
+        mind.step(tick, {}, Heard.none(()), NO_OUTCOMES)
+    assert mind.actuations == 6

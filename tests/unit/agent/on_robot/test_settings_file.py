@@ -1,10 +1,17 @@
+"""Settings of a robot: what is read, what is refused by file and key, certificates that go together."""
+
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from swarmwire.agent.on_robot.proof import check_proof
 from swarmwire.agent.on_robot.settings_file import NO_FILE, read_settings
+from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.network import Network
+from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
+from swarmwire.deploy.certificates.wanted import wanted
 
 WHOLE = """
 format = 1
@@ -151,3 +158,38 @@ def test_a_file_that_is_not_there_is_named_and_without_one_the_command_line():
     with pytest.raises(BadInput) as refused:
         read_settings(None, {})
     assert refused.value.where == NO_FILE
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory) -> tuple[Path, Path]:
+    """Two authorities, each with certificates of two robots."""
+    made: list[Path] = []
+    for name in ("lab", "other"):
+        folder = tmp_path_factory.mktemp(name) / "ca"
+        begin_authority(folder, WallClock())
+        issue(folder, [wanted("flock-0"), wanted("flock-1")], 30, WallClock())
+        made.append(folder)
+    return made[0], made[1]
+
+
+def _check(ca: Path, certificate: Path, key: Path) -> None:
+    check_proof(Network(listen=("tls/127.0.0.1:0",), ca=ca, certificate=certificate, key=key), "robot.toml")
+
+
+def test_what_goes_together_is_taken(folders):
+    lab, _ = folders
+    _check(lab / "ca.pem", lab / "flock-0.pem", lab / "flock-0.key")
+
+
+def test_a_certificate_of_another_key_authority_or_none_is_refused_in_one_line(folders):
+    lab, other = folders
+    refused = {
+        "network.key": (lab / "ca.pem", lab / "flock-0.pem", lab / "flock-1.key"),
+        "network.certificate": (other / "ca.pem", lab / "flock-0.pem", lab / "flock-0.key"),
+        "network.ca": (lab / "flock-0.key", lab / "flock-0.pem", lab / "flock-0.key"),
+    }
+    for key, files in refused.items():
+        with pytest.raises(BadInput) as error:
+            _check(*files)
+        assert (error.value.where, error.value.key) == ("robot.toml", key)
+        assert "\n" not in str(error.value)

@@ -1,0 +1,282 @@
+"""What a robot tells: log and status once a second, the terminal, who is heard and seen."""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from swarmwire.agent.drivers.driver import Command
+from swarmwire.agent.on_robot.control import Control
+from swarmwire.agent.on_robot.onlookers import NOT_YET, Onlookers
+from swarmwire.agent.on_robot.presence import Presence
+from swarmwire.agent.on_robot.robot_log import TickRow, new_log
+from swarmwire.agent.on_robot.status_file import StatusFile, status_path
+from swarmwire.agent.on_robot.terminal import Terminal, short
+from swarmwire.comms.clock import NS_PER_S, to_ns
+from swarmwire.comms.wire.poses import Pose
+from tests.support.agent.on_robot.scripted import PERIOD_NS, UTC_NS, DatedFakeClock
+from tests.support.clocks import FakeClock
+from tests.support.waiting import until
+
+
+class _Watched(Terminal):
+    """A terminal that somebody watches; what it shows is kept."""
+
+    def __init__(self) -> None:
+        super().__init__("robot-0")
+        self._watched = True
+
+
+class _Set:
+    """Onlookers of a robot whose status is `status`."""
+
+    def __init__(self, folder: Path, pace: float = 1.0) -> None:
+        self.clock = DatedFakeClock()
+        self.log = new_log(folder / "log", ("robot-0",), "robot-0", "now", "robot.toml")
+        self.file = folder / "status.json"
+        self.control = Control(lambda: None)
+        self.status = {**NOT_YET, "state": "running", "counts": {"clipped_commands": 3}}
+        self.onlookers = Onlookers(
+            self.clock, pace, _Watched(), StatusFile(self.file), self.control, {"name": "robot-0"}, self.log
+        )
+        self.onlookers.attach(lambda: self.status)
+
+    def steps(self, n: int) -> None:
+        for _ in range(n):
+            tick = self.onlookers.steps
+            self.status = {**self.status, "tick": tick}
+            self.clock.time_ns += PERIOD_NS
+            self.onlookers.step(TickRow(tick, 0, False, None, True, Command(), "", None, None))
+
+    @property
+    def written(self) -> dict[str, object]:
+        return json.loads(self.file.read_text())
+
+
+def test_log_and_status_are_written_once_a_second(tmp_path):
+    looking = _Set(tmp_path)
+    looking.steps(9)
+    assert (looking.log.folder / "ticks.csv").read_text() == ""
+    assert looking.written["tick"] == -1
+    looking.steps(1)
+    assert len((looking.log.folder / "ticks.csv").read_text().splitlines()) == 11
+    assert (looking.written["name"], looking.written["tick"]) == ("robot-0", 9)
+    assert looking.written["utc_ns"] == UTC_NS + looking.clock.now_ns()
+    assert looking.control.status() == looking.written
+    looking.onlookers.end("duration")
+
+
+def test_whoever_looks_on_with_them_is_called_once_a_second(tmp_path):
+    looking, looks = _Set(tmp_path), list[int]()
+    looking.onlookers.look = lambda: looks.append(looking.onlookers.steps)
+    looking.steps(25)
+    assert looks == [10, 20]
+    looking.onlookers.end("duration")
+
+
+def test_seconds_are_those_of_the_wall_however_fast_the_robot_is(tmp_path):
+    looking = _Set(tmp_path, pace=10.0)
+    looking.steps(99)
+    assert looking.written["tick"] == -1
+    looking.steps(1)
+    assert looking.written["tick"] == 99
+    looking.onlookers.end("duration")
+
+
+def test_a_robot_that_does_not_step_still_reports(tmp_path):
+    looking = _Set(tmp_path)
+    looking.status["state"] = "driver lost"
+    looking.clock.time_ns += 10 * PERIOD_NS
+    looking.onlookers.wait()
+    assert looking.written["state"] == "driver lost"
+    looking.onlookers.end("SIGTERM")
+
+
+def test_whoever_watches_the_terminal_sees_every_five_seconds_how_it_is_and_a_summary(tmp_path, capsys):
+    looking = _Set(tmp_path)
+    looking.steps(120)
+    looking.onlookers.end("duration")
+    assert capsys.readouterr().out.splitlines() == [
+        "robot-0: running, tick 49",
+        "robot-0: running, tick 99",
+        "robot-0: ended (duration) after 120 steps; clipped_commands 3",
+    ]
+
+
+def test_the_last_status_and_the_summary_tell_the_end(tmp_path):
+    looking = _Set(tmp_path)
+    looking.steps(3)
+    looking.onlookers.end("SIGTERM")
+    assert (looking.written["state"], looking.written["ended"]) == ("ended", "SIGTERM")
+    summary = json.loads((looking.log.folder / "summary.json").read_text())
+    assert summary == {
+        "ended": "SIGTERM",
+        "ticks": 3,
+        "late_ticks": 0,
+        "watchdog_stops": 0,
+        "counts": {"clipped_commands": 3},
+    }
+
+
+def test_an_emergency_stop_is_told_when_it_comes_in_the_status_and_at_the_end(tmp_path, capsys):
+    looking = _Set(tmp_path)
+    looking.steps(12)
+    looking.control.estop()
+    looking.control.estop()
+    said = until(lambda: capsys.readouterr().err)
+    assert said == (
+        "robot-0: emergency stop at step 12: motors off for good; end the agent, and start it anew, to go on\n"
+    )
+    looking.steps(10)
+    assert (looking.written["state"], looking.written["emergency_stop_at"]) == ("estop", 12)
+    looking.onlookers.end("SIGINT")
+    told = "robot-0: ended (SIGINT), stopped by an emergency stop at step 12, after 22 steps; clipped_commands 3"
+    assert capsys.readouterr().out.splitlines() == [told]
+    assert json.loads((looking.log.folder / "summary.json").read_text())["emergency_stop_at"] == 12
+
+
+def test_a_stop_of_the_watchdog_is_told_when_it_comes(tmp_path, capsys):
+    looking = _Set(tmp_path)
+    looking.onlookers.silent(0.512)
+    told = "watchdog: nothing was heard of the agent for 0.51 s; motors off until it goes on"
+    assert until(lambda: capsys.readouterr().err) == f"robot-0: {told}\n"
+    looking.onlookers.end("duration")
+
+
+def test_a_failure_is_told_with_its_cause_and_not_as_no_faults(tmp_path, capsys):
+    looking = _Set(tmp_path)
+    looking.status = {**looking.status, "counts": {}}
+    looking.onlookers.end("no driver", "nobody answers")
+    assert capsys.readouterr().out == "robot-0: ended (no driver: nobody answers) after 0 steps\n"
+
+
+def test_a_log_that_cannot_be_written_is_told_of_once_and_stops_nobody(tmp_path, capsys, monkeypatch):
+    looking = _Set(tmp_path)
+
+    def full(_: bytes) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(looking.log._ticks, "_append", full)
+    looking.steps(30)
+    looking.onlookers.end("duration")
+    assert capsys.readouterr().err.splitlines() == [
+        "robot-0: the log cannot be written, and goes on without what is lost: [Errno 28] No space left on device"
+    ]
+    assert looking.written["counts"] == {"clipped_commands": 3, "log_rows_lost": 30}
+
+
+def test_a_clock_that_is_set_is_told_of_and_counted_and_one_that_is_kept_in_step_is_not(tmp_path, capsys):
+    looking = _Set(tmp_path)
+    looking.steps(10)
+    looking.clock.set_by_ns = to_ns(0.01)
+    looking.steps(10)
+    looking.clock.set_by_ns = to_ns(-3.24)
+    looking.steps(20)
+    looking.onlookers.end("duration")
+    assert capsys.readouterr().err.splitlines() == [
+        "robot-0: the clock was set by -3.250 s: times in the log before and after do not compare"
+    ]
+    assert looking.written["counts"] == {"clipped_commands": 3, "clock_set": 1}
+
+
+def test_a_status_that_cannot_be_written_is_counted(tmp_path):
+    looking = _Set(tmp_path)
+    looking.file.unlink()
+    looking.file.mkdir()
+    looking.steps(10)
+    assert looking.control.status()["counts"] == {"clipped_commands": 3}
+    looking.steps(10)
+    assert looking.control.status()["counts"] == {"clipped_commands": 3, "status_lost": 1}
+    looking.onlookers.end("duration")
+
+
+def test_the_status_stands_in_the_folder_of_the_logs_or_in_the_users_for_what_runs(monkeypatch):
+    assert status_path("/logs", "flock-3") == Path("/logs/flock-3-status.json")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", "/run/user/1000")
+    assert status_path("", "flock-3") == Path("/run/user/1000/swarmwire/flock-3/status.json")
+    monkeypatch.delenv("XDG_RUNTIME_DIR")
+    assert status_path("", "flock-3") is None
+
+
+def test_a_terminal_that_is_gone_stops_nobody_not_even_at_the_end(monkeypatch):
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as out:
+        monkeypatch.setattr(sys, "stdout", out)
+        monkeypatch.setattr(sys, "stderr", out)
+        terminal = Terminal("robot-0")
+        terminal.begin("what runs")
+        terminal.say("something")
+    terminal.say("to a file that is closed")
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({}, "running, tick 600"),
+        ({"agent_state": "search"}, "running, tick 600, search"),
+        ({"late_ticks": 2}, "running, tick 600, 2 late"),
+        ({"charge": 0.5}, "running, tick 600, battery 50 %"),
+    ],
+)
+def test_a_status_is_a_line_of_what_there_is_to_tell(change, told):
+    assert (
+        short({"state": "running", "tick": 600, "agent_state": "", "late_ticks": 0, "charge": None, **change}) == told
+    )
+
+
+HERE = Pose(0.0, 0.0, 0.0)
+
+
+class _Swarm:
+    """What a robot among k-1 and k-2 hears and sees, looked at once a second."""
+
+    def __init__(self, pace: float = 1.0) -> None:
+        self.clock, self.said, self.heard = FakeClock(), list[str](), set[str]()
+        self.pose: Pose | None = None
+        others = ("k-1", "k-2")
+        self.presence = Presence(self.clock, self.said.append, others, lambda: self.heard, lambda: self.pose, pace)
+
+    def seconds(self, n: int) -> list[str]:
+        """What it says in so many seconds."""
+        self.said.clear()
+        for _ in range(n):
+            self.clock.time_ns += NS_PER_S
+            self.presence.look()
+        return list(self.said)
+
+
+def test_others_that_were_never_heard_are_told_once_after_five_seconds_and_when_they_come():
+    swarm = _Swarm()
+    swarm.pose = HERE
+    assert swarm.seconds(4) == []
+    assert swarm.seconds(10) == ["radio: hears none of k-1, k-2"]
+    swarm.heard.add("k-2")
+    assert swarm.seconds(3) == ["radio: now hears k-2"]
+    swarm.heard.add("k-1")
+    assert swarm.seconds(3) == ["radio: now hears k-1"]
+
+
+def test_those_that_were_heard_in_time_are_not_told_of():
+    swarm = _Swarm()
+    swarm.pose, swarm.heard = HERE, {"k-1"}
+    assert swarm.seconds(9) == ["radio: has never heard k-2"]
+
+
+def test_poses_that_do_not_come_are_told_of_and_counted_and_again_when_they_come():
+    swarm = _Swarm()
+    swarm.heard = {"k-1", "k-2"}
+    assert swarm.seconds(9) == ["tracker: no pose of this robot has come for 5 s"]
+    swarm.pose = HERE
+    assert swarm.seconds(9) == ["tracker: poses come"]
+    assert swarm.presence.counts() == {"seconds_without_pose": 9}
+    swarm.pose = None
+    assert swarm.seconds(4) == []
+    assert swarm.seconds(1) == ["tracker: no pose of this robot has come for 5 s"]
+    assert swarm.presence.counts() == {"seconds_without_pose": 14}
+
+
+def test_seconds_are_the_walls_however_fast_the_robot_is():
+    assert _Swarm(pace=10.0).seconds(49) == []

@@ -1,0 +1,233 @@
+"""From a text to an agent class, and from annotations to its parameters; every way in which either fails."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarmwire.agent import Agent, Robot
+from swarmwire.agent.behaviours import Flocking
+from swarmwire.agent.declared import REQUIRED, BadParameter, checked, make, parameters_of
+from swarmwire.agent.loading import NoAgent, agent_sha256, load_agent
+from swarmwire.comms.loading import resolve
+from tests.support.agent.hosts import PLAYERS, spec
+from tests.support.agent.players import Parametrised, Stateless
+
+HEAD = "from swarmwire.agent import Agent, Robot, VectorAgent\n"
+
+
+def refused(text: str) -> str:
+    with pytest.raises(NoAgent) as caught:
+        load_agent(text)
+    return str(caught.value)
+
+
+def written(directory: Path, code: str) -> str:
+    path = directory / "mine.py"
+    path.write_text(HEAD + code, encoding="utf-8")
+    return f"{path}:Mine"
+
+
+def test_a_class_of_a_module_is_found() -> None:
+    assert load_agent("swarmwire.agent.behaviours:Flocking") is Flocking
+
+
+def test_two_machines_tell_by_the_file_whether_they_have_the_same_agent(tmp_path) -> None:
+    own = agent_sha256(load_agent(spec("Counter")))
+    assert own == hashlib.sha256(PLAYERS.read_bytes()).hexdigest() == agent_sha256(load_agent(spec("Chatter")))
+    copy = tmp_path / "mine.py"
+    copy.write_bytes(PLAYERS.read_bytes() + b"\n")
+    assert agent_sha256(load_agent(f"{copy}:Counter")) != own
+    copy.unlink()
+    with pytest.raises(NoAgent, match="comes from no file that can be read"):
+        agent_sha256(type("Typed", (Flocking,), {"__module__": "__main__x"}))
+
+
+def test_a_class_of_a_file_is_found_and_loaded_once() -> None:
+    found = load_agent(spec("Counter"))
+    assert found.__name__ == "Counter"
+    assert load_agent(spec("Counter")) is found
+
+
+def test_files_of_one_name_do_not_meet(tmp_path: Path) -> None:
+    specs: list[str] = []
+    for number in (1, 2):
+        (tmp_path / str(number)).mkdir()
+        code = f"class Mine(Agent):\n    number = {number}\n    def step(self, robot): ...\n"
+        specs.append(written(tmp_path / str(number), code))
+    assert [vars(load_agent(text))["number"] for text in specs] == [1, 2]
+
+
+def test_a_file_lies_beside_the_scenario_and_a_module_lies_nowhere(tmp_path: Path) -> None:
+    assert resolve("../agents/mine.py:Mine", tmp_path / "scenarios") == f"{tmp_path.resolve()}/agents/mine.py:Mine"
+    assert resolve("a.b:Mine", tmp_path) == "a.b:Mine"
+    assert resolve(spec("Counter"), tmp_path) == f"{PLAYERS.resolve()}:Counter"
+
+
+@pytest.mark.parametrize("text", ["", "Mine", ":Mine", "a.b:", "mine.py", "a.b:Mine.Inner", "a.b:1", "mine.py:x y"])
+def test_a_text_without_a_place_or_a_name_says_what_was_expected(text: str) -> None:
+    assert refused(text) == f'expected "package.module:Class" or "file.py:Class", got {text!r}'
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    assert refused(f"{tmp_path}/mine.py:Mine") == f"there is no file {tmp_path}/mine.py"
+
+
+@pytest.mark.parametrize("text", ["no.such.module:Mine", "..up:Mine", "swarmwire.agent.nothing:Mine", "/a/folder:Mine"])
+def test_a_module_that_is_not_there(text: str) -> None:
+    assert "does not import" in refused(text)
+
+
+@pytest.mark.parametrize(
+    ("code", "reason"),
+    [
+        ("import no_such_module\n", "does not import: ModuleNotFoundError: No module named 'no_such_module'"),
+        ("def broken(:\n", "does not import: SyntaxError"),
+        ("\n1 / 0\n", "does not import: ZeroDivisionError: division by zero (line 3)"),
+        ("open('weights.json')\n", "does not import: FileNotFoundError"),  # the agent's own file, not the agent
+        ("class Yours(Agent): ...\n", "holds no such name: 'Mine'"),
+        ("class Mein(Agent): ...\n", "holds no such name: 'Mine' (did you mean Mein?)"),
+        ("Mine = 3\n", "holds no Agent or VectorAgent: 'Mine'"),
+        ("class Mine: ...\n", "holds no Agent or VectorAgent: 'Mine'"),
+        ("class Mine(Agent): ...\n", "Mine has no step method"),
+        (
+            "class Mine(Agent):\n    seen = {}\n    def step(self, robot): ...\n",
+            "Mine.seen: a dict that all robots would share: make it in __init__",
+        ),
+        ("class Mine(VectorAgent): ...\n", "Mine has no step method"),
+        ("class Mine(Agent):\n    api = 99\n    def step(self, robot): ...\n", "Mine.api: expected 1"),
+        ("class Mine(Agent):\n    needs = 'compass'\n    def step(self, robot): ...\n", "expected a tuple of texts"),
+        ("class Mine(Agent):\n    needs = ('a', 1)\n    def step(self, robot): ...\n", "expected a tuple of texts"),
+        (
+            "class Mine(Agent):\n    speeds: list[float]\n    def step(self, robot): ...\n",
+            "Mine.speeds: a parameter is a float, int, bool or str",
+        ),
+        ("class Mine(Agent):\n    x: 'Nowhere'\n    def step(self, robot): ...\n", "name 'Nowhere' is not defined"),
+    ],
+)
+def test_a_file_that_holds_no_agent_says_at_which_point(tmp_path: Path, code: str, reason: str) -> None:
+    assert reason in refused(written(tmp_path, code))
+
+
+def test_a_file_that_did_not_import_may_be_mended(tmp_path: Path) -> None:
+    refused(written(tmp_path, "1 / 0\n"))
+    assert load_agent(written(tmp_path, "class Mine(Agent):\n    def step(self, robot): ...\n")).__name__ == "Mine"
+
+
+def test_an_edited_file_is_loaded_anew_and_no_bytecode_is_left_beside_it(tmp_path: Path) -> None:
+    code = "class Mine(Agent):\n    number = 1\n    def step(self, robot): ...\n"
+    first = load_agent(written(tmp_path, code))
+    edited = load_agent(written(tmp_path, code.replace("1", "2")))  # of the same size, within the same second
+    assert (vars(first)["number"], vars(edited)["number"]) == (1, 2)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.py"]
+
+
+def test_what_lies_beside_a_file_is_not_there_for_it(tmp_path: Path) -> None:
+    (tmp_path / "swarmwire_test_beside.py").write_text("")
+    told = "No module named 'swarmwire_test_beside' (line 2); a file is loaded alone: it imports what is installed"
+    assert told in refused(written(tmp_path, "import swarmwire_test_beside\n"))
+
+
+@pytest.mark.parametrize("place", ["x" * 5000 + ".py", "é" * 300, "a\0b.py", "x" * 5000], ids=lambda place: place[:3])
+def test_names_that_no_file_can_have_lead_nowhere(tmp_path: Path, place: str) -> None:
+    refused(resolve(f"{place}:Mine", tmp_path))
+
+
+def refused_declared(params: dict[str, Any], kind: type = Parametrised) -> BadParameter:
+    with pytest.raises(BadParameter) as caught:
+        checked(kind, params)
+    return caught.value
+
+
+def test_annotated_attributes_are_the_parameters() -> None:
+    declared = parameters_of(Parametrised)
+    assert {name: of.type for name, of in declared.items()} == {
+        "speed_mps": float,
+        "count": int,
+        "eager": bool,
+        "word": str,
+    }
+    assert declared["speed_mps"].default is REQUIRED
+    assert declared["count"].default == 3
+    assert "needs" not in parameters_of(Flocking)
+
+
+def test_parameters_are_set_before_the_agent_is_made() -> None:
+    assert make(Parametrised, {"speed_mps": 0.5}).seen == (0.5, 3, False, "hop")
+    full = {"speed_mps": 0.5, "count": 0, "eager": True, "word": ""}
+    assert make(Parametrised, full).seen == (0.5, 0, True, "")
+
+
+def test_one_agents_parameters_are_not_the_others() -> None:
+    make(Parametrised, {"speed_mps": 1.0, "count": 9})
+    assert make(Parametrised, {"speed_mps": 2.0}).seen == (2.0, 3, False, "hop")
+
+
+def test_a_whole_number_is_a_number() -> None:
+    value = checked(Parametrised, {"speed_mps": 2})["speed_mps"]
+    assert type(value) is float
+    assert value == 2.0
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "expected"),
+    [
+        ("speed_mps", "0.5", "expected a number, got '0.5'"),
+        ("speed_mps", True, "expected a number, got True"),
+        ("speed_mps", None, "expected a number, got None"),
+        ("count", 2.0, "expected a whole number, got 2.0"),
+        ("count", True, "expected a whole number, got True"),
+        ("eager", 1, "expected true or false, got 1"),
+        ("speed_mps", float("nan"), "expected a finite number, got nan"),
+        ("speed_mps", float("inf"), "expected a finite number, got inf"),
+        ("count", 2**63, "expected a number of at most 64 bits, got 9223372036854775808"),
+        ("speed_mps", -(2**63) - 1, "expected a number of at most 64 bits, got -9223372036854775809"),
+        ("word", 3, "expected a text, got 3"),
+        ("word", ["a"], "expected a text, got ['a']"),
+    ],
+)
+def test_a_value_of_another_type_is_refused(key: str, value: Any, expected: str) -> None:
+    error = refused_declared({"speed_mps": 1.0, key: value})
+    assert (error.key, error.expected) == (key, expected)
+
+
+def test_an_unknown_parameter_is_refused_with_those_there_are() -> None:
+    error = refused_declared({"speed_mps": 1.0, "sped": 1})
+    assert error.key == "sped"
+    assert error.expected == (
+        "unknown parameter of Parametrised; expected one of speed_mps, count, eager, word (did you mean speed_mps?)"
+    )
+    assert refused_declared({"x": 1}, Stateless).expected == "unknown parameter of Stateless; expected none"
+    assert refused_declared({"speed_mps": 1.0, "needs": 1}).key == "needs"
+
+
+def test_a_missing_parameter_is_refused() -> None:
+    error = refused_declared({})
+    assert (error.key, error.expected) == ("speed_mps", "is missing: expected a number")
+
+
+def test_a_subclass_has_the_parameters_of_its_base_and_its_own_defaults() -> None:
+    class Slow(Parametrised):
+        speed_mps: float = 0.1
+        patience_s: float = 5.0
+
+    assert list(parameters_of(Slow)) == ["speed_mps", "count", "eager", "word", "patience_s"]
+    assert make(Slow, {}).seen[0] == 0.1
+
+
+@pytest.mark.parametrize(("name", "hint", "value"), [("api", int, 1), ("needs", tuple[str, ...], ("compass",))])
+def test_what_a_class_says_of_itself_is_no_parameter_however_it_is_annotated(name: str, hint: Any, value: Any) -> None:
+    mine = type("Mine", (Agent,), {"__annotations__": {name: hint, "gain": float}, name: value, "gain": 0.5})
+    assert list(parameters_of(mine)) == ["gain"]
+    with pytest.raises(BadParameter, match="unknown parameter of Mine"):
+        checked(mine, {name: value})
+
+
+def test_private_attributes_are_no_parameters() -> None:
+    class Quiet(Agent):
+        _memory: list[int]
+
+        def step(self, robot: Robot) -> None: ...
+
+    assert not parameters_of(Quiet)

@@ -1,0 +1,190 @@
+"""What a VectorAgent holds: a State, whose columns the framework owns, and parameters with a value per robot."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.agent import (
+    Agent,
+    BoolColumn,
+    FloatColumn,
+    IntColumn,
+    PerRobot,
+    Robot,
+    Robots,
+    State,
+    VectorAgent,
+    column,
+    per_robot,
+)
+from swarmwire.agent.declared import BadParameter, checked, parameters_of
+from swarmwire.agent.host import hosted
+from swarmwire.agent.testing import Trial, assert_rows_independent
+from swarmwire.agent.vector_agent import state_of
+from swarmwire.comms.packets import Heard
+from tests.support.agent.hosts import group, senses
+from tests.support.agent.players import Crowd, Steps, Table, VectorCounter
+
+rows_ = st.lists(st.integers(0, 9), unique=True).map(sorted)
+
+
+def test_a_new_robots_row_starts_with_the_defaults() -> None:
+    state = Table.fresh(3)
+    assert (state.x.tolist(), state.n.tolist()) == ([0.5] * 3, [-1] * 3)
+    assert (state.x.dtype, state.n.dtype) == (np.float64, np.int64)
+    assert len(Table.fresh(0).x) == 0
+
+
+def test_assigning_a_column_copies_into_it() -> None:
+    state = Table.fresh(2)
+    held, given_array = state.x, np.array([1.0, 2.0])
+    state.x = given_array
+    given_array[0] = 9.0
+    assert state.x is held
+    assert held.tolist() == [1.0, 2.0]
+    state.n = 7
+    assert state.n.tolist() == [7, 7]
+    state.n += 1
+    assert state.n.dtype == np.int64
+    with pytest.raises(ValueError):
+        state.x = np.zeros(3)
+
+
+def test_a_wide_column_has_several_numbers_for_each_robot_and_moves_with_it() -> None:
+    class Wide(State):
+        slots: IntColumn = column(-1, width=3)
+
+    state = Wide.fresh(2)
+    assert state.slots.tolist() == [[-1] * 3] * 2
+    state.slots[1] = [4, 5, 6]
+    moved = state.moved(np.array([2, 7]), np.array([5, 7]))
+    assert moved.slots.tolist() == [[-1] * 3, [4, 5, 6]]
+    state.slots = 8
+    assert state.slots.tolist() == [[8] * 3] * 2
+
+
+def test_tables_share_nothing() -> None:
+    first, second = Table.fresh(1), Table.fresh(1)
+    first.x += 1.0
+    assert second.x.tolist() == [0.5]
+
+
+def test_an_unknown_column_is_refused() -> None:
+    state = Table.fresh(1)
+    with pytest.raises(AttributeError, match="Table has no column 'y'; it has x, n"):
+        state.y = 1.0
+    with pytest.raises(AttributeError):
+        state.columns = {}
+
+
+def test_a_column_of_another_type_is_refused_where_it_is_declared() -> None:
+    message = r"expected FloatColumn, IntColumn or BoolColumn = column\(default\)"
+    with pytest.raises(TypeError, match=message):
+        type("Plain", (State,), {"__annotations__": {"x": float}, "x": column(0.0)})
+    with pytest.raises(TypeError, match=message):
+        type("Bare", (State,), {"__annotations__": {"x": FloatColumn}})
+    with pytest.raises(TypeError, match=message):
+        type("Start", (State,), {"__annotations__": {"x": FloatColumn}, "x": 0.0})
+
+
+def test_a_number_that_a_column_cannot_hold_is_refused_and_none_is_cut() -> None:
+    state = Table.fresh(2)
+    with pytest.raises(TypeError, match=r"Table\.n: a column of int64 takes no float64"):
+        state.n = state.n + 0.5
+    with pytest.raises(TypeError):
+        state.n = 1.5
+    assert state.n.tolist() == [-1, -1]
+    state.x = 3
+    assert state.x.tolist() == [3.0, 3.0]
+
+
+def test_a_column_cannot_take_a_name_that_states_use() -> None:
+    with pytest.raises(TypeError, match=r"Bad\.moved: the name is taken by State"):
+        type("Bad", (State,), {"__annotations__": {"moved": FloatColumn}, "moved": column(0.0)})
+
+
+def test_a_state_inherits_columns_without_changing_its_base() -> None:
+    class More(Table):
+        seen: BoolColumn = column(False)
+        n: IntColumn = column(4)
+
+    assert list(More.columns) == ["x", "n", "seen"]
+    assert list(Table.columns) == ["x", "n"]
+    assert More.fresh(1).n.tolist() == [4]
+    assert Table.fresh(1).n.tolist() == [-1]
+    assert More.fresh(1).seen.dtype == np.bool_
+
+
+@given(rows_, rows_)
+def test_rows_move_with_their_robots(old: list[int], new: list[int]) -> None:
+    state = Table.fresh(len(old))
+    state.n = np.array(old, np.int64) * 10
+    moved = state.moved(np.array(old, np.int64), np.array(new, np.int64))
+    assert moved.n.tolist() == [row * 10 if row in old else -1 for row in new]
+    assert moved.x.tolist() == [0.5] * len(new)
+
+
+def test_an_agents_state_is_the_one_that_its_class_names() -> None:
+    class Derived(VectorCounter): ...
+
+    assert state_of(VectorCounter) is Steps
+    assert state_of(Derived) is Steps
+    assert state_of(Crowd) is State
+    assert state_of(VectorAgent) is State
+
+
+class Lanes(VectorAgent):
+    needs: ClassVar[tuple[str, ...]] = ()
+    lane: PerRobot[int]
+    speed_mps: PerRobot[float] = per_robot(0.02)
+    gain: float = 2.0
+
+    def step(self, robots: Robots, state: State) -> None:
+        assert (self.lane.dtype, self.speed_mps.dtype) == (np.int64, np.float64)
+        robots.drive(self.speed_mps, self.gain * self.lane)
+
+
+def turns(rows: list[int], acting: list[int], **params: Any) -> list[float]:
+    host = hosted(group("", rows, params=params), Lanes)
+    actions = host.act((0, 0, 10**8), senses(0, acting), Heard.none(("range_m", "bearing_rad")))
+    assert len(actions.linear_mps) == len(acting)
+    return actions.angular_radps.tolist()
+
+
+def test_a_list_has_a_value_for_each_row_and_shows_those_of_the_robots_that_act():
+    assert turns([2, 5, 9], [2, 5, 9], lane=[1, 2, 3]) == [2.0, 4.0, 6.0]
+    assert turns([2, 5, 9], [9], lane=[1, 2, 3]) == [6.0]
+    assert turns([2, 5, 9], [2, 9], lane=4) == [8.0, 8.0]
+
+
+def test_rows_are_independent():
+    lanes = {"lane": list(range(7)), "speed_mps": 0.1}
+    assert_rows_independent(Lanes, Trial(robots=7, params=lanes))
+
+
+@pytest.mark.parametrize(
+    ("params", "text"),
+    [
+        ({}, "is missing"),
+        ({"lane": [1, 2]}, "a whole number, or a list with one for each of the 3 robots, got a list of 2"),
+        ({"lane": [1, 2, 0.5]}, "got 0.5"),
+        ({"lane": "1"}, "got '1'"),
+        ({"lane": 1, "gain": [1.0, 1.0, 1.0]}, "expected a number, got"),
+    ],
+)
+def test_what_does_not_fit_is_refused(params, text):
+    with pytest.raises(BadParameter, match=text):
+        checked(Lanes, params, 3)
+
+
+def test_only_a_vector_agent_has_them():
+    class Lone(Agent):
+        lane: PerRobot[int]
+
+        def step(self, robot: Robot) -> None: ...
+
+    with pytest.raises(TypeError, match="only a VectorAgent"):
+        parameters_of(Lone)
