@@ -6,6 +6,7 @@ import io
 import textwrap
 import tokenize
 from collections.abc import Collection
+from functools import cache
 from typing import Any
 
 
@@ -35,15 +36,19 @@ def comments_of(kind: type, names: Collection[str]) -> dict[str, str]:
     for base in reversed(kind.__mro__):
         if not {*base.__dict__, *inspect.get_annotations(base)} & set(names):
             continue
-        try:
-            source = textwrap.dedent(inspect.getsource(base))
-        except (OSError, TypeError):  # typed in, or compiled
-            continue
-        comments = _comments_by_line(source)
-        for line, name in _attributes(source):
-            if line in comments:
-                found[name] = comments[line]
+        found |= _comments_in(base)
     return found
+
+
+@cache
+def _comments_in(kind: type) -> dict[str, str]:
+    """By attribute that the body of this class declares: the comment behind it; none without readable source."""
+    try:
+        source = textwrap.dedent(inspect.getsource(kind))
+    except (OSError, TypeError):  # typed in, or compiled
+        return {}
+    comments = _comments_by_line(source)
+    return {name: comments[line] for line, name in _attributes(source) if line in comments}
 
 
 def _attributes(source: str) -> list[tuple[int, str]]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from swarmwire.deploy.catalogue.docs import first_line
@@ -11,6 +12,7 @@ from swarmwire.world.scenario.schema import table_of
 from swarmwire.world.scenario.schema_words import Node, forms, plain, words
 
 
+@cache  # the schema of a class takes milliseconds, and a list of bodies asks for the same dozen hundreds of times
 def parameters_of_dataclass(kind: type[Any]) -> tuple[Parameter, ...]:
     """The parameters of a dataclass made with `parameter`, those of nested ones by their path."""
     return parameters_of_schema(table_of(kind).model_json_schema())
