@@ -1,4 +1,7 @@
-"""Time: integer nanoseconds that never drift."""
+"""Time: integer nanoseconds that never drift, and clocks that no date moves."""
+
+import time
+from itertools import count
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -113,3 +116,14 @@ def test_dates_of_scaled_clocks_are_such_as_messages_have_room_for(factor: float
     wall.time_ns += NS_PER_S
     assert one.utc_ns() == other.utc_ns()
     assert 0 <= one.utc_ns() // NS_PER_S < 2**31
+
+
+def test_what_is_waited_for_and_measured_does_not_go_by_the_date(monkeypatch):
+    hours = count(start=1_800_000_000, step=3600)
+    monkeypatch.setattr(time, "time_ns", lambda: next(hours) * NS_PER_S)
+    monkeypatch.setattr(time, "time", lambda: float(next(hours)))
+    clock = WallClock()
+    before_ns = clock.now_ns()
+    clock.sleep_until(before_ns + 1_000_000)
+    assert 1_000_000 <= clock.now_ns() - before_ns < 60 * NS_PER_S
+    assert clock.utc_ns() - clock.utc_ns() == -3600 * NS_PER_S  # the date itself has jumped

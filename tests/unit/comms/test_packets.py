@@ -1,9 +1,12 @@
-"""Payload tables: rows of any length, taken, joined and sorted without loss."""
+"""Payload tables taken, joined and sorted without loss; fates keep their numbers; a state is a short text."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.notes import checked_state
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Heard, Payloads, Sent
 from swarmwire.comms.senses import Actions
@@ -119,3 +122,36 @@ def test_a_medium_that_gives_range_gives_it_also_when_nothing_is_heard() -> None
 def test_rows_without_bytes_can_be_taken_too():
     nothing = Payloads.of([b"", b""]).rows(np.array([1, 0, 1]))
     assert (len(nothing), nothing.row(2)) == (3, b"")
+
+
+def test_each_fate_has_its_number() -> None:
+    assert FATE_NAMES == (
+        "heard",
+        "out_of_range",
+        "blocked",
+        "lost",
+        "queue_full",
+        "too_large",
+        "in_flight",
+        "sender_dead",
+        "receiver_dead",
+        "blackout",
+        "partitioned",
+        "too_weak",
+        "collided",
+        "burst",
+        "channel_busy",
+        "jammed",
+    )
+    assert [int(fate) for fate in Fate] == list(range(len(FATE_NAMES)))
+
+
+@pytest.mark.parametrize("state", ["a", "ä" * 64])
+def test_a_short_text_is_a_state(state):
+    assert checked_state(state) == state
+
+
+@pytest.mark.parametrize("state", ["", "a" * 65, None, 1, b"a"])
+def test_anything_else_is_refused_as_it_was_called(state):
+    with pytest.raises(ValueError, match=r"^note\(state=…\): expected a text of 1 to 64 characters"):
+        checked_state(state)

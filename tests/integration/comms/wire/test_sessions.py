@@ -1,22 +1,26 @@
-"""Worlds, routers, runners and observers meet at endpoints that prove who is there, or that are of one machine."""
+"""Sessions of runs and of robots' networks: who meets whom, and that opening, closing and the end wait for nobody."""
 
+import stat
+import subprocess
+import sys
+import threading
 from contextlib import ExitStack
+from threading import Event
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import zenoh
 
+from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.wire import ending
+from swarmwire.comms.wire.closing import close_session, closed_after
+from swarmwire.comms.wire.ending import end_now
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.sessions import (
-    listens_at,
-    open_observed,
-    open_observer,
-    open_router,
-    open_runner,
-    open_world,
-    unix_endpoint,
-)
+from swarmwire.comms.wire.sessions import listens_at, open_router, open_runner, open_world, unix_endpoint
+from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm, swarm_config
+from tests.support.swarms import ANY_PORT, peers
 from tests.support.waiting import until
 
 
@@ -50,43 +54,9 @@ def test_ports_that_the_system_chose_are_told_and_a_world_may_listen_at_several_
                 pass
 
 
-@pytest.mark.parametrize("network", [None, Network(), Network(revoked=("r1",))])
-@pytest.mark.parametrize("endpoint", ["tcp/0.0.0.0:0", "tls/127.0.0.1:0"])
-def test_nobody_is_reached_beyond_this_machine_without_certificates(network, endpoint):
-    openings = (
-        lambda: open_world(endpoint, 10.0, network),
-        lambda: open_observed(endpoint, network),
-        lambda: open_router(endpoint, (), network),
-        lambda: open_router("tcp/127.0.0.1:0", endpoint, network),
-        lambda: open_runner(endpoint, 0.1, network),
-        lambda: open_observer(endpoint, network),
-    )
-    for opening in openings:
-        with pytest.raises(BadInput):
-            opening()
-
-
 def test_who_says_that_it_is_insecure_may():
     with closed_after(open_world("tcp/0.0.0.0:0", 10.0, Network(insecure=True))) as world:
         assert listens_at(world)
-
-
-@pytest.mark.parametrize(
-    ("opened", "lease_s"),
-    [
-        (lambda: open_world(unix_endpoint("/tmp/w"), 1.0), 7 * 86_400),
-        (lambda: open_runner(unix_endpoint("/tmp/w")), 7 * 86_400),
-        (lambda: open_observed([unix_endpoint("/tmp/w")]), 7 * 86_400),
-        (lambda: open_world("tcp/127.0.0.1:0", 1.0), 10),
-        (lambda: open_world([unix_endpoint("/tmp/w"), "tcp/127.0.0.1:0"], 45.0), 45),
-        (lambda: open_runner("tcp/127.0.0.1:1"), 60),
-    ],
-)
-def test_how_long_somebody_may_be_frozen_before_its_link_is_cut(monkeypatch, opened, lease_s):
-    configs: list[zenoh.Config] = []
-    monkeypatch.setattr(zenoh, "open", configs.append)
-    opened()
-    assert int(configs[0].get_json("transport/link/tx/lease")) == lease_s * 1000
 
 
 def test_a_query_passes_two_routers_whichever_begins_first():
@@ -103,3 +73,152 @@ def test_a_query_passes_two_routers_whichever_begins_first():
         asked = world.declare_queryable("here", answer)
         until(lambda: any(reply.ok for reply in runner.get("here", timeout=1.0)))
         asked.undeclare()
+
+
+NOBODY = "tcp/127.0.0.1:9"  # the discard port, on which nothing listens
+
+
+def test_peers_that_list_one_another_are_linked_and_others_are_not():
+    with peers(2) as (a, b):
+        until(lambda: len(list(a.info.peers_zid())) == 1)
+        until(lambda: [str(zid) for zid in b.info.peers_zid()] == [str(a.zid())])
+        alone = open_swarm(Network(listen=ANY_PORT))
+        try:
+            assert not list(alone.info.peers_zid())
+        finally:
+            close_session(alone)
+
+
+def test_opening_does_not_wait_for_those_who_are_not_there():
+    clock = WallClock()
+    began_ns = clock.now_ns()
+    session = open_swarm(Network(connect=(NOBODY,)))
+    assert clock.now_ns() - began_ns < NS_PER_S
+    close_session(session)
+
+
+def test_closing_does_not_wait_long_for_peers_that_are_frozen():
+    answers = threading.Event()
+    frozen: Any = SimpleNamespace(close=answers.wait)
+    try:
+        close_session(frozen, patience_s=0.01)
+    finally:
+        answers.set()
+    with peers(1) as (session,):
+        close_session(session)
+        assert session.is_closed()
+
+
+def test_a_chosen_port_can_be_read_back_and_a_given_one_is_as_given():
+    with peers(1) as (session,):
+        (endpoint,) = endpoints_of(session, Network(listen=ANY_PORT))
+        assert endpoint.startswith("tcp/127.0.0.1:")
+        assert not endpoint.endswith(":0")
+        given = Network(listen=(endpoint,))
+        assert endpoints_of(session, given) == given.listen
+        with pytest.raises(BadInput) as caught:
+            open_swarm(given)
+        assert endpoint in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+def test_who_lists_none_listens_nowhere():
+    session = open_swarm(Network(connect=(NOBODY,)))
+    try:
+        assert swarm_config(Network(connect=(NOBODY,)))["listen"]["endpoints"] == []
+        assert not list(session.info.peers_zid())
+    finally:
+        close_session(session)
+
+
+def test_who_is_to_be_found_by_multicast_listens_at_a_port_that_can_be_read_back():
+    network = Network(multicast=True, insecure=True)
+    config = swarm_config(network)
+    assert config["listen"]["endpoints"] == ["tcp/0.0.0.0:0"]
+    assert config["adminspace"]["enabled"] is True
+    with peers(1) as (session,):  # multicast itself is not for tests: it may find others
+        assert endpoints_of(session, network)[0].startswith("tcp/127.0.0.1:")
+
+
+def test_a_certificate_that_is_none_is_refused_in_one_line(tmp_path):
+    for name in ("ca", "pem", "key"):
+        (tmp_path / name).write_text("nonsense")
+        (tmp_path / name).chmod(stat.S_IRUSR)
+    files = {"ca": tmp_path / "ca", "certificate": tmp_path / "pem", "key": tmp_path / "key"}
+    with pytest.raises(BadInput) as caught:
+        open_swarm(Network(("tls/127.0.0.1:0",), **files))
+    assert "\n" not in str(caught.value)
+
+
+class Stuck:
+    """A session that zenoh cannot close in time."""
+
+    def __init__(self, wait: Event | None = None) -> None:
+        self._wait = wait
+
+    def close(self) -> None:
+        if self._wait is not None:
+            self._wait.wait()
+        raise zenoh.ZError("close operation timed out!")
+
+
+def test_a_session_is_closed_and_may_be_closed_again():
+    with peers(1) as (session,), closed_after(session):
+        close_session(session)
+        assert session.is_closed()
+
+
+def test_what_cannot_be_closed_in_time_is_left_to_the_end_of_the_process(caplog):
+    caplog.set_level("INFO")
+    with closed_after(Stuck()):
+        pass
+    assert "left to the end of the process" in caplog.text
+    wait = Event()
+    close_session(Stuck(wait), patience_s=0.01)
+    wait.set()
+
+
+# A session whose close takes long, as on a machine that is busy.
+PROGRAM = """
+import atexit, sys, threading
+from swarmwire.comms.wire import ending
+from swarmwire.comms.wire.closing import close_session
+
+class Slow:
+    def __init__(self): self.closed, self.may = False, threading.Event()
+    def close(self):
+        self.may.wait()
+        self.closed = True
+
+session = Slow()
+close_session(session, patience_s=0.01)
+print("done")
+"""
+WAITS = "atexit.register(lambda: print('closed' if session.closed else 'open')); "
+
+
+def ended(program: str) -> tuple[int, str, str]:
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_where_nothing_is_closing_it_returns(monkeypatch):
+    monkeypatch.setattr(ending, "_left", [])
+    end_now(3)
+
+
+def test_a_program_ends_at_once_with_its_exit_code():
+    assert ended(PROGRAM + "ending.end_now(3); sys.exit(4)") == (3, "done\n", "")
+
+
+def test_once_all_is_closed_it_ends_as_usual():
+    closed = "session.may.set(); ending._left[0].join(); "
+    assert ended(PROGRAM + closed + "ending.end_now(3); sys.exit(4)") == (4, "done\n", "")
+
+
+def test_else_python_waits_for_what_still_closes():
+    # What is registered first is called last: by then the session is closed, or the wait was in vain.
+    program = PROGRAM.replace("session = Slow()", "session = Slow()\n" + WAITS)
+    end = "threading.Timer(0.05, session.may.set).start(); sys.exit(4)"
+    assert ended(program + end) == (4, "done\nclosed\n", "")

@@ -1,17 +1,24 @@
-"""What the air tells a driver-run robot comes over whole, and is refused where its tables contradict one another."""
+"""What the air tells robots, between ticks too, and poses: over whole, or refused."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
+import msgpack
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard, Payloads
+from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.air_frames import MOST_BYTES, decode_air, encode_air
 from swarmwire.comms.wire.air_terms import AirTerms
+from swarmwire.comms.wire.in_time_frames import decode_packets, decode_sent, encode_packets, encode_sent
+from swarmwire.comms.wire.poses import POSE_BYTES, Pose, decode_pose, encode_pose
+from tests.support.agent.hosts import GIVES, heard_from
 
 ROW = 4  # of the robot, in the world; in its arena there are two
 TERMS = AirTerms(ROW, ("a", "b"), 10, 100, ("range_m", "bearing_rad"), ())
@@ -116,3 +123,142 @@ def test_a_frame_may_have_a_megabyte_and_no_more() -> None:
 def test_a_tick_that_no_run_has_is_refused(tick: int) -> None:
     with pytest.raises(BadFrame):
         decode_air(encode_air(tick, ROW, HEARD, OUTCOMES), TERMS)
+
+
+TOLD_TERMS = AirTerms(4, ("flock-0", "flock-1"), 10, 100, ("range_m",), ("radio.range", "radio.outcomes"))
+GOOD = msgpack.unpackb(TOLD_TERMS.encode())
+
+
+def fault_of(data: bytes) -> str:
+    with pytest.raises(BadFrame) as caught:
+        AirTerms.decode(data)
+    return caught.value.fault
+
+
+def test_what_was_told_is_what_is_learned():
+    assert AirTerms.decode(TOLD_TERMS.encode()) == TOLD_TERMS
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"row": -1},
+        {"row": "4"},
+        {"row": True},
+        {"rate_hz": 0},
+        {"max_payload_bytes": 1.5},
+        {"robots": "flock-0"},
+        {"robots": [1]},
+        {"gives": None},
+        {"needs": {}},
+        {"more": 1},
+    ],
+)
+def test_what_is_of_another_kind_is_refused(changed):
+    assert fault_of(msgpack.packb({**GOOD, **changed})) == "malformed"
+
+
+@pytest.mark.parametrize("version", [0, 2, "1", True, None])
+def test_another_version_is_named(version):
+    assert fault_of(msgpack.packb({**GOOD, "v": version})) == "version"
+
+
+@pytest.mark.parametrize("name", sorted(GOOD))
+def test_nothing_may_be_missing(name):
+    given = {key: value for key, value in GOOD.items() if key != name}
+    assert fault_of(msgpack.packb(given)) == ("version" if name == "v" else "malformed")
+
+
+@given(st.binary(max_size=60))
+def test_garbage_is_refused(data):
+    assert fault_of(data) in ("malformed", "version")  # an empty map names no version
+
+
+@pytest.mark.parametrize("value", [None, 3, [], ["v"], {1: 2}])
+def test_what_is_no_map_of_terms_is_refused(value):
+    assert fault_of(msgpack.packb(value)) == "malformed"
+
+
+NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@given(st.builds(Pose, NUMBERS, NUMBERS, NUMBERS), st.integers(-(2**63), 2**63 - 1))
+def test_a_pose_comes_back_with_its_time(pose: Pose, utc_ns: int) -> None:
+    assert decode_pose(encode_pose(pose, utc_ns)) == (pose, utc_ns)
+
+
+@given(st.binary(max_size=100).filter(lambda data: len(data) != POSE_BYTES))
+def test_bytes_of_another_length_are_none(data: bytes) -> None:
+    with pytest.raises(BadFrame):
+        decode_pose(data)
+
+
+@pytest.mark.parametrize("place", range(3))
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_is_none(place: int, wrong: float) -> None:
+    numbers = [0.0, 0.0, 0.0]
+    numbers[place] = wrong
+    with pytest.raises(BadFrame):
+        decode_pose(encode_pose(Pose(*numbers), 0))
+
+
+ROWS = np.array([5, 2])  # group after group: they need not rise
+SENT = Sent(np.array([2, 5, 2]), np.array([BROADCAST, 0, 1]), Payloads.of([b"abc", b"", b"d"]), np.array([-1, 0, 7]))
+
+
+def test_packets_and_outcomes_come_back_with_time_and_number() -> None:
+    heard, outcomes = heard_from(SENT, [2, 5]), Outcomes(np.array([2, 5]), np.array([0, 3]), np.array([1, 0]))
+    frame = frames.decode(encode_packets(7, 712_000_000, 3, heard, outcomes))
+    assert (frame.kind, frame.tick) == ("packets", 7)
+    at_ns, number, got, told = decode_packets(frame, GIVES)
+    assert (at_ns, number) == (712_000_000, 3)
+    for name in ("receiver", "sender", "sequence", "heard_at_ns", "payload"):
+        assert getattr(got, name).tolist() == getattr(heard, name).tolist()
+    assert [got.payloads.row(i) for i in range(3)] == [heard.payloads.row(i) for i in range(3)]
+    assert (told.row.tolist(), told.id.tolist(), told.result.tolist()) == ([2, 5], [0, 3], [1, 0])
+
+
+@pytest.mark.parametrize("values", [{}, {"at_ns": 1}, {"at_ns": 1.0, "number": 0}, {"at_ns": 1, "number": "0"}])
+def test_packets_without_time_and_number_are_refused(values: dict[str, Any]) -> None:
+    with pytest.raises(BadFrame):
+        decode_packets(frames.Frame("packets", 0, {}, values), GIVES)
+
+
+def test_packets_with_a_table_missing_are_refused() -> None:
+    whole = frames.decode(encode_packets(0, 0, 0, heard_from(SENT, [2]), NO_OUTCOMES))
+    for name in ("heard/given", "heard/data", "heard/offset"):
+        arrays = {key: array for key, array in whole.arrays.items() if key != name}
+        with pytest.raises(BadFrame):
+            decode_packets(frames.Frame("packets", 0, arrays, whole.values), GIVES)
+
+
+def test_what_was_sent_comes_back_and_says_what_was_missed() -> None:
+    for missed, values in ((0, {}), (4, {"missed": 4})):
+        frame = frames.decode(encode_sent(7, SENT, missed))
+        assert (frame.kind, frame.tick, frame.values) == ("sent", 7, values)
+        got = decode_sent(frame, ROWS)
+        assert (got.sender.tolist(), got.to.tolist()) == (SENT.sender.tolist(), SENT.to.tolist())
+        assert got.outcome_ids.tolist() == [-1, 0, 7]
+        assert [got.payloads.row(i) for i in range(3)] == [b"abc", b"", b"d"]
+
+
+def test_packets_of_robots_that_are_not_the_runners_own_are_refused_and_so_are_none() -> None:
+    for data, rows in ((encode_sent(7, SENT), np.array([2, 4])), (frames.encode("sent", 7, {}), ROWS)):
+        with pytest.raises(BadFrame, match="expected packets"):
+            decode_sent(frames.decode(data), rows)
+
+
+def test_nothing_heard_is_a_frame_of_outcomes_alone() -> None:
+    outcomes = Outcomes(np.array([2]), np.array([0]), np.array([1]))
+    _, _, heard, told = decode_packets(frames.decode(encode_packets(0, 0, 0, Heard.none(GIVES), outcomes)), GIVES)
+    assert (len(heard), len(told)) == (0, 1)
+
+
+def test_a_runner_of_one_robot_or_of_none_speaks_for_no_other() -> None:
+    for sender in (4, 6):
+        one = frames.decode(encode_sent(7, Sent(np.array([sender]), np.array([0]), Payloads.of([b"a"]))))
+        assert decode_sent(one, np.array([sender])).sender.tolist() == [sender]
+        assert one.values == {}
+        for rows in ([5], []):
+            with pytest.raises(BadFrame, match="expected packets of the runner's own robots"):
+                decode_sent(one, np.array(rows, np.int64))

@@ -1,9 +1,12 @@
-"""What is asked of a run arrives as it was sent, and what cannot be meant is refused in one line that names the key."""
+"""What is asked of a run arrives as it was sent; what cannot be meant is refused; an inbox counts what it drops."""
+
+import threading
 
 import msgpack
 import pytest
 
 from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.wire.bounded_inbox import BoundedInbox
 from swarmwire.comms.wire.control_frames import (
     MOST_BYTES,
     Request,
@@ -127,3 +130,25 @@ def test_an_answer_of_another_version_or_none_is_a_bad_frame():
 def test_what_no_message_can_carry_is_refused_by_whoever_asks(value):
     with pytest.raises(BadInput, match="event: expected texts, numbers of at most 64 bits, lists and tables alone"):
         encode_request(Request("event", value))
+
+
+def test_what_waits_comes_once_in_order_and_what_has_no_room_is_counted():
+    inbox = BoundedInbox[int](3)
+    for item in range(5):
+        inbox.put(item)
+    assert inbox.take() == [0, 1, 2]
+    assert inbox.take() == []
+    inbox.put(7)
+    assert inbox.take() == [7]
+    assert inbox.dropped == 2
+
+
+def test_nothing_is_lost_uncounted_when_several_threads_put():
+    inbox, taken = BoundedInbox[int](50), list[int]()
+    threads = [threading.Thread(target=lambda: [inbox.put(item) for item in range(2000)]) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads):
+        taken += inbox.take()
+    taken += inbox.take()
+    assert len(taken) + inbox.dropped == 8000

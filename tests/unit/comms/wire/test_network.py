@@ -1,11 +1,22 @@
-"""Settings of the robots' network: what is refused, and what is safe."""
+"""Settings of networks: what is refused, what is safe, and what sessions are opened with."""
 
+import json
 from pathlib import Path
 
 import pytest
+import zenoh
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.network import Network, is_local
+from swarmwire.comms.wire.sessions import (
+    open_observed,
+    open_observer,
+    open_router,
+    open_runner,
+    open_world,
+    unix_endpoint,
+)
+from swarmwire.comms.wire.swarm_session import swarm_config
 
 LOCAL = ["tcp/127.0.0.1:0"]
 AFAR = "tls/10.0.0.5:7447"
@@ -136,3 +147,49 @@ def test_what_will_not_do_is_refused_in_one_line_with_its_key(given, said):
 )
 def test_only_loopback_is_this_machine(endpoint, local):
     assert is_local(endpoint) is local
+
+
+@pytest.mark.parametrize("network", [None, Network(), Network(revoked=("r1",))])
+@pytest.mark.parametrize("endpoint", ["tcp/0.0.0.0:0", "tls/127.0.0.1:0"])
+def test_nobody_is_reached_beyond_this_machine_without_certificates(network, endpoint):
+    openings = (
+        lambda: open_world(endpoint, 10.0, network),
+        lambda: open_observed(endpoint, network),
+        lambda: open_router(endpoint, (), network),
+        lambda: open_router("tcp/127.0.0.1:0", endpoint, network),
+        lambda: open_runner(endpoint, 0.1, network),
+        lambda: open_observer(endpoint, network),
+    )
+    for opening in openings:
+        with pytest.raises(BadInput):
+            opening()
+
+
+@pytest.mark.parametrize(
+    ("opened", "lease_s"),
+    [
+        (lambda: open_world(unix_endpoint("/tmp/w"), 1.0), 7 * 86_400),
+        (lambda: open_runner(unix_endpoint("/tmp/w")), 7 * 86_400),
+        (lambda: open_observed([unix_endpoint("/tmp/w")]), 7 * 86_400),
+        (lambda: open_world("tcp/127.0.0.1:0", 1.0), 10),
+        (lambda: open_world([unix_endpoint("/tmp/w"), "tcp/127.0.0.1:0"], 45.0), 45),
+        (lambda: open_runner("tcp/127.0.0.1:1"), 60),
+    ],
+)
+def test_how_long_somebody_may_be_frozen_before_its_link_is_cut(monkeypatch, opened, lease_s):
+    configs: list[zenoh.Config] = []
+    monkeypatch.setattr(zenoh, "open", configs.append)
+    opened()
+    assert int(configs[0].get_json("transport/link/tx/lease")) == lease_s * 1000
+
+
+def test_with_certificates_nothing_else_is_spoken(tmp_path):
+    made = Network(multicast=True, ca=tmp_path / "ca", certificate=tmp_path / "pem", key=tmp_path / "key")
+    config = swarm_config(made, {"enabled": True})
+    link = config["transport"]["link"]
+    assert link["protocols"] == ["tls", "quic"]
+    assert link["tls"]["enable_mtls"] is True
+    assert config["listen"]["endpoints"] == ["tls/0.0.0.0:0"]
+    assert config["scouting"]["multicast"] == {"enabled": True}
+    assert config["access_control"] == {"enabled": True}
+    json.dumps(config)

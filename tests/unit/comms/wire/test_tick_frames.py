@@ -206,46 +206,29 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
     assert [got.sent.payloads.row(i) for i in range(k)] == payloads
 
 
-def sound() -> Actions:
+def sound(**more: Any) -> Actions:
     sent = Sent(np.array([4, 9, 9]), np.array([BROADCAST, 0, 2]), Payloads.of([b"ab", b"", b"cde"]))
-    return Actions(ROWS, np.array([True, False, True]), np.ones(3), np.zeros(3), np.zeros(3), sent)
+    return replace(Actions(ROWS, np.array([True, False, True]), np.ones(3), np.zeros(3), np.zeros(3), sent), **more)
+
+
+ACTUATED = Actuations(np.array([4, 4, 9]), np.array([0, 3, 1]), np.array([0.5, -2.0, 1e300]))
+LEDS = LedChanges(np.array([9, 4, 9]), np.array([0, 12, 7]), np.array([0xFFFFFF, 0, 0x123456]))
 
 
 def refused(**changes: Any) -> None:
-    frame = frames.decode(encode_actions(0, sound()))
+    frame = frames.decode(encode_actions(0, sound(own=ACTUATED)))
     with pytest.raises(BadFrame) as caught:
         decode_actions(replace(frame, arrays={**frame.arrays, **changes}), ROWS)
     assert caught.value.fault == "malformed"
 
 
-ACTUATED = Actuations(np.array([4, 4, 9]), np.array([0, 3, 1]), np.array([0.5, -2.0, 1e300]))
-
-
-def test_own_actuators_come_over_whole() -> None:
-    frame = frames.decode(encode_actions(0, replace(sound(), own=ACTUATED)))
-    got = decode_actions(frame, ROWS).own
-    assert all(same(getattr(got, name), getattr(ACTUATED, name)) for name in ("rows", "place", "value"))
-    assert not len(decode_actions(frames.decode(encode_actions(0, sound())), ROWS).own)
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"own": np.array([[4, 4, 8], [0, 3, 1]])},  # another runner's robot
-        {"own": np.array([[4, 4, 9], [0, -1, 1]])},
-        {"own": np.array([[4, 9], [0, 1]])},
-        {"own": np.array([[4.0, 4.0, 9.0], [0.0, 3.0, 1.0]])},
-        {"own/value": np.array([0.5, np.nan, 1.0])},
-        {"own/value": np.array([0.5, np.inf, 1.0])},
-        {"own/value": np.array([1, 2, 3])},
-    ],
-    ids=repr,
-)
-def test_own_actuators_that_are_none_are_refused(wrong: Any) -> None:
-    frame = frames.decode(encode_actions(0, replace(sound(), own=ACTUATED)))
-    with pytest.raises(BadFrame) as caught:
-        decode_actions(replace(frame, arrays={**frame.arrays, **wrong}), ROWS)
-    assert caught.value.fault == "malformed"
+def test_actuators_and_leds_come_over_whole_and_what_was_not_done_takes_no_room() -> None:
+    got = decode_actions(frames.decode(encode_actions(0, sound(own=ACTUATED, leds=LEDS))), ROWS)
+    assert all(same(getattr(got.own, name), getattr(ACTUATED, name)) for name in ("rows", "place", "value"))
+    assert all(same(getattr(got.leds, name), getattr(LEDS, name)) for name in ("rows", "which", "rgb"))
+    silent = frames.decode(encode_actions(0, sound(sent=Sent.none())))
+    assert not [name for name in silent.arrays if name.startswith(("sent", "own", "leds"))]
+    assert (len(decode_actions(silent, ROWS).sent), len(decode_actions(silent, ROWS).own)) == (0, 0)
 
 
 def test_frames_that_were_dropped_are_told_if_there_were_any() -> None:
@@ -253,15 +236,42 @@ def test_frames_that_were_dropped_are_told_if_there_were_any() -> None:
     assert frames.decode(encode_actions(0, sound(), 3)).values == {"dropped": 3}
 
 
-def test_actions_of_a_silent_runner_carry_no_packets() -> None:
-    silent = frames.decode(encode_actions(0, replace(sound(), sent=Sent.none())))
-    assert len(decode_actions(silent, ROWS).sent) == 0
-    assert not [name for name in silent.arrays if name.startswith("sent")]
-
-
-@pytest.mark.parametrize("rows", [[4, 6, 8], [6, 4, 9], [4, 6], [4, 6, 9, 9], [], [0, 0, 0]], ids=repr)
-def test_actions_for_other_robots_are_refused(rows: list[int]) -> None:
-    refused(rows=np.array(rows, np.int64))
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        *(("rows", rows) for rows in ([4, 6, 8], [6, 4, 9], [4, 6], [4, 6, 9, 9], np.empty(0, np.int64), [0, 0, 0])),
+        ("sent/offset", [0, 3, 2, 5]),  # falls
+        ("sent/offset", [0, 2, 2, 4]),  # leaves bytes over
+        ("sent/offset", [0, 2, 2, 6]),  # leaves the data
+        ("sent/offset", [1, 2, 2, 5]),
+        ("sent/offset", [0, -1, 2, 5]),
+        ("sent/offset", [-1, 2, 2, 5]),
+        ("sent/offset", [0, 6, 6, 5]),
+        ("sent/offset", [0, I64.max, I64.min, 5]),  # the differences wrap around to positive numbers
+        ("sent/offset", [0, I64.min, I64.max, 5]),
+        ("sent/offset", [0, I64.max, I64.max, 5]),
+        ("sent/offset", [0, 2, 2, I64.max]),
+        *(("sent", [sender, [0, 0, 0]]) for sender in ([4, 9, 5], [4, 9, -1], [I64.max, 9, 9], [0, 1, 2])),
+        *(("sent", [[4, 9, 9], [0, to, 0]]) for to in (-2, I64.min)),
+        *(("sent/outcome_id", ids) for ids in ([0, 1, 2], [-1, -2, 0], [-1, I64.min, 0], [-1, 1], [[-1, 1, 2]])),
+        ("sent/outcome_id", [-1.0, 1.0, 2.0]),
+        ("leds", [[5], [0], [1]]),  # another's robot
+        ("leds", [[4], [-1], [1]]),
+        ("leds", [[4], [0], [-1]]),
+        ("leds", [[4], [0], [0x1000000]]),
+        ("leds", [[4], [0]]),
+        ("leds", [4, 0, 1]),
+        ("leds", [[4.0], [0.0], [1.0]]),
+        ("own", [[4, 4, 8], [0, 3, 1]]),  # another's robot
+        ("own", [[4, 4, 9], [0, -1, 1]]),
+        ("own", [[4, 9], [0, 1]]),
+        ("own", [[4.0, 4.0, 9.0], [0.0, 3.0, 1.0]]),
+        *(("own/value", value) for value in ([0.5, np.nan, 1.0], [0.5, np.inf, 1.0], [1, 2, 3])),
+    ],
+    ids=repr,
+)
+def test_actions_of_others_or_that_contradict_themselves_are_refused(name: str, wrong: Any) -> None:
+    refused(**{name: np.array(wrong)})
 
 
 @pytest.mark.parametrize("name", ["rows", "command", "sent", "sent/offset"])
@@ -282,44 +292,6 @@ def test_a_column_that_is_missing_is_refused(name: str) -> None:
         decode_actions(replace(frame, arrays=rest), ROWS)
 
 
-@pytest.mark.parametrize(
-    "offset",
-    [
-        [0, 3, 2, 5],  # falls
-        [0, 2, 2, 4],  # leaves bytes over
-        [0, 2, 2, 6],  # leaves the data
-        [1, 2, 2, 5],
-        [0, -1, 2, 5],
-        [-1, 2, 2, 5],
-        [0, 6, 6, 5],
-        [0, I64.max, I64.min, 5],  # the differences wrap around to positive numbers
-        [0, I64.min, I64.max, 5],
-        [0, I64.max, I64.max, 5],
-        [0, 2, 2, I64.max],
-    ],
-    ids=repr,
-)
-def test_offsets_that_fall_or_leave_the_data_are_refused(offset: list[int]) -> None:
-    refused(**{"sent/offset": np.array(offset)})
-
-
-@pytest.mark.parametrize("sender", [[4, 9, 5], [4, 9, -1], [I64.max, 9, 9], [0, 1, 2]], ids=repr)
-def test_packets_of_robots_that_are_not_the_runners_are_refused(sender: list[int]) -> None:
-    refused(sent=np.array([sender, [0, 0, 0]]))
-
-
-@pytest.mark.parametrize("to", [-2, I64.min])
-def test_packets_to_a_negative_index_are_refused(to: int) -> None:
-    refused(sent=np.array([[4, 9, 9], [0, to, 0]]))
-
-
-@pytest.mark.parametrize(
-    "ids", [[0, 1, 2], [-1, -2, 0], [-1, I64.min, 0], [-1, 1], [[-1, 1, 2]], [-1.0, 1.0, 2.0]], ids=repr
-)
-def test_outcome_ids_that_fit_no_packet_or_a_broadcast_are_refused(ids: list[int]) -> None:
-    refused(**{"sent/outcome_id": np.array(ids)})
-
-
 def test_packets_without_any_sender_are_none() -> None:
     frame = frames.decode(encode_actions(0, sound()))
     empty = {"sent": np.empty((2, 0), np.int64), "sent/offset": np.zeros(1, np.int64)}
@@ -327,70 +299,17 @@ def test_packets_without_any_sender_are_none() -> None:
     assert len(decode_actions(replace(frame, arrays=arrays), ROWS).sent) == 0
 
 
-def switching(leds: LedChanges) -> frames.Frame:
-    return frames.decode(encode_actions(0, replace(sound(), leds=leds)))
-
-
-def test_switched_leds_come_over_whole_and_cost_nothing_otherwise() -> None:
-    leds = LedChanges(np.array([9, 4, 9]), np.array([0, 12, 7]), np.array([0xFFFFFF, 0, 0x123456]))
-    got = decode_actions(switching(leds), ROWS).leds
-    assert all(same(getattr(got, name), getattr(leds, name)) for name in ("rows", "which", "rgb"))
-    assert "leds" not in frames.decode(encode_actions(0, sound())).arrays
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        [[5], [0], [1]],  # another's robot
-        [[4], [-1], [1]],
-        [[4], [0], [-1]],
-        [[4], [0], [0x1000000]],
-        [[4], [0]],
-        [4, 0, 1],
-        [[4.0], [0.0], [1.0]],
-    ],
-    ids=repr,
-)
-def test_leds_that_are_none_are_refused(wrong: list[Any]) -> None:
-    refused(leds=np.array(wrong))
-
-
-def noting(rows: list[int], code: list[int], names: tuple[str, ...]) -> bytes:
-    return encode_actions(0, replace(sound(), notes=Notes(np.array(rows), np.array(code), names)))
-
-
-def test_named_states_come_over_whole() -> None:
-    notes = decode_actions(frames.decode(noting([9, 4], [1, 0], ("search", "wait"))), ROWS).notes
-    assert (notes.rows.tolist(), notes.code.tolist(), notes.names) == ([9, 4], [1, 0], ("search", "wait"))
-    assert decode_actions(frames.decode(noting([9], [0], ("search",))), ROWS).notes.names == ("search",)
-
-
-@pytest.mark.parametrize(
-    ("rows", "code", "names"),
-    [
-        ([5], [0], ("search",)),  # another's robot
-        ([4, 4], [0, 0], ("search",)),
-        ([4], [1], ("search",)),
-        ([4], [-1], ("search",)),
-        ([4], [0], ()),
-        ([4], [0], ("",)),
-        ([4], [0], ("x" * 65,)),
-        ([4], [0], (7,)),
-        ([4], [0], tuple(map(str, range(257)))),
-    ],
-    ids=repr,
-)
-def test_states_that_contradict_themselves_are_refused(rows: list[int], code: list[int], names: tuple[str]) -> None:
-    with pytest.raises(BadFrame) as caught:
-        decode_actions(frames.decode(noting(rows, code, names)), ROWS)
-    assert caught.value.fault == "malformed"
+def noting(rows: list[int], code: list[int], names: tuple[Any, ...]) -> bytes:
+    return encode_actions(0, sound(notes=Notes(np.array(rows), np.array(code), names)))
 
 
 def numbering(rows: list[int], value: list[float]) -> bytes:
-    return encode_actions(0, replace(sound(), values=Values(np.array(rows, np.int64), np.array(value, np.float64))))
+    return encode_actions(0, sound(values=Values(np.array(rows, np.int64), np.array(value, np.float64))))
 
 
-def test_numbers_that_were_told_come_over_bit_for_bit_and_nobodys_take_no_room() -> None:
+def test_named_states_and_numbers_come_over_bit_for_bit_and_nobodys_take_no_room() -> None:
+    notes = decode_actions(frames.decode(noting([9, 4], [1, 0], ("search", "wait"))), ROWS).notes
+    assert (notes.rows.tolist(), notes.code.tolist(), notes.names) == ([9, 4], [1, 0], ("search", "wait"))
     value = [0.1 + 0.2, -0.0, 5e-324]
     told = decode_actions(frames.decode(numbering([9, 4, 4], value)), ROWS).values
     assert (told.rows.tolist(), told.value.tobytes()) == ([9, 4, 4], np.array(value).tobytes())
@@ -399,9 +318,22 @@ def test_numbers_that_were_told_come_over_bit_for_bit_and_nobodys_take_no_room()
 
 
 @pytest.mark.parametrize(
-    ("rows", "value"), [([5], [1.0]), ([4], [np.nan]), ([4], [np.inf]), ([4, 9], [1.0]), ([4], [])], ids=repr
+    "data",
+    [
+        noting([5], [0], ("search",)),  # another's robot
+        noting([4, 4], [0, 0], ("search",)),
+        noting([4], [1], ("search",)),
+        noting([4], [-1], ("search",)),
+        *(noting([4], [0], names) for names in ((), ("",), ("x" * 65,), (7,), tuple(map(str, range(257))))),
+        numbering([5], [1.0]),
+        numbering([4], [np.nan]),
+        numbering([4], [np.inf]),
+        numbering([4, 9], [1.0]),
+        numbering([4], []),
+    ],
+    ids=range(14),
 )
-def test_numbers_that_are_none_or_anothers_are_refused(rows: list[int], value: list[float]) -> None:
+def test_states_and_numbers_that_contradict_themselves_or_are_anothers_are_refused(data: bytes) -> None:
     with pytest.raises(BadFrame) as caught:
-        decode_actions(frames.decode(numbering(rows, value)), ROWS)
+        decode_actions(frames.decode(data), ROWS)
     assert caught.value.fault == "malformed"

@@ -126,7 +126,6 @@ def equal(a: Any, b: Any) -> bool:
 
 
 @given(glimpses())
-@settings(max_examples=60)
 def test_a_glimpse_comes_over_whole(glimpse):
     assert equal(decode_truth(frames.decode(encode_truth(glimpse)), SCENE), glimpse)
 
@@ -210,29 +209,20 @@ def test_a_glimpse_that_contradicts_itself_is_refused(fault, given):
 
 
 EVENT = [0, 0.0, "kill", False, "", False]
+WRONG_EVENTS = [7, [], EVENT[:5], [*EVENT, 0], [0, 0, *EVENT[2:]], [*EVENT[:5], 1], [*EVENT[:3], 1, *EVENT[4:]]]
 
 
-@pytest.mark.parametrize("wrong", [7, [], EVENT[:5], [*EVENT, 0], [0, 0, *EVENT[2:]], [*EVENT[:5], 1]], ids=str)
-def test_events_that_are_none_are_refused(wrong):
+@pytest.mark.parametrize("events", [None, {}, "kill", *([wrong] for wrong in WRONG_EVENTS)], ids=str)
+def test_events_that_are_none_are_refused(events):
     frame = frames.decode(encode_truth(quiet(events=(Happened(0, 0.0, "kill", False, np.ones(ROWS, np.bool_)),))))
     assert frame.values["events"] == [EVENT]
-    with pytest.raises(BadFrame, match="events: expected serial"):
-        decode_truth(replace(frame, values={**frame.values, "events": [wrong]}), SCENE)
+    with pytest.raises(BadFrame, match="events: expected"):
+        decode_truth(replace(frame, values={**frame.values, "events": events}), SCENE)
 
 
 def test_a_sense_may_have_a_name_of_several_parts():
     glimpse = quiet(senses={"a": GroupSenses(np.array([0]), {"own/of/mine": np.zeros(1)})})
     assert equal(decode_truth(frames.decode(encode_truth(glimpse)), SCENE), glimpse)
-
-
-@pytest.mark.parametrize(
-    "events", [None, {}, "kill", [3], [[0, 0.0, "kill", False, ""]], [[0, 0.0, "kill", 1, "", False]]]
-)
-def test_events_of_another_form_are_refused(events):
-    frame = frames.decode(encode_truth(quiet()))
-    arrays = {**frame.arrays, "events": np.zeros((1, ROWS), np.bool_)}
-    with pytest.raises(BadFrame, match="events: expected"):
-        decode_truth(replace(frame, arrays=arrays, values={**frame.values, "events": events}), SCENE)
 
 
 @pytest.mark.parametrize("change", [{"serial": -1}, {"ticks": 0}, {"values": np.zeros((3, ARENAS))}])
@@ -286,28 +276,6 @@ def test_a_scene_that_contradicts_itself_is_refused(change, fault):
         decode_scene(frames.decode(encode_scene(replace(SCENE, static=replace(STATIC, **change)))))
 
 
-def test_a_scene_is_of_one_of_its_robots():
-    with pytest.raises(BadFrame, match="selected: expected one of the robots"):
-        decode_scene(frames.decode(encode_scene(replace(SCENE, selected="c-0"))))
-
-
-@pytest.mark.parametrize(
-    ("change", "fault"),
-    [
-        (None, "body: expected a body"),
-        ({"radius_m": -1.0}, "radius_m"),
-        ({"wings": 2}, "wings"),
-    ],
-)
-def test_a_scene_with_a_body_that_is_none_is_refused(change, fault):
-    frame = frames.decode(encode_scene(SCENE))
-    scene: Any = frame.values["scene"]
-    group = scene["static"]["groups"][0]
-    group["body"] = None if change is None else {**group["body"], **change}
-    with pytest.raises(BadFrame, match=fault):
-        decode_scene(frame)
-
-
 @pytest.mark.parametrize("parts", [{}, {"series": []}, {"static": None, "series": [], "selected": "", "more": 1}])
 def test_a_scene_has_just_its_parts(parts):
     with pytest.raises(BadFrame, match="scene: expected a map of static, series, selected"):
@@ -321,7 +289,10 @@ def test_a_scene_has_just_its_parts(parts):
         (("more",), 7, "scene: expected a map"),
         (("static", "groups", 0), [], r"groups\[0\]: expected a map"),
         (("static", "groups", 0, "body"), 7, "body: expected a body"),
+        (("static", "groups", 0, "body"), None, "body: expected a body"),
         (("static", "groups", 0, "body"), {"name": 7}, "body"),
+        (("static", "groups", 0, "body", "radius_m"), -1.0, "radius_m"),
+        (("static", "groups", 0, "body", "wings"), 2, "wings"),
         (("static", "obstacles", 0, 0, "height_m"), float("-inf"), "height_m"),
         (("static", "obstacles", 0, 0, "x_m"), float("inf"), "x_m"),
         (("static", "obstacles", 0, 0, "x_m"), "1", "x_m"),
@@ -357,7 +328,7 @@ def test_a_scene_of_anything_else_is_refused(junk):
 
 
 @given(glimpses(), st.integers(0, ARENAS - 1))
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_one_arena_of_several_is_a_run_of_its_own(glimpse, arena):
     truth, rows = replace(glimpse.truth, value=np.arange(ROWS) / 2), slice(arena * ROBOTS, (arena + 1) * ROBOTS)
     if truth.edges is not None:  # no edge joins robots of different arenas

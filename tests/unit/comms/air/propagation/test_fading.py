@@ -131,7 +131,7 @@ def test_a_single_link_decorrelates_as_all_do_while_both_robots_move():
 def test_a_robots_signal_fades_as_often_and_as_long_as_theory_says():
     """At 1 m/s and 2.44 GHz it falls by 10 dB 5.838 times a second, for 16.3 ms each; over 80 s of 8 pairs.
 
-    Held to 30 %: 470 fades, which come in runs, give about 7 %, so that is 4 standard errors; statistics have all of it.
+    Held to 30 %, 4 standard errors: 470 fades, which come in runs, give about 7 %. Statistics have all of it.
     """
     metres = np.arange(0.0, 10.0, 1e-3)
     falls, below = 0, 0

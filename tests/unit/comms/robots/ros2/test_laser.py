@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body
@@ -66,7 +66,6 @@ def scans():
     )
 
 
-@settings(max_examples=60, deadline=None)
 @given(scans())
 def test_what_an_emulated_scanner_sends_a_driver_of_the_same_sheet_reads(drawn):
     sheet, range_m = drawn
@@ -146,7 +145,6 @@ def test_beyond_the_sheets_range_or_further_off_than_45_degrees_a_sensor_answers
     assert alone.value(received(independent.laser_scan(ranges))) == pytest.approx([1 - 2 * 0.095], abs=1e-6)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.floats(-0.1, 0.1), st.floats(-pi, pi), st.floats(0.0, 0.3), st.floats(-pi, pi))
 def test_the_way_from_scanner_to_rim_is_that_of_geometry(at_m, angle_rad, away_m, mounted_rad):
     """A thing `away_m` from the rim along a ray of a scanner that stands `at_m` ahead of the centre."""

@@ -112,7 +112,6 @@ def test_half_a_message_is_a_bad_frame(kind, data):
         MESSAGES.decode(kind, half)
 
 
-@settings(max_examples=50, deadline=None)
 @given(linear=FINITE, angular=FINITE, lateral=FINITE, stamp=STAMPS, frame=FRAMES)
 def test_commands_laid_out_by_hand_are_those_of_the_library(linear, angular, lateral, stamp, frame):
     told, theirs = twist.Velocities(linear, angular, lateral), independent.twist(linear, angular, lateral)

@@ -1,0 +1,153 @@
+"""What a runner asks for and what a world offers come over whole; what is neither is refused."""
+
+import re
+from dataclasses import asdict, replace
+from typing import Any
+
+import msgpack
+import pytest
+
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.wire.frames import VERSION
+from swarmwire.comms.wire.join_request import MOST_BYTES, JoinRequest, versioned
+from swarmwire.comms.wire.offer import Offer, OfferedGroup
+
+HASH = "0123456789abcdef" * 4
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        JoinRequest(),
+        JoinRequest(robots=1),
+        JoinRequest(robots=7, agents={}, scenario_sha256=HASH),
+        JoinRequest(names=("flock-0",)),
+        JoinRequest(names=("flock-0", "scouts-3"), agents={"flock": HASH, "scouts": "f" * 64}),
+    ],
+    ids=str,
+)
+def test_a_request_comes_over_whole(request_: JoinRequest) -> None:
+    assert JoinRequest.decode(request_.encode()) == request_
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ({"robots": 0}, "robots: expected a number of at least 1"),
+        ({"robots": -1}, "robots: expected a number of at least 1"),
+        ({"robots": 2.0}, "robots: expected a number of at least 1"),
+        ({"robots": True}, "robots: expected a number of at least 1"),
+        ({"names": []}, "names: expected a list of names of robots"),
+        ({"names": ["flock-0", 1]}, "names: expected a list of names of robots"),
+        ({"names": "flock-0"}, "names: expected a list of names of robots"),
+        ({"names": {"flock-0": 1}}, "names: expected a list of names of robots"),
+        ({"robots": 1, "names": ["flock-0"]}, "expected robots or names, not both"),
+        ({"agents": [HASH]}, "agents: expected the sha256 of an agent by group"),
+        ({"agents": {"flock": HASH[1:]}}, "agents: expected the sha256 of an agent by group"),
+        ({"agents": {"flock": HASH, "scouts": 1}}, "agents: expected the sha256 of an agent by group"),
+        ({"agents": {1: HASH}}, "no msgpack"),
+        ({"agents": {b"flock": HASH}}, "agents: expected the sha256 of an agent by group"),
+        ({"scenario_sha256": HASH + "0"}, "scenario_sha256: expected 64 hexadecimal digits"),
+        ({"scenario_sha256": HASH.upper()}, "scenario_sha256: expected 64 hexadecimal digits"),
+        ({"scenario_sha256": HASH.encode()}, "scenario_sha256: expected 64 hexadecimal digits"),
+    ],
+    ids=str,
+)
+def test_what_is_no_request_is_refused(asked: dict[str, Any], told: str) -> None:
+    with pytest.raises(BadFrame, match=re.escape(told)) as caught:
+        JoinRequest.decode(msgpack.packb({"v": VERSION, **asked}))
+    assert caught.value.fault == "malformed"
+
+
+@pytest.mark.parametrize("version", [VERSION + 1, VERSION - 1, float(VERSION), None, str(VERSION)])
+def test_another_version_is_named(version: object) -> None:
+    with pytest.raises(BadFrame, match=f"expected version {VERSION} of the frames, got {version!r}") as caught:
+        versioned(msgpack.packb({"v": version}))
+    assert caught.value.fault == "version"
+
+
+@pytest.mark.parametrize("body", [[], ["v"], 1, None, {b"v": VERSION}, {"v": VERSION, b"robots": 1}], ids=str)
+def test_what_is_no_map_of_texts_is_refused(body: object) -> None:
+    with pytest.raises(BadFrame, match="expected a map"):
+        versioned(msgpack.packb(body))
+
+
+def test_a_request_may_have_a_megabyte_and_no_more() -> None:
+    empty = len(msgpack.packb({"v": VERSION, "x": bytes(2**17)})) - 2**17
+    assert MOST_BYTES == 2**20
+    assert versioned(msgpack.packb({"v": VERSION, "x": bytes(MOST_BYTES - empty)}))["v"] == VERSION
+    with pytest.raises(BadFrame, match="oversized"):
+        versioned(msgpack.packb({"v": VERSION, "x": bytes(MOST_BYTES - empty + 1)}))
+
+
+def test_an_offer_of_very_many_robots_comes_over_whole() -> None:
+    free = tuple(f"flock-{at}" for at in range(100_000))
+    group = OfferedGroup("flock", "mine.py:Mine", "a" * 64, len(free), free)
+    offer = Offer("RUN", "many", "d" * 64, "1.2.3", 10, 1.5, (group,))
+    data = offer.encode()
+    assert len(data) > MOST_BYTES
+    assert Offer.decode(data) == offer
+
+
+GROUP = OfferedGroup("flock", "mine.py:Mine", "a" * 64, 3, ("flock-0", "flock-2"))
+OFFER = Offer("RUN", "some", "d" * 64, "1.2.3", 10, None, (GROUP, replace(GROUP, name="scouts", free=())))
+
+
+def told(**changed: Any) -> bytes:
+    """An offer with these values in place of its own; `...` takes them out."""
+    body = {"v": VERSION, **asdict(OFFER), **changed}
+    return msgpack.packb({name: value for name, value in body.items() if value is not ...})
+
+
+@pytest.mark.parametrize("factor", [None, 1.0, 0.5, 2])
+def test_an_offer_comes_over_whole(factor: float | None) -> None:
+    got = Offer.decode(replace(OFFER, real_time=factor).encode())
+    assert got == replace(OFFER, real_time=factor)
+    assert factor is None or type(got.real_time) is float
+
+
+def test_robots_become_free_by_group() -> None:
+    free = OFFER.with_free({"scouts": ["scouts-1"]})
+    assert [group.free for group in free.groups] == [(), ("scouts-1",)]
+    assert replace(free, groups=OFFER.groups) == OFFER
+
+
+@pytest.mark.parametrize(
+    ("changed", "named"),
+    [
+        ({"run": 1}, "run is no str"),
+        ({"rate_hz": 10.0}, "rate_hz is no int"),
+        ({"rate_hz": True}, "rate_hz is no int"),
+        ({"scenario": ...}, "scenario"),
+        ({"real_time": ...}, "real_time"),
+        ({"real_time": "fast"}, "fast"),
+        ({"real_time": []}, "list"),
+        ({"groups": ...}, "groups"),
+        ({"groups": [1]}, "int"),
+        ({"groups": 3}, "not iterable"),
+        ({"groups": [{**asdict(GROUP), "robots": "3"}]}, "robots is no int"),
+        ({"groups": [{**asdict(GROUP), "free": "flock-0"}]}, "free is no list of texts"),
+        ({"groups": [{**asdict(GROUP), "free": ["flock-0", 1]}]}, "free is no list of texts"),
+        (
+            {"groups": [{name: value for name, value in asdict(GROUP).items() if name != "agent_sha256"}]},
+            "agent_sha256",
+        ),
+    ],
+    ids=str,
+)
+def test_what_is_no_offer_is_refused(changed: dict[str, Any], named: str) -> None:
+    with pytest.raises(BadFrame, match=f"expected an offer: .*{named}") as caught:
+        Offer.decode(told(**changed))
+    assert caught.value.fault == "malformed"
+
+
+def test_an_offer_of_another_version_is_named() -> None:
+    with pytest.raises(BadFrame, match="version") as caught:
+        Offer.decode(told(v=VERSION + 1))
+    assert caught.value.fault == "version"
+
+
+def test_offers_cannot_be_changed() -> None:
+    for thing, name in ((OFFER, "run"), (GROUP, "name")):
+        with pytest.raises(AttributeError):
+            setattr(thing, name, "other")
