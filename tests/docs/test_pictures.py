@@ -10,6 +10,8 @@ from docs.pictures.radio import sheet
 from docs.pictures.radio.__main__ import FIGURES
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize("name", FIGURES)
 def test_a_figure_of_the_radio_can_be_drawn(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(sheet, "FOLDER", tmp_path)
