@@ -9,7 +9,7 @@ from swarmwire.deploy import Result, crews, run
 from tests.support.deploy.commands import LOSSY, ROOT
 from tests.support.encoded_crew import EncodedCrew
 
-SHORT = ["duration_s=2"]
+SHORT = ["duration_s=1.5"]
 SCENARIOS = sorted(
     path
     for folder in (".", "behaviours", "papers/scenarios", "robots")
