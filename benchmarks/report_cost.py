@@ -23,6 +23,7 @@ COUNTS = (5, 10, 20, 40, 80)
 LIMIT_S = 600.0
 METRICS = ("order", "largest_component", "min_gap", "collisions", "target_best", "target_mean", "components")
 TIMES = ("aggregation_time_s", "stop_time_s")
+PLAIN = {"help": "made up", "listed": False, "hold_s": 0.0}  # of an outcome
 
 
 def report_cost(name: str, repeats: int, *, seeds: int) -> None:
@@ -75,8 +76,8 @@ def _drawn(run: IntArray, what: str) -> FloatArray:
 
 def _about(points: list[tuple[float, int]], seeds: int) -> dict[str, Any]:
     numbers = [*(f"{metric}.final" for metric in METRICS), "radio.pdr"]
-    outcomes = [{"column": column, "unit": "", "kind": "number", "help": "made up"} for column in numbers]
-    outcomes += [{"column": column, "unit": "s", "kind": "time", "help": "made up"} for column in TIMES]
+    outcomes = [{"column": column, "unit": "", "kind": "number", **PLAIN} for column in numbers]
+    outcomes += [{"column": column, "unit": "s", "kind": "time", **PLAIN} for column in TIMES]
     return {
         "format": 1,
         "name": "made up",

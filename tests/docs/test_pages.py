@@ -16,7 +16,9 @@ from tests.support.deploy.commands import called
 
 WITH_COMMANDS = [page for page in PAGES if commands_of(page)]
 SHOWN = ("docs/getting-started.md", "docs/scenario.md", "docs/api/deploy.md")
-IN_THIS_PROCESS = re.compile(r"(?:uv run )?swarmwire (?!sweep|tune)[^|&;>]*")  # workers want a main module of their own
+IN_THIS_PROCESS = re.compile(
+    r"(?:uv run )?swarmwire (?!sweep|tune)[^|&;>*]*"
+)  # workers want a main module of their own
 UV = """#!/bin/sh
 # What `uv run` comes to here: the environment is that of the tests.
 test "$1" = run || exit 64
@@ -42,8 +44,9 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def in_a_shell(line: str) -> tuple[object, str]:
     """Exit code of a line and what it prints."""
-    done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False, timeout=100)
-    return done.returncode, done.stdout + done.stderr
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    done = subprocess.run(["sh", "-c", line], **pipes, check=False, timeout=100)
+    return done.returncode, done.stdout
 
 
 @pytest.mark.timeout(400)
