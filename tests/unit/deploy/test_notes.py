@@ -29,16 +29,19 @@ class StatesSeen:
 
 def states(runners: int | None, seeds: Sequence[int]) -> list[list[str]]:
     seen = StatesSeen()
-    run_spread(PSO, runners, seeds=seeds, overrides=["duration_s=10"], observers=[seen])
+    run_spread(PSO, runners, seeds=seeds, overrides=["duration_s=15"], observers=[seen])
     return seen.ticks
 
 
-@pytest.mark.parametrize("runners", [3, PER_ROBOT])
-def test_states_are_the_same_however_the_agents_are_spread(runners: int) -> None:
-    alone = states(None, [2])
-    assert states(runners, [2]) == alone
+@pytest.fixture(scope="module")
+def alone() -> list[list[str]]:
+    return states(None, [2])
+
+
+def test_states_are_the_same_however_the_agents_are_spread(alone: list[list[str]]) -> None:
+    assert states(PER_ROBOT, [2]) == alone
     assert {"to its own best", "to the neighbours' best"} <= set(alone[-1])
 
 
-def test_states_of_an_arena_are_the_same_beside_others() -> None:
-    assert [tick[-10:] for tick in states(None, [5, 2])] == states(None, [2])
+def test_states_of_an_arena_are_the_same_beside_others(alone: list[list[str]]) -> None:
+    assert [tick[-10:] for tick in states(None, [5, 2])] == alone

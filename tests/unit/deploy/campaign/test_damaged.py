@@ -13,7 +13,9 @@ from swarmwire.deploy.campaign.campaign import read_campaign
 from swarmwire.deploy.campaign.run_again import CampaignRun
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
-from tests.unit.deploy.campaign.test_resume import ASKED, Killed, dying_at
+from tests.unit.deploy.campaign.test_resume import VARY, Killed, dying_at
+
+ASKED_SINGLY = {"seeds": 2, "vary": VARY, "pack": 1}
 
 
 @pytest.fixture(scope="module")
@@ -23,10 +25,10 @@ def sound(tmp_path_factory):
     scenario = scenario_in(folder)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
-        sweep(scenario, out=folder / "whole", **ASKED)
+        sweep(scenario, out=folder / "whole", **ASKED_SINGLY)
         dying_at(patched, 4, Killed())
         with pytest.raises(Killed):
-            sweep(scenario, out=folder / "half", **ASKED)
+            sweep(scenario, out=folder / "half", **ASKED_SINGLY)
     return folder
 
 
@@ -76,7 +78,7 @@ def test_a_table_of_another_campaign_is_told_by_the_first_strange_column(half):
     for frame, told in (
         (rows.drop("order.mean"), "order.mean: expected this column of the campaign's table, as Float64"),
         (rows.with_columns(pl.col("seed").cast(pl.String)), "seed: expected this column of the campaign's table, as I"),
-        (rows.with_columns(run=pl.col("run") + 8), "run: expected runs from 0 to 7"),
+        (rows.with_columns(run=pl.col("run") + 8), "run: expected runs from 0 to 3"),
     ):
         frame.write_parquet(part)
         assert refused(resume, half).startswith(f"{part}: {told}")
@@ -94,8 +96,8 @@ def test_files_of_others_in_the_folder_are_left_alone(half, whole):
     ("key", "value"),
     [
         ("seeds", []),
-        ("seeds", [1, 1, 2, 3]),
-        ("seeds", ["a", "b", "c", "d"]),
+        ("seeds", [1, 1]),
+        ("seeds", ["a", "b"]),
         ("points", []),
         ("points", [{"a": 0.0}, {"a": 1.0}]),
         ("point_overrides", [["radio.loss=0"]]),

@@ -25,7 +25,7 @@ def test_a_disk_that_is_full_at_some_time_loses_nothing_that_is_done(tmp_path, s
     assert len(rows_in(folder)) == 2 * (count // 2)
     assert here[0].closed
     assert resume(folder).is_over
-    assert len(rows_in(folder)) == 8
+    assert len(rows_in(folder)) == 4
 
 
 def test_the_command_line_says_so_in_one_line(tmp_path, scenario, here, monkeypatch, capsys):
@@ -53,7 +53,7 @@ def test_series_that_cannot_be_joined_are_no_loss_either(tmp_path, scenario, her
         patched.setattr(pl.LazyFrame, "sink_parquet", full)
         with pytest.raises(StorageFailed, match="No space left"):
             sweep(scenario, out=tmp_path / "c", **ASKED)
-    assert len(rows_in(tmp_path / "c")) == 8
+    assert len(rows_in(tmp_path / "c")) == 4
     assert not list((tmp_path / "c" / "series").glob("worker-*"))
     assert resume(tmp_path / "c").is_over
     assert "series" in [path.name for path in (tmp_path / "c").iterdir()]

@@ -13,7 +13,9 @@ pytestmark = pytest.mark.usefixtures("here")
 
 
 def test_the_best_is_a_scenario_that_runs_from_the_folder_alone(tmp_path, scenario):
-    found = tuned(scenario, tmp_path / "t", AT, "robots.pair.count=2:4", trials=6, overrides=("duration_s=0.3",))
+    found = tuned(
+        scenario, tmp_path / "t", AT, "robots.pair.count=2:4", trials=6, seeds=1, overrides=("duration_s=0.3",)
+    )
     shutil.rmtree(tmp_path / "t" / "scenario")
     for file in ("bowl.py", "careful.py", "bowl.toml"):
         (tmp_path / file).unlink()
@@ -48,7 +50,7 @@ def test_where_all_trials_fail_it_ends_in_a_line(tmp_path, scenario):
 
 def test_where_values_are_no_good_together_that_trial_fails(tmp_path, scenario):
     searched = ("robots.pair.count=2,60", "arena.size_m=[4.0, 4.0],[0.3, 0.3]")
-    found = tuned(scenario, tmp_path / "t", *searched, trials=8, seeds=1, sampler="random")
+    found = tuned(scenario, tmp_path / "t", *searched, trials=6, seeds=1, sampler="random")
     rows = trials_in(tmp_path / "t")
     crowded = (pl.col("robots.pair.count") == "60") & (pl.col("arena.size_m") == "[0.3, 0.3]")
     assert set(rows.filter(crowded)["state"]) == {"failed"}
@@ -59,7 +61,7 @@ def test_where_values_are_no_good_together_that_trial_fails(tmp_path, scenario):
 def test_choices_may_be_files_which_the_folder_keeps(tmp_path, scenario):
     (tmp_path / "other.py").write_text((tmp_path / "careful.py").read_text())
     searched = "robots.pair.agent=careful.py:Careful,other.py:Careful"
-    tuned(scenario, tmp_path / "t", searched, trials=2, until=1, batch=1, sampler="random")
+    tuned(scenario, tmp_path / "t", searched, trials=2, seeds=1, until=1, batch=1, sampler="random")
     for file in ("careful.py", "other.py", "bowl.py"):
         (tmp_path / file).unlink()
     found = gone_on_with(tmp_path / "t", trials=5)
