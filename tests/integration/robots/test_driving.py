@@ -1,4 +1,4 @@
-"""What a robot tells reaches the agent in the units and with the signs of its body's sheet."""
+"""Readings come through and commands arrive, on every rig."""
 
 from math import pi
 
@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.agent.drivers.driver import Command
 from swarmwire.comms.sheets import SHEETS
 from tests.support.robots.made_up_readings import readings
-from tests.support.robots.properties import ON_ONE_RIG
 from tests.support.robots.rig import Rig
-from tests.support.robots.rigs import RIGS
+from tests.support.robots.rigs import ON_ONE_RIG, RIGS
 
 
 def with_sense(name: str) -> pytest.MarkDecorator:
@@ -64,3 +64,45 @@ def test_odometry_adds_up_however_far_the_wheels_roll(connected: Rig, gone: list
     for left, right in gone:
         left_m, right_m = left_m + left * connected.farthest_m, right_m + right * connected.farthest_m
         connected.come_back({"odometry.left_m": np.array([left_m]), "odometry.right_m": np.array([right_m])})
+
+
+@ON_ONE_RIG
+@given(share=st.floats(-0.5, 0.5), turn=st.floats(-0.5, 0.5))
+def test_speeds_within_the_limits_arrive_as_they_are(connected: Rig, share: float, turn: float) -> None:
+    linear_mps, angular_radps = share * connected.body.max_linear_mps, turn * connected.body.max_angular_radps
+    connected.driver.act(Command(linear_mps, angular_radps))
+    connected.until_told(linear_mps, angular_radps)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_speeds_beyond_the_limits_are_cut_to_them(connected: Rig, sign: int) -> None:
+    body = connected.body
+    connected.driver.act(Command(sign * 10.0 * body.max_linear_mps, 0.0))
+    connected.until_told(sign * body.max_linear_mps, 0.0)
+    connected.driver.act(Command(0.0, sign * 10.0 * body.max_angular_radps))
+    connected.until_told(0.0, sign * body.max_angular_radps)
+
+
+def test_each_led_shows_what_it_was_told_and_the_others_what_they_showed(connected: Rig) -> None:
+    red, dark = 0xFF0000, 0
+    shown = dict.fromkeys(range(connected.body.led_count), dark)
+    for which in shown:
+        for colour in (red, dark, red):
+            connected.driver.act(Command(0.01 * (which + 1), leds={which: colour}))
+            connected.driver.sense(frozenset())
+            shown |= connected.told().leds
+            assert shown[which] == colour
+    assert set(shown.values()) <= {red}
+
+
+def test_an_open_driver_has_told_its_robot_to_rest(rig: Rig) -> None:
+    rig.connect()
+    rig.until_told(0.0, 0.0)
+
+
+def test_a_robot_is_told_to_rest_when_its_driver_is_closed(connected: Rig) -> None:
+    connected.driver.act(Command(0.05, 0.0))
+    connected.until_told(0.05, 0.0)
+    connected.driver.close()
+    connected.until_told(0.0, 0.0)
+    connected.driver.close()
