@@ -56,7 +56,9 @@ def test_without_losses_the_first_pattern_decays_by_the_eigenvalue_and_the_avera
 
 def test_a_gain_beyond_two_over_the_largest_eigenvalue_never_agrees() -> None:
     error = {
-        gain: run(PAPER, overrides=[FULL, f"robots.nodes.params.gain={gain}"]).metrics["consensus_error"].final
+        gain: run(PAPER, overrides=[FULL, "duration_s=16", f"robots.nodes.params.gain={gain}"])
+        .metrics["consensus_error"]
+        .final
         for gain in (0.19, 0.21)
     }
     assert (error[0.19] or 0.0) < 1e-6
