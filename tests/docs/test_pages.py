@@ -16,9 +16,7 @@ from tests.support.deploy.commands import called
 
 WITH_COMMANDS = [page for page in PAGES if commands_of(page)]
 SHOWN = ("docs/getting-started.md", "docs/scenario.md", "docs/api/deploy.md")
-IN_THIS_PROCESS = re.compile(
-    r"(?:uv run )?swarmwire (?!sweep|tune)[^|&;>*]*"
-)  # workers want a main module of their own
+IN_THIS_PROCESS = re.compile(r"(?:uv run )?swarmwire (?!sweep|tune)[^|&;>*]*")  # workers need a main module
 UV = """#!/bin/sh
 # What `uv run` comes to here: the environment is that of the tests.
 test "$1" = run || exit 64
