@@ -3,12 +3,14 @@
 The tier of a test is its directory: `unit`, `integration`, `statistics`, `docs`, `release`.
 """
 
+import importlib
 import os
 import platform
 import signal
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +36,17 @@ UNIT_LIMIT_S = 2.0  # of processor time, so that a busy machine fails no test
 # The order of the unit tests, by the start of their path. Of two workers the first then compiles the kernels of radio
 # and world, each once, while the second runs tests that need none of them; whole runs, which need all, come last.
 ORDER = ("comms/air", "comms/geometry", "comms/events", "world", "agent/behaviours", "metrics", "", "deploy")
+MANY = 200  # unit tests: fewer start sooner without these
+LOADED_LATE = (
+    "matplotlib.pyplot",
+    "polars",
+    "rerun",
+    "rich.console",
+    "scipy.stats",
+    "optuna",
+    "asyncssh",
+    "rosbags.typesys",
+)
 STARTS_A_PROCESS = {"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.exec", "os.system", "time.sleep"}
 
 _too_slow: list[str] = []
@@ -50,6 +63,14 @@ def pytest_configure() -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Unit tests in their order, then all else as it comes."""
     items.sort(key=_rank)  # stable
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Load what the product loads late, so that the first test that needs it does not pay for it."""
+    if sum(map(_is_unit, session.items)) > MANY:
+        for name in LOADED_LATE:
+            with suppress(ImportError):  # an extra that is not installed
+                importlib.import_module(name)
 
 
 def _rank(item: pytest.Item) -> int:
