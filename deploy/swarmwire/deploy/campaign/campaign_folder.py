@@ -18,11 +18,13 @@ from typing import TYPE_CHECKING
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, Campaign
+from swarmwire.deploy.campaign.columns import COUNTS
 from swarmwire.deploy.campaign.series_files import join_series, series_part, sort_out_series
-from swarmwire.deploy.campaign.storage import MEND, read_whole, storing
+from swarmwire.deploy.campaign.storage import storing
 from swarmwire.deploy.campaign.taken import taken
 from swarmwire.deploy.campaign.task import PieceResult, Row
 from swarmwire.metrics.campaign.formats import FAILED, PARTS, SERIES, SUMMARY
+from swarmwire.metrics.damage import damage, read_whole, refuse_damaged
 from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.metrics.record.part_files import PARQUET
 from swarmwire.metrics.whole_file import written_aside
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 RUNS = "runs"
+MEND = "without the file --resume runs again what it held"
 NUMBER = "[0-9]" * 8
 
 
@@ -83,7 +86,12 @@ class CampaignFolder:
         whole = self.path / SUMMARY
         files = [*([whole] if whole.exists() else []), *self._parts()]
         none = self._columns.frame([])
-        return self._columns.joined([none, *(_table(file, none.schema, self.campaign.runs) for file in files)])
+        tables = [_table(file, none.schema, self.campaign.runs) for file in files]
+        try:
+            return self._columns.joined([none, *tables])
+        except damage():
+            refuse_damaged(files, MEND)
+            raise
 
     def ended(self) -> dict[int, str]:
         """By run that has a row: how it ended."""
@@ -112,12 +120,17 @@ class CampaignFolder:
 
 
 def _table(file: Path, schema: "pl.Schema", runs: int) -> "pl.DataFrame":
-    frame = read_whole(file)
-    for name, kind in schema.items():
+    import polars as pl
+
+    frame = read_whole(file, cure=MEND)
+    counts = dict.fromkeys((name for name in frame.columns if name.startswith(COUNTS)), pl.Int64())
+    for name, kind in {**schema, **counts}.items():
         if frame.schema.get(name) != kind:
             raise BadInput(str(file), name, f"expected this column of the campaign's table, as {kind}; {MEND}")
-    if not frame["run"].is_between(0, runs - 1).all():
+    if not frame["run"].is_between(0, runs - 1).fill_null(value=False).all():
         raise BadInput(str(file), "run", f"expected runs from 0 to {runs - 1}; {MEND}")
+    if frame["ended"].null_count():
+        raise BadInput(str(file), "ended", f"expected how each run ended; {MEND}")
     return frame
 
 

@@ -3,9 +3,11 @@
 from collections.abc import Collection
 from pathlib import Path
 
-from swarmwire.deploy.campaign.storage import read_whole
+from swarmwire.metrics.damage import damage, read_whole, refuse_damaged
 from swarmwire.metrics.record.part_files import PARQUET
 from swarmwire.metrics.whole_file import written_aside
+
+MEND = "without the file its runs stay in the table, but not their series"
 
 
 def series_part(folder: Path, run: int) -> Path:
@@ -36,14 +38,18 @@ def join_series(folder: Path, files: int) -> None:
     for number in range(count):
         share = parts[len(parts) * number // count : len(parts) * (number + 1) // count]
         with written_aside(folder / f"worker-{first + number}.parquet") as aside:
-            pl.concat([pl.scan_parquet(part) for part in share], how="diagonal").sink_parquet(aside, **PARQUET)
+            try:
+                pl.concat([pl.scan_parquet(part) for part in share], how="diagonal").sink_parquet(aside, **PARQUET)
+            except damage():
+                refuse_damaged(share, MEND)
+                raise
         for part in share:
             part.unlink()
 
 
 def _runs(file: Path) -> set[int]:
     """Whose series it holds; BadInput if it is damaged."""
-    return set(read_whole(file, ["run"], "without the file their tables stay, but not their series")["run"])
+    return set(read_whole(file, ["run"], MEND)["run"])
 
 
 def _parts(folder: Path) -> list[Path]:

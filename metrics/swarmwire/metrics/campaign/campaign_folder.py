@@ -15,7 +15,7 @@ from swarmwire.metrics.campaign.about import About, Point, read_about
 from swarmwire.metrics.campaign.formats import ABOUT, FAILED, PARTS, SUMMARY
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.campaign.statistic import Statistic, find_outcome, find_statistic
-from swarmwire.metrics.damage import damage
+from swarmwire.metrics.damage import damage, read_whole, refuse_damaged
 from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
 
 if TYPE_CHECKING:
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 SIM_TIME = "sim_time_s"
 CHANGES_UNDERFOOT = 3  # times that the parts of a campaign that goes on may be joined while they are read
-NEEDED = ("run", "point", "seed", "ended", SIM_TIME)
+NUMBERS = ("run", "point", "seed")
+NEEDED = (*NUMBERS, "ended", SIM_TIME)
 
 
 class CampaignFolder:
@@ -67,17 +68,20 @@ class CampaignFolder:
         for _ in range(CHANGES_UNDERFOOT):
             files = self._files()
             try:
-                frames = [pl.read_parquet(file) for file in files]
-            except FileNotFoundError:
+                frames = [read_whole(file) for file in files]
+            except BadInput:
+                if all(file.exists() for file in files):
+                    raise
                 continue  # it finished just now, and its parts went
-            except (OSError, *damage()) as error:
-                reason = str(error).splitlines()[0]
-                raise BadInput(str(self.path), "", f"expected whole Parquet files: {reason}") from error
             for file, frame in zip(files, frames, strict=True):
                 _check_columns(file, frame, self.outcomes)
             if not frames:
                 return pl.DataFrame(schema=dict.fromkeys(NEEDED, pl.Int64) | {"ended": pl.String, SIM_TIME: pl.Float64})
-            return pl.concat(frames, how="diagonal_relaxed").unique("run", keep="last").sort("run")
+            try:
+                return pl.concat(frames, how="diagonal_relaxed").unique("run", keep="last").sort("run")
+            except damage():
+                refuse_damaged(files)
+                raise
         raise BadInput(str(self.path), PARTS, "expected files that stay while they are read")
 
     @property
@@ -150,14 +154,19 @@ class CampaignFolder:
 
 
 def _check_columns(file: Path, frame: "pl.DataFrame", outcomes: Iterable[Outcome]) -> None:
+    import polars as pl
+
     lacking = [name for name in NEEDED if name not in frame.columns]
     if lacking:
         raise BadInput(str(file), lacking[0], "expected this column of a campaign's table")
+    for name in NUMBERS:
+        if not frame.schema[name].is_integer() or frame[name].null_count():
+            raise BadInput(str(file), name, "expected a column of whole numbers")
     for name in (SIM_TIME, *(outcome.column for outcome in outcomes)):
         kind = frame.schema.get(name)
         if kind is not None and not (kind.is_numeric() or frame[name].is_null().all()):
             raise BadInput(str(file), name, "expected a column of numbers")
-    if frame["ended"].null_count():
+    if frame.schema["ended"] != pl.String or frame["ended"].null_count():
         raise BadInput(str(file), "ended", "expected how each run ended")
 
 

@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.formats import SERIES
 from swarmwire.metrics.campaign.selection import Selection
-from swarmwire.metrics.damage import damage
+from swarmwire.metrics.damage import damage, refuse_damaged
 from swarmwire.metrics.run_folder import RunFolder
 
 if TYPE_CHECKING:
@@ -75,6 +75,7 @@ def runs_of_campaign(of: Selection, metrics: tuple[str, ...], rate_hz: int, robo
         table = pl.concat([pl.scan_parquet(file) for file in files], how="diagonal")
         table = table.filter(pl.col("run").is_in(wanted)).collect()
     except (OSError, *damage()) as error:
+        refuse_damaged(files)
         raise BadInput(of.text, SERIES, f"expected whole Parquet files: {str(error).splitlines()[0]}") from None
     by_run = {int(key[0]): ticks for key, ticks in table.partition_by("run", as_dict=True).items()}
     runs = tuple(

@@ -5,14 +5,18 @@ from shutil import copytree
 
 import polars as pl
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign import sweeping
+from swarmwire.deploy.campaign import campaign_folder, sweeping
 from swarmwire.deploy.campaign.campaign import read_campaign
 from swarmwire.deploy.campaign.run_again import CampaignRun
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from tests.support.damaged import damaged
 from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
+from tests.support.deploy.commands import called
 from tests.unit.deploy.campaign.test_resume import VARY, Killed, dying_at
 
 ASKED_SINGLY = {"seeds": 2, "vary": VARY, "pack": 1}
@@ -29,7 +33,9 @@ def sound(tmp_path_factory):
         dying_at(patched, 4, Killed())
         with pytest.raises(Killed):
             sweep(scenario, out=folder / "half", **ASKED_SINGLY)
-    return folder
+        patched.undo()
+        patched.setenv("RUST_BACKTRACE", "0")  # to name the functions of a panic takes seconds
+        yield folder
 
 
 @pytest.fixture
@@ -51,6 +57,45 @@ def refused(call, *arguments):
     return str(told.value)
 
 
+def taken_up(folder):
+    """What `resume` reads and joins before and after it runs what is missing."""
+    its = campaign_folder.CampaignFolder(folder, read_campaign(folder))
+    its.clear()
+    its.finish(2)
+
+
+def faults_told(calls, *arguments):
+    """The errors of those of the calls that refuse what they find."""
+    for call in calls:
+        try:
+            call(*arguments)
+        except BadInput as error:
+            yield error
+
+
+@settings(max_examples=12)  # each copies a folder; what is read of one file has a test beside `read_whole`
+@given(of=st.data())
+def test_wherever_a_file_is_damaged_one_line_names_it_or_nothing_is_wrong(sound, tmp_path_factory, of):
+    file = of.draw(st.sampled_from(sorted(path.relative_to(sound) for path in sound.rglob("*.parquet"))))
+    data = of.draw(damaged((sound / file).read_bytes()))
+    folder = copytree(sound / file.parts[0], tmp_path_factory.mktemp("damaged") / file.parts[0])
+    (folder.parent / file).write_bytes(data)
+    tables = [str(path) for path in folder.rglob("*.parquet")]
+    read, again = lambda of: CampaignFolder(of).runs, lambda of: CampaignRun(of, 1)._before()
+    for told in faults_told((read, again, taken_up), folder):
+        assert told.where in tables
+        assert "\n" not in str(told)
+
+
+def test_the_command_line_says_so_in_one_line(half, monkeypatch, capsys):
+    part = half / "parts" / "part-00000001.parquet"
+    part.write_bytes(part.read_bytes()[:-9])
+    code, _, errors = called(monkeypatch, capsys, "sweep", "--resume", half)
+    assert code == 2
+    assert errors.startswith(f"error: {part}: expected a whole Parquet file: ")
+    assert errors.count("\n") == 1
+
+
 @pytest.mark.parametrize("data", [b"", b"PAR1", b"PAR1" + b"x" * 400 + b"PAR1"])
 def test_a_damaged_part_is_told_by_its_name_and_without_it_its_runs_are_run_again(half, whole, data):
     part = half / "parts" / "part-00000001.parquet"
@@ -66,10 +111,18 @@ def test_a_damaged_part_is_told_by_its_name_and_without_it_its_runs_are_run_agai
 def test_a_damaged_series_is_told_by_its_name_and_without_it_the_table_is_whole(half, whole):
     part = next((half / "series").glob("part-*"))
     part.write_bytes(b"")
-    assert "without the file their tables stay, but not their series" in refused(resume, half)
+    assert refused(resume, half).startswith(f"{part}: expected a whole Parquet file: ")
     part.unlink()
     assert resume(half).is_over
     assert rows_in(half) == rows_in(whole)
+
+
+def test_series_of_another_type_are_told_by_file_and_column(half):
+    first, second = sorted((half / "series").glob("part-*"))
+    pl.read_parquet(second).with_columns(pl.col("order").cast(pl.String)).write_parquet(second)
+    its = campaign_folder.CampaignFolder(half, read_campaign(half))
+    assert refused(its.finish, 1).startswith(f"{second}: order: expected ")
+    assert first.exists()
 
 
 def test_a_table_of_another_campaign_is_told_by_the_first_strange_column(half):
@@ -148,7 +201,11 @@ def test_a_package_that_is_no_more_has_changed(whole):
 
 @pytest.mark.parametrize(
     ("name", "value", "told"),
-    [("order.final", "much", "expected a column of numbers"), ("ended", None, "expected how each run ended")],
+    [
+        ("order.final", "much", "expected a column of numbers"),
+        ("ended", None, "expected how each run ended"),
+        ("run", None, "expected a column of whole numbers"),
+    ],
 )
 def test_reports_refuse_a_table_of_other_types_by_its_column(whole, name, value, told):
     table = whole / "summary.parquet"

@@ -177,7 +177,7 @@ def test_what_is_no_campaign_is_refused(tmp_path):
 def test_a_damaged_table_is_refused_when_it_is_read(tmp_path):
     folder = write_campaign(tmp_path / "a")
     (folder / "summary.parquet").write_text("no table")
-    with pytest.raises(BadInput, match="expected whole Parquet files"):
+    with pytest.raises(BadInput, match="summary.parquet: expected a whole Parquet file"):
         _ = CampaignFolder(folder).runs
     pl.DataFrame({"run": [0]}).write_parquet(folder / "summary.parquet")
     with pytest.raises(BadInput, match="point: expected this column"):
