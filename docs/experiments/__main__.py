@@ -67,7 +67,7 @@ def run_command(
     seeds: Annotated[
         str | None,
         typer.Option(
-            help="Other seeds than the campaigns' own: 2 (1 and 2), 1:9 or 1,5,7. All that is made goes to "
+            help="Other seeds than the campaigns' own: 2 (1 and 2), 4:10 (4 to 9) or 1,5,7. All that is made goes to "
             "campaigns/papers/seeds-…, and the page stays as it is."
         ),
     ] = None,

@@ -10,16 +10,51 @@ from swarmwire.world.scenario.scenario_file import load_scenario
 
 FASTEST = 1e6  # factor in real time
 SHORTEST_QUANTUM_S = 0.001
+LARGEST_SEED = 2**63 - 1
+MOST_SEEDS = 1_000_000
+MOST_ARENAS = 10_000  # of one world
+SEEDS = "how many (9: 1 to 9), FIRST:END (4:10: 4 to 9), or a list (1,5,7; 9, for 9 alone)"
 Runners = int | str | None  # how many, "per-robot", or None for a local crew
+SeedsGiven = str | int | Sequence[int]  # how many from 1 on, as a number or text; a range or list as text; a list
 
 
-def choose_seeds(scenario: Scenario, seed: int | None, seeds: Sequence[int] | None) -> tuple[int, ...]:
+def seed_list(given: SeedsGiven, said: str = "--seeds") -> tuple[int, ...]:
+    """The seeds that are meant, here as everywhere; BadInput names `said` unless they are different and 0 or more."""
+    try:
+        seeds = _seeds_in(given) if isinstance(given, str | int) else list(given)
+    except ValueError:
+        raise BadInput(said, "", f"expected {SEEDS}; got {given!r}") from None
+    if not 0 < len(seeds) <= MOST_SEEDS:
+        raise BadInput(said, "", f"expected {SEEDS}, 1 to {MOST_SEEDS} of them; got {given!r}")
+    good = all(type(seed) is int and 0 <= seed <= LARGEST_SEED for seed in (seeds[0], *seeds))
+    if not good or (not isinstance(seeds, range) and len(set(seeds)) < len(seeds)):
+        raise BadInput(said, "", f"expected different whole numbers from 0 to {LARGEST_SEED}; got {given!r}")
+    return tuple(seeds)
+
+
+def _seeds_in(given: str | int) -> range | list[int]:
+    """Unchecked; of a range that is too long its start, with one seed too many."""
+    if isinstance(given, int) or given.strip().isdecimal():
+        return range(1, min(int(given), MOST_SEEDS + 1) + 1)
+    first, colon, end = given.partition(":")
+    if colon:
+        return range(int(first), min(int(end), int(first) + MOST_SEEDS + 1))
+    return [int(part) for part in given.split(",") if part.strip()]
+
+
+def choose_seeds(scenario: Scenario, seed: int | None, seeds: SeedsGiven | None) -> tuple[int, ...]:
     """The seed of each arena: those asked for, or the scenario's own; BadInput if they are no good."""
-    if seed is not None and seeds is not None:
-        raise BadInput("", "seed and seeds", "expected only one of the two")
-    chosen = tuple(seeds) if seeds is not None else (scenario.seed if seed is None else seed,)
-    if not chosen or len(set(chosen)) != len(chosen) or min(chosen) < 0:
-        raise BadInput("", "seeds", f"expected different whole numbers of at least 0, got {list(chosen)}")
+    if seeds is None:
+        alone = scenario.seed if seed is None else seed
+        if not 0 <= alone <= LARGEST_SEED:
+            raise BadInput("--seed", "", f"expected a whole number from 0 to {LARGEST_SEED}, got {alone}")
+        return (alone,)
+    if seed is not None:
+        raise BadInput("--seed", "", "expected only one of --seed and --seeds")
+    chosen = seed_list(seeds)
+    if len(chosen) > MOST_ARENAS:
+        most = f"at most {MOST_ARENAS} seeds side by side; sweep takes more"
+        raise BadInput("--seeds", "", f"expected {most}; got {len(chosen)}")
     return chosen
 
 

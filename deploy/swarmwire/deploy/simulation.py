@@ -14,6 +14,7 @@ from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.arguments import (
     Runners,
+    SeedsGiven,
     choose_seeds,
     quantum_of,
     real_time_factor,
@@ -101,7 +102,7 @@ class Simulation:
         scenario: Scenario | Path | str,
         *,
         seed: int | None = None,
-        seeds: Sequence[int] | None = None,
+        seeds: SeedsGiven | None = None,
         runners: Runners = None,
         overrides: Sequence[str] = (),
         out: Path | str | None = None,
@@ -342,7 +343,7 @@ class Simulation:
             if observer not in early:
                 observer.begin(self.static)
 
-    def _new_world(self, seed: int | None, seeds: Sequence[int] | None) -> World:
+    def _new_world(self, seed: int | None, seeds: SeedsGiven | None) -> World:
         """Every arena at its start, with the senses that its agents need."""
         needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
         needs = self._behind.senses(needs, bodies_of(self.scenario, self.scenario.source))

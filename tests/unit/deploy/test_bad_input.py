@@ -185,8 +185,8 @@ def test_files_that_are_no_scenario_are_named(tmp_path):
     ("options", "name"),
     [
         *(({"runners": runners}, "--runners") for runners in (0, 21, "many", True)),
-        *(({"seeds": seeds}, "seeds") for seeds in ([], [1, 1], [-1])),
-        ({"seed": 1, "seeds": [2]}, "seed and seeds"),
+        *(({"seeds": seeds}, "--seeds") for seeds in ([], [1, 1], [-1])),
+        ({"seed": 1, "seeds": [2]}, "--seed"),
     ],
 )
 def test_an_option_that_cannot_be_is_refused_by_its_name(options, name):

@@ -8,9 +8,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.format_number import check_format
 from swarmwire.comms.one_of import one_of
 from swarmwire.comms.toml_file import read_toml
+from swarmwire.deploy.arguments import SEEDS, seed_list
 from swarmwire.deploy.campaign.design import GRID
 from swarmwire.deploy.campaign.plan import Asked
-from swarmwire.deploy.campaign.seed_list import chosen_seeds, seed_list
 from swarmwire.deploy.campaign.vary import vary_from
 
 FORMAT = 1
@@ -26,7 +26,7 @@ TYPES: dict[str, tuple[type, ...]] = {
     "overrides": (list,),
     "pack": (int,),
     "series": (bool,),
-    "record_seeds": (list, str),
+    "record_seeds": (int, str, list),
 }
 WORDS = {int: "a whole number", str: "a text", list: "a list", dict: "a table", bool: "true or false"}
 OF_SCENARIOS = ("arena", "robots", "duration_s")  # keys that a campaign never has
@@ -56,7 +56,7 @@ def asked_in(path: Path, table: Mapping[str, Any]) -> Asked:
     """What a campaign's file asks for; a scenario's path is as seen from the file. BadInput names the key."""
     where = str(path)
     if "seeds" not in table:
-        raise BadInput(where, "seeds", "is missing: expected how many, or a list")
+        raise BadInput(where, "seeds", f"is missing: expected {SEEDS}")
     vary = cast("dict[str, Any]", table.get("vary", {}))
     overrides = cast("list[Any]", table.get("overrides", []))
     if not all(isinstance(text, str) for text in overrides):
@@ -73,7 +73,7 @@ def asked_in(path: Path, table: Mapping[str, Any]) -> Asked:
         name=table.get("name"),
         pack=table.get("pack"),
         series=table.get("series", True),
-        record_seeds=chosen_seeds(recorded, f"{where}: record_seeds") if recorded else (),
+        record_seeds=seed_list(recorded, f"{where}: record_seeds") if recorded else (),
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from swarmwire.deploy.arguments import SeedsGiven, seed_list
 from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, read_campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
 from swarmwire.deploy.campaign.campaign_start import begin, default_folder
@@ -15,7 +16,6 @@ from swarmwire.deploy.campaign.executor import LOCAL, Executor, open_executor
 from swarmwire.deploy.campaign.pieces import tasks_of
 from swarmwire.deploy.campaign.plan import Asked, Plan, planned
 from swarmwire.deploy.campaign.resumption import check_code, check_files, check_same
-from swarmwire.deploy.campaign.seed_list import seed_list
 from swarmwire.deploy.campaign.task import PieceResult, Task
 from swarmwire.deploy.campaign.vary import vary_from
 from swarmwire.deploy.campaign.watcher import NobodyWatches, Watcher
@@ -52,7 +52,7 @@ class Sweep:
 def sweep(
     scenario: Scenario | Path | str,
     *,
-    seeds: int | str | Sequence[int],
+    seeds: SeedsGiven,
     vary: Mapping[str, Any] | None = None,
     design: str = GRID,
     points: int | None = None,
@@ -62,18 +62,18 @@ def sweep(
     name: str | None = None,
     pack: int | None = None,
     series: bool = True,
-    record_seeds: Sequence[int] = (),
+    record_seeds: SeedsGiven = (),
     on: str = LOCAL,
     workers: int | None = None,
     watcher: Watcher | None = None,
 ) -> Sweep:
     """Run a scenario at each point of a design with each seed, in worker processes, and keep a table of all runs.
 
-    `seeds` are 1 to a number, or a list. `vary` gives, by path, a list of values, a table with from, to, count (and
-    scale = "log"), or a text as for `--vary`. `design` is "grid", "list", or "random" and "latin" with so many `points`
-    from ranges without count. `out` is a new or empty folder, campaigns/<scenario>-<UTC> by default. `pack` arenas at
-    most are run as one world. With `series` each tick's metrics are kept, too; runs of `record_seeds` get run folders.
-    Ctrl-C ends it; `resume` goes on.
+    `seeds` are how many (9: 1 to 9), a list, or a text as for `--seeds`. `vary` gives, by path, a list of values, a
+    table with from, to, count (and scale = "log"), or a text as for `--vary`. `design` is "grid", "list", or "random"
+    and "latin" with so many `points` from ranges without count. `out` is a new or empty folder,
+    campaigns/<scenario>-<UTC> by default. `pack` arenas at most are run as one world. With `series` each tick's metrics
+    are kept, too; runs of `record_seeds` get run folders. Ctrl-C ends it; `resume` goes on.
 
     Raises BadInput for anything wrong with these, before anything is run, and StorageFailed when the disk is full. What
     a run raises is in its row.
@@ -81,7 +81,7 @@ def sweep(
     varied = tuple(vary_from(path, given, f"vary {path}") for path, given in (vary or {}).items())
     asked = Asked(
         scenario=scenario,
-        seeds=seed_list(seeds, "seeds"),
+        seeds=seed_list(seeds),
         varied=varied,
         design=design,
         points=points,
@@ -90,7 +90,7 @@ def sweep(
         name=name,
         pack=pack,
         series=series,
-        record_seeds=tuple(record_seeds),
+        record_seeds=seed_list(record_seeds, "--record-seeds") if record_seeds else (),
     )
     plan = planned(asked)
     folder = Path(out) if out is not None else default_folder(_stem(scenario))

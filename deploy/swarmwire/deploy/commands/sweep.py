@@ -38,7 +38,8 @@ def sweep_command(
     ] = None,
     vary: Vary = None,
     seeds: Annotated[
-        str | None, typer.Option(help="At each point: 200 (1 to 200), 1:9 (1 to 8) or 1,5,7.", metavar="SEEDS")
+        str | None,
+        typer.Option(help='At each point: 9 (1 to 9), 4:10 (4 to 9) or 1,5,7; "9," is 9 alone.', metavar="SEEDS"),
     ] = None,
     design: Annotated[
         str | None, typer.Option(help="grid (default), list (values one to one), random or latin.", metavar="DESIGN")
@@ -62,7 +63,7 @@ def sweep_command(
     ] = None,
     series: Annotated[bool, typer.Option(help="Keep the metrics of each tick.")] = True,
     record_seeds: Annotated[
-        str | None, typer.Option(help="Seeds whose runs get full run folders: 7, 1:3 or 1,7.", metavar="SEEDS")
+        str | None, typer.Option(help="Whose runs get full run folders; as for --seeds.", metavar="SEEDS")
     ] = None,
     resume: Annotated[
         Path | None, typer.Option(help="Do only what is missing of the campaign in this folder.", metavar="DIR")
@@ -84,7 +85,7 @@ def sweep_command(
     refused before anything was run; 130: interrupted.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.deploy.campaign.seed_list import chosen_seeds
+    from swarmwire.deploy.arguments import seed_list
     from swarmwire.deploy.campaign.sweeping import Means
     from swarmwire.deploy.interrupt import Interrupt
     from swarmwire.deploy.terminal.sweep_progress import sweep_progress
@@ -96,7 +97,7 @@ def sweep_command(
         "design_seed": design_seed,
         "name": name,
         "pack": pack,
-        "record_seeds": None if record_seeds is None else chosen_seeds(record_seeds, "--record-seeds"),
+        "record_seeds": None if record_seeds is None else seed_list(record_seeds, "--record-seeds"),
         "series": None if series else False,
     }
     plan = _plan(source, vary or [], seeds, overrides or [], {key: of for key, of in said.items() if of is not None})
@@ -125,9 +126,9 @@ def _plan(
     source: Path | None, vary: Sequence[str], seeds: str | None, overrides: Sequence[str], said: Mapping[str, Any]
 ) -> "Plan | None":
     """The campaign that is asked for, checked; options go before what a campaign's file says. None: none is."""
+    from swarmwire.deploy.arguments import SEEDS, seed_list
     from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
     from swarmwire.deploy.campaign.plan import Asked, planned
-    from swarmwire.deploy.campaign.seed_list import seed_list
     from swarmwire.deploy.campaign.vary import vary_of
 
     if source is None:
@@ -140,7 +141,7 @@ def _plan(
     varied = tuple(vary_of(text) for text in vary)
     if table is None:
         if seeds is None:
-            raise BadInput("--seeds", "", "is missing: expected how many (200: 1 to 200), FIRST:END, or a list")
+            raise BadInput("--seeds", "", f"is missing: expected {SEEDS}")
         return planned(replace(Asked(source, seed_list(seeds), varied, overrides=tuple(overrides)), **said))
     of_file = asked_in(source, table if seeds is None else {**table, "seeds": seeds})
     new = {of.path for of in varied}

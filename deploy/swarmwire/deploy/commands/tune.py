@@ -45,7 +45,7 @@ def tune_command(
     trials: Annotated[int | None, typer.Option(help=f"How many are tried. Default: {TRIALS}.")] = None,
     seeds: Annotated[
         str | None,
-        typer.Option(help=f"Of each trial: 20 (1 to 20), 1:9 (1 to 8) or 1,5,7. Default: {SEEDS}.", metavar="SEEDS"),
+        typer.Option(help=f"Of each trial: 9 (1 to 9), 4:10 (4 to 9) or 1,5,7. Default: {SEEDS}.", metavar="SEEDS"),
     ] = None,
     check_seeds: Annotated[
         str | None,
@@ -139,7 +139,7 @@ def _plan(
     said: Mapping[str, Any],
 ) -> "TuningPlan":
     """The tuning that is asked for, checked; `seeds` are those of the trials and the fresh ones."""
-    from swarmwire.deploy.campaign.seed_list import seed_list
+    from swarmwire.deploy.arguments import seed_list
     from swarmwire.deploy.tuning.plan import TuningAsked, planned_tuning
     from swarmwire.deploy.tuning.search import asked_search
     from swarmwire.deploy.tuning.seeds import fresh_seeds

@@ -20,7 +20,7 @@ from swarmwire.deploy.commands.access_options import (
 )
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
 from swarmwire.deploy.commands.options import Links, Overrides, Packets, Quiet, ScenarioFile, Seed
-from swarmwire.deploy.commands.run import Out, Quantum, RealTime, Rrd, Seeds, Select, Ui, View, run_shown, seed_list
+from swarmwire.deploy.commands.run import Out, Quantum, RealTime, Rrd, Seeds, Select, Ui, View, run_shown
 
 if TYPE_CHECKING:
     from swarmwire.deploy.certificates.member import Member
@@ -108,7 +108,7 @@ def world_command(
         insecure=insecure,
     )
     _warn(of, [*listen, *(observe or ())])
-    chosen = choose_seeds(checked, seed, None if seeds is None else seed_list(seeds))
+    chosen = choose_seeds(checked, seed, seeds)
     folder = out or default_folder(scenario.stem, chosen)
     console = Console(quiet=quiet, highlight=False)
     robots = tuple(robot for _ in chosen for robot in checked.robot_names())

@@ -1,7 +1,7 @@
 """Seeds on which the best parameters are checked: none of those on which they were found."""
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.seed_list import LARGEST, seed_list
+from swarmwire.deploy.arguments import LARGEST_SEED, seed_list
 
 OPTION = "--check-seeds"
 
@@ -11,7 +11,7 @@ def fresh_seeds(given: str, used: tuple[int, ...]) -> tuple[int, ...]:
     seeds = seed_list(given, OPTION)
     if given.strip().isdecimal():
         first = max(used) + 1
-        if first + len(seeds) - 1 > LARGEST:
+        if first + len(seeds) - 1 > LARGEST_SEED:
             raise BadInput(OPTION, "", "expected FIRST:END or a list: there are too few above the tuning's seeds")
         return tuple(range(first, first + len(seeds)))
     common = sorted(set(seeds) & set(used))

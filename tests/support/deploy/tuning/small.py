@@ -6,8 +6,8 @@ from typing import Any
 
 import polars as pl
 
+from swarmwire.deploy.arguments import seed_list
 from swarmwire.deploy.campaign.executor import Finished
-from swarmwire.deploy.campaign.seed_list import seed_list
 from swarmwire.deploy.campaign.task import PieceResult, Row, Task
 from swarmwire.deploy.campaign.watcher import NobodyWatches
 from swarmwire.deploy.interrupt import Interrupt
