@@ -291,10 +291,10 @@ def test_a_record_holds_of_an_arena_what_it_holds_of_one_alone(tmp_path: Path) -
 
 
 def test_a_run_that_arenas_left_is_recorded_whole_and_repeated(tmp_path: Path) -> None:
-    result = packed(scenario(tmp_path, "disk"), (3, 5, 1), out=tmp_path / "together")
+    result = packed(scenario(tmp_path, "disk"), (5, 1), out=tmp_path / "together")
     assert [found.part for found in verify(tmp_path / "together") if not found.good] == []
     rerun = RepeatedRun(tmp_path / "together")
-    rerun.simulation.judge = Stops((3, 5, 1), OVER)
+    rerun.simulation.judge = Stops((5, 1), OVER)
     repeated = rerun.run()
     assert (repeated.same, repeated.compared) == (True, TICKS)
     assert repeated.result.arenas == result.arenas

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.truth import Static, Tally, Truth
-from tests.support.deploy.layouts import PER_ROBOT, run_spread
+from tests.support.deploy.layouts import run_spread
 
 PSO = Path(__file__).parents[3] / "scenarios" / "pso.toml"
 
@@ -39,7 +39,7 @@ def alone() -> list[list[str]]:
 
 
 def test_states_are_the_same_however_the_agents_are_spread(alone: list[list[str]]) -> None:
-    assert states(PER_ROBOT, [2]) == alone
+    assert states(3, [2]) == alone
     assert {"to its own best", "to the neighbours' best"} <= set(alone[-1])
 
 
