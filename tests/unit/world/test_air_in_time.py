@@ -20,8 +20,8 @@ from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.support.comms.air.runs import RATE_HZ, TICK_NS, make_air, scattered
-from tests.support.world.samples import SAMPLE
 from tests.support.comms.air.traffic import RADIOS
+from tests.support.world.samples import SAMPLE
 
 MS = 1_000_000
 AIRTIME_NS = 96_000  # of a packet's three bytes
