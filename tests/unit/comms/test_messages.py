@@ -186,7 +186,11 @@ def test_a_number_beyond_a_whole_field_is_refused(name: str, value: float) -> No
 
 
 @pytest.mark.parametrize(
-    ("value", "nearest"), [(1.4, 1.0), (1.6, 2.0), (-1.4, -1.0), (-1.6, -2.0), (127.4, 127.0), (-128.4, -128.0)]
+    ("value", "nearest"),
+    [
+        *((1.4, 1.0), (1.6, 2.0), (-1.4, -1.0), (-1.6, -2.0), (127.4, 127.0), (-128.4, -128.0)),
+        *((0.5, 0.0), (1.5, 2.0), (2.5, 2.0), (-1.5, -2.0)),  # halves to the even number
+    ],
 )
 def test_a_fraction_is_rounded_to_the_nearest_whole_number_in_a_whole_field(value: float, nearest: float) -> None:
     fields = dict.fromkeys(Everything.ranges, 0.0)

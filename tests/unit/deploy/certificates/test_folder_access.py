@@ -35,6 +35,12 @@ def test_each_may_do_what_its_certificate_is_for_and_robots_and_trackers_take_no
     assert access.without_revoked().runners == ("laptop-1",)
 
 
+@pytest.mark.parametrize("role", ["runners", "observers", "operators", "routers"])
+def test_a_revoked_name_loses_whatever_it_may_do(role: str):
+    left = RunAccess(**{role: ("kept", "gone")}, revoked=("gone",)).without_revoked()
+    assert getattr(left, role) == ("kept",)
+
+
 def test_the_last_purpose_of_a_name_counts_and_stays_when_it_is_renewed(issued, clock):
     issue(issued, [wanted("wall", purpose="runner")], 365, clock, renew=True)
     issue(issued, [wanted("wall")], 365, clock, renew=True)

@@ -230,3 +230,19 @@ def test_losses_of_all_kinds_leave_a_share():
     radio = replace(with_access("none"), loss=0.25)
     assert passing_share(radio) == 0.75
     assert passing_share(replace(radio, bursts=Bursts(0.1, 0.2))) == 0.75 * (1.0 - Bursts(0.1, 0.2).loss) < 0.75
+
+
+def test_each_attempt_of_csma_waits_by_a_backoff_draw_of_its_own():
+    """Of packets whose first frame is lost and whose second is right, all that differs in time are two backoffs."""
+    radio = with_access("csma-802154")
+    radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
+    rules, ticks = rules_of(radio, 2), 60
+    told = run(make_air(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    arena, sequence = on_air(told, "arena"), on_air(told, "sequence")
+    lost = [uniform(KEYS[arena], 0, 1, sequence, purpose("fixed loss") + attempt) < 0.6 for attempt in range(2)]
+    second = lost[0] & ~lost[1]
+    draws = [uniform(KEYS[arena], 0, sequence, 16 * attempt, purpose("csma backoff")) for attempt in range(2)]
+    backoffs = sum(np.floor(u * 2**rules.least_exponent).astype(np.int64) for u in draws)
+    waited_ns = on_air(told, "final_at_ns") - on_air(told, "sent_at_ns")
+    assert np.count_nonzero(second) > 20
+    assert len(set((waited_ns - backoffs * rules.backoff_ns)[second].tolist())) == 1
