@@ -23,10 +23,9 @@ def draw(to: Path = TO) -> None:
     shapes: list[str] = []
     for part in PLACES:
         shapes += _part(part)
-    for user, giver in (("deploy", "world"), ("deploy", "metrics"), ("deploy", "agent")):
-        shapes.append(_import(PLACES[giver][0] + 140, PLACES[giver][1] - GAP))
-    for user in ("world", "metrics", "agent"):
-        shapes.append(_import(PLACES[user][0] + 140, PLACES["comms"][1] - GAP))
+    for part in ("world", "metrics", "agent"):  # an arrow from deploy, and one to comms
+        for giver in (part, "comms"):
+            shapes.append(_import(PLACES[part][0] + 140, PLACES[giver][1] - GAP))
     down = PLACES["comms"][1] + PLACES["comms"][3]
     note = "An arrow is an import that is allowed. deploy may import comms, too."
     shapes.append(text(WIDTH / 2, down + 24, note, anchor="middle"))
