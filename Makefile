@@ -27,8 +27,8 @@ test: sync ## lint, all unit tests, and the main uses from end to end: what to r
 	$(PYTEST) tests/unit tests/integration/test_smoke.py
 
 .PHONY: test-all
-test-all: sync ## every test: processes, robots, statistics, documented commands, installed packages
-	HYPOTHESIS_PROFILE=full $(PYTEST) $(RERUNS)
+test-all: sync ## every test: processes, robots, statistics, docs, installed packages; SLOW=no leaves out the longest
+	HYPOTHESIS_PROFILE=full $(PYTEST) $(RERUNS) $(if $(SLOW),-m "not slow")
 
 .PHONY: check
 check: sync ## lint, format, types, and who may import whom

@@ -1,7 +1,7 @@
 """What ns-3 has and what the air has, side by side: Markdown tables for the docs.
 
 `python -m benchmarks.ns3_agreement [TABLE ...] [--runs N] [--ours MODULE:FUNCTION]`; the tables are `contention`,
-`hidden-node` and `distance`, all unless some are named. ns-3's figures were recorded once, in `tests/support/comms/reference/`.
+`hidden-node` and `distance`, all unless some are named. Figures of ns-3 stand in `tests/support/comms/reference/`.
 Those of contention are computed over seeds 1 to N, of the presets unless another function is named; scenarios in which
 every node sends at the tick's start are left out, since the function cannot be told.
 """

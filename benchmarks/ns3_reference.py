@@ -7,7 +7,7 @@ from typing import Any
 from swarmwire.comms.air.radio import Radio
 from swarmwire.deploy.radio.probe import radio_of
 
-REFERENCE = Path(__file__).parents[1] / "tests" / "comms" / "reference"
+REFERENCE = Path(__file__).parents[1] / "tests" / "support" / "comms" / "reference"
 PRESETS = {"802.15.4": "ieee802154", "802.11a 6 Mbit/s": "wifi-a-6M", "802.11b 1 Mbit/s": "wifi-b-1M"}
 AS_RUN = {  # ns-3 was run without IP and UDP headers, and its 802.15.4 queue has no end
     "ieee802154": ["radio.queue_limit=1000000"],

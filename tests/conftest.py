@@ -29,7 +29,8 @@ _SHARED: dict[str, Any] = {
 }
 settings.register_profile("quick", max_examples=20, **_SHARED)
 settings.register_profile("full", max_examples=100, **_SHARED)
-settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
+PROFILE = os.environ.get("HYPOTHESIS_PROFILE", "quick")
+settings.load_profile(PROFILE)
 
 TESTS = Path(__file__).parent
 UNIT_LIMIT_S = 2.0  # of processor time, so that a busy machine fails no test
@@ -114,7 +115,7 @@ def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
             return (yield)
     finally:
         compiled_s = compiling.duration if compiling.done else 0.0
-        if _is_unit(item) and sys.gettrace() is None and not numba.config.DISABLE_JIT:
+        if _is_unit(item) and PROFILE == "quick" and sys.gettrace() is None and not numba.config.DISABLE_JIT:
             item.user_properties.append(("cpu_s", time.process_time() - before_s - compiled_s))
 
 

@@ -39,7 +39,7 @@ from swarmwire.comms.wire.memory_frames import decode_memory
 from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.comms.wire.tick_frames import check_rows, decode_tick, encode_actions
 
-JOIN_S = 30.0
+JOIN_S = 60.0  # for each step: as long as a world waits for the next runner to join
 FAREWELL_S = 3.0
 NO_ROBOTS = ""
 TIMED_OUT = "Timeout"  # what zenoh says for a world that says nothing
@@ -66,7 +66,12 @@ PLAIN = Asked()  # the next part that is free, with the world's own agents
 
 def run(endpoint: str, run_id: str, runner: str, joined: Callable[[Assignment], None] = lambda _: None) -> Ended:
     """Play robots of the run at `endpoint` until it ends; RunnerLost if there is no world or it gives no robots."""
-    with closed_after(open_runner(endpoint)) as session:
+    try:
+        session = open_runner(endpoint, JOIN_S)
+    except zenoh.ZError as error:
+        reason = str(error).split(" at ")[0]
+        raise RunnerLost(runner, NO_ROBOTS, f"no connection to its world within {JOIN_S:g} s: {reason}") from error
+    with closed_after(session):
         return play(session, Keys(run_id), runner, Inbox(), lambda: PLAIN, joined)
 
 

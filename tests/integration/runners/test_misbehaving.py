@@ -14,7 +14,7 @@ from tests.support.runners.played import Played
 from tests.support.runners.pranks import BESIDE, EARLY, INSTEAD, Prank
 from tests.support.runners.raw_runner import Says, Turn
 
-PAGE = Path(__file__).parents[4] / "docs" / "reliability.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reliability.md"
 ROW = re.compile(r"^\| (.+?) \| (.*?`.+?) \|", re.M)
 FIRST, EVERY = 6, 2  # the tick of the first prank, and ticks from one to the next: what comes late counts in the second
 

@@ -184,7 +184,7 @@ BESIDE = (
     ),
     Prank(
         "a frame of another version",
-        first(lambda turn: turn.honest.replace(b"\xa1v\x02", b"\xa1v\x03", 1)),
+        first(lambda turn: turn.honest.replace(b"\xa1v\x01", b"\xa1v\x02", 1)),
         {"malformed_frames": 1},
     ),
     Prank(

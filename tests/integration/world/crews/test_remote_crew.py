@@ -223,6 +223,12 @@ def test_a_runner_may_come_before_its_world(endpoint: str) -> None:
             assert ends.get(timeout=20.0) is None
 
 
+def test_a_runner_whose_world_does_not_come_says_so(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "JOIN_S", 0.1)
+    with pytest.raises(RunnerLost, match="r0 got no robots: no connection to its world within 0.1 s"):
+        runner.run(endpoint, RUN, "r0")
+
+
 def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many_more(
     endpoint: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
