@@ -108,9 +108,9 @@ def test_it_needs_nothing_but_zenoh_and_msgpack_and_is_short() -> None:
 class Both(Joiners):
     """The example, and a runner of swarmwire for the robots that it leaves."""
 
-    def start(self, name: str, *arguments: str | Path) -> None:
+    def start(self, name: str, *arguments: str | Path, label: str = "") -> None:
         if name != "foreign":
-            super().start(name, *arguments)
+            super().start(name, *arguments, label=label)
             return
         command = [sys.executable, str(PROGRAM), self.endpoint, "--name", name, *map(str, arguments)]
         self.processes[name] = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
