@@ -8,10 +8,10 @@ import pytest
 
 from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.parameters.propagation import Shadowing
+from tests.integration.deploy.radio.test_probe import WALLED, said
+from tests.integration.deploy.radio.test_radio_fit import here, rows
 from tests.support.deploy.commands import LOSSY, called
 from tests.support.metrics.radio_fit.synthetic import csv_of, made
-from tests.unit.deploy.radio.test_probe import WALLED, said
-from tests.unit.deploy.radio.test_radio_fit import here, rows
 
 __all__ = ["here"]  # in whose folder all of these tests are
 

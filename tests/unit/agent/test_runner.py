@@ -6,8 +6,10 @@ from typing import Any
 import msgpack
 import numpy as np
 import pytest
+import zenoh
 
-from swarmwire.agent.runner import PLAIN, Inbox, _join, given_robots
+from swarmwire.agent import runner
+from swarmwire.agent.runner import PLAIN, Inbox, given_robots
 from swarmwire.comms.errors import BadFrame, RunnerLost
 from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
 from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
@@ -151,6 +153,42 @@ def test_robots_that_a_world_cannot_give_are_refused(wrong: dict[str, Any]) -> N
         given_robots(msgpack.packb({**given, **wrong}))
 
 
+class Deaf:
+    """A session of which all but the `heard`-th subscriber are told nothing of the world's token."""
+
+    def __init__(self, heard: int) -> None:
+        self.heard, self.declared, self.undeclared = heard, 0, 0
+
+    def liveliness(self) -> "Deaf":
+        return self
+
+    def declare_subscriber(self, _key: str, callback: Any, *, history: bool) -> "Deaf":
+        assert history
+        self.declared += 1
+        if self.declared == self.heard:
+            callback(Token())
+        return self
+
+    def undeclare(self) -> None:
+        self.undeclared += 1
+
+
+class Token:
+    kind = zenoh.SampleKind.PUT
+
+
+@pytest.mark.parametrize(("heard", "declared", "undeclared"), [(1, 1, 0), (3, 3, 2), (9, 4, 4)])
+def test_a_runner_that_is_told_nothing_of_its_world_asks_again(
+    heard: int, declared: int, undeclared: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runner, "JOIN_S", 0.04)
+    monkeypatch.setattr(runner, "LOOK_S", 0.01)
+    session = Deaf(heard)
+    watched = runner._watched_world(session, Keys("run1"), Inbox())  # pyright: ignore[reportArgumentType]
+    assert (watched is None) == (heard > 4)
+    assert (session.declared, session.undeclared) == (declared, undeclared)
+
+
 class NoAnswer:
     """A session and an answer in one: a query whose time is up, as zenoh tells of it."""
 
@@ -170,5 +208,5 @@ class NoAnswer:
 
 def test_a_world_that_takes_too_long_to_answer_is_named_as_what_is_wrong() -> None:
     with pytest.raises(RunnerLost, match="the world did not answer to join within") as lost:
-        _join(NoAnswer(), Keys("run1"), "r7", PLAIN)  # pyright: ignore[reportArgumentType]
+        runner._join(NoAnswer(), Keys("run1"), "r7", PLAIN)  # pyright: ignore[reportArgumentType]
     assert lost.value.runner == "r7"

@@ -5,8 +5,8 @@ import pytest
 
 from swarmwire.comms.fates import FATE_NAMES, Fate
 from swarmwire.deploy import run
+from tests.integration.metrics.viewer.test_rerun_recording import class_names, column, series
 from tests.support.deploy.commands import LOSSY
-from tests.unit.metrics.viewer.test_rerun_recording import class_names, column, series
 
 pytest.importorskip("rerun", reason="needs the extra [view]")
 

@@ -14,10 +14,10 @@ from swarmwire.deploy.campaign import campaign_folder, sweeping
 from swarmwire.deploy.campaign.campaign import read_campaign
 from swarmwire.deploy.campaign.run_again import CampaignRun
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from tests.integration.deploy.campaign.test_resume import VARY, Killed, dying_at
 from tests.support.damaged import damaged
 from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
 from tests.support.deploy.commands import called
-from tests.unit.deploy.campaign.test_resume import VARY, Killed, dying_at
 
 ASKED_SINGLY = {"seeds": 2, "vary": VARY, "pack": 1}
 

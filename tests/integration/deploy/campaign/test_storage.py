@@ -6,9 +6,9 @@ import pytest
 
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaign.storage import StorageFailed
+from tests.integration.deploy.campaign.test_resume import ASKED, dying_at
 from tests.support.deploy.campaign.small import rows_in
 from tests.support.deploy.commands import called
-from tests.unit.deploy.campaign.test_resume import ASKED, dying_at
 
 FULL = OSError(errno.ENOSPC, "No space left on device")
 
