@@ -40,6 +40,7 @@ from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.comms.wire.tick_frames import check_rows, decode_tick, encode_actions
 
 JOIN_S = 60.0  # for each step: as long as a world waits for the next runner to join
+LOOK_S = 5.0  # for the world, each time
 FAREWELL_S = 3.0
 NO_ROBOTS = ""
 TIMED_OUT = "Timeout"  # what zenoh says for a world that says nothing
@@ -88,11 +89,11 @@ def play(
     RunnerLost if there is no world or it gives no robots.
     """
     declared = (  # zenoh takes back what nobody holds on to
-        session.liveliness().declare_subscriber(keys.world, Callback(inbox.put_token, indirect=False), history=True),
         session.declare_subscriber(keys.frame(runner), Callback(inbox.put_frame, indirect=False)),
         session.liveliness().declare_token(keys.alive(runner)),
     )
-    if not inbox.wait_for_world():
+    watched = _watched_world(session, keys, inbox)
+    if watched is None:
         raise RunnerLost(runner, NO_ROBOTS, f"there is no run {run_of(keys.world)}, or it does not let {runner} in")
     assignment, memory = _join(session, keys, runner, asked())
     inbox.forget_frames()
@@ -105,7 +106,7 @@ def play(
     if inbox.ended.how == "left":
         answer.put(frames.encode("leave", -1, {}))
         inbox.wait_for_farewell()  # the world must read this before the runner's token vanishes, as below
-    del declared
+    del declared, watched
     return inbox.ended
 
 
@@ -133,15 +134,15 @@ class Inbox:
         """The world's liveliness token appeared or vanished."""
         self._arrived.put(token.kind == zenoh.SampleKind.PUT)
 
-    def wait_for_world(self) -> bool:
-        """Whether the world's token appeared in time; it declares it last, when it can answer."""
+    def wait_for_world(self, timeout_s: float) -> bool | None:
+        """Whether the world's token appeared or vanished, None: neither; it declares it last, when it can answer."""
         try:
-            while not isinstance(arrived := self._arrived.get(timeout=JOIN_S), bool):
+            while not isinstance(arrived := self._arrived.get(timeout=timeout_s), bool):
                 if arrived is None:
                     raise KeyboardInterrupt
                 self.dropped += 1
         except queue.Empty:
-            return False
+            return None
         return arrived
 
     def forget_frames(self) -> None:
@@ -209,6 +210,22 @@ class Inbox:
             while arrived := self._arrived.get(timeout=FAREWELL_S):
                 if not isinstance(arrived, bool) and frames.decode(arrived.payload.to_bytes()).kind == "end":
                     return
+
+
+def _watched_world(session: zenoh.Session, keys: Keys, inbox: Inbox) -> "zenoh.Subscriber[None] | None":
+    """What tells of the world's token, which is there; None: it did not appear in time.
+
+    Where very many come at once, zenoh now and then tells one of them nothing of a token that is there: it asks again.
+    """
+    for _ in range(round(JOIN_S / LOOK_S)):
+        watched = session.liveliness().declare_subscriber(
+            keys.world, Callback(inbox.put_token, indirect=False), history=True
+        )
+        there = inbox.wait_for_world(LOOK_S)
+        if there is not None:
+            return watched if there else None
+        watched.undeclare()
+    return None
 
 
 def _end(frame: frames.Frame) -> Ended:
