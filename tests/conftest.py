@@ -17,6 +17,7 @@ from typing import Any
 import numba
 import pytest
 from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
 from numba.core.event import TimingListener, install_listener
 
 # The first example may wait for the compiler. `quick` is for `make test`, `full` for `make test-all`.
@@ -72,6 +73,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         for name in LOADED_LATE:
             with suppress(ImportError):  # an extra that is not installed
                 importlib.import_module(name)
+        st.text().validate()  # Hypothesis reads its table of letters
 
 
 def _rank(item: pytest.Item) -> int:

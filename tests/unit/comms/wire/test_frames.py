@@ -244,14 +244,14 @@ LARGE = 4 * 1024 * 1024
 
 
 def a_list(item: bytes) -> bytes:
-    count = LARGE // len(item)
+    count = LARGE // 2 // len(item)
     return b"\xdd" + count.to_bytes(4, "big") + item * count
 
 
 def nested(item: bytes) -> bytes:
     """The same in lists of 1000."""
     part = b"\xdc\x03\xe8" + item * 1000
-    return b"\xdd" + (LARGE // len(part)).to_bytes(4, "big") + part * (LARGE // len(part))
+    return b"\xdd" + (LARGE // 2 // len(part)).to_bytes(4, "big") + part * (LARGE // 2 // len(part))
 
 
 @pytest.mark.parametrize("shape", [a_list, nested])
