@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from swarmwire.deploy.campaign.campaign import Campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
+from swarmwire.deploy.campaign.columns import Columns
 from swarmwire.deploy.campaign.pieces import tasks_of, usual_pack
 
 
@@ -60,3 +61,9 @@ def test_packs_are_large_and_smaller_where_workers_would_be_idle_or_pieces_long(
     assert usual_pack(made(9, 200, robots=1000), 2) == 5
     assert usual_pack(made(9, 200, robots=100_000), 2) == 1
     assert {len(task.runs) for task in packed(made(2, 30), pack=7)} == {6}
+
+
+def test_of_a_run_with_several_rows_the_last_counts() -> None:
+    columns = Columns({}, [])
+    rows = [{"run": 0, "point": 0, "seed": 1, "ended": ended} for ended in ("failed", "duration")]
+    assert columns.joined(columns.frame([row]) for row in rows)["ended"].to_list() == ["duration"]
