@@ -37,7 +37,7 @@ TESTS = Path(__file__).parent
 UNIT_LIMIT_S = 2.0  # of processor time, so that a busy machine fails no test
 # The order of the unit tests, by the start of their path. Of two workers the first then compiles the kernels of radio
 # and world, each once, while the second runs tests that need none of them; whole runs, which need all, come last.
-ORDER = ("comms/air", "comms/geometry", "comms/events", "world", "agent/behaviours", "metrics", "", "deploy")
+ORDER = ("comms/air", "comms/geometry", "comms/events", "world", "agent/behaviours", "metrics", "", "deploy", "test_")
 MANY = 200  # unit tests: fewer start sooner without these
 LOADED_LATE = (
     "matplotlib.pyplot",
