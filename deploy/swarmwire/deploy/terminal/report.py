@@ -90,12 +90,12 @@ def _add_real_time(table: Table, result: Result) -> None:
         return
     missed = f"{real.missed_ticks} of {result.ticks} ticks missed"
     lag = f", worst lag {_lag(real.worst_lag_s)}" if real.missed_ticks else ""
-    table.add_row("real time", f"asked for x {real.factor:g}{_longer(result, real.factor)}; {missed}{lag}")
+    quanta = f" in quanta of {_lag(real.quantum_s)}" if real.quantum_s else ""
+    table.add_row("real time", f"asked for x {real.factor:g}{quanta}{_longer(result, real.factor)}; {missed}{lag}")
     if real.tick_jitter:
         table.add_row("ticks began late", _delays(real.tick_jitter))
     if real.delivery:
-        quanta = f", in quanta of {_lag(real.quantum_s)}" if real.quantum_s else ""
-        table.add_row("delivered late", f"{_delays(real.delivery)} of {real.delivery.count} packets{quanta}")
+        table.add_row("delivered late", f"{_delays(real.delivery)} of {real.delivery.count} packets")
     if result.runners:
         late, stops = sum(real.late_answers.values()), sum(real.watchdog_stops.values())
         drops = f"{real.frames_dropped} frames with {real.packets_dropped} packets dropped"
