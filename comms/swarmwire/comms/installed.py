@@ -1,5 +1,7 @@
 """Classes that installed packages bring, by entry points: known by name, imported where somebody asks for one."""
 
+import sys
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import TypeVar, cast
 
@@ -9,10 +11,20 @@ from swarmwire.comms.one_of import one_of
 T = TypeVar("T")
 
 
+def entry_points_of(group: str) -> tuple[EntryPoint, ...]:
+    """The entry points of a group, in no order. The packages are read once, and again if `sys.path` is another."""
+    return _entry_points_of(group, tuple(sys.path))
+
+
+@cache
+def _entry_points_of(group: str, _path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    return tuple(entry_points(group=group))
+
+
 def installed_points(group: str) -> dict[str, tuple[EntryPoint, ...]]:
     """The entry points of a group, by name in its order; more than one: several packages bring that name."""
     found: dict[str, tuple[EntryPoint, ...]] = {}
-    for point in sorted(entry_points(group=group), key=lambda point: point.name):
+    for point in sorted(entry_points_of(group), key=lambda point: point.name):
         found[point.name] = (*found.get(point.name, ()), point)
     return found
 

@@ -35,7 +35,7 @@ class Controls:
         self.paused_ns = 0
         self.on_wait: Callable[[], None] = lambda: None
         self.on_pause: Callable[[], None] = lambda: None
-        self._held = False  # whether the loop waits for the end of a pause
+        self._held = True  # whether no tick is under way: before the first, or while the loop waits for a pause's end
         self._asked = False  # whether `hold` has anything to do
         self._steps = 0
         self._next_ns = 0  # under a limit no tick begins before

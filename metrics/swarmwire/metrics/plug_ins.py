@@ -4,9 +4,10 @@ Their names are read from the packages' metadata; a class is imported only where
 """
 
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.installed import entry_points_of
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.own_metrics import own_kind
 
@@ -36,7 +37,7 @@ class PlugIn:
 def plug_ins() -> dict[str, PlugIn]:
     """All there are, by name."""
     found: dict[str, PlugIn] = {}
-    for point in entry_points(group=GROUP):
+    for point in entry_points_of(GROUP):
         found[point.name] = PlugIn(point.name, point.value.strip(), _package(point), twice=point.name in found)
     return dict(sorted(found.items()))
 

@@ -255,6 +255,15 @@ def test_so_many_ticks_are_let_go_whether_the_run_is_paused_or_not() -> None:
     assert not controls.paused
 
 
+def test_a_run_that_is_to_begin_paused_stands_still_before_its_loop_begins() -> None:
+    _, controls, _, _ = controlled()
+    assert not controls.stands_still
+    controls.pause()
+    assert controls.stands_still
+    controls.step()
+    assert not controls.stands_still
+
+
 def test_a_pause_ends_steps_that_have_not_begun_and_stands_still_once_the_loop_is_held() -> None:
     _, controls, asking, _ = controlled()
     controls.step_by(5)

@@ -7,7 +7,7 @@ name of its own it goes by its file's.
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -143,8 +143,9 @@ def body_names() -> list[str]:
     return sorted(name.removesuffix(".toml") for name in entries if name.endswith(".toml"))
 
 
+@cache
 def load_body(name: str) -> Body:
-    """A body that comes with swarmwire, by name; BadInput if there is none."""
+    """A body that comes with swarmwire, by name; BadInput if there is none. Everybody gets the same one."""
     return body_from(_shipped(name, "", "body"), where=f"{name}.toml")
 
 

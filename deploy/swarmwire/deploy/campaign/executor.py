@@ -7,11 +7,11 @@ points of the group `swarmwire.executors`: a name is what stands before `://` in
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Protocol, cast
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.installed import entry_points_of
 from swarmwire.comms.one_of import one_of
 from swarmwire.deploy.campaign.task import PieceResult, Task
 
@@ -74,7 +74,7 @@ def open_executor(on: str, workers: int | None, scenario: Path) -> Executor:
         return LocalExecutor(workers)
     if name == DASK:
         return _open_dask(on, workers, scenario)
-    others = {point.name: point for point in entry_points(group=GROUP)}
+    others = {point.name: point for point in entry_points_of(GROUP)}
     if name not in others:
         raise BadInput("--on", "", f"expected {one_of([LOCAL, DASK, *others], name)}; got {on!r}")
     opener = cast("OpenExecutor", others[name].load())

@@ -1,6 +1,7 @@
 """What a run ran on: equal hashes are promised for one CPU type with the same versions only."""
 
 import platform
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -19,7 +20,7 @@ def cpu() -> str:
 
 def versions() -> dict[str, str]:
     """Python and the packages whose arithmetic a run depends on."""
-    return {"python": platform.python_version(), **{package: version(package) for package in PACKAGES}}
+    return {"python": platform.python_version(), **{package: _version(package) for package in PACKAGES}}
 
 
 def _simd() -> str:
@@ -28,3 +29,6 @@ def _simd() -> str:
     targets = introspect.opt_func_info(func_name="^sin$", signature="float64")
     found = [target["current"] for target in targets.get("sin", {}).values() if target.get("current")]
     return found[0].split(" ")[-1] if found else "baseline"
+
+
+_version = cache(version)  # reading one takes longer than a tick

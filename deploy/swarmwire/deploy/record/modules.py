@@ -3,6 +3,7 @@
 import hashlib
 import importlib
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
 
 PARTS = ("swarmwire.comms", "swarmwire.agent", "swarmwire.world", "swarmwire.metrics", "swarmwire.deploy")
@@ -12,12 +13,13 @@ SOURCES = (".py", ".toml")  # code, and the data sheets of bodies
 def module_digests(specs: Iterable[str]) -> dict[str, str]:
     """sha256 by module: of swarmwire's parts, and of the outermost package around each "package.module:Class".
 
-    The digest is over the source files on the disk as they are now, sorted by name; a module that is no package is its
-    one file. What these packages import from others in turn is not followed.
+    The digest is over the source files on the disk, sorted by name; a module that is no package is its one file. Agents
+    may be edited and loaded anew while a process lives, so theirs are read each time; swarmwire's own, hundreds of
+    files, once. What these packages import from others in turn is not followed.
     """
     places = [spec.rpartition(":")[0] for spec in specs]
     own = [_outermost(place) for place in places if not place.endswith(".py")]
-    return {module: _digest(module) for module in dict.fromkeys((*PARTS, *sorted(own)))}
+    return {part: _digest_once(part) for part in PARTS} | {name: _digest(name) for name in sorted({*own} - {*PARTS})}
 
 
 def changed_modules(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
@@ -51,3 +53,6 @@ def _digest(module: str) -> str:
             whole.update(f"{path.relative_to(root).as_posix()}\0".encode())
             whole.update(hashlib.sha256(path.read_bytes()).digest())
     return whole.hexdigest()
+
+
+_digest_once = cache(_digest)

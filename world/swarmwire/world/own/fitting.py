@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib.metadata import entry_points
 from typing import Any, TypeVar, cast
 
 from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.installed import entry_points_of
 from swarmwire.comms.own_class import own_class
 from swarmwire.comms.sheets import OwnSheet, Sheet
 from swarmwire.comms.sheets.own import MOST_WIDE
@@ -71,8 +71,8 @@ def _actuator(sheet: ActuatorSheet, where: str, key: str) -> ActuatorSheet:
 
 def _entry_point(kind: str, group: str) -> str:
     """The "package.module:Class" that an entry point of this name stands for; any other text as it is."""
-    found = () if ":" in kind else tuple(entry_points(group=group, name=kind))
-    return found[0].value if found else kind
+    found = () if ":" in kind else entry_points_of(group)
+    return next((point.value for point in found if point.name == kind), kind)
 
 
 def _asked(own: object, name: str, where: str, key: str) -> object:
