@@ -52,12 +52,11 @@ def test_a_main_scenario_runs_from_the_command_line(name, tmp_path, monkeypatch,
 
 def test_a_recorded_run_is_intact_and_repeats_bit_for_bit(tmp_path, monkeypatch, capsys):
     folder = tmp_path / "run"
-    done = swarmwire("run", LOSSY, "--set", "duration_s=2", "--runners", "2", "--packets", "all", "--out", folder)
-    assert done.returncode == 0, done.stderr
-    assert RunFolder(folder).ticks()["tick"].to_list() == list(range(20))
-    for command in ("verify", "repeat"):
-        code, out, errors = called(monkeypatch, capsys, command, folder)
+    recorded = ("run", LOSSY, "--set", "duration_s=2", "--runners", "2", "--packets", "all", "--out", folder)
+    for command in (recorded, ("verify", folder), ("repeat", folder)):
+        code, out, errors = called(monkeypatch, capsys, *command)
         assert code == 0, out + errors
+    assert RunFolder(folder).ticks()["tick"].to_list() == list(range(20))
 
 
 def test_a_small_sweep_over_the_loss_shows_that_packets_are_lost(tmp_path):
@@ -84,7 +83,7 @@ def test_a_driver_and_the_gateway_of_its_robot_understand_each_other():
 
 def test_a_killed_agent_process_costs_its_robots_alone(tmp_path):
     folder = tmp_path / "run"
-    dead = ["--set", "run.on_runner_loss='dead'", "--set", "duration_s=4"]
+    dead = ["--set", "run.on_runner_loss='dead'", "--set", "duration_s=2"]
     with started(LOSSY, "--runners", "2", *dead, "--realtime=2", "--out", folder) as process:
         children = family(process)
         os.kill(runners_of(process)[0].pid, signal.SIGKILL)
