@@ -45,7 +45,7 @@ def scenario(tmp_path: Path) -> Path:
 def scripted(monkeypatch: pytest.MonkeyPatch) -> list[ScriptedGateway]:
     """The gateways of kind "scripted" that runs of this test make, in order."""
     point = EntryPoint("scripted", "tests.support.world.gateways.scripted:ScriptedGateway", registry.GROUP)
-    monkeypatch.setattr(installed, "entry_points", lambda **_: [point])
+    monkeypatch.setattr(installed, "entry_points_of", lambda _: [point])
     made: list[ScriptedGateway] = []
     monkeypatch.setattr(ScriptedGateway, "made", made)
     return made

@@ -22,7 +22,7 @@ def opened(on, workers, scenario):
 def test_an_executor_of_a_package_goes_by_the_name_before_its_address(monkeypatch, tmp_path):
     point = EntryPoint("made-up", f"{__name__}:opened", executor.GROUP)
     monkeypatch.setattr(EntryPoint, "load", lambda _: opened)
-    monkeypatch.setattr(executor, "entry_points", lambda group: [point] if group == executor.GROUP else [])
+    monkeypatch.setattr(executor, "entry_points_of", lambda group: [point] if group == executor.GROUP else [])
     assert open_executor("made-up://there:1", 3, tmp_path) == ("made-up://there:1", 3, tmp_path)
     with pytest.raises(BadInput, match=r"^--on: expected .*local.*made-up.*; got 'mad-up://there'"):
         open_executor("mad-up://there", None, tmp_path)

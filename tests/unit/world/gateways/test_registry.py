@@ -14,7 +14,7 @@ HERE = "tests.support.world.gateways.scripted:ScriptedGateway"
 
 def installed(monkeypatch: pytest.MonkeyPatch, *points: tuple[str, str]) -> None:
     found = [EntryPoint(name, value, registry.GROUP) for name, value in points]
-    monkeypatch.setattr(installed_classes, "entry_points", lambda group: found if group == registry.GROUP else [])
+    monkeypatch.setattr(installed_classes, "entry_points_of", lambda group: found if group == registry.GROUP else [])
 
 
 def refused(name: str) -> str:

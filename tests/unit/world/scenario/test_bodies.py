@@ -83,7 +83,7 @@ def test_what_a_scenario_may_not_change_is_named(tmp_path, sheet, key):
 
 def test_a_scenario_changes_parameters_of_a_users_own_sense_that_an_entry_point_names(tmp_path, monkeypatch):
     point = EntryPoint("painted", "tests.support.world.own_code:Paint", "swarmwire.sensors")
-    monkeypatch.setattr(fitting, "entry_points", lambda **asked: [point] if asked["name"] == "painted" else [])
+    monkeypatch.setattr(fitting, "entry_points_of", lambda _: [point])
     (tmp_path / "mine.toml").write_text('like = "epuck"\nsenses.paint.kind = "painted"\n')
     worn = bodies(tmp_path, "mine.toml", {"senses": {"paint": {"cells": 2}}})["worn"]
     assert own_code_of([worn]) == ("tests.support.world.own_code:Paint",)
