@@ -18,11 +18,13 @@ help: ## list the commands
 		printf '  make %-10s %s\n' "$$name" "$$text"; done
 
 .PHONY: demo
-demo: sync ## fly a flock over a lossy radio, a process per robot, and record it under runs/
+demo: ## fly a flock over a lossy radio, a process per robot, and record it under runs/
+	@.ci/sync --no-dev
 	$(RUN) swarmwire run scenarios/flocking-lossy.toml --runners per-robot
 
 .PHONY: test
-test: sync ## lint, all unit tests, and the main uses from end to end: what to run first
+test: ## lint, all unit tests, and the main uses from end to end: what to run first
+	@.ci/sync --no-dev --group test
 	$(RUN) ruff check --quiet
 	$(PYTEST) tests/unit tests/integration/test_smoke.py
 
@@ -68,5 +70,5 @@ mutants: ## change the code in small ways, one by one: does a test notice? ONLY=
 	@for group in $(or $(ONLY),codec draws fates); do $(RUN) tests/tools/mutants/try.sh $$group || exit 1; done
 
 .PHONY: sync
-sync: # the locked packages, exactly
+sync: # the locked packages
 	@.ci/sync

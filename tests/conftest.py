@@ -3,22 +3,19 @@
 The tier of a test is its directory: `unit`, `integration`, `statistics`, `docs`, `release`.
 """
 
-import importlib
 import os
 import platform
 import signal
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numba
 import pytest
+from _pytest.runner import runtestprotocol
 from hypothesis import HealthCheck, settings
-from hypothesis.internal.charmap import charmap
-from numba.core.event import TimingListener, install_listener
 
 # The first example may wait for the compiler. `quick` is for `make test`, `full` for `make test-all`.
 _SHARED: dict[str, Any] = {
@@ -38,25 +35,22 @@ UNIT_LIMIT_S = float(os.environ.get("UNIT_LIMIT_S", "2"))  # of processor time, 
 # The order of the unit tests, by the start of their path. Of two workers the first then compiles the kernels of radio
 # and world, each once, while the second runs tests that need none of them; whole runs, which need all, come last.
 ORDER = ("comms/air", "comms/geometry", "comms/events", "world", "agent/behaviours", "metrics", "", "deploy", "test_")
-MANY = 200  # unit tests: fewer start sooner without these
-LOADED_LATE = (
-    "matplotlib.pyplot",
-    "polars",
-    "rerun",
-    "rich.console",
-    "scipy.stats",
-    "optuna",
-    "asyncssh",
-    "rosbags.typesys",
-)
+# Tracing and Python in place of kernels slow all tests down; the full profile has more examples of each.
+LIMITED = PROFILE == "quick" and sys.gettrace() is None and not numba.config.DISABLE_JIT
+CPU_S, TOO_SLOW = pytest.StashKey[float](), "too slow"
 STARTS_A_PROCESS = {"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.exec", "os.system", "time.sleep"}
 
 _too_slow: list[str] = []
 _unit_test = False  # whether a unit test is running in this process
 
 
-def pytest_configure() -> None:
-    """What a shell starts in the background, or by nohup, ignores Ctrl-C or hang-ups; so would all that tests start."""
+def pytest_configure(config: pytest.Config) -> None:
+    """Add the limit of unit tests, and let tests be interrupted.
+
+    What a shell starts in the background, or by nohup, ignores Ctrl-C or hang-ups; so would all that tests start.
+    """
+    if LIMITED:
+        config.pluginmanager.register(TwiceIfSlow())
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
@@ -65,15 +59,6 @@ def pytest_configure() -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Unit tests in their order, then all else as it comes."""
     items.sort(key=_rank)  # stable
-
-
-def pytest_collection_finish(session: pytest.Session) -> None:
-    """Load what the product loads late, so that the first test that needs it does not pay for it."""
-    if sum(map(_is_unit, session.items)) > MANY:
-        for name in LOADED_LATE:
-            with suppress(ImportError):  # an extra that is not installed
-                importlib.import_module(name)
-        charmap()  # Hypothesis makes its table of letters
 
 
 def _rank(item: pytest.Item) -> int:
@@ -97,8 +82,8 @@ platform.processor()  # asks a program once; what a run says of its machine then
 sys.addaudithook(_refuse_processes)
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
     """A unit test starts no process and does not sleep."""
     global _unit_test  # noqa: PLW0603 - an audit hook takes no argument of ours and cannot be removed
     _unit_test = _is_unit(item)
@@ -108,23 +93,40 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
         _unit_test = False
 
 
+class TwiceIfSlow:
+    """A unit test is quick, at the latest the second time: the first may have to load or to compile something."""
+
+    def pytest_runtest_protocol(self, item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+        """Run a unit test, once more if it was too slow, and report the last."""
+        if not _is_unit(item):
+            return None
+        item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+        reports = runtestprotocol(item, log=False, nextitem=nextitem)
+        if item.stash.get(CPU_S, 0.0) > UNIT_LIMIT_S and all(report.passed for report in reports):
+            item._initrequest()  # fresh fixtures, as pytest-rerunfailures makes them
+            reports = runtestprotocol(item, log=False, nextitem=nextitem)
+            if item.stash[CPU_S] > UNIT_LIMIT_S:
+                reports[-1].user_properties.append((TOO_SLOW, item.stash[CPU_S]))
+        for report in reports:
+            item.ihook.pytest_runtest_logreport(report=report)
+        item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+        return True
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
-    """Note the processor time of a unit test without that of the compiler, which only an empty cache costs."""
-    compiling, before_s = TimingListener(), time.process_time()
+    """Note the processor time that a test takes."""
+    before_s = time.process_time()
     try:
-        with install_listener("numba:compile", compiling):
-            return (yield)
+        return (yield)
     finally:
-        compiled_s = compiling.duration if compiling.done else 0.0
-        if _is_unit(item) and PROFILE == "quick" and sys.gettrace() is None and not numba.config.DISABLE_JIT:
-            item.user_properties.append(("cpu_s", time.process_time() - before_s - compiled_s))
+        item.stash[CPU_S] = time.process_time() - before_s
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     """Collect the unit tests that took too long; under xdist, in the process that prints."""
-    cpu_s = dict(report.user_properties).get("cpu_s", 0.0)
-    if report.when == "call" and isinstance(cpu_s, float) and cpu_s > UNIT_LIMIT_S:
+    cpu_s = dict(report.user_properties).get(TOO_SLOW)
+    if cpu_s is not None:
         _too_slow.append(f"{report.nodeid}: {cpu_s:.1f} s")
 
 
