@@ -9,6 +9,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -79,6 +80,7 @@ def _refuse_processes(event: str, _: tuple[Any, ...]) -> None:
 
 
 platform.processor()  # asks a program once; what a run says of its machine then needs none
+import_module("matplotlib.font_manager")  # so does this, where it finds no list of the fonts
 sys.addaudithook(_refuse_processes)
 
 

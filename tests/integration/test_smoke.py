@@ -10,7 +10,7 @@ import pytest
 
 from swarmwire.agent.drivers.driver import Command
 from swarmwire.deploy import Result, RunFolder, run
-from tests.support.deploy.commands import LOSSY, ROOT, called, family, runners_of, started, swarmwire
+from tests.support.deploy.commands import LOSSY, ROOT, called, family, runners_of, started
 from tests.support.robots.rigs import RIGS
 
 MAIN = ("avoidance", "flocking", "flocking-lossy", "pso", "flocking-disrupted", "flocking-802154")
@@ -59,10 +59,10 @@ def test_a_recorded_run_is_intact_and_repeats_bit_for_bit(tmp_path, monkeypatch,
     assert RunFolder(folder).ticks()["tick"].to_list() == list(range(20))
 
 
-def test_a_small_sweep_over_the_loss_shows_that_packets_are_lost(tmp_path):
+def test_a_small_sweep_over_the_loss_shows_that_packets_are_lost(tmp_path, monkeypatch, capsys):
     vary = ["--vary", "radio.loss=0,0.9", "--seeds", "2", "--set", "duration_s=1", "--workers", "2"]
-    done = swarmwire("sweep", LOSSY, *vary, "--out", tmp_path / "losses")
-    assert done.returncode == 0, done.stderr
+    code, out, errors = called(monkeypatch, capsys, "sweep", LOSSY, *vary, "--out", tmp_path / "losses")
+    assert code == 0, out + errors
     rows = pl.read_parquet(tmp_path / "losses" / "summary.parquet")
     pdr = {loss: rows.filter(pl.col("radio.loss") == loss)["radio.pdr"].mean() for loss in (0.0, 0.9)}
     assert len(rows) == 4

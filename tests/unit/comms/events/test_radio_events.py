@@ -123,7 +123,7 @@ def test_the_phase_is_the_arenas_own_and_each_jammers():
 def test_it_is_on_for_its_duty_and_toggles_tell_when(duty: float):
     found = put_up(jammer(at=(0.0, 0.0), duty=duty, period_s=0.0007))
     assert found.duty == pytest.approx([duty] * 2, abs=1e-6)
-    at_ns = np.arange(0, 2_000_000, 100)
+    at_ns = np.arange(0, 2_000_000, 400)
     seen = np.array([found.is_on(one) for one in at_ns.tolist()])
     assert seen.mean(axis=0) == pytest.approx([duty] * 2, abs=0.15)
     now = found.is_on(-1)

@@ -237,7 +237,7 @@ def test_all_within_reach_are_found_also_across_the_edges_of_a_torus(reach_m: fl
     found, random = np.empty(len(things.shape), np.int64), np.random.default_rng(3)
     shifts = [(i * SIZE_M[0], j * SIZE_M[1]) for i in (-1, 0, 1) for j in (-1, 0, 1)] if torus else [(0.0, 0.0)]
     spread = 0.5 if torus else 0.8  # in the open, robots leave the arena
-    for x, y in (random.uniform(-spread, spread, (24 if torus else 60, 2)) * SIZE_M).tolist():
+    for x, y in (random.uniform(-spread, spread, (8 if torus else 60, 2)) * SIZE_M).tolist():
         for arena, own in enumerate(arenas):
             count = near_things(found, things, arena, x, y, reach_m, 0.0)
             listed = {(round(a, 9), round(b, 9)) for a, b in things.shape[found[:count], :2].tolist()}

@@ -96,14 +96,14 @@ def test_where_both_lie_beyond_the_limit_the_difference_may_be_anything():
 
 @pytest.mark.parametrize("shared", [True, False])
 def test_intervals_of_differences_cover_as_often_as_they_say(shared):
-    """Of 300 pairs of samples 95 % (1.3 % around) should; fewer than 90.5 % do by chance once in 1000 lists of seeds.
+    """Of 100 pairs of samples 95 % (2.2 % around) should; fewer than 88 % do by chance once in 1000 lists of seeds.
 
     Those of medians are wider, as resampled medians are few values.
     """
     rng = np.random.default_rng(17)
     covered = {"numbers": 0, "means": 0, "times": 0}
     seeds = np.arange(25) if shared else np.arange(100, 125)
-    for _ in range(300):
+    for _ in range(100):
         one, other = rng.normal(0.0, 1.0, 25), rng.normal(0.5, 1.0, 25)
         found = difference(numbers(one), numbers(other, seeds))
         covered["numbers"] += found.median_interval.low <= 0.5 <= found.median_interval.high
@@ -113,9 +113,9 @@ def test_intervals_of_differences_cover_as_often_as_they_say(shared):
         found = difference(censored(one, 40.0), later)
         truth = 10.0 * math.log(2.0)
         covered["times"] += found.median_interval.low <= truth <= found.median_interval.high
-    assert 0.905 <= covered["means"] / 300 <= 0.985
-    assert covered["numbers"] / 300 >= 0.905
-    assert covered["times"] / 300 >= 0.905
+    assert 88 <= covered["means"] <= 99
+    assert covered["numbers"] >= 88
+    assert covered["times"] >= 88
 
 
 DRAWS = np.random.default_rng(1)
