@@ -16,7 +16,7 @@ from typing import Any
 import numba
 import pytest
 from _pytest.runner import runtestprotocol
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 
 # The first example may wait for the compiler. `quick` is for `make test`, `full` for `make test-all`.
 _SHARED: dict[str, Any] = {
@@ -25,6 +25,7 @@ _SHARED: dict[str, Any] = {
     "database": None,
     "print_blob": True,
     "suppress_health_check": [HealthCheck.too_slow],
+    "phases": set(Phase) - {Phase.explain},  # which traces each line for minutes, and its hints are rarely of use
 }
 settings.register_profile("quick", max_examples=20, **_SHARED)
 settings.register_profile("full", max_examples=100, **_SHARED)

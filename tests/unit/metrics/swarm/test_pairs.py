@@ -5,7 +5,7 @@ from math import lgamma
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from swarmwire.metrics.metrics import Metrics
@@ -135,6 +135,7 @@ def test_a_gap_is_from_surface_to_surface():
 
 
 @given(st.lists(places, min_size=2, max_size=20))
+@example([(0.0, 0.0, 0.1, (0.0, 1.0)), (0.5, 0.0, 0.05, (0.0, 1.0)), (1.0, 0.0, 0.8, (0.0, 1.0))])  # far, but large
 def test_the_smallest_gap_is_that_of_all_pairs_also_of_different_bodies(robots):
     x, y, radius = np.array([robot[:3] for robot in robots]).T
     span = np.array([robot[3] for robot in robots])
