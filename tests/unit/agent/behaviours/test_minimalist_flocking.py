@@ -1,7 +1,5 @@
 """The sector rules, case by case on one flockbot, and what they make of five in a small arena."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,6 @@ from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.senses import GroupSenses
-from swarmwire.deploy import run
 from tests.support.agent.hosts import group
 
 RAYS = load_body("flockbot").proximity
@@ -148,37 +145,3 @@ def test_a_random_turn_comes_before_all_rules_as_often_as_asked():
     assert turned == pytest.approx(0.3, abs=0.06)  # four standard deviations
     assert {LEFT, RIGHT} <= set(steps)
     assert all(One(random_turn=1.0).step(walls={30: 0.1}) in (LEFT, RIGHT) for _ in range(3))
-
-
-SCENARIO = """
-format = 1
-name = "five"
-duration_s = 60.0
-standard_metrics = false
-metrics = [{ metric = "aggregation", gap_m = 0.21 }] # three diameters
-
-[time]
-rate_hz = 20
-
-[arena]
-size_m = [1.4, 1.4]
-
-[robots.swarm]
-body = "flockbot"
-count = 5
-agent = "swarmwire.agent.behaviours:MinimalistFlocking"
-"""
-
-
-def together(path: Path, *overrides: str) -> float:
-    """The mean share of the swarm in its largest cluster, over 8 arenas and 30 s."""
-    path.write_text(SCENARIO)
-    given = ["duration_s=30", *(f"robots.swarm.params.{of}" for of in overrides)]
-    return float(
-        np.mean([of.metrics["aggregation"].mean for of in run(path, seeds=range(1, 9), overrides=given).arenas])
-    )
-
-
-def test_five_come_together_by_cohesion_and_not_without(tmp_path):
-    path = tmp_path / "five.toml"
-    assert together(path) > together(path, "lateral_diameters=9.0", "rear_diameters=9.0")
