@@ -1,4 +1,4 @@
-"""The sector rules, case by case on one flockbot, and what they make of five in a small arena."""
+"""The sector rules, case by case on one flockbot."""
 
 import numpy as np
 import pytest
