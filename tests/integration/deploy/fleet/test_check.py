@@ -17,11 +17,14 @@ def test_a_host_that_will_do_is_told_in_a_line(fleet, robots, epuck):
     fleet.add("flock-0", driver={"address": f"127.0.0.1:{epuck}"})
     code, lines = robots("check")
     assert code == 0, lines
-    assert re.fullmatch(
-        r"flock-0 Python 3\.\d+\.\d+, \w+, glibc 2\.\d+; [\d.]+ GB free; clock [+-]\d+ ms \(within \d+\); "
-        rf"127\.0\.0\.1:{epuck} answers; linger is off: start switches it on",
-        lines[0],
-    )
+    for told in (
+        r"Python 3\.\d+\.\d+, \w+, glibc 2\.\d+",
+        r"[\d.]+ GB",
+        r"clock [+-]\d+ ms",
+        f":{epuck} answers",
+        "linger",
+    ):
+        assert re.search(told, lines[0]), told
     assert not fleet.hosts["flock-0"].root.exists()
 
 
@@ -29,10 +32,8 @@ def test_a_drivers_address_that_does_not_answer_is_told(fleet, robots):
     fleet.add("flock-0")
     code, lines = robots("check")
     assert code == 1
-    assert lines[0] == (
-        "flock-0 failed: the driver's address 127.0.0.1:1 does not answer from there: Connection refused; "
-        "is it switched on, and driver.address right?"
-    )
+    assert "127.0.0.1:1 does not answer" in lines[0]
+    assert "driver.address" in lines[0]
 
 
 def test_settings_that_do_not_fit_are_told_by_robot(fleet, robots, epuck):
@@ -42,7 +43,7 @@ def test_settings_that_do_not_fit_are_told_by_robot(fleet, robots, epuck):
     code, lines = robots("check")
     assert code == 1
     assert "failed" not in lines[0]
-    assert lines[1] == f"flock-1 failed: {fleet.file}: robots.flock-1.rate_hz: expected at least 1 Hz, got 0"
+    assert lines[1].startswith(f"flock-1 failed: {fleet.file}: robots.flock-1.rate_hz: ")
 
 
 def test_offline_nothing_is_connected_and_settings_are_told(fleet, robots):
@@ -50,21 +51,22 @@ def test_offline_nothing_is_connected_and_settings_are_told(fleet, robots):
     fleet.add("flock-1", host, rate_hz=0)
     code, lines = robots("check", "--offline")
     assert code == 1
-    assert lines[0].startswith("flock-0 still.py:Still on epuck2 by epuck2 at 127.0.0.1:1, radio none, 10 Hz, at most ")
-    assert lines[1] == f"flock-1 failed: {fleet.file}: robots.flock-1.rate_hz: expected at least 1 Hz, got 0"
+    for told in ("flock-0 still.py:Still ", "epuck2", "127.0.0.1:1", "10 Hz"):
+        assert told in lines[0]
+    assert lines[1].startswith(f"flock-1 failed: {fleet.file}: robots.flock-1.rate_hz: ")
     assert host.commands == []
 
 
 def test_an_agent_that_needs_more_than_the_driver_gives_is_told(fleet, robots, epuck):
     fleet.add("flock-0", driver={"address": f"127.0.0.1:{epuck}"})
     fleet.agent((fleet.folder / "still.py").read_text().replace("needs = ()", 'needs = ("positioning",)'))
-    assert "agent: Still needs 'positioning', which the body epuck2 lacks" in robots("check")[1][0]
+    assert "agent: Still needs 'positioning'" in robots("check")[1][0]
 
 
 def test_a_clock_that_is_off_is_told_with_its_cure(fleet, robots, epuck, monkeypatch):
     fleet.add("flock-0", driver={"address": f"127.0.0.1:{epuck}"})
     monkeypatch.setattr(check_module, "MOST_AHEAD_NS", -(10**12))
-    assert "latencies will be wrong by that, run NTP on it" in robots("check")[1][0]
+    assert "run NTP" in robots("check")[1][0]
 
 
 def test_trust_adds_the_keys_of_new_hosts_once_and_never_those_that_changed(fleet, robots, epuck):
@@ -74,9 +76,10 @@ def test_trust_adds_the_keys_of_new_hosts_once_and_never_those_that_changed(flee
     fleet.servers.change_key(old)
     code, lines = robots("check", "--trust")
     fingerprint = new.host_key.get_fingerprint()
-    assert lines[0] == f"new: 127.0.0.1:{new.port}: ssh-ed25519 {fingerprint}, added to {fleet.folder}/known_hosts"
+    assert lines[0].startswith(f"new: 127.0.0.1:{new.port}: ssh-ed25519 {fingerprint}, ")
+    assert f"{fleet.folder}/known_hosts" in lines[0]
     assert code == 1
-    assert "another machine than it was" in lines[1]
+    assert lines[1].startswith("old failed: ")
     assert lines[2].startswith("new Python 3")
     assert not any(line.startswith("new: ") for line in robots("check", "--trust")[1])
 

@@ -82,7 +82,7 @@ def test_what_was_made_is_kept_and_needs_no_index_again(tmp_path, wheels):
 
 def test_a_robot_for_which_there_is_no_wheel_is_told(tmp_path, wheels):
     next(wheels.glob("numpy*")).unlink()
-    with pytest.raises(HostFailed, match=r"there is no wheel of numpy==[\d.]+ for cp311-aarch64-glibc2\.36; install a"):
+    with pytest.raises(HostFailed, match=r"numpy==[\d.]+ for cp311-aarch64-glibc2\.36"):
         made(tmp_path, wheels)
     assert not list((tmp_path / "cache").glob("*.part"))
 

