@@ -44,8 +44,8 @@ def test_a_file_that_is_cut_off_or_changed_is_read_or_refused_in_one_line_that_n
     file.write_bytes(data)
     said = refusal(file)
     if said is not None:
-        assert said.startswith(f"{file}: expected a whole Parquet file: ")
-        assert said.endswith("; take it away")
+        assert said.startswith(f"{file}: ")
+        assert said.endswith("take it away")
         assert "\n" not in said
 
 
@@ -54,13 +54,12 @@ def test_a_panic_of_polars_is_such_a_line_too(file, monkeypatch):
         raise pl.exceptions.PanicException("called `Result::unwrap()` on an `Err` value")
 
     monkeypatch.setattr(pl, "read_parquet", panics)
-    with pytest.raises(BadInput) as told:
+    with pytest.raises(BadInput, check=lambda error: error.where == str(file)):
         read_whole(file)
-    assert str(told.value) == f"{file}: expected a whole Parquet file: polars gave up on it"
 
 
 def test_a_file_that_is_not_there_is_such_a_line_too(tmp_path):
-    with pytest.raises(BadInput, match="expected a whole Parquet file: No such file"):
+    with pytest.raises(BadInput, match="none.parquet: .*No such file"):
         read_whole(tmp_path / "none.parquet")
 
 

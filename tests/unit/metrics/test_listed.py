@@ -39,7 +39,7 @@ def names(*items, **options):
 def refused(*items):
     with pytest.raises(BadInput) as caught:
         listed(items, "s.toml")
-    return str(caught.value)
+    return caught.value
 
 
 def test_without_a_list_the_standard_ones_are_measured():
@@ -92,16 +92,16 @@ def test_what_ends_an_arena_is_measured_once_with_the_parameters_that_are_listed
     ],
 )
 def test_what_is_no_metric_or_does_not_fit_is_refused_with_its_key(asked, key, hint):
-    with pytest.raises(BadInput) as error:
-        listed([asked], "s.toml")
-    assert (error.value.where, error.value.key) == ("s.toml", key)
-    assert hint in error.value.expected
+    error = refused(asked)
+    assert (error.where, error.key) == ("s.toml", key)
+    assert hint in error.expected
 
 
 def test_one_name_is_measured_once(east):
-    twice = refused(item("order"), item("order", 1))
-    assert twice == "s.toml: metrics.1: 'order' is measured already, as metrics.0 lists it"
-    assert "metrics.1.metric: 'east' is measured already" in refused(item(east), item(east, 1, from_m=1))
+    for spec, params, key in (("order", {}, "metrics.1"), (east, {"from_m": 1}, "metrics.1.metric")):
+        error = refused(item(spec), item(spec, 1, **params))
+        assert (error.where, error.key) == ("s.toml", key)
+        assert "metrics.0" in error.expected
 
 
 @pytest.fixture
@@ -116,26 +116,28 @@ def test_a_package_brings_metrics_by_name(site):
     assert [metric.from_m for metric in found.metrics] == [1.0]
     assert found.code == ("compass_metrics:East",)
     assert names(stop("east"), with_standard=False) == ["east"]
-    assert "did you mean east?" in refused(item("eest"))
+    assert "east?" in refused(item("eest")).expected
 
 
 def test_a_plug_in_is_imported_only_if_it_is_asked_for(site):
     install(site, "broken_metrics", {"east": "East"}, code="raise ValueError('no such day')")
     assert names() == standard()
-    said = refused(item("east"))
-    assert said == "s.toml: metrics.0: broken_metrics does not import: ValueError: no such day"
+    error = refused(item("east"))
+    assert (error.where, error.key) == ("s.toml", "metrics.0")
+    assert "broken_metrics" in error.expected
+    assert "no such day" in error.expected
 
 
-def test_a_plug_in_of_another_name_is_refused(site):
-    install(site, "named_metrics", {"west": "East"})
-    said = "expected named_metrics:East to have the name 'west' of its entry point; got 'east'"
-    assert refused(item("west")) == f"s.toml: metrics.0: {said}"
-
-
-def test_a_plug_in_from_two_packages_is_refused(site):
-    install(site, "one_metrics", {"west": "East"})
-    install(site, "more_metrics", {"west": "East"})
-    assert refused(item("west")).endswith("expected one plug-in 'west'; more than one package brings it")
+@pytest.mark.parametrize(
+    ("packages", "hint"), [(["named_metrics"], "named_metrics:East"), (["one_metrics", "more_metrics"], "package")]
+)
+def test_a_plug_in_of_another_name_or_from_two_packages_is_refused(site, packages, hint):
+    for package in packages:
+        install(site, package, {"west": "East"})
+    error = refused(item("west"))
+    assert error.key == "metrics.0"
+    assert "'west'" in error.expected
+    assert hint in error.expected
 
 
 def test_a_name_of_swarmwires_own_stays_its_own(site):
@@ -203,39 +205,31 @@ def test_a_good_one_is_measured():
 
 
 @pytest.mark.parametrize(
-    ("kind", "said"),
-    [
-        (Plain, "expected a dataclass below Metric; .*:Plain is <class"),
-        (Endless, "Endless has no begin"),
-        (str, ".* holds no such name: 'str'"),
-    ],
+    ("kind", "hint"), [(Plain, "dataclass.*:Plain"), (Endless, "Endless.*begin"), (str, "no such name.*'str'")]
 )
-def test_a_class_that_is_no_metric_is_refused(kind, said):
-    with pytest.raises(BadInput, match=rf"^s.toml: metrics\.0: {said}"):
+def test_a_class_that_is_no_metric_is_refused(kind, hint):
+    with pytest.raises(BadInput, match=rf"^s.toml: metrics\.0: .*{hint}"):
         own_kind(spec_of(kind), "s.toml", "metrics.0")
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "said"),
+    ("name", "value"),
     [
-        ("name", "two words", "a name of letters, digits and _; got 'two words'"),
-        ("name", "order", "a name that is not taken; got 'order'"),
-        ("name", "x_m", "a name that is not taken; got 'x_m'"),
-        ("name", "delivery", "a name that is not taken; got 'delivery'"),
-        ("unit", 3, "unit as a text; got 3"),
-        ("kind", "sum", "the kind level or count or time; got 'sum'"),
-        ("bounds", (None, 1.0), r"bounds as a number, and a number or None; got \(None, 1.0\)"),
+        *(("name", value) for value in ("two words", "order", "x_m", "delivery")),
+        *(("unit", 3), ("kind", "sum"), ("bounds", (None, 1.0))),
     ],
 )
-def test_an_attribute_that_is_wrong_is_refused(monkeypatch, name, value, said):
+def test_an_attribute_that_is_wrong_is_refused(monkeypatch, name, value):
     monkeypatch.setattr(Good, name, value)
-    with pytest.raises(BadInput, match=rf"^s.toml: metrics\.0: Good: expected {said}"):
+    with pytest.raises(BadInput) as refused:
         own_kind(spec_of(Good), "s.toml", "metrics.0")
+    assert (refused.value.where, refused.value.key) == ("s.toml", "metrics.0")
+    assert all(told in refused.value.expected for told in ("Good: ", name, repr(value)))
 
 
 @pytest.mark.parametrize(("kind", "said"), [(BeginsBadly, "no start"), (Wide, "could not broadcast")])
 def test_one_that_fails_is_named(kind, said):
-    with pytest.raises(OwnCodeFailed, match=rf"the metric mine \({kind.__name__}\) failed:[\s\S]*{said}"):
+    with pytest.raises(OwnCodeFailed, match=rf"mine \({kind.__name__}\)[\s\S]*{said}"):
         _measure(kind())
 
 

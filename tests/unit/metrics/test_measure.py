@@ -100,18 +100,15 @@ def test_a_name_that_is_taken_is_refused(taken):
     class Other(Turned):
         name = taken
 
-    with pytest.raises(BadInput, match=rf"metrics\.{taken}: expected a name that is not taken"):
+    with pytest.raises(BadInput, check=lambda error: error.key == f"metrics.{taken}"):
         register(Other)
 
 
-def test_an_unknown_name_is_refused_with_those_that_are_known():
-    with pytest.raises(BadInput, match=r"expected some of order, .*; got 'ordre'"):
-        Metrics(["ordre"])
-
-
-@pytest.mark.parametrize("names", [["order", "order"], ["order", Order()]])
-def test_a_name_given_twice_is_refused(names):
-    with pytest.raises(BadInput, match="'order' is named twice"):
+@pytest.mark.parametrize(
+    ("names", "hint"), [(["ordre"], "'ordre'"), (["order", "order"], "'order'"), (["order", Order()], "'order'")]
+)
+def test_an_unknown_name_and_one_given_twice_are_refused(names, hint):
+    with pytest.raises(BadInput, check=lambda error: error.key == "metrics" and hint in error.expected):
         Metrics(names)
 
 

@@ -132,7 +132,7 @@ def test_the_summary_is_there_once_the_run_has_ended(tmp_path):
     less = [{key: value for key, value in summary.items() if key != left_out} for left_out in SUMMARY_KINDS]
     for wrong in ("{", "[]", *map(json.dumps, [*({**summary, **change} for change in changed), *less])):
         (tmp_path / "summary.json").write_text(wrong)
-        with pytest.raises(BadInput, match=r"summary\.json: expected"):
+        with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "summary.json")):
             _ = folder.summary
 
 
@@ -150,11 +150,11 @@ def test_parts_that_are_joined_while_they_are_read_do_no_harm(recorded, monkeypa
 
 
 def test_what_is_not_there_is_named(tmp_path):
-    with pytest.raises(BadInput, match=r"nowhere: expected a run folder"):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "nowhere")):
         RunFolder(tmp_path / "nowhere")
-    with pytest.raises(BadInput, match=r"packets: expected this table"):
+    with pytest.raises(BadInput, check=lambda error: error.key == "packets"):
         RunFolder(tmp_path).packets()
-    with pytest.raises(BadInput, match=r"static\.json"):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "static.json")):
         _ = RunFolder(tmp_path).static
 
 
@@ -171,11 +171,11 @@ def test_of_a_killed_run_in_which_nothing_had_happened_the_events_are_none(tmp_p
 
 def test_a_damaged_table_and_an_arena_that_is_not_there_are_named(recorded):
     folder, _, _ = recorded
-    with pytest.raises(BadInput, match=r"arena: expected 0 to 1, got 2"):
+    with pytest.raises(BadInput, check=lambda error: error.key == "arena"):
         folder.robots(2)
     for file in folder.files("ticks"):
         file.write_bytes(file.read_bytes()[:-9])
-    with pytest.raises(BadInput, match=r"ticks(\.parquet)?: expected whole Parquet files"):
+    with pytest.raises(BadInput, check=lambda error: error.where == folder.where("ticks")):
         folder.ticks()
 
 

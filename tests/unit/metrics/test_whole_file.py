@@ -17,7 +17,7 @@ def full(to):
 def test_a_disk_that_is_full_half_way_is_one_line_and_leaves_what_was_there(tmp_path):
     to = tmp_path / "page.html"
     to.write_text("before")
-    with pytest.raises(BadInput, match="page.html: expected a file that can be written: No space left on device"):
+    with pytest.raises(BadInput, match="page.html: .*No space left on device"):
         full(to)
     assert to.read_text() == "before"
     assert list(tmp_path.iterdir()) == [to]

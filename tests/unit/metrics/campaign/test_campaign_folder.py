@@ -110,38 +110,31 @@ def test_a_time_has_every_statistic(tmp_path, stat):
 
 
 @pytest.mark.parametrize(
-    ("name", "says"),
-    [
-        ("ordre.final", "did you mean order.final?"),
-        ("order.q51", "expected one of"),
-        ("order.censored", "expected a time"),
-        ("", "expected one of"),
-        (".q50", "expected one of"),
-    ],
+    ("name", "hint"),
+    [("ordre.final", "order.final?"), ("order.q51", ""), ("order.censored", "time"), ("", ""), (".q50", "")],
 )
-def test_a_statistic_that_there_is_not_is_refused(tmp_path, name, says):
+def test_a_statistic_that_there_is_not_is_refused(tmp_path, name, hint):
     campaign = CampaignFolder(write_campaign(tmp_path / "a"))
-    with pytest.raises(BadInput) as refused:
+    with pytest.raises(BadInput, check=lambda error: error.key == name and hint in error.expected):
         campaign.statistic(name)
-    assert says in str(refused.value)
 
 
 @pytest.mark.parametrize("point", [-1, 3])
 def test_a_point_that_there_is_not_is_refused(tmp_path, point):
-    with pytest.raises(BadInput, match="expected 0 to 2"):
+    with pytest.raises(BadInput, check=lambda error: error.key == "point"):
         CampaignFolder(write_campaign(tmp_path / "a")).sample("order", point)
 
 
 @pytest.mark.parametrize(
-    ("changes", "says"),
+    ("changes", "key"),
     [
         ({"seeds": [1, 1]}, "seeds"),
         ({"seeds": [True]}, "seeds"),
         ({"seeds": []}, "seeds"),
         ({"points": []}, "points"),
-        ({"points": [{"radio.loss": 0.1}, {}]}, "points[1]: expected a value of each path"),
+        ({"points": [{"radio.loss": 0.1}, {}]}, "points[1]"),
         ({"points": [3]}, "points[0]"),
-        ({"design": "gird"}, "did you mean grid?"),
+        ({"design": "gird"}, "design"),
         ({"duration_s": "1"}, "duration_s"),
         ({"duration_s": True}, "duration_s"),
         ({"outcomes": [{"column": "x", "unit": "", "kind": "level", "help": ""}]}, "outcomes[0].kind"),
@@ -150,37 +143,34 @@ def test_a_point_that_there_is_not_is_refused(tmp_path, point):
         ({"files": [{"what": "a"}]}, "files[0].path"),
         ({"overrides": [3]}, "overrides"),
         ({"modules": []}, "modules"),
-        ({"name": None}, "name: expected a text"),
+        ({"name": None}, "name"),
     ],
 )
-def test_a_damaged_or_foreign_campaign_is_refused_in_one_line(tmp_path, changes, says):
+def test_a_damaged_or_foreign_campaign_is_refused_with_its_key(tmp_path, changes, key):
     folder = rewritten(write_campaign(tmp_path / "a"), **changes)
     with pytest.raises(BadInput) as refused:
         CampaignFolder(folder)
-    assert says in str(refused.value)
-    assert "\n" not in str(refused.value)
+    assert (refused.value.where, refused.value.key.rstrip(".")) == (str(folder / "campaign.json"), key)
 
 
 def test_what_is_no_campaign_is_refused(tmp_path):
-    with pytest.raises(BadInput, match="there is none"):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "nothing")):
         CampaignFolder(tmp_path / "nothing")
-    with pytest.raises(BadInput, match="expected a campaign's folder"):
+    with pytest.raises(BadInput, check=lambda error: (error.where, error.key) == (str(tmp_path), "campaign.json")):
         CampaignFolder(tmp_path)
-    (tmp_path / "campaign.json").write_text("[]")
-    with pytest.raises(BadInput, match="expected an object"):
-        CampaignFolder(tmp_path)
-    (tmp_path / "campaign.json").write_text("{")
-    with pytest.raises(BadInput, match="expected what a campaign was asked for"):
-        CampaignFolder(tmp_path)
+    for text in ("[]", "{"):
+        (tmp_path / "campaign.json").write_text(text)
+        with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "campaign.json")):
+            CampaignFolder(tmp_path)
 
 
 def test_a_damaged_table_is_refused_when_it_is_read(tmp_path):
     folder = write_campaign(tmp_path / "a")
     (folder / "summary.parquet").write_text("no table")
-    with pytest.raises(BadInput, match="summary.parquet: expected a whole Parquet file"):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(folder / "summary.parquet")):
         _ = CampaignFolder(folder).runs
     pl.DataFrame({"run": [0]}).write_parquet(folder / "summary.parquet")
-    with pytest.raises(BadInput, match="point: expected this column"):
+    with pytest.raises(BadInput, check=lambda error: error.key == "point"):
         _ = CampaignFolder(folder).runs
 
 

@@ -38,13 +38,13 @@ def test_a_film_is_of_one_arena(tmp_path):
     both.write_parquet(tmp_path / "ticks.parquet")
     folder = Folder(tmp_path, two_groups(arenas=2))
     np.testing.assert_array_equal(film_of(folder, 1, "run").pose, moved.pose)
-    with pytest.raises(BadInput, match="run: arena: expected 0 to 1, got 2"):
+    with pytest.raises(BadInput, check=lambda error: (error.where, error.key) == ("run", "arena")):
         film_of(folder, 2, "run")
 
 
 def test_a_run_without_a_tick_yet_is_refused():
     empty = SimpleNamespace(static=two_groups(), measured={}, ticks=lambda _: ticks_frame(film())[:0])
-    with pytest.raises(BadInput, match="run: holds no tick yet"):
+    with pytest.raises(BadInput, check=lambda error: error.where == "run"):
         film_of(empty, 0, "run")
 
 
@@ -119,18 +119,17 @@ def test_one_tick_is_a_film_of_one_frame():
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "option", "number"),
     [
-        ({"from_s": 121.0}, "--from: expected a time that was recorded, 0 to 120 s; got 121"),
-        ({"from_s": float("nan")}, "--from: expected a time that was recorded"),
-        ({"until_s": -1.0}, "--until: expected a time that was recorded"),
-        ({"from_s": 5.0, "until_s": 5.0}, "--until: expected a time after --from, 5 s; got 5"),
-        ({"frames_per_s": 0.0}, "--fps: expected a number above 0 and at most 1000, got 0"),
-        ({"speed": -1.0}, "--speed: expected a number above 0"),
-        ({"speed": 0.001}, "--speed: expected no more than 20000 frames; 0.001 x makes 1200001"),
+        ({"from_s": 121.0}, "--from", "120"),
+        ({"from_s": float("nan")}, "--from", "120"),
+        ({"until_s": -1.0}, "--until", "120"),
+        ({"from_s": 5.0, "until_s": 5.0}, "--until", "--from"),
+        ({"frames_per_s": 0.0}, "--fps", "1000"),
+        ({"speed": -1.0}, "--speed", "1000"),
+        ({"speed": 0.001}, "--speed", "1200001"),
     ],
 )
-def test_what_is_no_film_is_refused(given, told):
-    with pytest.raises(BadInput) as error:
+def test_what_is_no_film_is_refused(given, option, number):
+    with pytest.raises(BadInput, check=lambda error: error.where == option and number in error.expected):
         cut(frames_per_s=10.0, **given) if "speed" in given else cut(**given)
-    assert str(error.value).startswith(told)

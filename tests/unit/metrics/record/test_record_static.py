@@ -73,33 +73,29 @@ def test_what_was_written_is_read_back_equal(tmp_path_factory, of):
 @pytest.mark.parametrize(
     ("change", "fault"),
     [
-        ({"wheels": 3}, "expected the static part of a run: .*wheels"),
-        ({"groups": [{"name": "a"}]}, "expected the static part of a run: 'body'"),
-        ({"obstacles": None}, "expected the static part of a run"),
-        ({"obstacles": []}, "expected the static part of a run: no size, or not as many obstacles as arenas"),
-        ({"rate_hz": ["g-0"]}, "expected the static part of a run: .*where a run writes int"),
-        ({"rate_hz": 0}, "expected the static part of a run: .*no rate"),
-        ({"robot_names": [["g-0"]]}, "expected the static part of a run: .*where a run writes str"),
-        ({"robot_names": ["g-0"]}, "expected the static part of a run: groups that do not hold each robot once"),
-        ({"range_m": True}, "expected the static part of a run: 'True' where a run writes"),
+        ({"wheels": 3}, "wheels"),
+        ({"groups": [{"name": "a"}]}, "body"),
+        ({"obstacles": None}, ""),
+        ({"obstacles": []}, "obstacles"),
+        ({"rate_hz": ["g-0"]}, "int"),
+        ({"rate_hz": 0}, "rate"),
+        ({"robot_names": [["g-0"]]}, "str"),
+        ({"robot_names": ["g-0"]}, "groups"),
+        ({"range_m": True}, "True"),
     ],
 )
 def test_what_is_no_static_is_refused(tmp_path, change, fault):
     path = tmp_path / "static.json"
     write_static(static(2), path)
     path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
-    with pytest.raises(BadInput, match=rf"static\.json: {fault}"):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(path) and fault in error.expected):
         read_static(path)
 
 
-@pytest.mark.parametrize("text", ["", "[1]", "{", "\x00"])
-def test_what_is_no_json_object_of_ours_is_refused(tmp_path, text):
+@pytest.mark.parametrize("text", [None, "", "[1]", "{", "\x00"])
+def test_what_is_no_json_object_of_ours_or_not_there_is_refused(tmp_path, text):
     path = tmp_path / "static.json"
-    path.write_text(text)
-    with pytest.raises(BadInput, match=r"static\.json: expected the static part of a run"):
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(BadInput, check=lambda error: error.where == str(path)):
         read_static(path)
-
-
-def test_a_file_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(BadInput, match=r"static\.json: expected a file"):
-        read_static(tmp_path / "static.json")

@@ -102,5 +102,5 @@ def test_a_metric_named_like_a_column_is_refused(tmp_path):
         name = "heard"
 
     metrics = Metrics([Heard()])
-    with pytest.raises(BadInput, match=r"metrics\.heard: expected another name"):
+    with pytest.raises(BadInput, check=lambda error: error.key == "metrics.heard"):
         TickRecorder(tmp_path, metrics, StillClock()).begin(static(2))

@@ -78,14 +78,14 @@ def test_a_table_that_does_not_agree_with_the_summary_is_named(folder, table, co
 @pytest.mark.parametrize(
     ("table", "change", "state", "text"),
     [
-        ("radio_distances", pl.lit(7.0).alias("pdr"), State.DAMAGED, r"pdr is not heard / intended in \d+ rows"),
-        ("radio_distances", pl.col("pdr").cast(pl.String), State.DAMAGED, "pdr is of type String, expected Float64"),
-        ("radio_distances", pl.lit(None, pl.Float64).alias("from_m"), State.DAMAGED, "from_m is null in"),
-        ("radio_robots", pl.col("robot").reverse(), State.DAMAGED, r"flock-4 \(arena 0\) stands in the place"),
-        ("radio_robots", pl.lit(0, pl.Int64).alias("as_receiver_heard"), State.DIFFERS, "0 heard over receivers and"),
-        ("radio_robots", pl.lit(-1, pl.Int64).alias("packets"), State.DAMAGED, "packets is below 0 in 10 rows"),
-        ("radio_links", pl.lit(99, pl.Int32).alias("sender"), State.DAMAGED, "sender is beyond 4, the last of static"),
-        ("radio_links", pl.lit(2, pl.Int32).alias("arena"), State.DAMAGED, "arena is beyond 1, the last of static"),
+        ("radio_distances", pl.lit(7.0).alias("pdr"), State.DAMAGED, r"pdr .*heard / intended"),
+        ("radio_distances", pl.col("pdr").cast(pl.String), State.DAMAGED, "pdr .*String.*Float64"),
+        ("radio_distances", pl.lit(None, pl.Float64).alias("from_m"), State.DAMAGED, "from_m .*null"),
+        ("radio_robots", pl.col("robot").reverse(), State.DAMAGED, r"flock-4 \(arena 0\)"),
+        ("radio_robots", pl.lit(0, pl.Int64).alias("as_receiver_heard"), State.DIFFERS, "0 heard"),
+        ("radio_robots", pl.lit(-1, pl.Int64).alias("packets"), State.DAMAGED, "packets .*10 rows"),
+        ("radio_links", pl.lit(99, pl.Int32).alias("sender"), State.DAMAGED, "sender .*4"),
+        ("radio_links", pl.lit(2, pl.Int32).alias("arena"), State.DAMAGED, "arena .*1"),
     ],
 )
 def test_what_cannot_be_in_a_table_is_named(folder, table, change, state, text):
@@ -132,7 +132,7 @@ def test_links_are_off_unless_asked_for_and_without_a_radio_there_is_no_table(tm
     assert record(tmp_path / "radio", of, [quiet]).keys() == {"ticks", "events", "radio_robots", "radio_distances"}
     assert record(tmp_path / "none", of, [truth(of)], links=True).keys() == {"ticks", "events"}
     for table, missing in (("radio_links", "radio"), ("radio_robots", "none")):
-        with pytest.raises(BadInput, match=f"{table}: expected this table"):
+        with pytest.raises(BadInput, check=lambda error, table=table: error.key == table):
             getattr(RunFolder(tmp_path / missing), table)()
     assert len(RunFolder(tmp_path / "radio").radio_distances()) == 0
 

@@ -110,7 +110,7 @@ def test_the_first_robot_with_rays_is_selected_unless_another_is_named():
 
 
 def test_a_robot_that_is_not_there_cannot_be_selected(tmp_path):
-    with pytest.raises(BadInput, match=r"run\.rrd: selected: expected a robot such as flock-0; got 'nobody'"):
+    with pytest.raises(BadInput, check=lambda error: error.key == "selected" and "'nobody'" in error.expected):
         record(tmp_path / "run.rrd", static(2), [], selected="nobody")
 
 
@@ -119,5 +119,5 @@ def test_a_robot_that_is_not_there_cannot_be_selected(tmp_path):
 )
 def test_rays_and_light_are_told_of_only_if_the_selected_body_has_them(body, rays, light):
     text = about(static(body=load_body(body)), 0, "flock-1", 1)
-    assert "The ring marks flock-1." in text
+    assert "flock-1" in text
     assert ("rays" in text, "light" in text) == (rays, light)
