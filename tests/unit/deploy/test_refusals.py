@@ -11,17 +11,15 @@ from tests.support.deploy.commands import called
 
 
 def test_each_says_what_and_where_and_what_to_do():
-    assert refusal(OSError(errno.EMFILE, "Too many open files", "/x")) == (
-        "/x: Too many open files (raise the limit: ulimit -n)"
-    )
-    assert str(refusal(BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable"))).startswith(
-        "Resource temporarily"
-    )
-    assert str(refusal(RuntimeError("can't start new thread"))).startswith("no thread can be started (raise the limit")
-    assert refusal(MemoryError()) == "no memory is left (fewer robots, seeds or runners need less)"
+    files = str(refusal(OSError(errno.EMFILE, "Too many open files", "/x")))
+    assert files.startswith("/x: Too many open files")
+    assert "ulimit -n" in files
+    assert "temporarily unavailable" in str(refusal(BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")))
+    assert "raise the limit" in str(refusal(RuntimeError("can't start new thread")))
+    assert "fewer robots" in str(refusal(MemoryError()))
     with pytest.raises(MemoryError) as told:
         np.empty(2**56)
-    assert str(refusal(told.value)).startswith("no memory is left: Unable to allocate")
+    assert "Unable to allocate" in str(refusal(told.value))
     assert (
         refusal(RuntimeError("wrong")) is refusal(FileNotFoundError(errno.ENOENT, "x")) is refusal(KeyError()) is None
     )
@@ -35,10 +33,8 @@ def test_the_command_line_ends_with_that_line_and_passes_on_what_is_a_mistake(mo
         monkeypatch.setattr(cli, "app", app)
         return called(monkeypatch, capsys, "run")
 
-    assert raises(OSError(errno.EMFILE, "Too many open files")) == (
-        1,
-        "",
-        "error: Too many open files (raise the limit: ulimit -n)\n",
-    )
+    code, out, errors = raises(OSError(errno.EMFILE, "Too many open files"))
+    assert (code, out, errors.count("\n")) == (1, "", 1)
+    assert errors.startswith("error: Too many open files")
     with pytest.raises(RuntimeError, match="a mistake"):
         raises(RuntimeError("a mistake"))

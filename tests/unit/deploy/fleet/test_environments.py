@@ -20,7 +20,7 @@ def test_an_agent_needs_three_packages_beside_swarmwire_and_a_driver_its_own():
     assert [pin.name for pin in pins(["epuck2"], [], (3, 11))] == ["eclipse-zenoh", "msgpack", "numpy"]
     assert {"rosbags", "lz4", "ruamel-yaml"} <= {pin.name for pin in pins(["ros2"], [], sys.version_info[:2])}
     assert "scipy" in [pin.name for pin in pins(["epuck2"], ["scipy"], (3, 11))]
-    with pytest.raises(BadInput, match="packages: not-there: is not installed here"):
+    with pytest.raises(BadInput, match="^packages: not-there: "):
         pins(["epuck2"], ["not-there"], (3, 11))
 
 
@@ -34,10 +34,10 @@ def test_what_only_some_versions_of_python_need_goes_to_robots_that_have_them():
 @pytest.mark.parametrize(
     ("changed", "expected"),
     [
-        ({"machine": "armv7l", "bits": 32}, "expected aarch64 or x86_64 with 64 bits, got armv7l with 32 bits"),
+        ({"machine": "armv7l", "bits": 32}, "got armv7l with 32 bits"),
         ({"bits": 32}, "got aarch64 with 32 bits"),
-        ({"libc": ["", ""]}, "expected CPython on Linux with glibc, got cpython on Linux with another C library"),
-        ({"implementation": "pypy"}, "got pypy on Linux with glibc"),
+        ({"libc": ["", ""]}, "another C library"),
+        ({"implementation": "pypy"}, "got pypy"),
     ],
 )
 def test_a_platform_without_wheels_is_refused(changed, expected):

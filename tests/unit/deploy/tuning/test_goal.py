@@ -66,15 +66,16 @@ def test_which_way_is_better():
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "expected"),
     [
-        ("order", 'expected "min OUTCOME.STAT"'),
-        ("least order", 'expected "min OUTCOME.STAT"'),
-        ("min", 'expected "min OUTCOME.STAT"'),
-        ("min ordr.final", "ordr.final: expected one of .*did you mean order.final"),
-        ("min order.final.censored", "expected a time"),
+        ("order", "OUTCOME.STAT"),
+        ("least order", "OUTCOME.STAT"),
+        ("min", "OUTCOME.STAT"),
+        ("min ordr.final", "order.final"),
+        ("min order.final.censored", "a time"),
     ],
 )
-def test_another_goal_is_refused(text, told):
-    with pytest.raises(BadInput, match=f"^--goal: .*{told}"):
+def test_another_goal_is_refused(text, expected):
+    with pytest.raises(BadInput, match=expected) as refused:
         goal_of(text, (ORDER, TIME), LIMIT_S)
+    assert refused.value.where == "--goal"

@@ -34,7 +34,7 @@ def test_choices_are_toml_values_known_by_their_texts():
 def test_what_is_none_of_it_is_refused_by_its_name(text):
     with pytest.raises(BadInput) as refused:
         search(text)
-    assert str(refused.value).startswith(f"--search {text}: expected ")
+    assert refused.value.where == f"--search {text}"
     assert "\n" not in str(refused.value)
     assert "COUNT" not in str(refused.value)
 
@@ -49,8 +49,7 @@ def test_fresh_seeds_are_none_of_those_used():
     assert fresh_seeds("3", (1, 2, 5)) == (6, 7, 8)
     assert fresh_seeds("10:12", (1, 2, 5)) == (10, 11)
     assert fresh_seeds("3,4", (1, 2, 5)) == (3, 4)
-    for text, told in (("5:9", "5 is among both"), ("0", "expected how many"), ("x", "expected how many")):
-        with pytest.raises(BadInput, match=f"^--check-seeds: .*{told}"):
-            fresh_seeds(text, (1, 2, 5))
-    with pytest.raises(BadInput, match="^--check-seeds: .*too few"):
-        fresh_seeds("2", (2**63 - 1,))
+    for text, used in (("5:9", (1, 2, 5)), ("0", (1, 2, 5)), ("x", (1, 2, 5)), ("2", (2**63 - 1,))):
+        with pytest.raises(BadInput) as refused:
+            fresh_seeds(text, used)
+        assert refused.value.where == "--check-seeds"
