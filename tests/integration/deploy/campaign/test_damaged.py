@@ -54,7 +54,13 @@ def refused(call, *arguments):
     with pytest.raises(BadInput) as told:
         call(*arguments)
     assert "\n" not in str(told.value)
-    return str(told.value)
+    assert told.value.expected
+    return told.value
+
+
+def at(error):
+    """The file and the key that an error names."""
+    return error.where, error.key
 
 
 def taken_up(folder):
@@ -92,7 +98,7 @@ def test_the_command_line_says_so_in_one_line(half, monkeypatch, capsys):
     part.write_bytes(part.read_bytes()[:-9])
     code, _, errors = called(monkeypatch, capsys, "sweep", "--resume", half)
     assert code == 2
-    assert errors.startswith(f"error: {part}: expected a whole Parquet file: ")
+    assert errors.startswith(f"error: {part}: ")
     assert errors.count("\n") == 1
 
 
@@ -101,7 +107,7 @@ def test_a_damaged_part_is_told_by_its_name_and_without_it_its_runs_are_run_agai
     part = half / "parts" / "part-00000001.parquet"
     part.write_bytes(data)
     for call in (resume, lambda folder: CampaignRun(folder, 1).again()):
-        assert refused(call, half).startswith(f"{part}: expected a whole Parquet file: ")
+        assert refused(call, half).where == str(part)
     part.unlink()
     assert resume(half).is_over
     assert rows_in(half) == rows_in(whole)
@@ -111,7 +117,7 @@ def test_a_damaged_part_is_told_by_its_name_and_without_it_its_runs_are_run_agai
 def test_a_damaged_series_is_told_by_its_name_and_without_it_the_table_is_whole(half, whole):
     part = next((half / "series").glob("part-*"))
     part.write_bytes(b"")
-    assert refused(resume, half).startswith(f"{part}: expected a whole Parquet file: ")
+    assert refused(resume, half).where == str(part)
     part.unlink()
     assert resume(half).is_over
     assert rows_in(half) == rows_in(whole)
@@ -121,20 +127,22 @@ def test_series_of_another_type_are_told_by_file_and_column(half):
     first, second = sorted((half / "series").glob("part-*"))
     pl.read_parquet(second).with_columns(pl.col("order").cast(pl.String)).write_parquet(second)
     its = campaign_folder.CampaignFolder(half, read_campaign(half))
-    assert refused(its.finish, 1).startswith(f"{second}: order: expected ")
+    assert at(refused(its.finish, 1)) == (str(second), "order")
     assert first.exists()
 
 
 def test_a_table_of_another_campaign_is_told_by_the_first_strange_column(half):
     part = half / "parts" / "part-00000000.parquet"
     rows = pl.read_parquet(part)
-    for frame, told in (
-        (rows.drop("order.mean"), "order.mean: expected this column of the campaign's table, as Float64"),
-        (rows.with_columns(pl.col("seed").cast(pl.String)), "seed: expected this column of the campaign's table, as I"),
-        (rows.with_columns(run=pl.col("run") + 8), "run: expected runs from 0 to 3"),
+    for frame, column, expected in (
+        (rows.drop("order.mean"), "order.mean", "Float64"),
+        (rows.with_columns(pl.col("seed").cast(pl.String)), "seed", "Int"),
+        (rows.with_columns(run=pl.col("run") + 8), "run", "0 to 3"),
     ):
         frame.write_parquet(part)
-        assert refused(resume, half).startswith(f"{part}: {told}")
+        error = refused(resume, half)
+        assert at(error) == (str(part), column)
+        assert expected in error.expected
 
 
 def test_files_of_others_in_the_folder_are_left_alone(half, whole):
@@ -166,8 +174,8 @@ def test_files_of_others_in_the_folder_are_left_alone(half, whole):
 def test_what_campaigns_never_say_is_refused_by_its_key(whole, key, value):
     about = whole / "campaign.json"
     about.write_text(json.dumps({**json.loads(about.read_text()), key: value}))
-    assert refused(resume, whole).startswith(f"{about}: {key}")
-    assert refused(CampaignRun, whole, 0).startswith(f"{about}: {key}")
+    for error in (refused(resume, whole), refused(CampaignRun, whole, 0)):
+        assert (error.where, error.key.startswith(key)) == (str(about), True)
 
 
 def test_a_campaign_that_lacks_any_key_is_refused(whole):
@@ -175,12 +183,14 @@ def test_a_campaign_that_lacks_any_key_is_refused(whole):
     found = json.loads(about.read_text())
     for key in found:
         about.write_text(json.dumps({name: value for name, value in found.items() if name != key}))
-        assert refused(read_campaign, whole).startswith(f"{about}: ")
+        assert refused(read_campaign, whole).where == str(about)
 
 
 def test_a_campaign_that_ended_before_its_first_run_says_what_to_do(half):
     (half / "campaign.json").unlink()
-    assert "take the folder away and begin again" in refused(resume, half)
+    error = refused(resume, half)
+    assert error.where == str(half)
+    assert "begin again" in error.expected
 
 
 def test_a_summary_beside_unreadable_others_is_kept(whole):
@@ -195,19 +205,13 @@ def test_a_package_that_is_no_more_has_changed(whole):
     about = whole / "campaign.json"
     found = json.loads(about.read_text())
     about.write_text(json.dumps({**found, "modules": {**found["modules"], "gone_away": "0"}}))
-    assert "module gone_away has changed since" in refused(resume, whole)
-    assert CampaignRun(whole, 0).again().changes == ("module gone_away has changed since",)
+    assert "gone_away" in str(refused(resume, whole))
+    (change,) = CampaignRun(whole, 0).again().changes
+    assert "gone_away" in change
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "told"),
-    [
-        ("order.final", "much", "expected a column of numbers"),
-        ("ended", None, "expected how each run ended"),
-        ("run", None, "expected a column of whole numbers"),
-    ],
-)
-def test_reports_refuse_a_table_of_other_types_by_its_column(whole, name, value, told):
+@pytest.mark.parametrize(("name", "value"), [("order.final", "much"), ("ended", None), ("run", None)])
+def test_reports_refuse_a_table_of_other_types_by_its_column(whole, name, value):
     table = whole / "summary.parquet"
     pl.read_parquet(table).with_columns(pl.lit(value, pl.String).alias(name)).write_parquet(table)
-    assert refused(lambda: CampaignFolder(whole).runs) == f"{table}: {name}: {told}"
+    assert at(refused(lambda: CampaignFolder(whole).runs)) == (str(table), name)

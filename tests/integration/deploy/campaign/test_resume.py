@@ -88,7 +88,7 @@ def test_failed_runs_stay_unless_they_are_to_be_tried_again(tmp_path, whole):
     agent = whole / "scenario" / "files" / "stumbling.py"
     campaign = read_campaign(whole)
     agent.write_text(agent.read_text().replace("< self.share", "< 0.0"))
-    with pytest.raises(BadInput, match="scenario/files/stumbling.py is not as the run left it"):
+    with pytest.raises(BadInput, match="scenario/files/stumbling.py"):
         resume(whole, retry_failed=True)
     _say_as_it_is_now(whole, agent)
     done = resume(whole, retry_failed=True)
@@ -113,12 +113,12 @@ def _say_as_it_is_now(folder, agent):
 def test_other_code_versions_and_machines_are_refused_unless_people_insist(whole):
     found = json.loads((whole / "campaign.json").read_text())
     for key, value, told in (
-        ("modules", {**found["modules"], "swarmwire.world": "0"}, "module swarmwire.world has changed"),
-        ("versions", {**found["versions"], "numpy": "1.0"}, r"numpy is .*; it was 1\.0"),
-        ("cpu", "another", "the CPU is .*; it was another"),
+        ("modules", {**found["modules"], "swarmwire.world": "0"}, "swarmwire.world"),
+        ("versions", {**found["versions"], "numpy": "1.0"}, r"numpy.* 1\.0"),
+        ("cpu", "another", "CPU.* another"),
     ):
         (whole / "campaign.json").write_text(json.dumps({**found, key: value}))
-        with pytest.raises(BadInput, match=f"^--resume {whole}: {told}.*--anyway"):
+        with pytest.raises(BadInput, match=f"^--resume {whole}: .*{told}.*--anyway"):
             resume(whole)
         assert resume(whole, anyway=True).is_over
 

@@ -221,7 +221,7 @@ def key_with_a_passphrase(fleet):
     ("bad", "told"),
     [
         (changed_key, "another machine"),
-        (unknown_key, "--trust"),
+        (unknown_key, "is not in"),
         (switched_off, "cannot be reached"),
         (key_not_let_in, "ssh-copy-id -p"),
         (key_with_a_passphrase, "/locked cannot be used"),

@@ -28,17 +28,21 @@ def test_a_tuning_says_what_it_found_what_that_is_worth_and_what_to_do_next(tmp_
     assert (code, errors) == (0, "")
     lines = [" ".join(line.split()) for line in out.splitlines()]
     best = trials_in(folder)["value"].arg_min()
-    assert lines[0] == "bowl: min bowl.final.q50: 20 trials x 2 seeds"
-    assert any(re.fullmatch(rf"20/20 trials, best: .* \(trial {best}\), 0 s left", line) for line in lines)
-    assert f"bowl: the best of 20 trials is trial {best}" in lines
+    assert lines[0].endswith("min bowl.final.q50: 20 trials x 2 seeds")
+    assert any(re.match(rf"20/20 trials, .* \(trial {best}\)", line) for line in lines)
     assert any(re.fullmatch(r"│ metrics.0.at │ 0.[67]\d* │ 0 to 1 │ \d+ % │", line) for line in lines)
-    assert any(re.fullmatch(r"│ the scenario's own │ │ 0.36 \(0.36 to 0.36\) │", line) for line in lines)
-    assert lines[-4:] == [
-        f"written: {folder}",
-        f"run the best: swarmwire run {folder}/best.toml",
-        f"compare all outcomes: swarmwire compare {folder}/check/own {folder}/check/trial-{best}",
-        f"try more: swarmwire tune --resume {folder} --trials 40",
-    ]
+    assert "0.36 (0.36 to 0.36)" in out
+    for line, command in zip(
+        lines[-4:],
+        (
+            str(folder),
+            f"swarmwire run {folder}/best.toml",
+            f"swarmwire compare {folder}/check/own {folder}/check/trial-{best}",
+            f"swarmwire tune --resume {folder} --trials 40",
+        ),
+        strict=True,
+    ):
+        assert line.endswith(f": {command}")
     assert json.loads((folder / "tuning.json").read_text())["command"].startswith(f"swarmwire tune {scenario}")
     code, out, _ = typed("compare", folder / "check" / "own", folder / "check" / f"trial-{best}", "--outcome", "bowl")
     assert code == 0
@@ -51,22 +55,22 @@ def test_a_tuning_says_what_it_found_what_that_is_worth_and_what_to_do_next(tmp_
         ([], "SCENARIO: is missing"),
         (["bowl.toml", "--search", AT], "--goal: is missing"),
         (["bowl.toml", *GOAL], "--search: is missing"),
-        (["no.toml", *GOAL, "--search", AT], "no.toml: expected a readable file"),
-        (["bowl.toml", *GOAL, "--search", "robots.pair.cuont=1:2"], "--search robots.pair.cuont=1:2: .*unknown key"),
+        (["no.toml", *GOAL, "--search", AT], "no.toml: "),
+        (["bowl.toml", *GOAL, "--search", "robots.pair.cuont=1:2"], "--search robots.pair.cuont=1:2: .*cuont: "),
         (["bowl.toml", *GOAL, "--search", "metrics.0.at=0:2"], "--search metrics.0.at=0:2: .*at most 1"),
         (["bowl.toml", *GOAL, "--search", "metrics.0.at=-1:1"], "--search metrics.0.at=-1:1: .*at least 0"),
         (["bowl.toml", *GOAL, "--search", "robots.pair.body=epuck,epock"], "--search robots.pair.body=.*epuck"),
-        (["bowl.toml", *GOAL, "--search", "seed=1:5"], "--search seed=1:5: .*seed cannot vary"),
-        (["bowl.toml", *GOAL, "--search", AT, "--search", AT], f"--search {AT}: expected each path once"),
-        (["bowl.toml", "--goal", "min bawl", "--search", AT], "--goal: bawl: expected one of .*bowl"),
+        (["bowl.toml", *GOAL, "--search", "seed=1:5"], "--search seed=1:5: "),
+        (["bowl.toml", *GOAL, "--search", AT, "--search", AT], f"--search {AT}: .*once"),
+        (["bowl.toml", "--goal", "min bawl", "--search", AT], "--goal: bawl: .*bowl"),
         (["bowl.toml", *GOAL, "--search", AT, "--trials", "0"], "--trials: expected 1 to"),
         (["bowl.toml", *GOAL, "--search", AT, "--batch", "0"], "--batch: expected 1 to"),
-        (["bowl.toml", *GOAL, "--search", AT, "--sampler", "tpee"], "--sampler: .*did you mean tpe"),
-        (["bowl.toml", *GOAL, "--search", AT, "--sampler-seed", "-1"], "--sampler-seed: expected"),
-        (["bowl.toml", *GOAL, "--search", AT, "--check-seeds", "20:30"], "--check-seeds: .*20 is among both"),
+        (["bowl.toml", *GOAL, "--search", AT, "--sampler", "tpee"], "--sampler: .*tpe"),
+        (["bowl.toml", *GOAL, "--search", AT, "--sampler-seed", "-1"], "--sampler-seed: "),
+        (["bowl.toml", *GOAL, "--search", AT, "--check-seeds", "20:30"], "--check-seeds: .*20"),
         (["bowl.toml", *GOAL, "--search", AT, "--set", "duration_s=-1"], "--set duration_s=-1"),
-        (["--resume", "nowhere"], "nowhere: expected a tuning's folder"),
-        (["bowl.toml", "--resume", "nowhere"], "SCENARIO: expected --resume without it"),
+        (["--resume", "nowhere"], "nowhere: "),
+        (["bowl.toml", "--resume", "nowhere"], "SCENARIO: .*--resume"),
     ],
 )
 def test_what_cannot_be_tuned_is_refused_in_a_line_before_anything_is(
@@ -103,11 +107,12 @@ def test_ctrl_c_ends_it_with_a_word_how_to_go_on(tmp_path, scenario, typed, monk
         )
     assert (code, errors) == (130, "")
     first, best, last = out.splitlines()
-    assert first == "interrupted: 3 of 6 trials are done"
-    assert re.fullmatch(r"best so far: \S+ with metrics.0.at=\S+", best)
-    assert last == f"go on: swarmwire tune --resume {folder}"
+    assert "3 of 6 trials" in first
+    assert re.search(r"metrics.0.at=\S+$", best)
+    assert last.endswith(f"swarmwire tune --resume {folder}")
     code, out, _ = typed("tune", "--resume", folder)
-    assert (code, out.splitlines()[0]) == (0, "bowl: min bowl.final.q50: 6 trials x 1 seeds; 3 of them are there")
+    assert code == 0
+    assert re.search("6 trials x 1 seeds; 3 of them", out.splitlines()[0])
 
 
 def test_where_all_trials_fail_it_is_a_line_and_exit_code_1(tmp_path, scenario, monkeypatch, capsys, here):
@@ -115,4 +120,4 @@ def test_where_all_trials_fail_it_is_a_line_and_exit_code_1(tmp_path, scenario, 
     arguments = ("--search", searched, *GOAL, "--trials", "2", "--seeds", "1", "--out", folder, "--quiet")
     code, out, errors = called(monkeypatch, capsys, "tune", scenario, *arguments)
     assert (code, out) == (1, "")
-    assert re.fullmatch(r"error: \S+: all 2 trials failed, such as trial 0: ValueError: too fast, in tick .*\n", errors)
+    assert re.fullmatch(r"error: \S+: all 2 trials failed.* trial 0: ValueError: too fast.*\n", errors)
