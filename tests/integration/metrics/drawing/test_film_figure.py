@@ -99,8 +99,7 @@ def test_obstacles_that_robots_push_look_otherwise_than_fixed_ones_and_the_legen
     assert shown(of, 0, (pillar.x_m, pillar.y_m), (box.x_m, box.y_m)) == [OBSTACLE, MOVABLE]
     assert "movable" in legend_of(of)
     assert "movable" not in legend_of(film())
-    assert dict(facts_of_scenario(static))["obstacles"] == "1 cylinder"
-    assert ("", "1 movable box") in facts_of_scenario(static)
+    assert {"1 cylinder", "1 movable box"} <= {text for _, text in facts_of_scenario(static)}
 
 
 @pytest.mark.parametrize(
@@ -150,7 +149,8 @@ def test_only_robots_that_fly_cast_a_shadow():
 
 
 def test_the_legend_tells_how_high_a_group_flies():
-    assert legend_of(flying(1.0))[:2] == ["air (1), 1 m up", "floor (2)"]
+    air, floor = legend_of(flying(1.0))[:2]
+    assert (air[:7], "1 m" in air, floor) == ("air (1)", True, "floor (2)")
 
 
 @pytest.mark.parametrize("index", [0, 30])
@@ -208,22 +208,17 @@ def test_a_crowd_is_drawn():
 
 
 @pytest.mark.parametrize(
-    ("size", "metrics", "told"),
-    [
-        (10, None, "--size: expected 100 to 8000 pixels, got 10"),
-        (300, ["ordr"], "--metric: ordr: was not recorded; expected one of order, min_gap (did you mean order?)"),
-        (300, ["order"] * 5, "--metric: expected 4 at most, got 5"),
-    ],
+    ("size", "metrics", "where", "key"),
+    [(10, None, "--size", ""), (300, ["ordr"], "--metric", "ordr"), (300, ["order"] * 5, "--metric", "")],
 )
-def test_what_cannot_be_drawn_is_refused(size, metrics, told):
-    with pytest.raises(BadInput) as error:
+def test_what_cannot_be_drawn_is_refused(size, metrics, where, key):
+    with pytest.raises(BadInput, check=lambda error: (error.where, error.key) == (where, key)):
         FilmFigure(film(), size, metrics)
-    assert str(error.value) == told
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "absent/a.png", "."])
 def test_a_path_that_cannot_be_written_is_refused(tmp_path, name):
-    with pytest.raises(BadInput, match="expected a"):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / name)):
         FilmFigure(film(), 300).save(0, tmp_path / name)
     assert not any(tmp_path.iterdir())
 

@@ -1,5 +1,6 @@
 """Pictures of a robot, of a radio's coverage and of delivery over distance show what they are drawn from."""
 
+import re
 import struct
 import sys
 from dataclasses import replace
@@ -75,19 +76,20 @@ def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells
 
 def test_the_facts_are_those_of_the_data_sheet():
     facts = dict(facts_of(load_body("epuck")))
-    assert facts["size"] == "7 cm across, 8.6 cm high"
-    assert facts["wheels"] == "5.3 cm apart"
-    assert facts["proximity"] == "8 rays of 10 cm"
-    assert facts["odometry"] == "slip 5 %, step 0.13 mm"
+    numbers = {name: re.findall(r"[\d.]+ (?:%|\w+)", text) for name, text in facts.items()}
+    assert numbers["size"] == ["7 cm", "8.6 cm"]
+    assert numbers["wheels"] == ["5.3 cm"]
+    assert numbers["proximity"] == ["8 rays", "10 cm"]
+    assert numbers["odometry"] == ["5 %", "0.13 mm"]
     assert "positioning" not in facts
-    assert dict(facts_of(load_body("epuck-gps")))["positioning"] == "error 1 cm"
+    assert "1 cm" in dict(facts_of(load_body("epuck-gps")))["positioning"]
 
 
 def test_each_fact_has_a_name_of_its_own():
     for name in body_names():
         names = [fact for fact, _ in facts_of(load_body(name)) if fact]
         assert len(names) == len(set(names)), name
-    assert dict(facts_of(load_body("footbot")))["LEDs"] == "13, the last a beacon"
+    assert dict(facts_of(load_body("footbot")))["LEDs"].startswith("13")
 
 
 def test_own_senses_and_actuators_are_facts_by_their_class():
@@ -99,12 +101,12 @@ def test_own_senses_and_actuators_are_facts_by_their_class():
 
 def test_only_a_body_that_flies_is_told_to():
     flying = body_from({"like": "epuck", "name": "flying", "altitude_m": 1.0}, "flying.toml")
-    assert dict(facts_of(flying))["flies"] == "1 m up"
+    assert "1 m" in dict(facts_of(flying))["flies"]
     assert "flies" not in dict(facts_of(load_body("epuck")))
 
 
 def test_a_size_that_nobody_could_look_at_is_refused(tmp_path):
-    with pytest.raises(BadInput, match="--size: expected 100 to 8000 pixels, got 9000"):
+    with pytest.raises(BadInput, check=lambda error: error.where == "--size" and "8000" in error.expected):
         draw_body(load_body("epuck"), tmp_path / "a.png", 9000)
 
 
@@ -154,31 +156,30 @@ def test_the_curve_is_that_of_the_table_up_to_somewhat_beyond_what_was_heard(tmp
 def test_distances_that_cannot_be_drawn_are_refused(tmp_path):
     of = static(2)
     record(tmp_path, of, [truth(of, departed=departed([]), finished=links([], [], 0, 0))])
-    with pytest.raises(BadInput, match="--pdr: expected a run in which packets went on air"):
-        draw_distances(RunFolder(tmp_path), 0, tmp_path / "pdr.png", 640)
-    with pytest.raises(BadInput, match="--arena: expected 0 to 0, got 1"):
-        draw_distances(RunFolder(tmp_path), 1, tmp_path / "pdr.png", 640)
+    for arena, option in enumerate(("--pdr", "--arena")):
+        with pytest.raises(BadInput, check=lambda error, option=option: error.where == option):
+            draw_distances(RunFolder(tmp_path), arena, tmp_path / "pdr.png", 640)
     (tmp_path / "radio_distances.parquet").unlink()
-    with pytest.raises(BadInput, match="radio_distances: expected this table"):
+    with pytest.raises(BadInput, check=lambda error: error.key == "radio_distances"):
         draw_distances(RunFolder(tmp_path), 0, tmp_path / "pdr.png", 640)
 
 
 @pytest.mark.parametrize(
-    ("change", "text"),
+    ("change", "fault"),
     [
-        (pl.col("pdr").cast(pl.String), "pdr is of type String, expected Float64"),
-        (pl.lit(None, pl.Float64).alias("from_m"), r"from_m is null in \d+ rows"),
-        (pl.lit(7.0).alias("pdr"), r"pdr is not heard / intended in \d+ rows"),
+        (pl.col("pdr").cast(pl.String), "pdr .*String.*Float64"),
+        (pl.lit(None, pl.Float64).alias("from_m"), "from_m .*null"),
+        (pl.lit(7.0).alias("pdr"), "pdr .*heard / intended"),
         (None, "no column pdr"),
     ],
 )
-def test_a_damaged_table_is_refused_with_file_and_fault(tmp_path, change, text):
+def test_a_damaged_table_is_refused_with_file_and_fault(tmp_path, change, fault):
     of = static(6)
     record(tmp_path, of, ticks(DISK, of, 3, count=20))
     file = tmp_path / "radio_distances.parquet"
     table = pl.read_parquet(file)
     (table.drop("pdr") if change is None else table.with_columns(change)).write_parquet(file)
-    with pytest.raises(BadInput, match=rf"radio_distances\.parquet: expected a table as a run writes it, but {text}"):
+    with pytest.raises(BadInput, match=rf"radio_distances\.parquet: .*{fault}"):
         draw_distances(RunFolder(tmp_path), 0, tmp_path / "pdr.png", 640)
     assert not (tmp_path / "pdr.png").exists()
 
@@ -188,9 +189,8 @@ def test_a_damaged_table_is_refused_with_file_and_fault(tmp_path, change, text):
 )
 def test_who_lacks_the_extra_is_told_how_to_get_it(tmp_path, monkeypatch, module, name):
     monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(BadInput) as error:
+    with pytest.raises(BadInput, match=rf"^pictures: .*{name}.*swarmwire-metrics\[report\]"):
         draw_body(load_body("epuck"), tmp_path / "a.png", 300)
-    assert str(error.value) == f"pictures: needs {name}: install swarmwire-metrics[report]"
-    with pytest.raises(BadInput, match="films: needs"):
+    with pytest.raises(BadInput, check=lambda error: error.where == "films"):
         write_mp4(tmp_path / "a.mp4", iter(()), 10.0)
     assert not any(tmp_path.iterdir())

@@ -81,7 +81,7 @@ def test_a_run_is_near_itself(runs, tmp_path):
     delivery = next(row for row in found.radio if row.of.name == "delivery")
     assert delivery.of.log == pytest.approx(delivery.emulated.median, abs=0.01)
     assert delivery.within is None
-    assert "what other seeds would give, only a campaign tells" in verdict(found)
+    assert "campaign" in verdict(found)
 
 
 def test_another_seed_lies_within_the_spread(runs, tmp_path):
@@ -91,9 +91,8 @@ def test_another_seed_lies_within_the_spread(runs, tmp_path):
     assert sum(within) >= 5  # of six each is outside once in eight times
     radio = [row.within for row in found.judged_radio]
     assert len(radio) == len(found.radio) == 5
-    parts = f"({sum(within)} of 6 metrics, {sum(radio)} of 5 of the radio)"
-    told = f"{sum(within) + sum(radio)} of 11 numbers {parts} lie within the spread over 7 runs"
-    assert verdict(found).startswith(told)
+    assert verdict(found).startswith(f"{sum(within) + sum(radio)} of 11 ")
+    assert f"{sum(within)} of 6 metrics, {sum(radio)} of 5 " in verdict(found)
 
 
 def test_a_swarm_at_half_the_speed_does_not(runs, tmp_path):
@@ -101,19 +100,19 @@ def test_a_swarm_at_half_the_speed_does_not(runs, tmp_path):
     assert found.rows[0].metric.name == "speed"
     assert found.rows[0].within is False
     assert found.rows[0].distance > 2.0 * found.rows[0].reach
-    assert "outside: speed" in verdict(found)
+    assert ": speed" in verdict(found)
 
 
 def test_what_is_not_compared_has_its_reason(runs, tmp_path):
     found = compared(runs[1], watched(seed=11), tmp_path)
-    assert found.not_in_log["collisions"] == "contacts are not in the log"
-    assert "who was within range is not in the log" in found.not_in_log["pdr"]  # some were out of it
+    assert "contacts" in found.not_in_log["collisions"]
+    assert "range" in found.not_in_log["pdr"]  # some were out of it
     assert found.undefined == ()
     assert found.never == ("coverage_time_s",)
     lines = left_out(found)
-    assert any(line.startswith("not in the log: collisions: ") for line in lines)
-    assert "happened on neither side: coverage_time_s" in lines
-    assert any("no p-values" in line for line in meanings(found))
+    assert any("collisions: " in line for line in lines)
+    assert any(line.endswith(": coverage_time_s") for line in lines)
+    assert any("p-values" in line for line in meanings(found))
 
 
 def test_a_metric_that_neither_side_can_have_is_passed_over_one_that_one_has_is_told(runs, tmp_path):
@@ -142,8 +141,8 @@ def test_only_the_time_in_common_is_compared(runs, tmp_path):
     assert found.duration_s == pytest.approx(9.9, abs=0.11)
     assert all(len(values) <= 101 for row in found.rows for values in row.runs)
     assert found.radio == ()  # runs have their totals of 20 s alone
-    assert "runs keep totals of all their 20 s" in found.not_compared["delivery"]
-    assert any(line.startswith("not compared: packets sent, delivery, ") for line in left_out(found))
+    assert "20 s" in found.not_compared["delivery"]
+    assert any("packets sent, delivery, " in line for line in left_out(found))
 
 
 def test_of_a_longer_run_the_counts_of_its_ticks_tell_what_the_radio_did_meanwhile(tmp_path):
@@ -180,7 +179,7 @@ def test_of_a_longer_log_the_radio_is_that_of_the_time_that_is_compared(runs, tm
     assert rows["delivery"].of.log == pytest.approx(rows["delivery"].emulated.median, abs=0.02)
     whole = parity(short, measured_log(logs, MEASURES, of.static), MEASURES)
     assert whole.radio == ()
-    assert whole.not_compared["delivery"] == "the log's are of 19.9 s, of which 10 s are compared"
+    assert all(length in whole.not_compared["delivery"] for length in ("19.9 s", "10 s"))
 
 
 def test_latencies_over_a_runs_radio_are_held_against_those_to_the_agent(runs, tmp_path):
@@ -207,7 +206,7 @@ def test_two_runs_have_no_spread(runs, tmp_path):
     two = replace(runs[1], runs=runs[1].runs[:2])
     found = compared(two, watched(seed=11), tmp_path)
     assert not found.judged
-    assert verdict(found) == "2 runs have no spread: give 3 seeds or more."
+    assert verdict(found).startswith("2 runs ")
 
 
 NOTHING = np.empty(0)

@@ -118,8 +118,8 @@ def test_reasons_are_of_metrics_that_there_are():
 def test_without_a_tracker_the_radio_is_measured_and_nothing_else(tmp_path):
     of = measured(tmp_path, tracker=False)
     assert set(of.series) == {"pdr", "throughput", "age_of_information", "latency_air"}
-    assert of.left_out["order"] == "poses are not in the log: no tracker"
-    assert of.notes == ("no poses: without a tracker, what rests on positions is not in the log",)
+    assert "tracker" in of.left_out["order"]
+    assert [("tracker" in note) for note in of.notes] == [True]
     assert of.radio["fates"]["heard"] > 1000
 
 
@@ -127,7 +127,6 @@ def test_clocks_that_are_apart_are_told_and_set_right(tmp_path, emulated):
     series, radio = emulated
     of = measured(tmp_path, ahead_s={"flock-2": 0.3})
     (note,) = of.notes
-    assert note.startswith("clocks up to 0.3 s apart")
     assert "flock-2 +0.3" in note
     assert of.radio["latency_air_s"]["p50"] == pytest.approx(radio["latency_air_s"]["p50"], abs=0.003)
     assert np.nanmean(np.abs(of.series["cohesion"] - series["cohesion"][: len(of.series["cohesion"])])) < 0.01
@@ -137,7 +136,7 @@ def test_a_robot_without_a_log_takes_its_packets_along(tmp_path, emulated):
     folder = as_logs(flock(), tmp_path)
     (folder / "flock-4").rename(tmp_path.parent / f"{tmp_path.name}-away")
     of = measured_log(read_real_logs(folder), MEASURES)
-    assert of.notes == ("no log of flock-4: packets to and from there are left out",)
+    assert ["flock-4" in note for note in of.notes] == [True]
     assert of.static.robots == 5
     assert of.radio["sent"] == pytest.approx(5 / 6 * emulated[1]["sent"], rel=0.02)
     assert of.radio["intended"] == 4 * of.radio["sent"]
@@ -150,14 +149,14 @@ def test_a_robot_that_was_killed_ends_the_comparison_for_all(tmp_path):
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:102]))
     of = measured_log(read_real_logs(folder), MEASURES)
     assert of.duration_s == 10.0
-    assert of.notes == ("the last 9.9 s of other robots are left out: flock-3 ended so early",)
+    assert ["9.9 s" in note and "flock-3" in note for note in of.notes] == [True]
 
 
 def test_robots_that_never_ran_together_are_refused(tmp_path):
     folder = as_logs(flock(), tmp_path)
     path = folder / "flock-3" / "ticks.csv"
     path.write_text(path.read_text().replace(",17672256", ",17672266").replace(",17672257", ",17672267"))
-    with pytest.raises(BadInput, match="ran at the same time: flock-3 began as"):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(folder) and "flock-3" in error.expected):
         measured_log(read_real_logs(folder), MEASURES)
 
 
@@ -165,7 +164,7 @@ def test_logs_that_last_for_years_are_refused_as_a_clock_was_set(tmp_path):
     folder = as_logs(flock(), tmp_path / "logs")
     for path in folder.glob("*/ticks.csv"):
         path.write_text(f"{path.read_text()}999,8e9,0,0.0,0.0,0.0,1,0,0,,,\n")
-    with pytest.raises(BadInput, match="steps in common at most, got [0-9]+: was a clock set meanwhile"):
+    with pytest.raises(BadInput, check=lambda error: (error.where, error.key) == (str(folder), "t_s")):
         measured_log(read_real_logs(folder), MEASURES)
 
 

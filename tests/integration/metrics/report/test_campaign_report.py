@@ -141,8 +141,7 @@ def test_ranges_that_points_were_drawn_from_are_told(tmp_path):
     }
     (folder / "campaign.json").write_text(json.dumps(about | told))
     _, shown = of(folder)
-    for row in (["radio.loss", "from 0 to 0.6"], ["begun", "2026-01-02 03:04 UTC"], ["settings for all", "a=1, b=2"]):
-        assert row in shown.tables[0]
+    assert {"from 0 to 0.6", "2026-01-02 03:04 UTC", "a=1, b=2"} <= {row[1] for row in shown.tables[0]}
 
 
 def test_seeds_are_told_to_the_last_digit(tmp_path):
@@ -169,15 +168,15 @@ def test_what_does_not_vary_or_never_came_is_left_out_and_named(tmp_path):
     }
     _, shown = of(ordinary(tmp_path, numbers=numbers, times={"never_s": lambda *_: None}))
     said = " ".join(shown.said)
-    assert "The same in all runs that have a value, and so left out: components.final ." in said
-    assert "Never there in any run, and so left out: gap_m.final and never_s ." in said
+    assert "left out: components.final ." in said
+    assert "left out: gap_m.final and never_s ." in said
 
 
 def test_what_is_asked_for_is_shown_even_if_it_never_varies(tmp_path):
     numbers = {"order.final": lambda _, rng: rng.random(), "components.final": lambda *_: 1.0}
     _, shown = of(ordinary(tmp_path, numbers=numbers), ["components", "aggregation_time_s"])
     assert [row[2] for row in shown.table("radio.loss", "n")] == ["1"] * 4
-    with pytest.raises(BadInput, match="expected one of order.final"):
+    with pytest.raises(BadInput, check=lambda error: error.key == "ordre" and "order.final" in error.expected):
         of(tmp_path / "made-up", ["ordre"])
 
 
@@ -198,7 +197,7 @@ def test_the_shape_of_what_is_left_is_named(tmp_path, shape, better):
     }
     sections, shown = of(ordinary(tmp_path, vary=vary, numbers=numbers, times={}))
     assert [row[2] for row in shown.table("outcome", "over", "shape") if row[-1] == "better"] == [better]
-    assert "without a curve: `wait.final`" in str(sections["Resilience"].parts[0])
+    assert "`wait.final`" in str(sections["Resilience"].parts[0])
 
 
 def test_a_scenario_may_be_called_anything(tmp_path):

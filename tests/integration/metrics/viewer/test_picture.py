@@ -52,17 +52,17 @@ def test_a_machine_without_a_driver_is_told_what_it_lacks(rrd, monkeypatch):
 
 @pytest.mark.parametrize("tick", [-1, 20])
 def test_a_tick_that_was_not_recorded_is_refused(rrd, tick):
-    with pytest.raises(BadInput, match="tick: expected 0 to 19"):
+    with pytest.raises(BadInput, check=lambda error: error.key == "tick" and "19" in error.expected):
         picture(rrd, "none.png", tick)
 
 
 def test_a_recording_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(BadInput, match=r"none\.rrd: there is no such recording"):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "none.rrd")):
         render_png(tmp_path / "none.rrd", tmp_path / "none.png")
 
 
 @pytest.mark.parametrize("name", ["x.txt", "x", "x.jpg"])
 def test_what_is_no_png_by_name_is_refused(rrd, name):
-    with pytest.raises(BadInput, match=rf"{name}: expected a file name that ends in \.png$"):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(rrd.with_name(name))):
         render_png(rrd, rrd.with_name(name))
     assert not rrd.with_name(name).exists()

@@ -182,7 +182,7 @@ def test_events_of_its_arena_are_told_and_marked_where_they_take_effect(tmp_path
     happened = truth(of, 1, events=(kill, elsewhere)), truth(of, 3, events=(here, elsewhere))
     record(tmp_path / "run.rrd", of, [truth(of), happened[0], truth(of, 2), happened[1]], arena=1)
     told = column(tmp_path / "run.rrd", "/events", "TextLog:text")
-    assert told[0][0].startswith("the run begins: 2 robots")
+    assert "2 robots" in told[0][0]
     assert (told[1], told[3], len(told)) == (["kill: flock-0, flock-1"], ["fail motors: flock-0"], 3)
     assert list(column(tmp_path / "run.rrd", "/plots/shares/event", "Scalars:scalars")) == [1, 3]
 
@@ -250,7 +250,7 @@ def test_a_recording_that_failed_while_it_began_is_closed(tmp_path, monkeypatch)
     recording.end(None)
     state, told = check_recording(tmp_path / "run.rrd")
     assert state is State.PARTIAL
-    assert told.endswith(" MB, no tick in it")  # and not that it was never closed
+    assert "closed" not in told
 
 
 def refuse(*_, **__):
@@ -335,13 +335,13 @@ def test_the_floor_is_one_picture_below_all_else(tmp_path):
 
 
 def test_an_arena_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(BadInput, match=r"run\.rrd: arena: expected 0 to 1"):
+    with pytest.raises(BadInput, check=lambda error: error.key == "arena"):
         record(tmp_path / "run.rrd", static(2, arenas=2), [], arena=2)
 
 
 def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("swarmwire.metrics.viewer.extra.find_spec", lambda _: None)
-    with pytest.raises(BadInput, match=r"run\.rrd: needs rerun-sdk: install swarmwire-metrics\[view\]"):
+    with pytest.raises(BadInput, match=r"run\.rrd: .*swarmwire-metrics\[view\]"):
         RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
 
 
