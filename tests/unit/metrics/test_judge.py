@@ -73,43 +73,39 @@ def script(comparison="at_least", limit=1.0, hold_s=0.0):
     return Condition("script", comparison, limit, hold_s)
 
 
-def test_without_a_time_to_hold_the_first_tick_is_enough():
-    assert one([0, 0.5, 1, 0, 1], script()) == (0.2, "script at least 1", 2)
-
-
-def test_the_stop_time_is_where_the_held_stretch_began():
-    assert one([1, 0, 1, 1, 1, 1], script(hold_s=0.3)) == (0.2, "script at least 1 for 0.3 s", 5)
-
-
-def test_what_does_not_hold_long_enough_until_the_end_is_no_stop():
-    assert one([0, 1, 1, 1], script(hold_s=0.3)) == (None, None, None)
-
-
-def test_what_has_no_value_breaks_the_stretch():
-    assert one([1, 1, NONE, 1, 1, 1], script(hold_s=0.2)) == (pytest.approx(0.3), "script at least 1 for 0.2 s", 5)
-    assert one([NONE] * 3, script("below", 5.0)) == (None, None, None)
-
-
 @pytest.mark.parametrize(
-    ("comparison", "over"), [("at_least", True), ("at_most", True), ("above", False), ("below", False)]
+    ("series", "condition", "stop"),
+    [
+        ([0, 0.5, 1, 0, 1], script(), (0.2, 2)),
+        ([1, 0, 0, 1], script(), (0.0, 0)),
+        ([1, 0, 1, 1, 1, 1], script(hold_s=0.3), (0.2, 5)),
+        ([0, 1, 1, 1], script(hold_s=0.3), None),
+        ([1, 1, NONE, 1, 1, 1], script(hold_s=0.2), (pytest.approx(0.3), 5)),
+        ([NONE] * 3, script("below", 5.0), None),
+        ([1.0], script("at_most"), (0.0, 0)),
+        ([1.0], script("above"), None),
+        ([1.0], script("below"), None),
+    ],
 )
-def test_a_limit_counts_only_where_the_comparison_says_so(comparison, over):
-    assert (one([1.0], script(comparison))[2] == 0) is over
+def test_the_stop_time_is_where_the_first_stretch_that_held_began(series, condition, stop):
+    stop_time_s, over = stop or (None, None)
+    assert one(series, condition) == (stop_time_s, str(condition) if stop else None, over)
+
+
+def test_a_condition_is_told_in_words():
+    assert str(script()) == "script at least 1"
+    assert str(script("above", 0.0, 0.2)) == "script above 0 for 0.2 s"
 
 
 def test_of_several_conditions_any_is_enough_and_the_first_is_named():
     first, second = script("at_least", 2.0), script("above", 0.0, 0.2)
-    assert one([0, 2, 2], first, second)[:2] == (0.1, "script at least 2")
-    assert one([1, 1, 2], first, second)[:2] == (0.2, "script at least 2")
-    assert one([1, 1, 1], first, second)[:2] == (0.0, "script above 0 for 0.2 s")
+    assert one([0, 2, 2], first, second)[:2] == (0.1, str(first))
+    assert one([1, 1, 2], first, second)[:2] == (0.2, str(first))
+    assert one([1, 1, 1], first, second)[:2] == (0.0, str(second))
 
 
 def test_a_count_is_compared_by_its_total():
     assert one([1, 2, 0, 3], Condition("tallied", "at_least", 6.0), kind=Tallied)[2] == 3
-
-
-def test_what_ended_an_arena_stays_whatever_comes_after():
-    assert one([1, 0, 0, 1], script())[0] == 0.0
 
 
 @given(

@@ -172,18 +172,17 @@ def sampled_in(every_s, ticks=12):
     return [int(a) for a, _ in found]
 
 
-def test_a_sampled_metric_is_measured_at_the_start_and_at_each_multiple():
-    assert sampled_in(0.5) == [0] * 5 + [5] * 5 + [10] * 2
-    assert sampled_in(1.0) == [0] * 10 + [10] * 2
-
-
-@pytest.mark.parametrize("every_s", [0.0, 0.05, 0.1])
-def test_no_time_in_between_is_every_tick(every_s):
-    assert sampled_in(every_s) == list(range(12))
-
-
-def test_what_is_no_multiple_of_a_tick_is_sampled_in_the_first_tick_after():
-    assert sampled_in(0.25) == [0, 0, 0, 3, 3, 5, 5, 5, 8, 8, 10, 10]
+@pytest.mark.parametrize(
+    ("every_s", "ticks"),
+    [
+        *((every_s, [*range(12)]) for every_s in (0.0, 0.05, 0.1)),
+        (0.25, [0, 0, 0, 3, 3, 5, 5, 5, 8, 8, 10, 10]),  # the first tick after what is no multiple of a tick
+        (0.5, [0] * 5 + [5] * 5 + [10] * 2),
+        (1.0, [0] * 10 + [10] * 2),
+    ],
+)
+def test_a_sampled_metric_is_measured_at_the_start_and_at_each_multiple(every_s, ticks):
+    assert sampled_in(every_s) == ticks
 
 
 def test_one_sampled_metric_serves_many_runs():

@@ -30,9 +30,9 @@ def events_of(ticks, hold):
     return found
 
 
-def finals(ticks, hold_s=None, of=None, alive=None):
+def finals(ticks, hold_s=None):
     """Of one arena with two robots: + joined, - apart, 0 all dead; at 10 ticks per second."""
-    of = of or static(2)
+    of = static(2)
     metrics = Metrics(list(NAMES) if hold_s is None else [kind(hold_s=hold_s) for kind in KINDS])
     metrics.begin(of)
     for tick, shown in enumerate(ticks):
@@ -42,40 +42,27 @@ def finals(ticks, hold_s=None, of=None, alive=None):
     return tuple(found[name]["final"] for name in NAMES)
 
 
-def test_a_swarm_that_stays_whole_has_no_event():
-    assert finals("+" * 30) == (0.0, None, None, None)
+NO_EVENT = (0.0, None, None, None)
 
 
-def test_a_split_shorter_than_the_hold_is_no_event():
-    assert finals("++" + "-" * 10 + "++") == (0.0, None, None, None)
-
-
-def test_a_split_of_the_hold_is_an_event_and_its_length_counts_from_its_start():
-    assert finals("++" + "-" * 11 + "++") == (1.0, 1.1, 1.1, 0.0)
-
-
-def test_the_median_and_the_worst_are_over_events_that_re_joined():
-    lengths = (12, 30, 15, 5)
-    assert finals("+" + "".join("-" * n + "+" for n in lengths)) == (3.0, 1.5, 3.0, 0.0)
-
-
-def test_what_has_not_re_joined_by_the_end_is_censored():
-    assert finals("+" + "-" * 20 + "+" + "-" * 40) == (2.0, 2.0, 2.0, 0.5)
-    assert finals("+" + "-" * 40) == (1.0, None, None, 1.0)
-
-
-def test_the_hold_is_a_parameter():
-    assert finals("+-+--+---", hold_s=0.0) == (3.0, pytest.approx(0.15), 0.2, pytest.approx(1 / 3))
-    assert finals("+" + "-" * 30 + "+", hold_s=3.1)[0] == 0.0
-
-
-def test_a_swarm_that_starts_in_pieces_has_not_fallen_apart():
-    assert finals("-" * 30 + "+" * 5) == (0.0, None, None, None)
-    assert finals("-" * 30 + "+" + "-" * 12 + "+") == (1.0, 1.2, 1.2, 0.0)
-
-
-def test_a_swarm_that_died_has_not_re_joined():
-    assert finals("+" + "-" * 15 + "0" * 10) == (1.0, None, None, 1.0)
+@pytest.mark.parametrize(
+    ("ticks", "hold_s", "exact"),
+    [
+        ("+" * 30, None, NO_EVENT),
+        ("++" + "-" * 10 + "++", None, NO_EVENT),  # shorter than the hold
+        ("++" + "-" * 11 + "++", None, (1.0, 1.1, 1.1, 0.0)),  # its length counts from its start
+        ("+" + "".join("-" * n + "+" for n in (12, 30, 15, 5)), None, (3.0, 1.5, 3.0, 0.0)),
+        ("+" + "-" * 20 + "+" + "-" * 40, None, (2.0, 2.0, 2.0, 0.5)),
+        ("+" + "-" * 40, None, (1.0, None, None, 1.0)),
+        ("+-+--+---", 0.0, (3.0, pytest.approx(0.15), 0.2, pytest.approx(1 / 3))),
+        ("+" + "-" * 30 + "+", 3.1, NO_EVENT),
+        ("-" * 30 + "+" * 5, None, NO_EVENT),  # it starts in pieces
+        ("-" * 30 + "+" + "-" * 12 + "+", None, (1.0, 1.2, 1.2, 0.0)),
+        ("+" + "-" * 15 + "0" * 10, None, (1.0, None, None, 1.0)),  # who died has not re-joined
+    ],
+)
+def test_known_swarms_have_their_events(ticks, hold_s, exact):
+    assert finals(ticks, hold_s) == exact
 
 
 @given(st.text("+-0", max_size=60) | st.text("++----0", max_size=60), st.integers(0, 4))

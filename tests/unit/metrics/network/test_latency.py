@@ -19,7 +19,7 @@ from swarmwire.metrics.network.windowed import Window
 from tests.support.comms.air.runs import make_air, packets
 from tests.support.metrics.radio_runs import radio_runs, rows_of
 from tests.support.metrics.recorded import links
-from tests.support.metrics.truths import finished, measured, static, tally, truth
+from tests.support.metrics.truths import finished, static, tally, truth
 
 OF_WINDOWS = ("pdr", "latency_air", "latency_agent")
 MS = 1_000_000
@@ -74,11 +74,6 @@ def test_latencies_end_at_hearing_and_at_the_tick_in_which_the_receiver_acts():
     [_, air, agent] = told(of, seen, window_s=0.1)
     assert air.ravel().tolist() == [pytest.approx(0.06), pytest.approx(np.nan, nan_ok=True)]
     assert agent.ravel().tolist() == [pytest.approx(0.08), pytest.approx(np.nan, nan_ok=True)]
-
-
-def test_what_was_not_heard_has_no_latency():
-    of = static()
-    assert np.isnan(measured("latency_air", of, truth(of, 1, finished=finished([0], [50 * MS], fate=Fate.LOST)))).all()
 
 
 @settings(max_examples=25)

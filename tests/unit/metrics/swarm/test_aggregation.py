@@ -44,12 +44,6 @@ def test_within_one_hop_it_is_that_of_the_algorithm(swarm, gap_m):
     assert said(AggregationHop(gap_m=gap_m), swarm) == pytest.approx(values, nan_ok=True)
 
 
-@given(swarms(), gaps)
-def test_one_hop_reaches_no_more_than_many(swarm, gap_m):
-    hop, all_hops = said(AggregationHop(gap_m=gap_m), swarm), said(Aggregation(gap_m=gap_m), swarm)
-    assert all(np.isnan(few) or few <= many for few, many in zip(hop, all_hops, strict=True))
-
-
 def test_a_star_is_one_flock_either_way_and_a_chain_is_not():
     apart_m = 3.9 * RADIUS_M
     star = [(0, 0), (apart_m, 0), (-apart_m, 0), (0, apart_m), (0, -apart_m)]
@@ -98,18 +92,18 @@ def time_s(together, robots=5, **parameters):
     return told(AggregationTime(**parameters), *ticks, of=of)
 
 
-def test_the_time_is_when_the_share_was_first_there():
-    assert time_s([1, 2, 4, 1, 5]) == [pytest.approx(0.2)]
-    assert np.isnan(time_s([1, 2, 3, 1, 3])).all()
-
-
-def test_a_swarm_that_starts_together_has_zero():
-    assert time_s([5, 1]) == [0.0]
-
-
-def test_the_time_is_the_start_of_the_first_stretch_that_was_held():
-    assert time_s([4, 1, 4, 4, 1, 4, 4, 4], hold_s=0.2) == [pytest.approx(0.5)]
-    assert np.isnan(time_s([4, 1, 4, 4, 1, 4, 4], hold_s=0.2)).all()
+@pytest.mark.parametrize(
+    ("together", "hold_s", "exact"),
+    [
+        ([1, 2, 4, 1, 5], 0.0, 0.2),
+        ([1, 2, 3, 1, 3], 0.0, np.nan),
+        ([5, 1], 0.0, 0.0),
+        ([4, 1, 4, 4, 1, 4, 4, 4], 0.2, 0.5),
+        ([4, 1, 4, 4, 1, 4, 4], 0.2, np.nan),
+    ],
+)
+def test_the_time_is_the_start_of_the_first_stretch_that_was_held(together, hold_s, exact):
+    assert time_s(together, hold_s=hold_s) == [pytest.approx(exact, nan_ok=True)]
 
 
 @pytest.mark.parametrize(

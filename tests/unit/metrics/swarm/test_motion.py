@@ -97,21 +97,19 @@ def oscillation(turn_radps, alive=None, arenas=1, **parameters):
     return told(Oscillation(**parameters), *ticks, of=of)
 
 
-def test_a_robot_that_dithers_changes_sides_in_every_tick():
-    assert oscillation([[1.0], [-1.0], [1.0], [-1.0]]) == [pytest.approx(3 / 4 * PER_MIN)]
-
-
-def test_turning_one_way_going_straight_and_turning_little_are_no_changes():
-    assert oscillation([[1.0], [0.0], [1.0], [-0.04], [0.3]]) == [0.0]
-
-
-def test_going_straight_in_between_does_not_hide_a_change():
-    assert oscillation([[1.0], [0.0], [0.0], [-1.0]]) == [pytest.approx(1 / 4 * PER_MIN)]
-
-
-def test_the_dead_band_is_a_parameter():
-    assert oscillation([[0.2], [-0.2]], dead_band_radps=0.2) == [0.0]
-    assert oscillation([[0.2], [-0.2]], dead_band_radps=0.1) == [pytest.approx(1 / 2 * PER_MIN)]
+@pytest.mark.parametrize(
+    ("turn_radps", "dead_band_radps", "changes_per_tick"),
+    [
+        ([1.0, -1.0, 1.0, -1.0], 0.05, 3 / 4),
+        ([1.0, 0.0, 1.0, -0.04, 0.3], 0.05, 0.0),
+        ([1.0, 0.0, 0.0, -1.0], 0.05, 1 / 4),  # going straight in between does not hide a change
+        ([0.2, -0.2], 0.2, 0.0),
+        ([0.2, -0.2], 0.1, 1 / 2),
+    ],
+)
+def test_changes_of_side_beyond_the_dead_band_count(turn_radps, dead_band_radps, changes_per_tick):
+    found = oscillation([[turn] for turn in turn_radps], dead_band_radps=dead_band_radps)
+    assert found == [pytest.approx(changes_per_tick * PER_MIN)]
 
 
 def test_the_dead_neither_count_nor_remember():

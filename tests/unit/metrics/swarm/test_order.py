@@ -10,17 +10,13 @@ from tests.support.metrics.swarm.swarms import said, stand, swarms
 from tests.support.metrics.truths import measured, poses, static, truth
 
 
-def order(heading_rad, **given_fields):
-    of = static(len(heading_rad))
-    return measured("order", of, truth(of, pose=poses(heading_rad), **given_fields))[0]
-
-
 @pytest.mark.parametrize(
     ("heading_rad", "exact"),
     [([0.7] * 9, 1.0), ([0.3, 0.3 + np.pi, -1.0, -1.0 - np.pi], 0.0), ([0.0, np.pi / 2], np.sqrt(0.5))],
 )
 def test_headings_that_agree_cancel_or_stand_at_a_right_angle_have_the_known_order(heading_rad, exact):
-    assert order(heading_rad) == pytest.approx(exact, abs=1e-15)
+    of = static(len(heading_rad))
+    assert measured("order", of, truth(of, pose=poses(heading_rad))) == [pytest.approx(exact, abs=1e-15)]
 
 
 @pytest.mark.parametrize(("robots", "exact"), [(5, 0.402), (10, 0.282), (40, 0.1404), (100, 0.0887), (400, 0.0445)])
@@ -70,21 +66,15 @@ def test_headings_at_random_have_no_local_order():
     assert found.mean() == pytest.approx(0.0, abs=5 * np.sqrt(0.5 / (arenas * robots * (robots - 1) / 2)))
 
 
-def order_of_velocities(*velocity, **fields):
+def order_of_velocities(*velocity):
     of = static(len(velocity))
     table = np.zeros((len(velocity), 3))
     table[:, :2] = velocity
-    return measured("order_velocity", of, truth(of, velocity=table, **fields))[0]
-
-
-def test_robots_that_move_one_way_have_order_one_however_fast():
-    assert order_of_velocities((0.1, 0.1), (0.2, 0.2), (0.0, 0.0)) == pytest.approx(1.0)
+    return measured("order_velocity", of, truth(of, velocity=table))[0]
 
 
 def test_robots_count_by_their_speed():
+    assert order_of_velocities((0.1, 0.1), (0.2, 0.2), (0.0, 0.0)) == pytest.approx(1.0)
     assert order_of_velocities((0.3, 0.0), (-0.1, 0.0)) == pytest.approx(0.5)
     assert order_of_velocities((0.1, 0.0), (0.0, 0.1)) == pytest.approx(np.sqrt(0.5))
-
-
-def test_a_swarm_that_stands_still_has_no_order():
     assert order_of_velocities((0.0, 0.0), (0.0, 0.0)) == 0.0
