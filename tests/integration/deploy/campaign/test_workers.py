@@ -54,7 +54,8 @@ def test_a_worker_that_dies_is_replaced_and_a_seed_of_which_they_die_is_a_failed
     finally:
         executor.close()
     assert [(row["seed"], row["ended"]) for row in rows] == [(1, "duration"), (DEADLY, "failed"), (4, "duration")]
-    assert rows[1] == {"run": 2, "point": 0, "seed": DEADLY, "ended": "failed", "error": "the worker died, signal 9"}
+    assert "signal 9" in rows[1].pop("error")
+    assert rows[1] == {"run": 2, "point": 0, "seed": DEADLY, "ended": "failed"}
 
 
 def test_an_agent_that_asks_for_input_gets_none_and_takes_no_task(scenario):
@@ -74,7 +75,7 @@ def test_workers_that_cannot_start_are_one_line(scenario, monkeypatch):
     monkeypatch.setattr(sys, "executable", "/bin/false")
     executor = LocalExecutor(2)
     try:
-        with pytest.raises(SwarmwireError, match=r"^no worker can start: the worker ended, exit code 1"):
+        with pytest.raises(SwarmwireError, match="exit code 1"):
             execute(tasks_of(scenario, 1, 2), executor, ignored)
     finally:
         executor.close()
@@ -114,7 +115,8 @@ def test_a_worker_that_is_frozen_is_ended_and_its_runs_are_done_by_another(scena
     finally:
         executor.close()
     assert [row["ended"] for row in rows] == ["duration"]
-    assert [done.lost for done in lost] == ["the worker stood still for 2 s", ""]
+    assert [bool(done.lost) for done in lost] == [True, False]
+    assert "2 s" in lost[0].lost
 
 
 def _noted(found, into):
