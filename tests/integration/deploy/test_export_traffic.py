@@ -94,35 +94,35 @@ def test_tshark_reads_every_frame_and_finds_no_fault(folders, tmp_path, preset):
 
 
 FAULTS = [
-    (["--gif"], "--to: expected a file name for --png, --gif, --mp4 or --pdr"),
-    (["--pdr"], "--to: expected a file name for --png, --gif, --mp4 or --pdr"),
-    (["--from", "5", "--until", "4"], "--until: expected a time after --from 5, got 4"),
-    (["--from", "0.1", "--until", "0.1"], "--until: expected a time after --from 0.1, got 0.1"),
-    (["--from", "nan"], "--from: expected a time of 0 to 1e\\+09 s, got nan"),
-    (["--until", "inf"], "--until: expected a time of 0 to 1e\\+09 s, got inf"),
-    (["--size", "300"], "--size: expected a picture or a film with it"),
-    (["--arena", "3"], "--arena: expected 0 to 0, got 3"),
+    (["--gif"], "--to"),
+    (["--pdr"], "--to"),
+    (["--from", "5", "--until", "4"], "--until"),
+    (["--from", "0.1", "--until", "0.1"], "--until"),
+    (["--from", "nan"], "--from"),
+    (["--until", "inf"], "--until"),
+    (["--size", "300"], "--size"),
+    (["--arena", "3"], "--arena"),
 ]
 
 
-@pytest.mark.parametrize(("options", "text"), FAULTS)
-def test_what_does_not_fit_a_capture_is_refused(folders, tmp_path, options, text):
-    with pytest.raises(BadInput, match=text):
+@pytest.mark.parametrize(("options", "option"), FAULTS)
+def test_what_does_not_fit_a_capture_is_refused(folders, tmp_path, options, option):
+    with pytest.raises(BadInput, match=f"^{option}: expected "):
         exported(folders["argos-rab"], tmp_path / "t.pcapng", *options)
     assert not list(tmp_path.iterdir())
 
 
 def test_the_older_kind_of_capture_is_refused_with_the_name_of_the_newer(folders, tmp_path):
-    with pytest.raises(BadInput, match=r"t\.pcap: expected a file name that ends in \.pcapng for a capture"):
+    with pytest.raises(BadInput, match=r"t\.pcap: .*\.pcapng"):
         exported(folders["argos-rab"], tmp_path / "t.pcap")
 
 
 DAMAGED = [
-    (pl.lit(99).cast(pl.Int32).alias("sender"), r"sender is beyond 5, the last of static\.json in \d+ rows"),
-    (pl.lit(-1).cast(pl.Int32).alias("to"), r"to is below 0 in \d+ rows"),
-    (pl.lit(None).cast(pl.Int64).alias("on_air_at_ns"), r"on_air_at_ns is null in \d+ rows"),
-    (pl.col("on_air_at_ns").cast(pl.String), "on_air_at_ns is of type String, expected Int64"),
-    (pl.lit("eaten").alias("fate"), "fate is of type String, expected Enum"),
+    (pl.lit(99).cast(pl.Int32).alias("sender"), "sender is beyond 5"),
+    (pl.lit(-1).cast(pl.Int32).alias("to"), "to is below 0"),
+    (pl.lit(None).cast(pl.Int64).alias("on_air_at_ns"), "on_air_at_ns is null"),
+    (pl.col("on_air_at_ns").cast(pl.String), "on_air_at_ns .*String.* Int64"),
+    (pl.lit("eaten").alias("fate"), "fate .*String.* Enum"),
 ]
 
 
@@ -132,7 +132,7 @@ def test_damaged_packets_are_refused_with_file_and_fault_and_verify_finds_them(f
     shutil.copytree(folders["argos-rab"], folder)
     file = folder / "packets.parquet"
     pl.read_parquet(file).with_columns(change).write_parquet(file)
-    with pytest.raises(BadInput, match=rf"packets\.parquet: expected a table as a run writes it, but {text}"):
+    with pytest.raises(BadInput, match=rf"packets\.parquet: .*{text}"):
         exported(folder, tmp_path / "t.pcapng")
     assert not (tmp_path / "t.pcapng").exists()
     (found,) = (finding for finding in verify(folder) if finding.part == "packets")
@@ -145,11 +145,11 @@ def test_packets_whose_arenas_are_no_numbers_are_refused_in_one_line_with_the_fi
     shutil.copytree(folders["argos-rab"], folder)
     file = folder / "packets.parquet"
     pl.read_parquet(file).with_columns(pl.col("arena").cast(pl.String)).write_parquet(file)
-    with pytest.raises(BadInput, match=r"packets\.parquet: expected whole Parquet files [^\n]+$"):
+    with pytest.raises(BadInput, match=r"^\S+packets\.parquet: expected [^\n]+$"):
         exported(folder, tmp_path / "t.pcapng")
 
 
 def test_a_run_whose_packets_were_not_recorded_is_refused_with_the_way_out(tmp_path):
     run(SCENARIO, overrides=SHORT, out=tmp_path / "run")
-    with pytest.raises(BadInput, match="recorded with --packets all"):
+    with pytest.raises(BadInput, match="--packets all"):
         exported(tmp_path / "run", tmp_path / "t.pcapng")

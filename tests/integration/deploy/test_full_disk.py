@@ -14,8 +14,8 @@ from swarmwire.metrics.verify.verify import verify
 from tests.support.deploy.commands import LOSSY, called
 
 SHORT = ("--set", "duration_s=1", "--set", "robots.flock.count=4")
-FULL = OSError(errno.ENOSPC, "No space left on device")
-NO_ROOM = "No space left on device (make room: df -h)"
+NO_ROOM = "No space left on device"
+FULL = OSError(errno.ENOSPC, NO_ROOM)
 IN_SMALL = (
     'mount -t tmpfs -o size=40k none "$0" || exit 99; to=$1; shift; "$@"; code=$?; cp -r "$0/run" "$to"; exit $code'
 )
@@ -23,6 +23,14 @@ IN_SMALL = (
 
 def refuses(*_, **__):
     raise FULL
+
+
+def assert_names(error, path):
+    """One line with the path, the cause and the cure."""
+    assert error.startswith(f"error: {path} ")
+    assert NO_ROOM in error
+    assert "df -h" in error
+    assert len(error.splitlines()) == 1
 
 
 def test_a_run_on_a_disk_that_is_full_goes_on_and_its_folder_is_readable(tmp_path):
@@ -37,9 +45,9 @@ def test_a_run_on_a_disk_that_is_full_goes_on_and_its_folder_is_readable(tmp_pat
         pytest.skip(f"mount namespaces: {told.stderr.strip()}")
     assert told.returncode == 1
     *before, last = told.stderr.splitlines()
-    assert last == f"error: {disk / 'run' / 'summary.json'} cannot be written: {NO_ROOM}"
+    assert_names(last, disk / "run" / "summary.json")
     assert before
-    assert all(line.startswith("observer ") and line.endswith("; the run goes on without it") for line in before)
+    assert all(line.startswith("observer ") for line in before)
     assert "4 s in" in told.stdout
     assert "observer_failed_TickRecorder" in told.stdout
     states = {finding.part: finding.state for finding in verify(left)}
@@ -50,7 +58,8 @@ def test_a_run_on_a_disk_that_is_full_goes_on_and_its_folder_is_readable(tmp_pat
 def test_a_disk_without_room_for_the_summary_costs_nobody_the_result(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(Result, "write", refuses)
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
-    assert (code, errors) == (1, f"error: {tmp_path}/run/summary.json cannot be written: {NO_ROOM}\n")
+    assert code == 1
+    assert_names(errors, tmp_path / "run" / "summary.json")
     assert "trajectory" in out
     assert (tmp_path / "run" / "ticks.parquet").exists()
 
@@ -58,5 +67,6 @@ def test_a_disk_without_room_for_the_summary_costs_nobody_the_result(tmp_path, m
 def test_a_disk_that_is_full_from_the_start_is_one_line(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(origin, "write_whole", refuses)
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
-    assert (code, out, errors) == (1, "", f"error: {tmp_path}/run cannot be written: {NO_ROOM}\n")
-    assert f"failed to start: {tmp_path}/run cannot be written" in (tmp_path / "run" / "log.txt").read_text()
+    assert (code, out) == (1, "")
+    assert_names(errors, tmp_path / "run")
+    assert f"failed to start: {tmp_path}/run " in (tmp_path / "run" / "log.txt").read_text()

@@ -86,10 +86,11 @@ def test_a_folder_that_is_there_is_left_alone(tmp_path, monkeypatch, capsys):
     (tmp_path / "mine").mkdir()
     code, out, errors = called(monkeypatch, capsys, "new", "mine", "--in", tmp_path)
     assert (code, out) == (2, "")
-    assert errors == f"error: {tmp_path}/mine: expected a name that is free: something is there already\n"
+    assert errors.startswith(f"error: {tmp_path}/mine: ")
     assert not list((tmp_path / "mine").iterdir())
 
 
 def test_a_place_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(BadInput, match="a folder that can be made"):
+    with pytest.raises(BadInput) as refused:
         new_swarm("mine", tmp_path / "absent")
+    assert str(tmp_path / "absent") in refused.value.where

@@ -1,6 +1,7 @@
 """A run can be repeated from its folder alone, and what stands in its way is named."""
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -142,9 +143,9 @@ def test_an_agent_file_that_was_edited_since_is_named_and_its_run_is_another(tmp
     repetition = repeat(tmp_path / "run")
     assert repetition.same is False
     assert repetition.first_difference == 0
-    assert repetition.changes == ("files/mine.py is not as the run left it: its sha256 differs",)
+    assert [change.split()[0] for change in repetition.changes] == ["files/mine.py"]
     path.unlink()
-    with pytest.raises(BadInput, match="there is no file"):
+    with pytest.raises(BadInput, match="mine.py"):
         repeat(tmp_path / "run")
 
 
@@ -160,7 +161,8 @@ def test_a_changed_installed_module_is_named(tmp_path, mine, monkeypatch):
     (package / "circler.py").write_text(FILE_AGENT + "# a word more\n")
     repetition = repeat(tmp_path / "run")
     assert repetition.same
-    assert repetition.changes == ("module circling_agents has changed since",)
+    (change,) = repetition.changes
+    assert "circling_agents" in change
 
 
 def test_parts_of_swarmwire_are_named_once_and_a_lone_module_is_its_file(tmp_path, monkeypatch):
@@ -181,11 +183,10 @@ def test_what_the_run_ran_on_is_compared(tmp_path):
     origin["cpu"], origin["versions"]["numpy"] = "Z80", "1.0"
     origin["modules"]["swarmwire.world"] = "0" * 64
     path.write_text(json.dumps(origin))
-    changes = repeat(tmp_path / "run").changes
-    assert changes[0] == "module swarmwire.world has changed since"
-    assert changes[1].startswith("numpy is ")
-    assert changes[1].endswith("; it was 1.0")
-    assert changes[2].endswith("; it was Z80")
+    module, package, cpu = repeat(tmp_path / "run").changes
+    assert "swarmwire.world" in module
+    assert re.search(r"numpy.* 1\.0$", package)
+    assert "Z80" in cpu
 
 
 def called(*arguments: str | Path) -> Result:
@@ -198,15 +199,15 @@ def test_the_command_says_same_or_different_and_names_what_changed(tmp_path, min
     run(mine, out=folder)
     same = called(folder, "--out", tmp_path / "again")
     assert same.exit_code == 0
-    assert "the same run, bit for bit: 20 ticks" in same.stdout
+    assert "same run, bit for bit: 20 ticks" in same.stdout
     assert (tmp_path / "again" / "summary.json").exists()
     assert called(folder, "--quiet").stdout == ""
     path = folder / "files" / "mine.py"
     path.write_text(path.read_text().replace("0.5)", "0.6)"))
     other = called(folder)
     assert other.exit_code == 1
-    assert "a different run from tick 0 on" in other.stdout
-    assert "files/mine.py is not as the run left it" in other.stdout
+    assert "different run from tick 0" in other.stdout
+    assert "files/mine.py" in other.stdout
 
 
 def test_an_agent_that_draws_by_itself_is_suspected(tmp_path, mine):
@@ -215,7 +216,7 @@ def test_an_agent_that_draws_by_itself_is_suspected(tmp_path, mine):
     run(mine, out=tmp_path / "run")
     other = called(tmp_path / "run")
     assert other.exit_code == 1
-    assert "does an agent draw or read the time by itself?" in other.stdout
+    assert "by itself" in other.stdout
 
 
 @pytest.mark.parametrize(
@@ -250,7 +251,8 @@ def test_a_run_that_was_killed_is_compared_as_far_as_it_came(tmp_path, mine, log
     assert repetition.before is None
     assert repetition.compared == (7 if logged else 0)
     assert repetition.same is (True if logged else None)
-    assert repetition.why_not_all == "the run left no summary.json: it was killed, or still goes on"
+    assert repetition.why_not_all
+    assert "summary.json" in repetition.why_not_all
 
 
 def test_a_run_that_an_agent_ended_is_repeated_up_to_there(tmp_path, mine):
@@ -262,7 +264,7 @@ def test_a_run_that_an_agent_ended_is_repeated_up_to_there(tmp_path, mine):
     repetition = repeat(tmp_path / "run")
     assert repetition.same
     assert repetition.result.ticks == 5
-    assert "the same run, bit for bit: 5 ticks, where it ended early: failed" in called(tmp_path / "run").stdout
+    assert re.search("same run.* 5 ticks.* failed", called(tmp_path / "run").stdout)
 
 
 def test_the_first_tick_that_came_out_differently_is_named(tmp_path, mine):

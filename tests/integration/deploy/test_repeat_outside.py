@@ -83,8 +83,9 @@ def test_a_run_in_real_time_whose_runner_was_frozen_for_a_while_is_the_same_agai
     assert repetition.result.radio == result.radio
     assert repetition.result.inputs == result.inputs
     assert repeat(tmp_path / "again").same
-    with pytest.raises(BadInput, match="says what the runners did"):
+    with pytest.raises(BadInput) as refused:
         repeat(tmp_path / "run", runners=2)
+    assert refused.value.where == "--runners"
 
 
 @pytest.mark.parametrize("realtime", [None, 10])
@@ -98,7 +99,7 @@ def test_a_run_that_lost_a_runner_whose_robots_stand_from_then_on_is_the_same_ag
     result = run(LOSSY, overrides=setting, runners=4, realtime=realtime, out=tmp_path / "run", observers=[watcher])
     assert (result.ended, result.counts["runners_lost"], len(result.lost_runners)) == ("interrupted", 1, 1)
     assert "(5 robots)" in result.lost_runners[0]
-    assert "its robots stand still" in capfd.readouterr().err
+    assert "stand still" in capfd.readouterr().err
     stood = ~watcher.truths[-1].command.any(axis=1)
     assert not watcher.truths[-10].command[stood].any()
     assert result.inputs is not None
@@ -156,8 +157,9 @@ def test_a_record_that_is_cut_off_is_repeated_as_far_as_it_is_whole(in_real_time
     (in_real_time / INPUTS).write_bytes(data[:-10])
     repetition = repeat(in_real_time)
     assert (repetition.before, repetition.compared, repetition.same) == (None, 9, True)
-    assert repetition.why_not_all == "this is 9 of the run's 10 ticks"
-    assert repetition.changes == (f"{INPUTS} is not as the run left it: its sha256 differs",)
+    assert repetition.why_not_all
+    assert "9 of the run's 10" in repetition.why_not_all
+    assert [change.split()[0] for change in repetition.changes] == [INPUTS]
     (in_real_time / "summary.json").unlink()
     assert repeat(in_real_time).result.ticks == 9
 

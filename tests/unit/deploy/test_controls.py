@@ -295,7 +295,7 @@ def test_a_speed_that_is_asked_for_is_kept_or_refused() -> None:
     controls.hold(5, never)
     assert len(clock.slept_until) == sleeps
     for wrong in (0.0, -1.0, 1e9):
-        with pytest.raises(BadInput, match="factor: expected 0.001 to 1e"):
+        with pytest.raises(BadInput, match="factor: "):
             controls.set_speed(wrong)
     assert controls.speed is None
     _, paced, _, _ = controlled(1.0)
