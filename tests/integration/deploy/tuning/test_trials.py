@@ -42,7 +42,7 @@ def test_trials_that_fail_are_told_of_and_never_the_best(tmp_path, scenario):
 
 
 def test_where_all_trials_fail_it_ends_in_a_line(tmp_path, scenario):
-    with pytest.raises(NothingFound, match="all 3 trials failed, such as trial 0: .*too fast") as ended:
+    with pytest.raises(NothingFound, match="all 3 trials failed.*too fast") as ended:
         tuned(scenario, tmp_path / "t", "robots.pair.params.speed=0.6:1", trials=3)
     assert "\n" not in str(ended.value)
     assert not (tmp_path / "t" / "best.toml").exists()

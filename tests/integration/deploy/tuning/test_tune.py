@@ -55,8 +55,9 @@ def test_more_trials_are_those_of_a_longer_tuning(tmp_path, scenario):
     assert gone_on_with(tmp_path / "t", trials=14).is_over
     assert trials_in(tmp_path / "t").equals(trials_in(tmp_path / "whole"), null_equal=True)
     assert json.loads((tmp_path / "t" / "tuning.json").read_text())["trials"] == 14
-    with pytest.raises(BadInput, match="--trials: expected at least 14"):
+    with pytest.raises(BadInput, match="14") as refused:
         gone_on_with(tmp_path / "t", trials=13)
+    assert refused.value.where == "--trials"
 
 
 def test_a_half_written_line_of_a_killed_process_is_no_trial(tmp_path, scenario):
@@ -85,11 +86,11 @@ def test_changed_files_and_other_code_are_refused(tmp_path, scenario):
     about = tmp_path / "t" / "tuning.json"
     found = json.loads(about.read_text())
     about.write_text(json.dumps({**found, "cpu": "another"}))
-    with pytest.raises(BadInput, match="the CPU is .*; it was another.*--anyway"):
+    with pytest.raises(BadInput, match="CPU.* another.*--anyway"):
         gone_on_with(tmp_path / "t")
     about.write_text(json.dumps(found))
     (tmp_path / "t" / "scenario" / "files" / "careful.py").write_text("x = 1")
-    with pytest.raises(BadInput, match=r"scenario/files/careful.py is not as the run left it"):
+    with pytest.raises(BadInput, match="scenario/files/careful.py"):
         gone_on_with(tmp_path / "t")
 
 
