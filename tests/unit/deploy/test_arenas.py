@@ -100,14 +100,14 @@ def test_arenas_on_a_torus_run_as_they_do_alone(around: Path):
 
 
 @pytest.mark.parametrize(
-    ("setting", "said"),
+    ("setting", "key"),
     [
-        ("physics.engine='auto'", "arena.boundary: expected walls or open: on a torus no robot has contacts"),
-        ("radio={model='friis'}", "radio.model: expected a disk without bodies_block"),
-        ("radio.bodies_block=true", "radio.bodies_block: expected a disk without bodies_block"),
+        ("physics.engine='auto'", "arena.boundary"),
+        ("radio={model='friis'}", "radio.model"),
+        ("radio.bodies_block=true", "radio.bodies_block"),
     ],
 )
-def test_what_a_torus_cannot_have_is_refused_at_the_door(around: Path, setting: str, said: str):
+def test_what_a_torus_cannot_have_is_refused_at_the_door(around: Path, setting: str, key: str):
     with pytest.raises(BadInput) as caught:
         Simulation(around, overrides=[setting])
-    assert said in str(caught.value)
+    assert caught.value.key == key

@@ -299,8 +299,8 @@ def test_a_speed_that_is_asked_for_is_kept_or_refused() -> None:
             controls.set_speed(wrong)
     assert controls.speed is None
     _, paced, _, _ = controlled(1.0)
-    with pytest.raises(BadInput, match="keeps to the wall clock"):
+    with pytest.raises(BadInput, match="wall clock"):
         paced.set_speed(None)
     fixed = Controls(clock, RATE_HZ, speed_fixed=True)
-    with pytest.raises(BadInput, match="programs elsewhere keep to that of the run"):
+    with pytest.raises(BadInput, match="programs elsewhere"):
         fixed.set_speed(2.0)

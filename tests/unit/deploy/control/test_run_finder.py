@@ -53,19 +53,19 @@ def test_a_run_that_was_killed_is_forgotten_and_what_is_no_run_is_removed(tmp_pa
 
 
 def test_which_run_is_meant_must_be_clear(tmp_path):
-    with pytest.raises(BadInput, match="this machine has none of yours"):
+    with pytest.raises(BadInput, match="none"):
         find_run(None)
     for run in ("aa1", "ab2"):
         announced(tmp_path / run, run)
-    with pytest.raises(BadInput, match=r"several runs go on; expected one of aa1 \(.*\), ab2 \("):
+    with pytest.raises(BadInput, match=r"several.* aa1 \(.*\), ab2 \("):
         find_run(None)
-    with pytest.raises(BadInput, match="several runs go on"):
+    with pytest.raises(BadInput, match="several.* aa1 .*ab2"):
         find_run("a")
     assert find_run("ab").run == "ab2"
-    with pytest.raises(BadInput, match="expected one of aa1, ab2"):
+    with pytest.raises(BadInput, match="aa1, ab2"):
         find_run("b")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(BadInput, match="expected the folder of a run that goes on"):
+    with pytest.raises(BadInput, match="empty: expected the folder of a run"):
         find_run(str(tmp_path / "empty"))
 
 
@@ -77,7 +77,7 @@ def test_a_folder_that_others_may_write_to_is_not_believed(tmp_path, runtime):
     runtime.rmdir()
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     runtime.symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(BadInput, match="expected a folder that is the user's"):
+    with pytest.raises(BadInput, match="that is the user's"):
         runs_folder()
 
 
