@@ -81,24 +81,25 @@ def test_a_picture_may_be_of_lines(here):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "place", "expected"),
     [
-        (["blimp"], f"blimp: expected a scenario's or a body's .toml, or one of {', '.join(body_names())}"),
-        (["absent.toml"], "absent.toml: expected a readable file: No such file or directory"),
-        (["epuck", "--seed", "2"], "--seed: expected a scenario; a body has nothing to set"),
-        (["epuck", "--set", "mass_kg=2"], "--set: expected a scenario; a body has nothing to set"),
-        (["epuck", "--to", "a.bmp"], "a.bmp: expected a file name that ends in .png or .svg or .pdf"),
-        (["epuck", "--to", "absent/a.png"], "absent/a.png: expected a path in a folder that exists"),
-        ([LOSSY, "--size", "9"], "--size: expected 100 to 8000 pixels, got 9"),
-        ([LOSSY, "--seed", "-1"], "--seed: expected a whole number from 0 to 9223372036854775807, got -1"),
-        (["thin.toml"], "thin.toml: radius_m: expected more than 0 m, got -1.0"),
+        (["blimp"], "blimp", ", ".join(body_names())),
+        (["absent.toml"], "absent.toml", "file"),
+        (["epuck", "--seed", "2"], "--seed", "scenario"),
+        (["epuck", "--set", "mass_kg=2"], "--set", "scenario"),
+        (["epuck", "--to", "a.bmp"], "a.bmp", ".png or .svg or .pdf"),
+        (["epuck", "--to", "absent/a.png"], "absent/a.png", "folder"),
+        ([LOSSY, "--size", "9"], "--size", "100 to 8000 pixels"),
+        ([LOSSY, "--seed", "-1"], "--seed", "0 to 9223372036854775807"),
+        (["thin.toml"], "thin.toml: radius_m", "-1.0"),
     ],
 )
-def test_what_cannot_be_drawn_is_refused(here, arguments, told):
+def test_what_cannot_be_drawn_is_refused(here, arguments, place, expected):
     (here / "thin.toml").write_text('like = "epuck"\nradius_m = -1\n')
     with pytest.raises(BadInput) as error:
         draw(*arguments)
-    assert str(error.value) == told
+    assert ": ".join(filter(None, (error.value.where, error.value.key))) == place
+    assert expected in error.value.expected
 
 
 def test_the_program_says_it_in_one_line_and_exits_with_2(here, monkeypatch, capsys):

@@ -47,7 +47,7 @@ def test_a_run_in_another_process_is_found_changed_killed_and_repeated(tmp_path,
     tick = now["tick"]
     assert status(now["run"][:5])["run"] == status(tmp_path / "run")["run"] == now["run"]
     assert now["folder"] == str(tmp_path / "run")
-    assert "event 0: kill, from the next tick on" in ctl("kill", "flock-1", "flock-4")
+    assert "event 0: kill" in ctl("kill", "flock-1", "flock-4")
     assert "event 1: ramp" in ctl("set", "loss=0.7")
     ctl("partition", "x", "--for", 1)
     ctl("push", "flock", "20%", "--speed", 0.5, "--direction", 1.57)
@@ -63,7 +63,7 @@ def test_a_run_in_another_process_is_found_changed_killed_and_repeated(tmp_path,
     assert "2 ready, 0 lost" in told
     process.kill()
     process.communicate()
-    assert ctl("status") == "no run of yours goes on on this machine\n"
+    assert ctl("status").startswith("no run ")
     assert len((tmp_path / "run" / INTERVENTIONS).read_text().splitlines()) == 5
     repetition = repeat(tmp_path / "run")
     assert repetition.same
@@ -78,7 +78,7 @@ def test_speed_resume_and_stop_end_a_run_with_its_summary(tmp_path, process):
     ctl("stop")
     process.communicate()
     assert (tmp_path / "run" / "summary.json").exists()
-    with pytest.raises(BadInput, match="expected a run that goes on: this machine has none of yours"):
+    with pytest.raises(BadInput):
         ctl("pause")
 
 
@@ -89,7 +89,7 @@ def test_of_several_runs_there_is_a_table(tmp_path, process):
         assert len(lines) == 3
         assert lines[0].split() == ["run", "scenario", "tick", "state", "speed", "alive", "folder"]
         assert len(ctl("status", "--json").splitlines()) == 2
-        with pytest.raises(BadInput, match="several runs go on"):
+        with pytest.raises(BadInput, match="several"):
             ctl("pause")
         ctl(tmp_path / "other", "stop")
         other.communicate()
