@@ -92,11 +92,11 @@ def _edges(of: Static, place_m: Array, alive: Array) -> Array:
     return np.argwhere(np.triu(near & alive[:, None] & alive[None], 1))
 
 
-def make(seed: int, boundary: str, spread: float, robots: int, arenas: int, dead: float, radio: bool = True) -> History:
+def make(seed: int, boundary: str, spread: float, robots: int, arenas: int, dead: float) -> History:
     """A run: robots walk, turn, die and live again, touch, note values and send; some are dead all the time."""
     rng = np.random.default_rng(seed)
     lights = [[Light(*rng.uniform(-1.3, 1.3, 2), 1.0) for _ in range(2)] for _ in range(arenas)]
-    of = mixed(static(robots, arenas, radio, lights=lights), int(rng.integers(1, robots + 1)))
+    of = mixed(static(robots, arenas, lights=lights), int(rng.integers(1, robots + 1)))
     of = replace(of, boundary=boundary)
     rows = robots * arenas
     place_m = _place(rng, boundary, (TICKS, rows, 2), spread)
@@ -106,6 +106,7 @@ def make(seed: int, boundary: str, spread: float, robots: int, arenas: int, dead
     ticks = []
     for tick in range(TICKS):
         alive = (rng.random(rows) >= dead) & ~np.tile(never, arenas)
+        living = alive.reshape(arenas, robots)
         fields: dict[str, Any] = {
             "alive": alive,
             "pose": np.concatenate([place_m[tick], heading_rad[tick]], axis=1),
@@ -114,12 +115,9 @@ def make(seed: int, boundary: str, spread: float, robots: int, arenas: int, dead
             "contact_onsets": rng.integers(0, 3, (arenas, 2)),
             "value": np.where(alive & (rng.random(rows) < 0.6), rng.normal(5.0, 2.0, rows), np.nan) if tick else None,
         }
-        if radio:
-            counts = [{fate: int(rng.integers(0, 5)) for fate in (*FATES, Fate.OUT_OF_RANGE)} for _ in range(arenas)]
-            living = alive.reshape(arenas, robots)
-            fields["edges"] = _edges(of, place_m[tick], alive)
-            fields["finished"], fields["departed"] = _links(rng, of, living, tick), _packets(rng, living, tick)
-            fields["tally"] = tally(*counts)
+        counts = [{fate: int(rng.integers(0, 5)) for fate in (*FATES, Fate.OUT_OF_RANGE)} for _ in range(arenas)]
+        fields |= {"edges": _edges(of, place_m[tick], alive), "tally": tally(*counts)}
+        fields["finished"], fields["departed"] = _links(rng, of, living, tick), _packets(rng, living, tick)
         ticks.append(truth(of, tick, **fields))
     return History(of, tuple(ticks))
 
@@ -141,13 +139,11 @@ def histories(
     )
 
 
-def at_rest(robots: int, alive: bool, radio: bool = True) -> History:
+def at_rest(robots: int, alive: bool) -> History:
     """Robots in the middle that do nothing, say nothing and hear nothing, 1 m from a light."""
-    of = static(robots, radio=radio, lights=[[Light(1.0, 0.0, 1.0)]])
-    fields: dict[str, Any] = {"alive": np.full(robots, alive)}
-    if radio:
-        fields |= {"edges": np.zeros((0, 2), np.int64), "finished": no_rows(Finished), "departed": no_rows(Departed)}
-        fields["tally"] = tally({}, sent=0)
+    of = static(robots, lights=[[Light(1.0, 0.0, 1.0)]])
+    fields: dict[str, Any] = {"alive": np.full(robots, alive), "edges": np.zeros((0, 2), np.int64)}
+    fields |= {"finished": no_rows(Finished), "departed": no_rows(Departed), "tally": tally({}, sent=0)}
     return History(of, tuple(truth(of, tick, **fields) for tick in range(TICKS)))
 
 

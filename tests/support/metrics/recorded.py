@@ -1,4 +1,4 @@
-"""Recorders fed by hand, and a clock that a test sets."""
+"""Recorders fed by hand."""
 
 from pathlib import Path
 
@@ -12,10 +12,10 @@ from tests.support.clocks import StillClock
 from tests.support.metrics.truths import truth
 
 
-def record(folder: Path, of, ticks, clock=None, **options):
+def record(folder: Path, of, ticks, **options):
     """Feed these ticks to all recorders of a run folder; the summary's `record`."""
     metrics = Metrics()
-    observers = [metrics, *recorders(folder, metrics, clock or StillClock(), **options)]
+    observers = [metrics, *recorders(folder, metrics, StillClock(), **options)]
     for observer in observers:
         observer.begin(of)
     for seen in ticks:
@@ -27,9 +27,9 @@ def record(folder: Path, of, ticks, clock=None, **options):
     return record_summary(parts)
 
 
-def wandering(of, ticks, seed=5, **fields):
+def wandering(of, ticks, **fields):
     """Robots that are somewhere else in each tick, and named a state."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(5)
     rows = of.arenas * of.robots
     states = ("", "search", "home")
     for tick in range(ticks):

@@ -134,7 +134,7 @@ def test_a_robot_alone_has_a_report(tmp_path, radio):
     silent = {"departed": departed([]), "finished": links([], [], 0, 0), "tally": tally({})} if radio else {}
     report = run_report(run_folder(tmp_path, of, wandering(of, 9, **silent), links=True))
     assert names(report)[:2] == ["timeline", "trajectories"]
-    assert ("nobody was in range of anybody" in texts(report)) == radio
+    assert ("nobody was in range" in texts(report)) == radio
 
 
 def test_what_users_name_is_escaped(tmp_path):
@@ -155,7 +155,7 @@ def test_a_damaged_table_costs_its_figure_and_is_named(tmp_path):
     assert names(report) == ["timeline", "trajectories", "metrics"]
     for name in ("radio_distances", "radio_links", "packets"):
         assert f"{folder / name}.parquet" in texts(report)
-    assert "see `swarmwire verify`" in texts(report)
+    assert "`swarmwire verify`" in texts(report)
 
 
 def test_events_are_listed_with_the_robots_that_they_changed(tmp_path):
@@ -164,7 +164,6 @@ def test_events_are_listed_with_the_robots_that_they_changed(tmp_path):
     seen = [replace(one, events=(kill,) if one.tick == 1 else ()) for one in wandering(of, 6)]
     report = run_report(run_folder(tmp_path, of, seen))
     assert table(report, "All events") == {"0.1": ("kill", "flock-1, flock-2")}
-    assert "a bar until it was over" in texts(report)
 
 
 def test_what_stopped_a_run_and_the_times_that_metrics_wait_for_are_marked(tmp_path, monkeypatch):

@@ -13,7 +13,6 @@ Make = Callable[[Mapping[str, Any], np.random.Generator], float | None]  # (poin
 
 LIMIT_S = 100.0
 RATE_HZ = 10.0
-PLAIN = {"listed": False, "hold_s": 0.0}  # of an outcome
 
 
 def order(point: Mapping[str, Any], rng: np.random.Generator) -> float:
@@ -52,7 +51,6 @@ def write_campaign(
     failed: Collection[int] = (),
     missing: Collection[int] = (),
     parts: int = 0,
-    series: bool = False,
     draws: int = 0,
 ) -> Path:
     """Write a campaign's folder and return its path.
@@ -65,7 +63,7 @@ def write_campaign(
     if points is None:
         points = [dict(zip(varied, values, strict=True)) for values in itertools.product(*varied.values())]
     folder.mkdir(parents=True, exist_ok=True)
-    about = about_of(name, design, varied, points, seeds, numbers, times, limit_s)
+    about = _about(name, design, varied, points, seeds, numbers, times, limit_s)
     (folder / "campaign.json").write_text(json.dumps(about, indent=2))
     (folder / "scenario").mkdir()
     (folder / "scenario" / "scenario.toml").write_text(f'name = "{name}"\n')
@@ -83,13 +81,10 @@ def write_campaign(
             frame[part::parts].write_parquet(folder / "parts" / f"part-{part:06d}.parquet")
     else:
         frame.write_parquet(folder / "summary.parquet")
-    if series:
-        (folder / "series").mkdir()
-        _series(frame).write_parquet(folder / "series" / "worker-0.parquet")
     return folder
 
 
-def about_of(
+def _about(
     name: str,
     design: str,
     varied: Mapping[str, Sequence[Any]],
@@ -101,10 +96,9 @@ def about_of(
 ) -> dict[str, Any]:
     """campaign.json."""
     outcomes = [
-        {"column": column, "unit": "", "kind": "number", "help": f"made-up {column}", **PLAIN} for column in numbers
-    ]
-    outcomes += [
-        {"column": column, "unit": "s", "kind": "time", "help": f"made-up {column}", **PLAIN} for column in times
+        {"column": column, "unit": unit, "kind": kind, "help": f"made-up {column}", "listed": False, "hold_s": 0.0}
+        for columns, unit, kind in ((numbers, "", "number"), (times, "s", "time"))
+        for column in columns
     ]
     return {
         "format": 1,
@@ -161,13 +155,3 @@ def _schema(
     measured = dict.fromkeys([*numbers, *times], pl.Float64)
     machine = {"machine_cpu": pl.String, "machine_host": pl.String, "machine_worker": pl.Int64}
     return {**start, **middle, **measured, "timing_wall_s": pl.Float64, **machine}
-
-
-def _series(frame: pl.DataFrame) -> pl.DataFrame:
-    """Ten ticks of each run that ended well, in which order rises to its last value."""
-    well = frame.filter(pl.col("ended") != "failed")
-    ticks = np.arange(10)
-    last = well["order.final"].to_numpy() if "order.final" in frame.columns else np.ones(len(well))
-    rising = np.outer(last, (ticks + 1) / 10.0).astype(np.float32).ravel()
-    run = np.repeat(well["run"].to_numpy(), 10)
-    return pl.DataFrame({"run": run, "tick": np.tile(ticks, len(well)), "order": rising})

@@ -95,11 +95,3 @@ def swarms(draw: st.DrawFn, least: int = 1, most: int = 14) -> Swarm:
         place = np.floor(place / grid_m) * grid_m
     pose = np.column_stack([place, rng.uniform(-np.pi, np.pi, arenas * robots)])
     return Swarm(of, pose, rng.random(arenas * robots) < draw(st.sampled_from([1.0, 0.7, 0.1])))
-
-
-def moved(swarm: Swarm, by_m: tuple[float, float], turn_rad: float = 0.0) -> Swarm:
-    """The swarm turned around the origin and moved; on a torus it must not be turned."""
-    c, s = np.cos(turn_rad), np.sin(turn_rad)
-    place = swarm.pose[:, :2] @ np.array([[c, s], [-s, c]]) + by_m
-    place = rolled(place) if swarm.of.boundary == "torus" else place
-    return replace(swarm, pose=np.column_stack([place, swarm.pose[:, 2] + turn_rad]))

@@ -98,9 +98,7 @@ def test_the_table_says_how_many_failed_are_missing_and_what_it_shows(tmp_path, 
     part = write_campaign(tmp_path / "part", failed=(0, 1), missing=(25,), parts=1)
     found = compared(plain, part)
     told = "\n".join(notes(found))
-    assert f"A: {plain} (30 runs)" in told
-    assert f"B: {part} (not finished: 29 of 30 runs, 2 failed)" in told
-    assert "95 %" in told
+    assert all(text in told for text in (f"A: {plain} (30 ", f"B: {part} (", "29 of 30", "2 failed", "95 %"))
     assert [len(cells(found, row)) for row in found.rows] == [len(COLUMNS)] * 9
     assert cells(found, found.rows[0])[-1] == "8"
 

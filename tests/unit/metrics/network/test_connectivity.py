@@ -17,11 +17,6 @@ def components(of, **given_fields):
     return measured("components", of, seen), measured("largest_component", of, seen)
 
 
-def test_a_ring_is_one_component():
-    of = static(6)
-    assert components(of, edges=edges(*[(i, (i + 1) % 6) for i in range(6)])) == ([1.0], [1.0])
-
-
 def test_a_split_swarm_counts_its_pieces_and_the_share_of_the_largest():
     assert components(static(8), edges=edges((0, 1), (1, 2), (3, 4), (4, 5), (5, 6))) == ([3.0], [0.5])
 

@@ -21,15 +21,8 @@ def rate_per_h(of, onsets, alive):
     return told("collision_rate", *ticks, of=of)
 
 
-def test_an_onset_counts_for_both_robots_and_walls_do_not_count():
-    alive = np.ones((600, 4), np.bool_)  # a minute of four robots
-    onsets = np.zeros((600, 1), np.int64)
-    onsets[100] = 1
-    assert rate_per_h(static(4), onsets, alive) == [pytest.approx(2 / (4 / 60))]
-
-
 @given(st.integers(0, 1000), st.integers(1, 20), st.sampled_from([0.0, 0.1, 0.9]))
-def test_the_rate_is_onsets_over_the_time_of_the_robots_alive(seed, ticks, dead):
+def test_the_rate_is_twice_the_onsets_over_the_time_of_the_robots_alive_and_walls_do_not_count(seed, ticks, dead):
     rng, of = np.random.default_rng(seed), static(3, arenas=2)
     onsets, alive = rng.integers(0, 3, (ticks, 2)), rng.random((ticks, 6)) >= dead
     alive[:, 3:] &= rng.random() < 0.8

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 
 from tests.support.metrics.swarm.centroids import away_m
-from tests.support.metrics.swarm.swarms import mixed, moved, said, stand, swarms
+from tests.support.metrics.swarm.swarms import mixed, rolled, said, stand, swarms
 
 
 @given(swarms())
@@ -98,8 +98,9 @@ def test_a_ring_that_goes_one_way_has_none():
 
 
 def test_a_mill_across_the_corner_of_a_torus_is_one():
-    mill = stand(*ring(12, np.pi / 2), boundary="torus")
-    assert said("rotation", moved(mill, (4.0, 3.0))) == [pytest.approx(1.0)]
+    mill = ring(12, np.pi / 2, at=(4.0, 3.0))
+    mill[:, :2] = rolled(mill[:, :2])
+    assert said("rotation", stand(*mill, boundary="torus")) == [pytest.approx(1.0)]
 
 
 def test_a_robot_at_the_centroid_adds_nothing():
