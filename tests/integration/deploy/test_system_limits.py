@@ -34,8 +34,9 @@ def test_where_files_are_too_few_for_all_runners_nothing_begins(tmp_path):
     command = [sys.executable, "-c", few + call, "run", LOSSY, "--runners", "per-robot", "--out", tmp_path / "run"]
     told = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=100, check=False)
     assert told.returncode == 2
-    needed = f"expected a limit of at least {OWN_FILES + 20} open files for 20 runners, got 64 (ulimit -n)"
-    assert told.stderr.splitlines() == [f"error: this machine: {needed}"]
+    (line,) = told.stderr.splitlines()
+    for said in ("error: this machine: ", f"at least {OWN_FILES + 20} open files", "got 64 ", "ulimit -n"):
+        assert said in line
     assert not (tmp_path / "run").exists()
 
 
@@ -50,13 +51,13 @@ def test_where_threads_are_too_few_nothing_begins(tmp_path, monkeypatch, capsys)
     monkeypatch.setattr("swarmwire.deploy.system_limits.start_new_thread", limited)
     code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--runners", "10", "--out", tmp_path / "run")
     assert code == 2
-    assert errors.startswith("error: this machine: expected room for ")
-    cures = "ulimit -u, or the container's limit of pids"
-    assert errors.endswith(f"more threads and processes for 10 runners, got {OWN_THREADS} ({cures})\n")
+    assert errors.startswith("error: this machine: ")
+    for said in ("for 10 runners", f"got {OWN_THREADS} ", "ulimit -u"):
+        assert said in errors
     assert not (tmp_path / "run").exists()
 
 
 def test_a_machine_has_room_for_the_threads_of_a_few_runners():
     need_threads(10)
-    with pytest.raises(BadInput, match="open files for 1000000000 runners"):
+    with pytest.raises(BadInput, match="open files .*1000000000 runners"):
         need_open_files(1_000_000_000)

