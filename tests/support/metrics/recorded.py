@@ -9,18 +9,14 @@ from swarmwire.comms.truth import Finished
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.recorders import record_summary, recorders
 from tests.support.clocks import StillClock
-from tests.support.metrics.truths import truth
+from tests.support.metrics.truths import truth, watch
 
 
 def record(folder: Path, of, ticks, **options):
     """Feed these ticks to all recorders of a run folder; the summary's `record`."""
     metrics = Metrics()
     observers = [metrics, *recorders(folder, metrics, StillClock(), **options)]
-    for observer in observers:
-        observer.begin(of)
-    for seen in ticks:
-        for observer in observers:
-            observer.see(seen)
+    watch(of, ticks, *observers)
     parts = {}
     for observer in observers:
         parts.update(observer.end(None))

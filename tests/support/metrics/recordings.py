@@ -8,7 +8,7 @@ import pytest
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.viewer.recording import RerunRecording
 from tests.support.clocks import StillClock
-from tests.support.metrics.truths import truth
+from tests.support.metrics.truths import truth, watch
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
 
@@ -17,12 +17,7 @@ def record(path: Path, of, ticks, **options):
     """The recording of these ticks, of which no row was dropped."""
     metrics = Metrics()
     recording = RerunRecording(path, metrics, StillClock(), **options)
-    observers = (metrics, recording)
-    for observer in observers:
-        observer.begin(of)
-    for seen in ticks:
-        for observer in observers:
-            observer.see(seen)
+    watch(of, ticks, metrics, recording)
     assert recording.end(None)["record_rrd"]["dropped"] == 0
 
 

@@ -1,6 +1,6 @@
 """Truth made by hand: what a test does not name is a robot at rest, alive, without a radio."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -84,11 +84,19 @@ def finished(
     return Finished(zero + arena, zero, zero + 1, zero + 1, zero - 1, zero, sent, sent, final, zero + fate, zero, zero)
 
 
+def watch(of: Static, ticks: Iterable[Truth], *observers: Any) -> None:
+    """Each of them begins, and sees each tick in their order."""
+    for observer in observers:
+        observer.begin(of)
+    for seen in ticks:
+        for observer in observers:
+            observer.see(seen)
+
+
 def measured(name: str, of: Static, seen: Truth) -> list[float]:
     """The metric's value in this one tick, per arena."""
     metrics = Metrics([name])
-    metrics.begin(of)
-    metrics.see(seen)
+    watch(of, [seen], metrics)
     return metrics.latest[name].tolist()
 
 

@@ -14,7 +14,7 @@ from swarmwire.metrics.moment import Components, Moment, agreement
 from swarmwire.metrics.registry import METRICS, register
 from swarmwire.metrics.sampled import Sampled
 from swarmwire.metrics.swarm.order import Order
-from tests.support.metrics.truths import edges, poses, static, truth
+from tests.support.metrics.truths import edges, poses, static, truth, watch
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,7 @@ class Turned(Metric):
 
 
 def seen(metrics, of, *ticks):
-    metrics.begin(of)
-    for tick, fields in enumerate(ticks):
-        metrics.see(truth(of, tick, **fields))
+    watch(of, (truth(of, tick, **fields) for tick, fields in enumerate(ticks)), metrics)
     return metrics.end(None)["metrics"]
 
 

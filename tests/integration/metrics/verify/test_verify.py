@@ -19,7 +19,7 @@ from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.verify import TABLES, verify
 from tests.support.metrics.recorded import links, record, wandering
 from tests.support.metrics.summaries import made_up_summary
-from tests.support.metrics.truths import static, tally
+from tests.support.metrics.truths import static, tally, watch
 
 TICKS, ARENAS = 10, 2
 HASHES = ["a" * 64, "b" * 64]
@@ -37,9 +37,7 @@ def summarise(folder, of, recorded, **given):
     """The summary of a run of these ticks, as deploy writes it."""
     parts = {}
     for observer in (Metrics(), RadioTally(), EventLog()):
-        observer.begin(of)
-        for seen in seen_ticks(of):
-            observer.see(seen)
+        watch(of, seen_ticks(of), observer)
         parts.update(observer.end(tally({Fate.IN_FLIGHT: 4}, {})))
     run = made_up_summary(TICKS, arenas=ARENAS, record=recorded, trajectory_sha256=HASHES, **parts)
     (folder / "summary.json").write_text(json.dumps({**run, **given}))

@@ -8,7 +8,7 @@ from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.viewer.picture import NoGraphics, render_png
 from swarmwire.metrics.viewer.recording import RerunRecording
 from tests.support.clocks import StillClock
-from tests.support.metrics.truths import static, truth
+from tests.support.metrics.truths import static, truth, watch
 
 pytest.importorskip("rerun", reason="needs the extra [view]")
 
@@ -17,12 +17,9 @@ pytest.importorskip("rerun", reason="needs the extra [view]")
 def rrd(tmp_path):
     of, metrics = static(3), Metrics()
     recording = RerunRecording(tmp_path / "run.rrd", metrics, StillClock())
-    for observer in (metrics, recording):
-        observer.begin(of)
-    for tick in range(20):
-        pose = np.column_stack([np.linspace(-2, 2, 3), np.full(3, 0.1 * tick), np.zeros(3)])
-        for observer in (metrics, recording):
-            observer.see(truth(of, tick, pose=pose))
+    x_m = np.linspace(-2, 2, 3)
+    poses = (np.column_stack([x_m, np.full(3, 0.1 * tick), np.zeros(3)]) for tick in range(20))
+    watch(of, (truth(of, tick, pose=pose) for tick, pose in enumerate(poses)), metrics, recording)
     recording.end(None)
     return tmp_path / "run.rrd"
 

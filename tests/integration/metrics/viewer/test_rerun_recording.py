@@ -15,7 +15,7 @@ from swarmwire.metrics.viewer.colors import DEAD, FATES, packed
 from swarmwire.metrics.viewer.recording import RerunRecording
 from tests.support.clocks import StillClock
 from tests.support.metrics.recordings import class_names, column, moving, record, series
-from tests.support.metrics.truths import edges, static, tally, truth
+from tests.support.metrics.truths import edges, static, tally, truth, watch
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
 
@@ -231,11 +231,7 @@ def test_what_is_much_is_sent_before(tmp_path, monkeypatch):
 def test_a_recording_is_closed_also_where_an_entity_fails_at_its_end(tmp_path, monkeypatch):
     of, metrics = static(3), Metrics()
     recording = RerunRecording(tmp_path / "run.rrd", metrics, StillClock())
-    for observer in (metrics, recording):
-        observer.begin(of)
-    for seen in moving(of, 4):
-        for observer in (metrics, recording):
-            observer.see(seen)
+    watch(of, moving(of, 4), metrics, recording)
     monkeypatch.setattr(rerun.TextLog, "columns", refuse)
     recording._rows.add("events", rerun.TextLog.columns, text=["cannot be sent"])
     with pytest.raises(ValueError, match="refused"):

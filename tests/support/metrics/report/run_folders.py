@@ -9,6 +9,7 @@ from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from tests.support.metrics.recorded import record
 from tests.support.metrics.summaries import made_up_summary
+from tests.support.metrics.truths import watch
 
 
 def run_folder(folder: Path, of, ticks, ended="duration", summary=True, **options) -> Path:
@@ -35,9 +36,7 @@ def run_folder(folder: Path, of, ticks, ended="duration", summary=True, **option
 def _observed(of, seen):
     parts: dict[str, Any] = {"radio": None}
     for observer in (Metrics(), RadioTally(), EventLog()):
-        observer.begin(of)
-        for one in seen:
-            observer.see(one)
+        watch(of, seen, observer)
         parts.update(observer.end(None))
     if of.arenas == 1:
         parts["metrics"] = parts["metrics"][0]

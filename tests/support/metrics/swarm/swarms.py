@@ -11,7 +11,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.truth import Group, Static, Truth
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
-from tests.support.metrics.truths import static, truth
+from tests.support.metrics.truths import static, truth, watch
 
 Array = np.ndarray[Any, Any]
 
@@ -48,9 +48,7 @@ class Swarm:
 def told(metric: Metric | str, *ticks: Truth, of: Static) -> list[float]:
     """What the metric says of each arena in the last of these ticks."""
     metrics = Metrics([metric])
-    metrics.begin(of)
-    for seen in ticks:
-        metrics.see(seen)
+    watch(of, ticks, metrics)
     (latest,) = metrics.latest.values()
     return latest.tolist()
 

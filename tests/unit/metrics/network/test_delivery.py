@@ -19,14 +19,12 @@ from swarmwire.metrics.network.robot_counts import RobotCounts
 from tests.support.comms.air.runs import make_air, packets
 from tests.support.metrics.radio_runs import radio_runs, rows_of
 from tests.support.metrics.recorded import links
-from tests.support.metrics.truths import departed, finished, measured, static, tally, truth
+from tests.support.metrics.truths import departed, finished, measured, static, tally, truth, watch
 
 
 def tallied(of, *ticks, last=None):
     observer = RadioTally()
-    observer.begin(of)
-    for tick, fields in enumerate(ticks):
-        observer.see(truth(of, tick, **fields))
+    watch(of, (truth(of, tick, **fields) for tick, fields in enumerate(ticks)), observer)
     return observer.end(last)["radio"]
 
 

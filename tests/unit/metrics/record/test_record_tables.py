@@ -24,11 +24,15 @@ def chunk(first, rows=10):
     return Chunk(rows, lambda: frame)
 
 
+def put_many(writer, parts):
+    for part in range(parts):
+        writer.put(chunk(10 * part))
+
+
 @pytest.mark.parametrize("parts", [0, 1, 2, 7])
 def test_the_parts_become_one_table_in_order_and_are_gone(tmp_path, parts):
     writer = TableWriter(tmp_path, "rows", SCHEMA)
-    for part in range(parts):
-        writer.put(chunk(10 * part))
+    put_many(writer, parts)
     writer.close()
     table = pl.read_parquet(tmp_path / "rows.parquet")
     assert table.schema == pl.Schema(SCHEMA)
@@ -40,16 +44,14 @@ def test_the_parts_become_one_table_in_order_and_are_gone(tmp_path, parts):
 def test_where_parts_ended_does_not_show_in_the_table(tmp_path):
     pyarrow_parquet = pytest.importorskip("pyarrow.parquet", reason="comes with the extra [view]")
     writer = TableWriter(tmp_path, "rows", SCHEMA)
-    for part in range(5):
-        writer.put(chunk(10 * part))
+    put_many(writer, 5)
     writer.close()
     assert pyarrow_parquet.ParquetFile(tmp_path / "rows.parquet").metadata.num_row_groups == 1
 
 
 def test_until_the_end_there_are_numbered_parts_and_nothing_half_written(tmp_path):
     writer = TableWriter(tmp_path, "rows", SCHEMA)
-    for part in range(3):
-        writer.put(chunk(10 * part))
+    put_many(writer, 3)
     written = Event()
     writer.put(Chunk(0, lambda: written.set() or pl.DataFrame(schema=SCHEMA)))
     assert written.wait(30)
@@ -117,16 +119,11 @@ def refuse_after(monkeypatch, files):
     monkeypatch.setattr(table_writer, "write_file", full)
 
 
-def put_many(writer):
-    for part in range(100):
-        writer.put(chunk(10 * part))
-
-
 def test_a_full_disk_is_told_once_more_is_put_and_what_was_written_stays(tmp_path, monkeypatch):
     refuse_after(monkeypatch, 2)
     writer = TableWriter(tmp_path, "rows", SCHEMA)
     with pytest.raises(RecordFailed, match="rows: .*No space left"):
-        put_many(writer)
+        put_many(writer, 100)
     with pytest.raises(RecordFailed, match="No space left"):
         writer.close()
     assert not writer._thread.is_alive()

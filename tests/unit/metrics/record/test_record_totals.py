@@ -19,7 +19,7 @@ from swarmwire.metrics.verify.verify import verify
 from tests.support.metrics.radio_runs import DISK, ticks
 from tests.support.metrics.recorded import links, record
 from tests.support.metrics.summaries import made_up_summary
-from tests.support.metrics.truths import departed, static, truth
+from tests.support.metrics.truths import departed, static, truth, watch
 
 TOTALS = ("radio_robots", "radio_distances", "radio_links")
 OF = static(5, arenas=2)
@@ -30,9 +30,7 @@ def folder(tmp_path):
     """A run folder as far as the radio goes, with its summary."""
     seen = list(ticks(DISK, OF, 7, count=20))
     recorded, tally = record(tmp_path, OF, seen, links=True), RadioTally()
-    tally.begin(OF)
-    for one in seen:
-        tally.see(one)
+    watch(OF, seen, tally)
     summary = made_up_summary(20, arenas=2, record=recorded, **tally.end(None))
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     return RunFolder(tmp_path)

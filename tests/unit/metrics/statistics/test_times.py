@@ -14,7 +14,7 @@ from swarmwire.metrics.statistics.bootstrap import drawn
 from swarmwire.metrics.statistics.gehan import paired_p, surely_greater, surely_less
 from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
 from swarmwire.metrics.statistics.resampled_times import resampled_quantiles
-from tests.support.metrics.statistics.samples import number_samples, placebo, time_samples, times, treated
+from tests.support.metrics.statistics.samples import placebo, time_samples, times, treated
 
 shares = st.floats(0.01, 0.99)
 
@@ -55,13 +55,6 @@ def test_survival_and_band_are_those_of_scipy(sample, level):
     inner = (ours.survival > 1e-9) & (ours.survival < 1.0 - 1e-9)
     np.testing.assert_allclose(ours.low[inner], band.low.probabilities[inner], atol=1e-9)
     np.testing.assert_allclose(ours.high[inner], band.high.probabilities[inner], atol=1e-9)
-
-
-@given(number_samples)
-def test_without_censoring_survival_is_one_less_the_share_of_values_up_to_then(sample):
-    curve = kaplan_meier(times(sample.value))
-    for time, survival in zip(curve.time, curve.survival, strict=True):
-        assert survival == pytest.approx(1.0 - np.mean(sample.value <= time), abs=1e-12)
 
 
 @given(time_samples, shares, shares)
