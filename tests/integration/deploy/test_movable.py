@@ -12,8 +12,6 @@ from tests.support.deploy.layouts import run_spread
 
 PUSHER = """
 from swarmwire.agent import Agent
-from tests.support.deploy.layouts import run_spread
-
 
 class Pusher(Agent):
     needs = ("compass",)

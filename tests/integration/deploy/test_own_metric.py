@@ -66,7 +66,8 @@ def test_a_package_brings_one_by_name_and_its_code_is_told_with_the_run(tmp_path
     assert RunFolder(tmp_path / "run").metrics()["east"][-1] == result.metrics["east"].final
     assert repeat(tmp_path / "run").changes == ()
     (tmp_path / "site" / "wind_metrics.py").write_text(CODE + "# a word more\n")
-    assert repeat(tmp_path / "run").changes == ("module wind_metrics has changed since",)
+    (change,) = repeat(tmp_path / "run").changes
+    assert "wind_metrics" in change
 
 
 @pytest.mark.parametrize("names", [[], ["order"]])

