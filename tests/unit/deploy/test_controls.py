@@ -202,15 +202,8 @@ def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, monkeypatc
     monkeypatch.setattr(simulation_module, "WallClock", lambda: GoingClock(MS))
     simulation = Simulation(LOSSY, overrides=SHORT)
     controls = simulation.controls
-    plan = [
-        controls.toggle_pause,
-        controls.step,
-        controls.step,
-        controls.toggle_pause,
-        controls.slower,
-        controls.slower,
-    ]
-    plan += [controls.toggle_pause, controls.step, controls.toggle_pause, *[controls.faster] * 20]
+    pause, step = controls.toggle_pause, controls.step
+    plan = [pause, step, step, pause, *[controls.slower] * 2, pause, step, pause, *[controls.faster] * 20]
     asker = Asker(plan)
     controls.on_wait = asker.ask
     simulation.watch(asker)

@@ -9,23 +9,11 @@ from swarmwire.deploy import Percentiles, run
 from tests.support.deploy.commands import LOSSY, called
 from tests.support.deploy.layouts import run_spread
 
-REQUIRED = {
-    "scenario",
-    "seed",
-    "robots",
-    "runners",
-    "mode",
-    "ticks",
-    "sim_time_s",
-    "wall_time_s",
-    "start_time_s",
-    "realtime_factor",
-    "trajectory_sha256",
-    "cpu",
-    "versions",
-    "radio",
-    "metrics",
-}
+MEASURED = {"wall_time_s", "start_time_s", "realtime_factor"}
+REQUIRED = MEASURED | {
+    "scenario", "seed", "robots", "runners", "mode", "ticks", "sim_time_s", "trajectory_sha256", "cpu", "versions",
+    "radio", "metrics",
+}  # fmt: skip
 
 
 def test_the_summary_of_the_command_is_the_result_from_python(tmp_path, monkeypatch, capsys):
@@ -34,18 +22,11 @@ def test_the_summary_of_the_command_is_the_result_from_python(tmp_path, monkeypa
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary.keys() >= REQUIRED
     assert set(summary["metrics"]) >= {"order", "largest_component", "components", "collisions"}
-    result = run(LOSSY, overrides=["duration_s=4"])
-    measured = (
-        "wall_time_s",
-        "start_time_s",
-        "realtime_factor",
-        "files",
-        "record",
-    )  # the last two: only with a run folder
-    same = {key: value for key, value in summary.items() if key not in measured}
-    assert same == {
-        key: value for key, value in json.loads(json.dumps(result.summary())).items() if key not in measured
-    }
+    result = json.loads(json.dumps(run(LOSSY, overrides=["duration_s=4"]).summary()))
+    for key in (*MEASURED, "files", "record"):  # the last two: only with a run folder
+        del summary[key]
+        result.pop(key, None)
+    assert summary == result
     assert (tmp_path / "run" / "run.rrd").stat().st_size > 10_000
 
 
@@ -97,7 +78,8 @@ def test_help_teaches(call, monkeypatch, capsys):
 def test_check_says_what_is_in_a_good_scenario(monkeypatch, capsys):
     code, out, _ = called(monkeypatch, capsys, "check", LOSSY)
     assert code == 0
-    assert "20 epuck (flock), 120 s at 10 Hz" in out
+    for text in ("20 epuck", "flock", "120 s", "10 Hz"):
+        assert text in out
 
 
 def test_schema_is_json_schema_with_units_and_bounds(monkeypatch, capsys):

@@ -59,7 +59,7 @@ def test_tables_and_lists_of_a_file_say_the_same():
 def test_what_is_none_of_it_is_refused_by_its_name(text):
     with pytest.raises(BadInput) as refused:
         vary_of(text)
-    assert str(refused.value).startswith(f"--vary {text}: expected ")
+    assert (refused.value.where, refused.value.expected.startswith("expected ")) == (f"--vary {text}", True)
     assert "\n" not in str(refused.value)
 
 
