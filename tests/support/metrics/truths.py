@@ -9,6 +9,7 @@ from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.truth import Departed, Finished, Group, Light, Obstacle, Static, Tally, Truth
+from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
 
 
@@ -93,11 +94,19 @@ def watch(of: Static, ticks: Iterable[Truth], *observers: Any) -> None:
             observer.see(seen)
 
 
+def in_each_tick(of: Static, ticks: Iterable[Truth], *metrics: Metric | str) -> np.ndarray[Any, Any]:
+    """What the metrics say, (ticks, metrics, arenas)."""
+    observer, found = Metrics(metrics), list[np.ndarray[Any, Any]]()
+    observer.begin(of)
+    for seen in ticks:
+        observer.see(seen)
+        found.append(np.array(list(observer.latest.values())))
+    return np.array(found)
+
+
 def measured(name: str, of: Static, seen: Truth) -> list[float]:
     """The metric's value in this one tick, per arena."""
-    metrics = Metrics([name])
-    watch(of, [seen], metrics)
-    return metrics.latest[name].tolist()
+    return in_each_tick(of, [seen], name)[0, 0].tolist()
 
 
 def departed(

@@ -14,7 +14,7 @@ from swarmwire.metrics.moment import Components, Moment, agreement
 from swarmwire.metrics.registry import METRICS, register
 from swarmwire.metrics.sampled import Sampled
 from swarmwire.metrics.swarm.order import Order
-from tests.support.metrics.truths import edges, poses, static, truth, watch
+from tests.support.metrics.truths import edges, in_each_tick, poses, static, truth, watch
 
 
 @dataclass(frozen=True)
@@ -160,14 +160,10 @@ class Ticks(Sampled):
 
 
 def sampled_in(every_s, ticks=12):
-    of, metrics = static(2, arenas=2), Metrics([Ticks(every_s=every_s)])
-    metrics.begin(of)
-    found = []
-    for tick in range(ticks):
-        metrics.see(truth(of, tick))
-        found.append(metrics.latest["ticks_sampled"].tolist())
-    assert all(a == b for a, b in found)
-    return [int(a) for a, _ in found]
+    of = static(2, arenas=2)
+    first, second = in_each_tick(of, (truth(of, tick) for tick in range(ticks)), Ticks(every_s=every_s))[:, 0].T
+    assert first.tolist() == second.tolist()
+    return first.tolist()
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.truth import Group, Static, Truth
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.metrics import Metrics
-from tests.support.metrics.truths import static, truth, watch
+from tests.support.metrics.truths import in_each_tick, static, truth
 
 Array = np.ndarray[Any, Any]
 
@@ -47,10 +46,7 @@ class Swarm:
 
 def told(metric: Metric | str, *ticks: Truth, of: Static) -> list[float]:
     """What the metric says of each arena in the last of these ticks."""
-    metrics = Metrics([metric])
-    watch(of, ticks, metrics)
-    (latest,) = metrics.latest.values()
-    return latest.tolist()
+    return in_each_tick(of, ticks, metric)[-1, 0].tolist()
 
 
 def said(metric: Metric | str, swarm: Swarm) -> list[float]:

@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.algebraic_connectivity import AlgebraicConnectivity, second_eigenvalue
 from swarmwire.metrics.network.articulation import cut_vertices
-from tests.support.metrics.truths import edges, measured, static, truth
+from tests.support.metrics.truths import edges, in_each_tick, measured, static, truth
 
 
 def components(of, **given_fields):
@@ -97,13 +96,9 @@ def test_of_a_large_swarm_both_ways_find_the_same_connectivity():
 
 
 def test_it_is_sampled_and_held():
-    of, metrics = static(3), Metrics([AlgebraicConnectivity(every_s=0.2)])
-    metrics.begin(of)
-    found = []
-    for tick in range(4):
-        metrics.see(truth(of, tick, edges=edges((0, 1), (1, 2)) if tick < 1 else edges()))
-        found += metrics.latest[CONNECTIVITY].tolist()
-    assert found == [1.0, 1.0, 0.0, 0.0]
+    of = static(3)
+    ticks = (truth(of, tick, edges=edges((0, 1), (1, 2)) if tick < 1 else edges()) for tick in range(4))
+    assert in_each_tick(of, ticks, AlgebraicConnectivity(every_s=0.2)).ravel().tolist() == [1.0, 1.0, 0.0, 0.0]
 
 
 NAME = "articulation"

@@ -19,7 +19,7 @@ from swarmwire.metrics.network.robot_counts import RobotCounts
 from tests.support.comms.air.runs import make_air, packets
 from tests.support.metrics.radio_runs import radio_runs, rows_of
 from tests.support.metrics.recorded import links
-from tests.support.metrics.truths import departed, finished, measured, static, tally, truth, watch
+from tests.support.metrics.truths import departed, finished, in_each_tick, measured, static, tally, truth, watch
 
 
 def tallied(of, *ticks, last=None):
@@ -170,12 +170,10 @@ def test_airtime_is_the_share_of_the_tick_that_a_robot_alive_is_on_air():
 
 
 def test_of_a_packet_longer_than_a_tick_the_rest_counts_in_those_that_follow():
-    of, metrics, found = static(2), Metrics(["airtime"]), []
-    metrics.begin(of)
-    for tick, sender in enumerate(([0], [1], [], [])):
-        metrics.see(truth(of, tick, departed=departed(sender, off_air_at_ns=(250 - 200 * tick) * MS)))
-        found += metrics.latest["airtime"].tolist()
-    assert found == pytest.approx([0.5, (1.0 + 0.5) / 2, 0.25, 0.0])
+    of, senders = static(2), ([0], [1], [], [])
+    gone = (departed(sender, off_air_at_ns=(250 - 200 * tick) * MS) for tick, sender in enumerate(senders))
+    found = in_each_tick(of, (truth(of, tick, departed=one) for tick, one in enumerate(gone)), "airtime").ravel()
+    assert found.tolist() == pytest.approx([0.5, (1.0 + 0.5) / 2, 0.25, 0.0])
 
 
 def test_throughput_counts_payload_once_for_each_that_heard_it():

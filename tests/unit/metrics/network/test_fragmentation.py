@@ -12,7 +12,7 @@ from swarmwire.metrics.network.fragmentation_count import Fragmentations
 from swarmwire.metrics.network.fragmented import Fragmented
 from swarmwire.metrics.network.rejoin import RejoinMedian, RejoinWorst
 from swarmwire.metrics.network.unrejoined import Unrejoined
-from tests.support.metrics.truths import edges, static, truth
+from tests.support.metrics.truths import edges, in_each_tick, static, truth, watch
 
 NAMES = ("fragmentations", "rejoin_median", "rejoin_worst", "unrejoined")
 KINDS = (Fragmentations, RejoinMedian, RejoinWorst, Unrejoined)
@@ -20,7 +20,7 @@ WHOLE, SPLIT = edges((0, 1)), edges()
 
 
 def events_of(ticks, hold):
-    """Of a string as `finals` takes it the length of each event in ticks, by its whole ticks; None: open at the end."""
+    """The length of each event in ticks, of a string as `seen_ticks` takes it; None: open at the end."""
     whole = [tick for tick, shown in enumerate(ticks) if shown == "+"]
     found = []
     for this, following in zip(whole, [*whole[1:], None], strict=False):
@@ -30,14 +30,17 @@ def events_of(ticks, hold):
     return found
 
 
-def finals(ticks, hold_s=None):
+def seen_ticks(of, ticks):
     """Of one arena with two robots: + joined, - apart, 0 all dead; at 10 ticks per second."""
+    for tick, shown in enumerate(ticks):
+        yield truth(of, tick, edges=WHOLE if shown == "+" else SPLIT, alive=np.full(2, shown != "0"))
+
+
+def finals(ticks, hold_s=None):
+    """What the four metrics say in the end of ticks as `seen_ticks` takes them."""
     of = static(2)
     metrics = Metrics(list(NAMES) if hold_s is None else [kind(hold_s=hold_s) for kind in KINDS])
-    metrics.begin(of)
-    for tick, shown in enumerate(ticks):
-        alive = np.full(2, shown != "0")
-        metrics.see(truth(of, tick, edges=WHOLE if shown == "+" else SPLIT, alive=alive))
+    watch(of, seen_ticks(of, ticks), metrics)
     [found] = metrics.end(None)["metrics"]
     return tuple(found[name]["final"] for name in NAMES)
 
@@ -80,13 +83,8 @@ def test_events_are_those_read_off_the_ticks(ticks, hold):
 
 @given(st.text("+++-----0", min_size=1, max_size=60), st.integers(0, 4))
 def test_fragmented_is_the_share_of_the_time_in_events_without_their_holds(ticks, hold):
-    of, metrics = static(2), Metrics([Fragmented(hold_s=hold / 10)])
-    metrics.begin(of)
-    found = []
-    for tick, shown in enumerate(ticks):
-        alive = np.full(2, shown != "0")
-        metrics.see(truth(of, tick, edges=WHOLE if shown == "+" else SPLIT, alive=alive))
-        found += metrics.latest["fragmented"].tolist()
+    of = static(2)
+    found = in_each_tick(of, seen_ticks(of, ticks), Fragmented(hold_s=hold / 10)).ravel().tolist()
     assert set(found) <= {0.0, 1.0}
     starts = [tick for tick, (before, now) in enumerate(zip([0.0, *found], found, strict=False)) if now > before]
     lengths = events_of(ticks, hold)

@@ -11,7 +11,6 @@ from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.packets import BROADCAST
-from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network import age_of_information
 from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
 from swarmwire.metrics.network.pdr import PacketDeliveryRatio
@@ -19,21 +18,15 @@ from swarmwire.metrics.network.windowed import Window
 from tests.support.comms.air.runs import make_air, packets
 from tests.support.metrics.radio_runs import radio_runs, rows_of
 from tests.support.metrics.recorded import links
-from tests.support.metrics.truths import finished, static, tally, truth
+from tests.support.metrics.truths import finished, in_each_tick, static, tally, truth
 
-OF_WINDOWS = ("pdr", "latency_air", "latency_agent")
 MS = 1_000_000
 
 
 def told(of, seen, window_s):
     """The three metrics in each tick, (3, ticks, arenas)."""
-    metrics = Metrics([kind(window_s=window_s) for kind in (PacketDeliveryRatio, LatencyOnAir, LatencyToAgent)])
-    metrics.begin(of)
-    found = []
-    for one in seen:
-        metrics.see(one)
-        found.append([metrics.latest[name] for name in OF_WINDOWS])
-    return np.array(found).transpose(1, 0, 2)
+    metrics = (kind(window_s=window_s) for kind in (PacketDeliveryRatio, LatencyOnAir, LatencyToAgent))
+    return in_each_tick(of, seen, *metrics).transpose(1, 0, 2)
 
 
 @given(st.lists(st.integers(-9, 9), max_size=30), st.integers(1, 8))
@@ -128,13 +121,7 @@ NAME = "age_of_information"
 
 def ages(of, seen):
     """The metric in each tick, (ticks, arenas)."""
-    metrics = Metrics([NAME])
-    metrics.begin(of)
-    found = []
-    for one in seen:
-        metrics.see(one)
-        found.append(metrics.latest[NAME])
-    return np.array(found)
+    return in_each_tick(of, seen, NAME)[:, 0]
 
 
 def links_heard(sender, receiver, sent_at_ms, fate=Fate.HEARD, arena=0):
@@ -232,16 +219,13 @@ def test_age_is_that_of_a_dictionary_of_what_each_has_heard(run):
 def test_of_independent_losses_age_is_what_the_renewals_say(lost):
     """Mean d + T (1 + p) / (2 (1 - p)): of 40,000 periods it deviates by a hundredth at most."""
     rng, arenas, periods, delay_ms, period_ms = np.random.default_rng(3), 100, 400, 50, 300
-    of, found = static(2, arenas=arenas), []
-    metrics = Metrics([NAME])
-    metrics.begin(of)
+    of, seen = static(2, arenas=arenas), []
     for tick in range(1, 3 * periods):
         arrived = np.flatnonzero(rng.random(arenas) >= lost) if tick % 3 == 1 else np.arange(0)
         none = np.zeros(len(arrived), np.int64)
         told = links_heard(none, none + 1, none + (tick - 1) * 100, arena=arrived)
-        metrics.see(truth(of, tick, finished=told))
-        found.append(metrics.latest[NAME])
-    mean_s = np.mean(found[100:])
+        seen.append(truth(of, tick, finished=told))
+    mean_s = np.mean(ages(of, seen)[100:])
     # Known from the tick after: seen at 0.1, 0.2, … s of age, whose mean is that of 0.05 s of delay.
     expected_s = (delay_ms + period_ms * (1 + lost) / (2 * (1 - lost))) / 1000
     assert mean_s == pytest.approx(expected_s, rel=0.02)

@@ -12,7 +12,7 @@ from swarmwire.comms.truth import Obstacle
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.task.coverage import Coverage
 from swarmwire.metrics.task.coverage_time import CoverageTime
-from tests.support.metrics.truths import static, truth
+from tests.support.metrics.truths import in_each_tick, static, truth
 
 BOX = Obstacle("box", 1.0, 0.5, 0.3, size_m=(1.5, 0.7))
 POLYGON = Obstacle("polygon", -2.0, 1.0, 0.5, points_m=((0.0, 0.0), (1.0, 0.0), (0.3, 1.2)))
@@ -21,14 +21,12 @@ CYLINDER = Obstacle("cylinder", -1.0, -1.5, radius_m=0.6)
 
 def shares(of, ticks, alive=None, **parameters):
     """Coverage in each tick, (ticks, arenas), of robots at places (ticks, rows, 2)."""
-    metrics, found = Metrics([Coverage(**parameters)]), []
-    metrics.begin(of)
+    seen = []
     for tick, at in enumerate(ticks):
         pose = np.concatenate([at, np.zeros((len(at), 1))], axis=1)
         given_alive = {} if alive is None else {"alive": np.array(alive[tick])}
-        metrics.see(truth(of, tick, pose=pose, **given_alive))
-        found.append(metrics.latest["coverage"])
-    return np.array(found)
+        seen.append(truth(of, tick, pose=pose, **given_alive))
+    return in_each_tick(of, seen, Coverage(**parameters))[:, 0]
 
 
 def is_free(x, y, obstacles):

@@ -8,21 +8,18 @@ from hypothesis import strategies as st
 from swarmwire.comms.truth import Light
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.task.find_time import FindTime
-from tests.support.metrics.truths import measured, static, truth
+from tests.support.metrics.truths import in_each_tick, measured, static, truth
 
-NAMES = ("consensus_error", "consensus_bias")
 numbers = st.floats(-1e6, 1e6) | st.just(np.nan)
 
 
 def both(of, values, alive=None):
     """Both metrics in each tick, (ticks, 2, arenas)."""
-    metrics, found = Metrics(NAMES), []
-    metrics.begin(of)
+    seen = []
     for tick, value in enumerate(values):
         given_alive = {} if alive is None else {"alive": np.array(alive[tick])}
-        metrics.see(truth(of, tick, value=None if value is None else np.array(value, np.float64), **given_alive))
-        found.append([metrics.latest[name] for name in NAMES])
-    return np.array(found)
+        seen.append(truth(of, tick, value=None if value is None else np.array(value, np.float64), **given_alive))
+    return in_each_tick(of, seen, "consensus_error", "consensus_bias")
 
 
 def test_the_error_is_the_deviation_of_those_that_live_and_told_a_number():
