@@ -12,19 +12,7 @@ from swarmwire.deploy.campaign.sweeping import Sweep
 from swarmwire.deploy.campaign.task import PieceResult
 from swarmwire.deploy.terminal.sweep_progress import SweepBar, SweepLines, sweep_progress
 from swarmwire.deploy.terminal.sweep_report import print_sweep
-
-
-class Hand:
-    """A clock that the test sets."""
-
-    def __init__(self):
-        self.now_s = 0.0
-
-    def now_ns(self):
-        return int(self.now_s * NS_PER_S)
-
-    def sleep_until(self, at_ns):
-        raise AssertionError("nobody waits here")
+from tests.support.clocks import StillClock
 
 
 class Campaign:
@@ -36,11 +24,11 @@ def piece(runs, failed=0):
 
 
 def printed(watcher_of, pieces, terminal, done=0):
-    clock, text = Hand(), io.StringIO()
+    clock, text = StillClock(), io.StringIO()
     watcher = watcher_of(clock, Console(file=text, force_terminal=terminal, width=110))
     watcher.begin(Campaign(), done, 0)
     for one in pieces:
-        clock.now_s += 1.0
+        clock.time_ns += NS_PER_S
         watcher.see(one)
     watcher.end()
     return text.getvalue()
