@@ -62,7 +62,7 @@ class _Fields:
     def __init__(self, found: object, where: str, key: str = "") -> None:
         self.where, self.key = where, key
         if not isinstance(found, dict):
-            raise BadInput(where, key, "expected an object")
+            raise BadInput(where, key.rstrip("."), "expected an object")
         self.found = cast("JsonObject", found)
 
     def get(self, name: str, kind: type | tuple[type, ...], expected: str) -> Any:

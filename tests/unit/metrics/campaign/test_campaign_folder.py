@@ -150,7 +150,7 @@ def test_a_damaged_or_foreign_campaign_is_refused_with_its_key(tmp_path, changes
     folder = rewritten(write_campaign(tmp_path / "a"), **changes)
     with pytest.raises(BadInput) as refused:
         CampaignFolder(folder)
-    assert (refused.value.where, refused.value.key.rstrip(".")) == (str(folder / "campaign.json"), key)
+    assert (refused.value.where, refused.value.key) == (str(folder / "campaign.json"), key)
 
 
 def test_what_is_no_campaign_is_refused(tmp_path):
