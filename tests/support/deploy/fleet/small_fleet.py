@@ -1,6 +1,6 @@
 """A fleet of fake robots, and what is pushed to them: an agent of a few lines, and packages of a few files."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -85,8 +85,3 @@ class SmallFleet:
         """Write the known hosts: these."""
         keys = [f"[127.0.0.1]:{host.port} {host.host_key.export_public_key().decode()}" for host in hosts]
         (self.folder / "known_hosts").write_text("".join(keys))
-
-
-def words(lines: str | Sequence[str]) -> list[str]:
-    """Lines with single spaces."""
-    return [" ".join(line.split()) for line in (lines.splitlines() if isinstance(lines, str) else lines)]
