@@ -244,7 +244,7 @@ def test_packets_overtake_unless_order_is_kept(radio: Radio):
     assert sorted_rows(ordered) == sorted_rows(expected)
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(
     st.sampled_from(LATE_RADIOS),
     st.integers(0, 1000),
