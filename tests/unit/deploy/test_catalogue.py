@@ -44,7 +44,7 @@ HELD = {
     "engines": [*get_args(PhysicsTable.model_fields["engine"].annotation)],
     "events": [*EVENTS],
     "metrics": [*METRICS],
-    "stages": [module.__name__.rpartition(".")[2] for module in ORDER],
+    "stages": [kind.name for kind in ORDER],
     "fates": [*FATE_NAMES],
 }
 REGISTRIES = {"drive": DRIVES, "sense": SHEETS, "event": EVENTS, "metric": METRICS}
@@ -152,15 +152,15 @@ def test_a_body_tells_the_figures_of_its_sheet(name):
 
 
 def test_metrics_and_stages_tell_what_their_code_says():
-    for name, kind in METRICS.items():
+    for name, metric in METRICS.items():
         facts = dict(find(f"metric:{name}").facts)
-        assert (facts["unit"], facts["kind"].startswith(kind.kind)) == (kind.unit or "none", True)
+        assert (facts["unit"], facts["kind"].startswith(metric.kind)) == (metric.unit or "none", True)
         assert facts["bounds"]
-    for module in ORDER:
-        entry = find(f"stage:{module.__name__.rpartition('.')[2]}")
+    for kind in ORDER:
+        entry = find(f"stage:{kind.name}")
         told = {of.name for table in entry.tables for of in table.parameters}
-        assert {f"radio.{key}" for key in module.KEYS} <= told
-        assert bool(told) == bool(module.KEYS)
+        assert {f"radio.{key}" for key in kind.keys} <= told
+        assert bool(told) == bool(kind.keys)
 
 
 def test_every_key_of_a_scenarios_schema_can_be_described():

@@ -9,8 +9,6 @@ from swarmwire.comms.air.air import Air
 from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.air.presets.registry import PRESETS, with_preset
 from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.stages.chain import ORDER
-from swarmwire.comms.air.stages.stage import Stage
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
@@ -139,9 +137,3 @@ def test_an_arena_among_others_is_blocked_as_it_is_alone():
 def test_infrared_presets_are_blocked_by_bodies(name: str):
     assert PRESETS[name].radio["bodies_block"]
     assert with_preset({"preset": name, "bodies_block": False})["bodies_block"] is False
-
-
-@pytest.mark.parametrize("module", ORDER, ids=lambda module: module.__name__.rpartition(".")[2])
-def test_each_module_of_the_order_holds_one_stage(module):
-    kinds = [of for of in vars(module).values() if isinstance(of, type) and issubclass(of, Stage) and of is not Stage]
-    assert [kind.__module__ for kind in kinds] == [module.__name__]

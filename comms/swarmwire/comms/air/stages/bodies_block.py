@@ -12,16 +12,17 @@ from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry import grid
 
-KEYS = ("bodies_block",)
-
-
-def stage(medium: Medium) -> Stage | None:
-    """The stage, where the radio says so and there are bodies."""
-    return BodiesBlock(medium) if medium.radio.bodies_block and medium.radius_m.any() else None
-
 
 class BodiesBlock(Stage):
     """A link is blocked if the disc of a third robot, dead or alive, covers a point of the line between the centres."""
+
+    name = "bodies_block"
+    keys = ("bodies_block",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio says so and there are bodies."""
+        return BodiesBlock(medium) if medium.radio.bodies_block and medium.radius_m.any() else None
 
     def __init__(self, medium: Medium) -> None:
         assert medium.radio.range_m is not None  # `Air` has refused a disk without

@@ -8,16 +8,17 @@ from swarmwire.comms.air.stages.stage import Medium, Stage
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.fates import Fate
 
-KEYS = ("bursts",)
-
-
-def stage(medium: Medium) -> Stage | None:
-    """The stage, where the radio has bursts; of a signal, its reception asks for them."""
-    return BurstLoss(medium) if medium.radio.bursts is not None and not medium.radio.is_signal else None
-
 
 class BurstLoss(Stage):
     """Gilbert's and Elliott's chain for each directed link, in continuous time."""
+
+    name = "burst_loss"
+    keys = ("bursts",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio has bursts; of a signal, its reception asks for them."""
+        return BurstLoss(medium) if medium.radio.bursts is not None and not medium.radio.is_signal else None
 
     remembers = True
 

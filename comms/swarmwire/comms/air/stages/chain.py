@@ -16,33 +16,46 @@ Radios with signals pass `AFTER_RECEPTION` alone: what stands there serves both 
 with reception there: what weakens signals belongs to `signal/pairs.py`, what takes frames to `signal/losses.py`.
 """
 
-from swarmwire.comms.air.stages import (
-    bodies_block,
-    burst_loss,
-    disrupted,
-    fixed_loss,
-    given_bearing,
-    given_range,
-    given_rssi,
-    latency,
-    line_of_sight,
-    propagation_delay,
-    trace,
-    varying_delay,
-)
+from swarmwire.comms.air.stages.bodies_block import BodiesBlock
+from swarmwire.comms.air.stages.burst_loss import BurstLoss
+from swarmwire.comms.air.stages.disrupted import Disrupted
+from swarmwire.comms.air.stages.fixed_loss import FixedLoss
+from swarmwire.comms.air.stages.given_bearing import GivenBearing
+from swarmwire.comms.air.stages.given_range import GivenRange
+from swarmwire.comms.air.stages.given_rssi import GivenRssi
+from swarmwire.comms.air.stages.latency import Latency
+from swarmwire.comms.air.stages.line_of_sight import LineOfSight
+from swarmwire.comms.air.stages.propagation_delay import PropagationDelay
 from swarmwire.comms.air.stages.stage import Medium, Stage
+from swarmwire.comms.air.stages.trace import Replay
+from swarmwire.comms.air.stages.varying_delay import VaryingDelay
 
-AFTER_RECEPTION = (trace, given_range, given_bearing, given_rssi, latency, varying_delay, propagation_delay)
-ORDER = (line_of_sight, bodies_block, disrupted, fixed_loss, burst_loss, *AFTER_RECEPTION)  # order has a meaning
+AFTER_RECEPTION: tuple[type[Stage], ...] = (
+    Replay,
+    GivenRange,
+    GivenBearing,
+    GivenRssi,
+    Latency,
+    VaryingDelay,
+    PropagationDelay,
+)
+ORDER: tuple[type[Stage], ...] = (
+    LineOfSight,
+    BodiesBlock,
+    Disrupted,
+    FixedLoss,
+    BurstLoss,
+    *AFTER_RECEPTION,
+)  # order has a meaning
 
 
 def chain(medium: Medium) -> tuple[Stage, ...]:
     """The stages that this medium has, in order."""
-    made = (module.stage(medium) for module in ORDER)
+    made = (kind.of(medium) for kind in ORDER)
     return tuple(stage for stage in made if stage is not None)
 
 
 def chain_after_reception(medium: Medium) -> tuple[Stage, ...]:
     """Those of them that a signal passes once it was received: what comes before is one with its events."""
-    made = (module.stage(medium) for module in AFTER_RECEPTION)
+    made = (kind.of(medium) for kind in AFTER_RECEPTION)
     return tuple(stage for stage in made if stage is not None)

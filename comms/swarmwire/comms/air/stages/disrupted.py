@@ -7,16 +7,17 @@ from swarmwire.comms.air.stages.stage import Medium, Stage
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.fates import Fate
 
-KEYS = ()  # events bring them
-
-
-def stage(medium: Medium) -> Stage | None:
-    """The stage; every radio has it, since events may come."""
-    return Disrupted(medium)
-
 
 class Disrupted(Stage):
     """Ends links by the disruption that holds. They were in range: that asks for path loss and walls alone."""
+
+    name = "disrupted"
+    keys = ()  # events bring them
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage; every radio has it, since events may come."""
+        return Disrupted(medium)
 
     def __init__(self, medium: Medium) -> None:
         self._disruption = medium.disruption

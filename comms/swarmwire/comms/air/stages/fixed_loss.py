@@ -12,17 +12,19 @@ from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.fates import Fate
 
-KEYS = ("loss",)
 LOSS = purpose("fixed loss")
-
-
-def stage(medium: Medium) -> Stage | None:
-    """The stage, where the radio loses anything."""
-    return FixedLoss(medium) if medium.radio.loss > 0.0 else None
 
 
 class FixedLoss(Stage):
     """A Bernoulli trial with probability `loss` for each packet and receiver."""
+
+    name = "fixed_loss"
+    keys = ("loss",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio loses anything."""
+        return FixedLoss(medium) if medium.radio.loss > 0.0 else None
 
     def __init__(self, medium: Medium) -> None:
         self._loss, self._keys, self._robots = medium.radio.loss, medium.keys, medium.robots

@@ -12,15 +12,8 @@ from swarmwire.comms.air.stages.stage import Medium, Stage
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 
-KEYS = ("gives.bearing",)
 NOISE = purpose("bearing noise")
 TURN = 2.0 * np.pi
-
-
-def stage(medium: Medium) -> Stage | None:
-    """The stage, where the radio gives the bearing."""
-    asked = medium.radio.gives.bearing
-    return None if asked is None else GivenBearing(medium, asked.noise_rad)
 
 
 class GivenBearing(given.Given):
@@ -28,6 +21,15 @@ class GivenBearing(given.Given):
 
     In the receiver's frame: 0 is ahead, positive to the left; wrapped to (-pi, pi].
     """
+
+    name = "given_bearing"
+    keys = ("gives.bearing",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio gives the bearing."""
+        asked = medium.radio.gives.bearing
+        return None if asked is None else GivenBearing(medium, asked.noise_rad)
 
     def __init__(self, medium: Medium, noise_rad: float) -> None:
         super().__init__(medium, "bearing_rad", noise_rad, bearing_rad)

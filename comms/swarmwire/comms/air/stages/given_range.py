@@ -12,18 +12,20 @@ from swarmwire.comms.air.stages.stage import Medium, Stage
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 
-KEYS = ("gives.range",)
 NOISE = purpose("range noise")
-
-
-def stage(medium: Medium) -> Stage | None:
-    """The stage, where the radio gives the range."""
-    asked = medium.radio.gives.range
-    return None if asked is None else GivenRange(medium, asked.noise_m)
 
 
 class GivenRange(given.Given):
     """The distance between the centres when the packet went on air, plus a normal error; never below 0."""
+
+    name = "given_range"
+    keys = ("gives.range",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio gives the range."""
+        asked = medium.radio.gives.range
+        return None if asked is None else GivenRange(medium, asked.noise_m)
 
     def __init__(self, medium: Medium, noise_m: float) -> None:
         super().__init__(medium, "range_m", noise_m, range_m)

@@ -11,18 +11,20 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 
-KEYS = ("gives.rssi",)
 NOISE = purpose("rssi noise")
-
-
-def stage(medium: Medium) -> Stage | None:
-    """The stage, where the radio gives the strength."""
-    given = medium.radio.gives.rssi
-    return None if given is None else GivenRssi(medium, given.noise_db)
 
 
 class GivenRssi(Stage):
     """The power of the signal at the receiver, fading included, plus a normal error in dB."""
+
+    name = "given_rssi"
+    keys = ("gives.rssi",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio gives the strength."""
+        given = medium.radio.gives.rssi
+        return None if given is None else GivenRssi(medium, given.noise_db)
 
     def __init__(self, medium: Medium, noise_db: float) -> None:
         self._noise_db, self._keys, self._robots = noise_db, medium.keys, medium.robots

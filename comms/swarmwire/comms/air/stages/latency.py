@@ -12,17 +12,19 @@ from swarmwire.comms.clock import to_ns
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 
-KEYS = ("latency_s", "jitter_s")
 DELAY = purpose("delay")
-
-
-def stage(medium: Medium) -> Stage | None:
-    """The stage, where the radio has latency or jitter."""
-    return Latency(medium) if medium.radio.latency_s > 0.0 or medium.radio.jitter_s > 0.0 else None
 
 
 class Latency(Stage):
     """`heard_at = off_air_at + latency + U[0, jitter)`, in integer ns."""
+
+    name = "latency"
+    keys = ("latency_s", "jitter_s")
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio has latency or jitter."""
+        return Latency(medium) if medium.radio.latency_s > 0.0 or medium.radio.jitter_s > 0.0 else None
 
     def __init__(self, medium: Medium) -> None:
         self._latency_ns, self._jitter_ns = to_ns(medium.radio.latency_s), to_ns(medium.radio.jitter_s)

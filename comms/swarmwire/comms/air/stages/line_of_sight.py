@@ -11,17 +11,18 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import is_blocked, is_blocked_on
 
-KEYS = ("line_of_sight",)
-
-
-def stage(medium: Medium) -> Stage | None:
-    """The stage, where the radio needs a line of sight and there are obstacles."""
-    any_obstacle = len(medium.obstacles.circle) or len(medium.obstacles.polygon)
-    return LineOfSight(medium) if medium.radio.needs_line_of_sight and any_obstacle else None
-
 
 class LineOfSight(Stage):
     """A link is blocked if an obstacle touches the straight line between the centres of sender and receiver."""
+
+    name = "line_of_sight"
+    keys = ("line_of_sight",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio needs a line of sight and there are obstacles."""
+        any_obstacle = len(medium.obstacles.circle) or len(medium.obstacles.polygon)
+        return LineOfSight(medium) if medium.radio.needs_line_of_sight and any_obstacle else None
 
     def __init__(self, medium: Medium) -> None:
         self._obstacles, self._robots, self._wrap_m = medium.obstacles, medium.robots, medium.wrap_m

@@ -11,17 +11,18 @@ from swarmwire.comms.air.stages.stage import Medium, Stage
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import NS_PER_S
 
-KEYS = ("propagation_mps",)
-
-
-def stage(medium: Medium) -> Stage | None:
-    """The stage, where the radio says how fast its waves are."""
-    speed_mps = medium.radio.propagation_mps
-    return None if speed_mps is None else PropagationDelay(speed_mps, medium.wrap_m)
-
 
 class PropagationDelay(Stage):
     """`heard_at` is later by distance / speed, with the distance between the centres when the packet went on air."""
+
+    name = "propagation_delay"
+    keys = ("propagation_mps",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio says how fast its waves are."""
+        speed_mps = medium.radio.propagation_mps
+        return None if speed_mps is None else PropagationDelay(speed_mps, medium.wrap_m)
 
     def __init__(self, speed_mps: float, wrap_m: tuple[float, float]) -> None:
         self._speed_mps, self._wrap_m = speed_mps, wrap_m

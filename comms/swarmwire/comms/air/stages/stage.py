@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 from swarmwire.comms.air.antennas import Antennas
 from swarmwire.comms.air.disruption import Disruption
@@ -37,7 +38,14 @@ class Medium:
 class Stage(ABC):
     """One step in the life of a packet between the sender's radio and one receiver."""
 
+    name: ClassVar[str]  # as `swarmwire describe` has it
+    keys: ClassVar[tuple[str, ...]]  # of [radio] that it goes by
     remembers = False  # whether packets that never go on air must not be shown to it
+
+    @classmethod
+    @abstractmethod
+    def of(cls, medium: Medium) -> "Stage | None":
+        """The stage of this medium; None where it has none."""
 
     @abstractmethod
     def decide(self, links: Links, pose: FloatArray) -> None:

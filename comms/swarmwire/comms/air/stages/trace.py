@@ -14,13 +14,7 @@ from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.fates import Fate
 
-KEYS = ("trace",)
 TRACE = purpose("trace")
-
-
-def stage(medium: Medium) -> Stage | None:
-    """The stage, where the radio has a trace; of a signal, its links have all but the delays."""
-    return None if medium.traces is None else Replay(medium)
 
 
 class Replay(Stage):
@@ -28,6 +22,14 @@ class Replay(Stage):
 
     The values are those at the end of the airtime. Links without any are out of range, unless the model is to decide.
     """
+
+    name = "trace"
+    keys = ("trace",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio has a trace; of a signal, its links have all but the delays."""
+        return None if medium.traces is None else Replay(medium)
 
     def __init__(self, medium: Medium) -> None:
         assert medium.traces is not None

@@ -12,17 +12,19 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 
-KEYS = ("delays",)
 DELAYS = purpose("delays")
-
-
-def stage(medium: Medium) -> Stage | None:
-    """The stage, where the radio has such delays."""
-    return VaryingDelay(medium) if medium.radio.delays is not None else None
 
 
 class VaryingDelay(Stage):
     """`heard_at` is later by a quantile of the distribution."""
+
+    name = "varying_delay"
+    keys = ("delays",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio has such delays."""
+        return VaryingDelay(medium) if medium.radio.delays is not None else None
 
     def __init__(self, medium: Medium) -> None:
         assert medium.radio.delays is not None
