@@ -13,7 +13,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import Clock, WallClock
 from swarmwire.comms.messages import encode_rows
 from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import GroupSenses
+from swarmwire.comms.tick_io import GroupSenses
 
 RAYS, PACKETS = 24, 10  # packets that a robot reads in a step
 

@@ -11,15 +11,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.lines import print_line, spread
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.signal.levels import range_of
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import WallClock, tick_start_ns
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, Sent
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.phy.propagation import range_of
 from swarmwire.deploy.radio.probe import radio_of
 
 RATE_HZ, TICKS, WARM_UP = 10, 60, 10

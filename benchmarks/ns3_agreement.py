@@ -16,7 +16,7 @@ from typing import Protocol, cast
 
 from benchmarks import ns3_distance, ns3_hidden_node
 from benchmarks.ns3_reference import radio_in_one_spot, recorded
-from swarmwire.comms.air.probe.contention import contention as contend
+from swarmwire.comms.radio.analysis.contention import contention as contend
 
 CONTENTION = ("ns3_802154_contention.json", "ns3_80211_contention.json")
 RATIO_LIMIT, DELAY_LIMIT = 0.03, 0.15  # absolute; relative

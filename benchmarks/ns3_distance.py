@@ -8,15 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.ns3_reference import radio_far_apart, recorded
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.decibels import from_db
-from swarmwire.comms.air.propagation.path_loss import loss_db
-from swarmwire.comms.air.reception.oqpsk import oqpsk_success
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, Sent
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.propagation.decibels import from_db
+from swarmwire.comms.radio.propagation.path_loss import loss_db
+from swarmwire.comms.radio.reception.error_rates import oqpsk_success
 
 FILE = "ns3_802154_distance.json"
 SEEDS, PACKETS = 20, 1000  # of the table: 20,000 packets at each distance, as many as ns-3 sent

@@ -8,15 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.ns3_reference import radio_far_apart, recorded
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.parameters.propagation import Walls
-from swarmwire.comms.air.propagation.path_loss import reach_m
 from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
 from swarmwire.comms.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.draws import derive_key, purpose, uniform
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, Sent
+from swarmwire.comms.radio.config.phy import Walls
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.propagation.path_loss import reach_m
 from swarmwire.comms.truth import Obstacle
 
 FILE = "ns3_hidden_node.json"

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.deploy.radio.probe import radio_of
 
 REFERENCE = Path(__file__).parents[1] / "tests" / "support" / "comms" / "reference"

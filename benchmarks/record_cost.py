@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 from benchmarks import scenes
 from benchmarks.lines import report, spread
 from swarmwire.comms.clock import WallClock, to_s
-from swarmwire.comms.protocols import Observer
+from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Result, run
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.recorders import recorders

@@ -18,11 +18,10 @@ from benchmarks import scenes
 from benchmarks.lines import print_line
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.wire.access_control import RunAccess, agents_access
 from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.run_access import RunAccess, agents_access
 from swarmwire.comms.wire.sessions import unix_endpoint
 from swarmwire.deploy import Simulation
 from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue

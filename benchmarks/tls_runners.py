@@ -6,10 +6,9 @@ from pathlib import Path
 
 from swarmwire.agent import runner
 from swarmwire.agent.loading import load_agent
-from swarmwire.comms.wire.closing import closed_after
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.sessions import open_runner
+from swarmwire.comms.wire.sessions import closed_after, open_runner
 
 
 def main(endpoint: str, run_id: str, agent: str, certs: str, *names: str) -> None:

@@ -27,9 +27,8 @@ from benchmarks.lines import report
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.comms.wire import frames, tick_frames
-from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.sessions import open_world, unix_endpoint
+from swarmwire.comms.wire.sessions import close_session, open_world, unix_endpoint
 from swarmwire.deploy import run
 from swarmwire.world.scenario.scenario_file import scenario_from
 

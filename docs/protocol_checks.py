@@ -12,27 +12,20 @@ import numpy as np
 
 from swarmwire.agent import runner
 from swarmwire.agent.behaviours.flocking import Heading
-from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.led_changes import LedChanges
-from swarmwire.comms.notes import Notes
-from swarmwire.comms.outcomes import Outcomes, SendResult
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions, GroupSenses
-from swarmwire.comms.values import Values
-from swarmwire.comms.wire import frames, join_request, tick_frames, unpacking
-from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.packets import BROADCAST, Heard, Outcomes, Payloads, SendResult, Sent
+from swarmwire.comms.tick_io import Actions, Actuations, GroupSenses, LedChanges, Notes, Values
+from swarmwire.comms.wire import frames, join, tick_frames
+from swarmwire.comms.wire.join import LIMITS, JoinRequest, Offer, OfferedGroup
 from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.limits import LIMITS
-from swarmwire.comms.wire.offer import Offer, OfferedGroup
 from swarmwire.comms.wire.tick_frames import encode_actions, encode_tick
 from swarmwire.world.crews import admission, lockstep, realtime, roster, runner_crew, runner_inbox
 
 PAGE = Path(__file__).parent / "protocol.md"
 ROWS = np.array([4, 6])
 ENCODERS = (runner, tick_frames, runner_crew)
-COUNTERS = (unpacking, frames, tick_frames, admission, roster, lockstep, realtime, runner_inbox)
+COUNTERS = (frames, frames, tick_frames, admission, roster, lockstep, realtime, runner_inbox)
 
 
 def protocol_page() -> Iterator[str]:
@@ -109,7 +102,7 @@ def _numbers(page: _Page) -> Iterator[Comparison]:
     yield "results of sending", [int(number) for number in page.table("results")], [of.value for of in SendResult]
     yield "the tag of Heading", re.findall(r"<!-- tag: Heading -->(\d+)", page.text), [str(Heading.tag)]
     limits = {field.name: float(getattr(LIMITS, field.name)) for field in fields(LIMITS)}
-    limits |= {"frame": frames.MOST_BYTES, "items": unpacking.MOST_ITEMS, "request to join": join_request.MOST_BYTES}
+    limits |= {"frame": frames.MOST_BYTES, "items": frames.MOST_ITEMS, "request to join": join.MAX_JOIN_BYTES}
     yield "limits", {name: float(value.split()[0]) for name, (value, _) in page.table("limits").items()}, limits
     source = _source(*COUNTERS)
     counted = {f"{fault}_frames" for fault in re.findall(r'BadFrame\("(\w+)"', source)}

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from docs.experiments.places import Places
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 
 PACKETS, RAYS, INFRARED, SCANS = "packets", "rays' readings", "infrared rays' readings", "scanner's readings"
 BEFORE_WALLS = "oscillation", "deadlocked"  # how robots fare that something holds up

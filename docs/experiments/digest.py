@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from docs.experiments.experiment import Experiment
 from docs.experiments.places import Places
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.whole_file import chosen_file
 

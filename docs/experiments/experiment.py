@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from docs.experiments.places import Places
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 
 if TYPE_CHECKING:
     import polars as pl

@@ -18,10 +18,9 @@ from typer.main import get_command
 from swarmwire.agent.cli import _parser as agent_parser
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.wire.access import access_of
+from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.swarm_keys import SwarmKeys
-from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm
+from swarmwire.comms.wire.robot_network import SwarmKeys, endpoints_of, open_swarm
 from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
 from swarmwire.deploy.certificates.wanted import wanted
 from swarmwire.deploy.cli import app

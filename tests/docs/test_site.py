@@ -16,14 +16,13 @@ from swarmwire import agent, deploy
 from swarmwire.agent import behaviours, readings, testing
 from swarmwire.agent.declared import parameters_of
 from swarmwire.comms import errors
-from swarmwire.comms.air.parameters.gives import Gives
-from swarmwire.comms.air.presets.registry import PRESETS
 from swarmwire.comms.bodies.body import Body, body_names, load_body
-from swarmwire.comms.bodies.drives import DRIVES, Holonomic, Twist, Wheels
-from swarmwire.comms.bodies.leds import Leds
+from swarmwire.comms.bodies.drives import DRIVES, Holonomic, Leds, Twist, Wheels
+from swarmwire.comms.bodies.sensors import SHEETS
 from swarmwire.comms.events.registry import ACTIONS
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.sheets import SHEETS
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.radio.config.impairments import Gives
+from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.deploy import run
 from swarmwire.deploy.cli import app
 from swarmwire.metrics.registry import METRICS

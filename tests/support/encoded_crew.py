@@ -12,10 +12,9 @@ import zenoh
 
 from swarmwire.agent.runner import Inbox, answers, given_robots
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions, Senses
-from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.world.crews.lockstep import Lockstep
 from swarmwire.world.crews.split_robots import split
 

@@ -13,13 +13,12 @@ from swarmwire.agent.loading import NoAgent, load_agent
 from swarmwire.agent.on_robot.settings_file import read_settings
 from swarmwire.agent.radios.packet_header import PacketHeader
 from swarmwire.agent.runner import given_robots
+from swarmwire.comms.config import check_format
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.format_number import check_format
-from swarmwire.comms.glimpse import Scene
-from swarmwire.comms.wire import control_frames, frames, scene_frames, truth_frames
-from swarmwire.comms.wire.air_terms import AirTerms
-from swarmwire.comms.wire.join_request import JoinRequest
-from swarmwire.comms.wire.offer import Offer
+from swarmwire.comms.run_views import Scene
+from swarmwire.comms.wire import control_frames, frames, observer_frames
+from swarmwire.comms.wire.join import JoinRequest, Offer
+from swarmwire.comms.wire.radio_bridge import AirTerms
 from swarmwire.deploy import RunFolder
 from swarmwire.deploy.campaign.campaign import read_campaign
 from swarmwire.deploy.campaign.campaign_file import campaign_table
@@ -115,8 +114,8 @@ WIRE: dict[str, tuple[type[Exception], Callable[[Any], Any]]] = {
     "offer": (BadFrame, lambda v: Offer.decode(packed(v=v))),
     "assignment": (BadFrame, lambda v: given_robots(packed(v=v))),
     "terms of an air": (BadFrame, lambda v: AirTerms.decode(packed(v=v))),
-    "scene": (BadFrame, lambda v: scene_frames.decode_scene(frame("scene", v))),
-    "truth": (BadFrame, lambda v: truth_frames.decode_truth(frame("truth", v), Scene.__new__(Scene))),
+    "scene": (BadFrame, lambda v: observer_frames.decode_scene(frame("scene", v))),
+    "truth": (BadFrame, lambda v: observer_frames.decode_truth(frame("truth", v), Scene.__new__(Scene))),
     "control": (BadInput, lambda v: control_frames.decode_request(packed(v=v, do="pause"))),
     "answer to control": (BadFrame, lambda v: control_frames.decode_reply(packed(v=v))),
 }

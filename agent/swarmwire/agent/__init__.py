@@ -9,7 +9,7 @@ from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, IntColumn, State, VectorAgent, column
 from swarmwire.comms.messages import Message, f4, f8, i1, i2, i4, u1, u2, u4
-from swarmwire.comms.outcomes import Outcomes, SendResult
+from swarmwire.comms.packets import Outcomes, SendResult
 
 __all__ = [
     "API_VERSION",

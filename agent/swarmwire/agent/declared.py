@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.agent.per_robot import PerRobot, PerRobotDefault
 from swarmwire.agent.vector_agent import VectorAgent
-from swarmwire.comms.one_of import one_of
+from swarmwire.comms.config import one_of
 
 T = TypeVar("T")
 TYPES: dict[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}  # in words

@@ -19,10 +19,9 @@ from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.comms.memory import GroupMemory, Layout, Memory
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard, Sent
-from swarmwire.comms.senses import Actions, GroupSenses, Senses
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
+from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
 
 NOT_OWN = -1
 NOBODY = np.empty(0, np.int64)

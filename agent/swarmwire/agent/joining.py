@@ -21,15 +21,12 @@ from swarmwire.agent.loading import NoAgent, agent_sha256, load_agent
 from swarmwire.agent.runner import NO_ROBOTS, Asked, Ended, Inbox, play
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame, BadInput, RunnerLost
-from swarmwire.comms.loading import resolve
-from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.plugins import resolve
 from swarmwire.comms.wire.frames import VERSION
-from swarmwire.comms.wire.join_request import JoinRequest
-from swarmwire.comms.wire.keys import EVERY_WORLD, Keys, run_of
+from swarmwire.comms.wire.join import JoinRequest, Offer
+from swarmwire.comms.wire.keys import EVERY_WORLD, Keys, fault_of_name, run_of
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.network_names import fault_of_name
-from swarmwire.comms.wire.offer import Offer
-from swarmwire.comms.wire.sessions import open_runner
+from swarmwire.comms.wire.sessions import closed_after, open_runner
 
 LOOK_S = 5.0  # for worlds at an endpoint: a router may have to find its own first
 OTHERS_S = 0.3  # for further worlds after the first

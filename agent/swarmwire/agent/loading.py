@@ -9,7 +9,7 @@ from swarmwire.agent.agent import Agent
 from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.declared import parameters_of
 from swarmwire.agent.vector_agent import VectorAgent
-from swarmwire.comms.loading import NotLoaded, load_named
+from swarmwire.comms.plugins import NotLoaded, load_named
 
 AgentClass = type[Agent] | type[VectorAgent[Any]]  # what a scenario's `agent` names
 

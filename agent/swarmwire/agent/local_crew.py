@@ -3,9 +3,8 @@
 from swarmwire.agent.host import Host
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions, GroupSenses, Senses
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 
 
 class LocalCrew:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from swarmwire.comms.outcomes import SendResult
+from swarmwire.comms.packets import SendResult
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,9 @@ from swarmwire.agent.robots import forward_and_turn
 from swarmwire.agent.sensing import Sensing
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.leds import rgb_of
+from swarmwire.comms.bodies.drives import rgb_of
 from swarmwire.comms.messages import DICT_TAG, Message, dict_in, encode_dict, message_class
-from swarmwire.comms.outcomes import SendResult
+from swarmwire.comms.packets import SendResult
 
 M = TypeVar("M", bound=Message)
 

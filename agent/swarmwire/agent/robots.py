@@ -11,9 +11,9 @@ from swarmwire.agent.readings import BumperReadings, CameraReadings, OwnReading
 from swarmwire.agent.sensing import Sensing
 from swarmwire.agent.turn import Turn
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.bodies.leds import rgb_of
+from swarmwire.comms.bodies.drives import rgb_of
 from swarmwire.comms.messages import Message, encode_rows, message_class
-from swarmwire.comms.outcomes import Outcomes
+from swarmwire.comms.packets import Outcomes
 
 M = TypeVar("M", bound=Message)
 N = TypeVar("N", float, FloatArray)

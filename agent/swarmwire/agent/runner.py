@@ -26,18 +26,14 @@ from swarmwire.agent.host import Host, layout_of
 from swarmwire.agent.loading import NoAgent, load_agent
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
-from swarmwire.comms.memory import Memory
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Senses
+from swarmwire.comms.packets import Heard, Outcomes
+from swarmwire.comms.tick_io import Senses
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.closing import closed_after
-from swarmwire.comms.wire.in_time_frames import decode_packets, encode_sent
-from swarmwire.comms.wire.join_request import JoinRequest, versioned
+from swarmwire.comms.wire.agent_memory import Memory, decode_memory
+from swarmwire.comms.wire.join import JoinRequest, versioned
 from swarmwire.comms.wire.keys import Keys, run_of
-from swarmwire.comms.wire.memory_frames import decode_memory
-from swarmwire.comms.wire.sessions import open_runner
-from swarmwire.comms.wire.tick_frames import check_rows, decode_tick, encode_actions
+from swarmwire.comms.wire.sessions import closed_after, open_runner
+from swarmwire.comms.wire.tick_frames import check_rows, decode_packets, decode_tick, encode_actions, encode_sent
 
 JOIN_S = 60.0  # for each step: as long as a world waits for the next runner to join
 LOOK_S = 5.0  # for the world, each time

@@ -18,7 +18,7 @@ from swarmwire.agent.readings import (
 )
 from swarmwire.agent.readings.number import N
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.sheets import Sheet
+from swarmwire.comms.bodies.sensors import Sheet
 
 S = TypeVar("S", bound=Sheet)
 

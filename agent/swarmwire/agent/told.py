@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import Heard, Outcomes
 
 
 class Told(NamedTuple):

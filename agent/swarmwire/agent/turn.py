@@ -6,17 +6,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.packet import HeardLists, NotDeclared, Packets
-from swarmwire.comms.actuations import NO_ACTUATIONS, Actuations
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
 from swarmwire.comms.bodies.body import NotFitted
-from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
 from swarmwire.comms.messages import Message, decode_alike, decode_rows, message_class
-from swarmwire.comms.notes import Notes, checked_state
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions, GroupSenses
-from swarmwire.comms.values import NO_VALUES, Values
+from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.tick_io import (
+    NO_ACTUATIONS,
+    NO_LED_CHANGES,
+    NO_VALUES,
+    Actions,
+    Actuations,
+    GroupSenses,
+    LedChanges,
+    Notes,
+    Values,
+    checked_state,
+)
 
 M = TypeVar("M", bound=Message)
 OUTCOMES = "radio.outcomes"  # what `needs` calls the outcomes of addressed packets

@@ -1,10 +1,39 @@
-"""Packets as tables: what agents hand to the air, and what the air hands to agents."""
+"""What may become of a packet for one intended receiver."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
+from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from swarmwire.comms.config import Explained
+
+
+class Fate(Explained):
+    """One per (packet, intended receiver), with its meaning; the order is that of the tally's columns."""
+
+    HEARD = 0, "reached the receiver"
+    OUT_OF_RANGE = 1, "the receiver was out of the radio's reach when the packet went on air"
+    BLOCKED = 2, "an obstacle stood in the line of sight"
+    LOST = 3, "within reach, but lost by the medium's fixed loss, or a trace's delivery ratio"
+    QUEUE_FULL = 4, "the sender's queue was full: never on air"
+    TOO_LARGE = 5, "above the medium's largest payload: never on air"
+    IN_FLIGHT = 6, "queued or on its way when the run ended"
+    SENDER_DEAD = 7, "the sender died before the packet went on air"
+    RECEIVER_DEAD = 8, "within reach, but dead when the packet went on air, or before it was handed over"
+    BLACKOUT = 9, "the sender's radio was off, or that of a receiver within reach"
+    PARTITIONED = 10, "within reach, but a partition kept the two apart when the packet went on air"
+    TOO_WEAK = 11, "within reach on average, but too weak for the receiver's noise when the packet was on air"
+    COLLIDED = 12, "other packets on air disturbed it, or the receiver was busy with another or sending itself"
+    BURST = 13, "lost by a burst, while the link was in its bad state"
+    CHANNEL_BUSY = 14, "the sender found the air busy each time it listened: never on air"
+    JAMMED = 15, "a jammer drowned it: without it the packet would have been right"
+
+
+FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # by number, as summaries and tables have them
+
+
+# --- Packets as tables: what agents hand to the air, and what the air hands to agents.
+
 
 BROADCAST = -1  # addressed to whoever is within reach
 NOWHERE = -2  # addressed to a robot that is not there: numbered, never on air
@@ -193,3 +222,50 @@ class Heard:
         """The same with those payloads only that somebody heard."""
         used, payload = np.unique(self.payload, return_inverse=True)
         return replace(self, payload=payload.reshape(-1), payloads=self.payloads.rows(used))
+
+
+# --- What a sender's radio knows of an addressed packet once it is done with it: all but what became of it elsewhere.
+
+
+class SendResult(Explained):
+    """How a radio that waits for acknowledgements is done with a packet, with its meaning."""
+
+    ACKNOWLEDGED = 0, "the receiver's radio said that it has it"
+    NO_ACKNOWLEDGEMENT = 1, "no answer to any attempt: it was not heard, or the answer was not"
+    CHANNEL_BUSY = 2, "the radio found the air busy each time it listened, and gave up"
+    QUEUE_FULL = 3, "the radio's queue was full: never on air"
+    TOO_LARGE = 4, "above the medium's largest payload: never on air"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcomes:
+    """Packets that their senders' radios are done with, sorted by (row, id)."""
+
+    row: IntArray  # (k,) sender: to a VectorAgent 0 to n - 1, between crew and air arena x robots + index
+    id: IntArray  # (k,) that `send` returned
+    result: IntArray  # (k,) SendResult
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    @property
+    def acknowledged(self) -> BoolArray:
+        """Which packets arrived for certain, (k,)."""
+        return self.result == SendResult.ACKNOWLEDGED
+
+    def select(self, index: IntArray) -> "Outcomes":
+        """The rows of `index` (k,), in its order."""
+        return Outcomes(self.row[index], self.id[index], self.result[index])
+
+    @classmethod
+    def joined(cls, parts: "list[Outcomes]") -> "Outcomes":
+        """The outcomes of all parts, sorted."""
+        parts = [part for part in parts if len(part)]
+        if not parts:
+            return NO_OUTCOMES
+        row, id_, result = (np.concatenate([getattr(part, name) for part in parts]) for name in ("row", "id", "result"))
+        return cls(row, id_, result).select(np.lexsort((id_, row)))
+
+
+_NOTHING.setflags(write=False)
+NO_OUTCOMES = Outcomes(_NOTHING, _NOTHING, _NOTHING)  # nothing to tell

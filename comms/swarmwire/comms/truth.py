@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.geometry.floor import Floor
 from swarmwire.comms.packets import Payloads, offsets
-from swarmwire.comms.senses import Senses
+from swarmwire.comms.tick_io import Senses
 
 NOBODY = -1  # in place of a robot; of a receiver: all that the packet was meant for
 Boundary = Literal["walls", "open", "torus"]  # walls, nothing at all, or the opposite side

@@ -6,7 +6,7 @@ from pathlib import Path
 from swarmwire.agent.declared import BadParameter, checked
 from swarmwire.agent.loading import AgentClass, NoAgent, load_agent
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.loading import resolve
+from swarmwire.comms.plugins import resolve
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario import Scenario
 

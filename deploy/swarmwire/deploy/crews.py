@@ -8,7 +8,7 @@ from pathlib import Path
 from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock
-from swarmwire.comms.protocols import Crew
+from swarmwire.comms.interfaces import Crew
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.endpoint import local_endpoint
 from swarmwire.deploy.gateways.served import Served

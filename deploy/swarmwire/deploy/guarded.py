@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from swarmwire.comms.errors import SwarmwireError
-from swarmwire.comms.protocols import Observer
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy.refusals import refusal
 

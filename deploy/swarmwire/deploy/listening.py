@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.access_control import RunAccess, agents_access, observers_access
+from swarmwire.comms.wire.join import LIMITS, Limits
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
-from swarmwire.comms.wire.limits import LIMITS, Limits
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.run_access import RunAccess, agents_access, observers_access
 from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.door import Door
 from swarmwire.world.crews.roster import GOES_ON

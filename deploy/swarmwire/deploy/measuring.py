@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from swarmwire.comms.loading import resolve
+from swarmwire.comms.plugins import resolve
 from swarmwire.metrics.judge import Condition
 from swarmwire.metrics.listed import Item, Listed, listed
 from swarmwire.world.scenario.metric_tables import MetricTable

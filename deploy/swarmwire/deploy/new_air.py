@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.antennas import Antennas
-from swarmwire.comms.air.traces.link_traces import LinkTraces
+from swarmwire.comms.radio.config.phy import Antennas
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.world import World
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from swarmwire.agent.host import layout_of
 from swarmwire.agent.loading import agent_sha256, load_agent
 from swarmwire.comms.truth import Static
-from swarmwire.comms.wire.offer import Offer, OfferedGroup
+from swarmwire.comms.wire.join import Offer, OfferedGroup
 from swarmwire.deploy.listening import Listening
 from swarmwire.world.crews.terms import Terms
 from swarmwire.world.scenario.scenario import Scenario

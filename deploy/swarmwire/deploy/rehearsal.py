@@ -7,10 +7,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics

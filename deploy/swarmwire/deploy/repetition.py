@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.protocols import Observer
+from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy.arguments import Runners
 from swarmwire.deploy.record.inputs import RecordedInputs, recorded_inputs
 from swarmwire.deploy.record.interventions import read_interventions

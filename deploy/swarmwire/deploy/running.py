@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from swarmwire.comms.protocols import Observer
+from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy.arguments import Runners, SeedsGiven
 from swarmwire.deploy.gateways.gateways import GatewaysGiven
 from swarmwire.deploy.listening import Listening

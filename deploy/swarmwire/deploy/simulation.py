@@ -8,8 +8,7 @@ from typing import Any, Self, cast
 
 from swarmwire.comms.clock import PreciseClock, WallClock, to_s
 from swarmwire.comms.errors import BadInput, Interrupted, RecordFailed
-from swarmwire.comms.in_time import TimedCrew
-from swarmwire.comms.protocols import Crew, Judge, Observer
+from swarmwire.comms.interfaces import Crew, Judge, Observer, TimedCrew
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.arguments import (

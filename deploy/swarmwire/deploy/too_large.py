@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Static, Tally, Truth
 
 

@@ -4,8 +4,7 @@ from inspect import getdoc
 
 from reference.markdown import code, sentence, table, toml
 from reference.parameters import HEAD, parameter_rows
-from swarmwire.comms.bodies.drives import DRIVES
-from swarmwire.comms.bodies.leds import Leds
+from swarmwire.comms.bodies.drives import DRIVES, Leds
 
 
 def drive_tables() -> str:

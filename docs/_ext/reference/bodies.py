@@ -8,7 +8,7 @@ from typing import Any, cast
 from reference.markdown import NOTHING, code, number, table
 from reference.parameters import HEAD, parameter_rows
 from swarmwire.comms.bodies.body import Body, body_names, load_body
-from swarmwire.comms.parameters import limits_of
+from swarmwire.comms.config import limits_of
 
 Figure = tuple[str, str, object]  # path within the sheet, unit, value
 

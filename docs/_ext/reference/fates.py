@@ -1,7 +1,7 @@
 """What may become of a packet."""
 
 from reference.markdown import code, sentence, table
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 
 
 def fate_table() -> str:

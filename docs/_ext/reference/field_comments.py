@@ -11,7 +11,7 @@ from typing import Any
 from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 
-from swarmwire.comms.parameters import limits_of
+from swarmwire.comms.config import limits_of
 
 PARTS = ("comms", "agent", "world", "metrics", "deploy")
 FIELD = re.compile(r"^(    (\w+): [^#\n]*  )# (?!noqa|pyright:)(.*)$", re.MULTILINE)

@@ -1,10 +1,10 @@
-"""Parameters made by `swarmwire.comms.parameters.parameter`, as rows of tables."""
+"""Parameters made by `swarmwire.comms.config.parameter`, as rows of tables."""
 
 from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any, get_type_hints
 
 from reference.markdown import NOTHING, code, number, sentence, toml_code
-from swarmwire.comms.parameters import Limits, limits_of
+from swarmwire.comms.config import Limits, limits_of
 
 HEAD = ("key", "unit", "allowed", "default", "meaning")
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from reference.markdown import NOTHING, code, number, table
-from swarmwire.comms.air.presets.registry import PRESETS
-from swarmwire.comms.air.signal.levels import range_of
-from swarmwire.comms.air.timing.frames import airtime_ns
+from swarmwire.comms.radio.config.presets import PRESETS
+from swarmwire.comms.radio.config.radio import airtime_ns
+from swarmwire.comms.radio.phy.propagation import range_of
 from swarmwire.deploy.radio.probe import radio_of
 
 HEADS = ["preset", "what it is", "reach, m", "longest frame, ms", "but"]

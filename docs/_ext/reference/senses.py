@@ -5,7 +5,7 @@ from inspect import getdoc
 
 from reference.markdown import code, sentence, table
 from reference.parameters import HEAD, parameter_rows
-from swarmwire.comms.sheets import SHEETS, RangedSheet, Sheet
+from swarmwire.comms.bodies.sensors import SHEETS, RangedSheet, Sheet
 
 
 def sense_tables() -> str:

@@ -8,13 +8,12 @@ import numpy as np
 
 from benchmarks.ns3_reference import AS_RUN, recorded
 from docs.pictures.radio.sheet import legend, line_color, panels, say, write
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.probe.contention import contention
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import Payloads, Sent
+from swarmwire.comms.packets import Fate, Payloads, Sent
+from swarmwire.comms.radio.analysis.contention import contention
+from swarmwire.comms.radio.medium import Air
 from swarmwire.deploy.radio.probe import radio_of
 from swarmwire.metrics.drawing.looks import INK
 

@@ -5,11 +5,11 @@
 import numpy as np
 
 from docs.pictures.radio.sheet import legend, line_color, panels, say, write
-from swarmwire.comms.air.parameters.bursts import Bursts
-from swarmwire.comms.air.reception.burst_states import BurstStates
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key
+from swarmwire.comms.radio.config.impairments import Bursts
+from swarmwire.comms.radio.reception.bursts import BurstStates
 from swarmwire.metrics.radio_fit.expected_runs import expected_runs
 
 BURSTS = Bursts(bad_s=0.5, good_s=2.0)

@@ -8,14 +8,13 @@ import numpy as np
 
 from benchmarks.ns3_reference import PRESETS, radio_far_apart
 from docs.pictures.radio.sheet import legend_below, line_color, panels, say, write
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.parameters.access import Access
-from swarmwire.comms.air.propagation.path_loss import reach_m
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import Payloads, Sent
+from swarmwire.comms.packets import Fate, Payloads, Sent
+from swarmwire.comms.radio.config.phy import Access
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.propagation.path_loss import reach_m
 
 WANTED_LOSS_DB = 70.0
 SIR_DB = np.arange(-8.0, 12.1, 0.5)

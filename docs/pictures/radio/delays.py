@@ -5,8 +5,8 @@
 import numpy as np
 
 from docs.pictures.radio.sheet import legend, line_color, panels, say, write
-from swarmwire.comms.air.parameters.delays import DISTRIBUTIONS, Delays
-from swarmwire.comms.air.timing.delay_law import delay_law, varying_delay_ns
+from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays
+from swarmwire.comms.radio.stages.delays import delay_law, varying_delay_ns
 
 MEAN_S, DEVIATION_S = 0.02, 0.008
 DRAWS = (np.arange(40_000) + 0.5) / 40_000  # evenly, so that the picture shows the law and not its draws

@@ -6,12 +6,11 @@ import numpy as np
 from scipy import special, stats
 
 from docs.pictures.radio.sheet import legend, legend_below, line_color, panels, say, write
-from swarmwire.comms.air.decibels import to_db
-from swarmwire.comms.air.parameters.propagation import Fading
-from swarmwire.comms.air.propagation.fading import fading_gain, fading_law
-from swarmwire.comms.air.propagation.scattering import scattered_between
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import derive_key, uniform
+from swarmwire.comms.radio.config.phy import Fading
+from swarmwire.comms.radio.propagation.decibels import to_db
+from swarmwire.comms.radio.propagation.fading import fading_gain, fading_law, scattered_between
 from swarmwire.metrics.drawing.looks import INK
 
 FREQUENCY_HZ = 2.44e9

@@ -5,11 +5,8 @@
 import numpy as np
 
 from docs.pictures.radio.sheet import legend, line_color, panels, say, write
-from swarmwire.comms.air.propagation.friis import Friis
-from swarmwire.comms.air.propagation.itu_indoor import ItuIndoor
-from swarmwire.comms.air.propagation.log_distance import LogDistance
-from swarmwire.comms.air.propagation.path_loss import loss_db
-from swarmwire.comms.air.propagation.two_ray import TwoRay
+from swarmwire.comms.radio.config.path_loss_models import Friis, ItuIndoor, LogDistance, TwoRay
+from swarmwire.comms.radio.propagation.path_loss import loss_db
 
 FREQUENCY_HZ = 2.44e9
 MODELS = {

@@ -8,10 +8,16 @@ from typing import Any
 import numpy as np
 
 from docs.pictures.radio.sheet import line_color, panels, say, write
-from swarmwire.comms.air.decibels import from_db
-from swarmwire.comms.air.reception import dsss, ofdm
-from swarmwire.comms.air.reception.receiver import Receiver, chunk_success, ieee80211ag, ieee80211b, ieee802154
-from swarmwire.comms.air.reception.sensitivity import sinr_for_db
+from swarmwire.comms.radio.propagation.decibels import from_db
+from swarmwire.comms.radio.reception import error_rates
+from swarmwire.comms.radio.reception.receiver import (
+    Receiver,
+    chunk_success,
+    ieee80211ag,
+    ieee80211b,
+    ieee802154,
+    sinr_for_db,
+)
 
 POINTS = 141
 OCTETS_154, OCTETS_B, OCTETS_AG = (20, 40, 127), 1024, 1000
@@ -23,10 +29,10 @@ def draw() -> None:
     receivers = [(str(octets), ieee802154(), 8 * octets) for octets in OCTETS_154]
     _draw(short, receivers, (-5.0, 3.0))
     say(short, "802.15.4, by octets", "SINR in dB", "share of frames that are right")
-    receivers = [(f"{rate / 1e6:g}", ieee80211b(rate), 8 * OCTETS_B) for rate in dsss.RATES_BPS]
+    receivers = [(f"{rate / 1e6:g}", ieee80211b(rate), 8 * OCTETS_B) for rate in error_rates.DSSS_RATES_BPS]
     _draw(dsss_axes, receivers, (-6.0, 10.0))
     say(dsss_axes, f"802.11b, {OCTETS_B} octets, by Mbit/s", "SINR in dB", "")
-    receivers = [(f"{rate / 1e6:g}", ieee80211ag(rate), 8 * OCTETS_AG) for rate in ofdm.RATES_BPS]
+    receivers = [(f"{rate / 1e6:g}", ieee80211ag(rate), 8 * OCTETS_AG) for rate in error_rates.OFDM_RATES_BPS]
     _draw(ofdm_axes, receivers, (0.0, 26.0))
     say(ofdm_axes, f"802.11a/g, {OCTETS_AG} octets, by Mbit/s", "SINR in dB", "")
     write(figure, "reception")

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from docs.pictures.radio.sheet import legend, line_color, panels, say, scale, write
-from swarmwire.comms.air.parameters.propagation import Shadowing
-from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves, shadowing_db
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import derive_key
+from swarmwire.comms.radio.config.phy import Shadowing
+from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves, shadowing_db
 from swarmwire.metrics.drawing.looks import INK
 from swarmwire.metrics.radio_fit.link_field import link_covariance
 

@@ -7,12 +7,11 @@ import math
 import numpy as np
 
 from docs.pictures.radio.sheet import legend, line_color, panels, say, scale, write
-from swarmwire.comms.air.parameters.propagation import Walls
-from swarmwire.comms.air.propagation.link_budget import rssi_dbm
-from swarmwire.comms.air.propagation.log_distance import LogDistance
-from swarmwire.comms.air.propagation.path_loss import loss_db
-from swarmwire.comms.air.propagation.walls import wall_loss_db
 from swarmwire.comms.geometry.obstacles import Obstacles, obstacle_arrays
+from swarmwire.comms.radio.config.path_loss_models import LogDistance
+from swarmwire.comms.radio.config.phy import Walls
+from swarmwire.comms.radio.propagation.obstruction import wall_loss_db
+from swarmwire.comms.radio.propagation.path_loss import loss_db, rssi_dbm
 from swarmwire.comms.truth import Obstacle
 from swarmwire.metrics.drawing.looks import INK
 

@@ -3,7 +3,7 @@
 from typing import Any, get_args
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.own_class import own_class
+from swarmwire.comms.plugins import own_class
 from swarmwire.metrics.metric import Kind, Metric
 from swarmwire.metrics.record.tick_columns import KEYS, MOVABLE, RADIO, ROBOT_COLUMNS, SIDEWAYS, VALUE
 from swarmwire.metrics.registry import DELIVERY, METRICS

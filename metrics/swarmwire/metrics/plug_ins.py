@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.installed import entry_points_of
+from swarmwire.comms.plugins import entry_points_of
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.own_metrics import own_kind
 

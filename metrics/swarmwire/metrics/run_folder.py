@@ -7,9 +7,8 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any, TypeGuard, cast
 
+from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
-from swarmwire.comms.parsing import from_json
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.damage import damage
 from swarmwire.metrics.record.distance_totals import distance_totals_schema

@@ -12,14 +12,12 @@ from swarmwire.agent import joining as joining_module
 from swarmwire.agent.joining import Joining, join
 from swarmwire.agent.runner import Inbox
 from swarmwire.comms.errors import BadInput, RunnerLost
-from swarmwire.comms.outcomes import NO_OUTCOMES
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import NO_OUTCOMES, Heard
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.closing import closed_after
-from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.sessions import listens_at, open_world
+from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
 from swarmwire.comms.wire.tick_frames import encode_tick
 from tests.support.agent.hosts import GIVES, senses, spec
 from tests.support.agent.made_up_world import NOTHING, OFFER, OFFERED, REFUSED, MadeUpWorld, given, made_up_world

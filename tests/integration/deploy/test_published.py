@@ -12,10 +12,10 @@ import pytest
 import zenoh
 
 from swarmwire.comms.clock import NS_PER_S, WallClock, to_s
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Happened
+from swarmwire.comms.wire.observer_frames import encode_truth
 from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpoint
-from swarmwire.comms.wire.truth_frames import encode_truth
 from swarmwire.deploy import run
 from swarmwire.deploy.live import published
 from swarmwire.deploy.live.following import RunGone, following

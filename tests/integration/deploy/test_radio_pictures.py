@@ -6,8 +6,8 @@ import tomllib
 
 import pytest
 
-from swarmwire.comms.air.parameters.bursts import Bursts
-from swarmwire.comms.air.parameters.propagation import Shadowing
+from swarmwire.comms.radio.config.impairments import Bursts
+from swarmwire.comms.radio.config.phy import Shadowing
 from tests.integration.deploy.radio.test_probe import WALLED, said
 from tests.integration.deploy.radio.test_radio_fit import here, rows
 from tests.support.deploy.commands import LOSSY, called

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.deploy import Simulation
 from swarmwire.deploy import simulation as simulation_module
 from swarmwire.deploy.new_air import new_air

@@ -11,9 +11,8 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from swarmwire.comms.errors import AgentFailed, BadInput
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.deploy import Recording, Simulation, crews, repeat, run
 from swarmwire.deploy.cli import app
 from swarmwire.deploy.record.inputs import RecordedCrew

@@ -11,9 +11,8 @@ import pytest
 from swarmwire.agent.joining import Joining, join
 from swarmwire.agent.runner import Inbox
 from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
-from swarmwire.comms.wire.closing import closed_after
 from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.sessions import listens_at, open_world
+from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling
 from swarmwire.deploy.control.run_finder import Announced, found_runs
 from swarmwire.deploy.listening import Listening

@@ -5,12 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.parameters.propagation import Antenna
-from swarmwire.comms.air.parameters.reception import Reception
-from swarmwire.comms.air.probe.contention import contention
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.noise import Noise
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.radio.analysis.contention import contention
+from swarmwire.comms.radio.config.phy import Antenna, Noise, Reception
+from swarmwire.comms.radio.config.radio import Radio
 from tests.support.comms.air.runs import at, make_air, packets, run
 from tests.support.comms.air.signal.radios import with_access
 

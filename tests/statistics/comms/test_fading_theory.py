@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.parameters.propagation import Fading
-from swarmwire.comms.air.propagation.fading import fading_gain, fading_law
 from swarmwire.comms.draws import derive_key
+from swarmwire.comms.radio.config.phy import Fading
+from swarmwire.comms.radio.propagation.fading import fading_gain, fading_law
 
 KEY = np.uint64(derive_key("fading"))
 LAW = fading_law(Fading(), 2.44e9)._replace(wave_number=2.44e9 / 299_792_458.0)

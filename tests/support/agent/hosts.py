@@ -10,9 +10,8 @@ from swarmwire.agent.loading import AgentClass
 from swarmwire.comms import draws
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions, GroupSenses, Senses
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 from tests.support.agent.players import Word
 
 PLAYERS = Path(__file__).with_name("players.py")

@@ -12,10 +12,9 @@ from zenoh.handlers import Callback
 
 from swarmwire.agent.loading import agent_sha256, load_agent
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.wire.join import Offer, OfferedGroup
 from swarmwire.comms.wire.keys import Keys, runner_of
-from swarmwire.comms.wire.offer import Offer, OfferedGroup
-from swarmwire.comms.wire.sessions import listens_at, open_world
+from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
 from tests.support.agent.hosts import assignment, group, spec
 
 REFUSED = "refused by the test"

@@ -16,12 +16,11 @@ from swarmwire.agent.host import layout_of
 from swarmwire.agent.loading import load_agent
 from swarmwire.agent.runner import Inbox, answers, given_robots
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.new_terms import KEPT
 from swarmwire.deploy.result import Result

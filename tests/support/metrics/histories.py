@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.comms.truth import Departed, Finished, Light, Static, Truth
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics

@@ -6,7 +6,7 @@ from pathlib import Path
 CODE = '''
 from dataclasses import dataclass
 
-from swarmwire.comms.parameters import parameter
+from swarmwire.comms.config import parameter
 from swarmwire.metrics.metric import Metric
 
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.disruption import Disruption
-from swarmwire.comms.air.parameters.access import Access
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.radio.config.phy import Access
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.truth import Static, Truth
 from tests.support.comms.air.runs import make_air, scattered
 from tests.support.comms.air.signal.radios import with_access

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Finished
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.recorders import record_summary, recorders

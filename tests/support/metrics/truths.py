@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.comms.truth import Departed, Finished, Group, Light, Obstacle, Static, Tally, Truth
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics

@@ -12,9 +12,8 @@ import msgpack
 import zenoh
 
 from examples.protocol.runner import VERSION, acted, frame
-from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.sessions import open_runner
+from swarmwire.comms.wire.sessions import close_session, open_runner
 
 JOIN_S = 30.0
 Arrays = dict[str, Any]

@@ -7,7 +7,7 @@ import numpy as np
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.crews.lockstep import Lockstep

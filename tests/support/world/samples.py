@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.senses import Actions
+from swarmwire.comms.tick_io import Actions
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.scenario_file import scenario_from
 from swarmwire.world.world import World

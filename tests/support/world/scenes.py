@@ -6,9 +6,9 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.sensors import Sheet
 from swarmwire.comms.geometry.ground import ground_of
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.sheets import Sheet
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.sensors import SENSORS, Scene
 from swarmwire.world.sensors.scene import led_places_m

@@ -9,17 +9,13 @@ import numpy as np
 
 from swarmwire.agent.host import Host, layout_of
 from swarmwire.agent.loading import load_agent
-from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.memory import Layout
-from swarmwire.comms.notes import Notes
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.tick_io import Actions, Actuations, Notes, Senses, Values
 from swarmwire.comms.truth import Truth
-from swarmwire.comms.values import Values
 from swarmwire.comms.wire import frames as frame_codec
-from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.agent_memory import Layout
+from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.deploy.new_air import new_air
 from swarmwire.world.crews.lockstep import Lockstep

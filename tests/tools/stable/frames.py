@@ -5,28 +5,19 @@ from typing import Any
 import msgpack
 import numpy as np
 
-from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.glimpse import Glimpse, Scene
-from swarmwire.comms.led_changes import LedChanges
-from swarmwire.comms.memory import GroupMemory, Memory
 from swarmwire.comms.messages import Message, f4, f8, i1, u2
-from swarmwire.comms.notes import Notes
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions, GroupSenses
+from swarmwire.comms.packets import Fate, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.run_views import Glimpse, Scene
+from swarmwire.comms.tick_io import Actions, Actuations, GroupSenses, LedChanges, Notes, Values
 from swarmwire.comms.truth import Finished, Happened, Tally, Truth
-from swarmwire.comms.values import Values
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.in_time_frames import encode_packets, encode_sent
-from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.agent_memory import GroupMemory, Memory
+from swarmwire.comms.wire.join import JoinRequest, Offer, OfferedGroup
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
-from swarmwire.comms.wire.offer import Offer, OfferedGroup
-from swarmwire.comms.wire.scene_frames import OBSERVED_VERSION, encode_scene
-from swarmwire.comms.wire.tick_frames import encode_actions, encode_tick
-from swarmwire.comms.wire.truth_frames import encode_truth
+from swarmwire.comms.wire.observer_frames import OBSERVED_VERSION, encode_scene, encode_truth
+from swarmwire.comms.wire.tick_frames import encode_actions, encode_packets, encode_sent, encode_tick
 from tests.tools.stable.samples import LEFT_OUT, joined, lines_of, paths_of, sample
 
 # Lengths of axes, each its own, so that a shape can be told in words.

@@ -2,11 +2,10 @@
 
 from collections.abc import Iterable
 
-from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.drives import DRIVES
-from swarmwire.comms.bodies.leds import Leds
-from swarmwire.comms.sheets import SHEETS
+from swarmwire.comms.bodies.custom import ActuatorSheet
+from swarmwire.comms.bodies.drives import DRIVES, Leds
+from swarmwire.comms.bodies.sensors import SHEETS
 from swarmwire.deploy.catalogue.entry import Parameter
 from swarmwire.deploy.catalogue.scenario_keys import all_keys
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass

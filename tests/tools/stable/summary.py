@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from swarmwire.comms.fates import FATE_NAMES
+from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.deploy import Result
 from swarmwire.metrics.registry import METRICS
 from tests.tools.stable.recorded_run import recorded

@@ -13,7 +13,7 @@ from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_indepe
 from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions
+from swarmwire.comms.tick_io import Actions
 from tests.support.agent.hosts import GIVES, group, senses
 
 ROWS = [1, 4, 6]

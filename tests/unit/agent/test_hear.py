@@ -7,8 +7,7 @@ from swarmwire.agent import Agent, Robot
 from swarmwire.agent.host import Host, _Single
 from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Sent
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, Sent
 from tests.support.agent.hosts import SILENCE, assignment, group, heard_from, senses, spec, words
 from tests.support.agent.players import Word
 

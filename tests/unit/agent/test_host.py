@@ -14,7 +14,7 @@ from swarmwire.agent.local_crew import LocalCrew
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.messages import encode_dict
 from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions
+from swarmwire.comms.tick_io import Actions
 from tests.support.agent.hosts import (
     SILENCE,
     assignment,

@@ -8,12 +8,10 @@ import pytest
 from swarmwire.agent.host import Host, layout_of
 from swarmwire.agent.loading import load_agent
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.memory import GroupMemory, Memory
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions
+from swarmwire.comms.packets import Heard, Outcomes
+from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.memory_frames import decode_memory, encode_memory
+from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, decode_memory, encode_memory
 from tests.support.agent.hosts import GIVES, assignment, group, one_group, plain, spec
 
 ROWS = [0, 1, 2, 5, 6]

@@ -10,8 +10,7 @@ from swarmwire.agent.packet import Columns, Packets
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.messages import DICT_TAG, encode_dict
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Outcomes, Payloads, Sent
 from tests.support.agent.hosts import heard_from, host_of, step, words
 from tests.support.agent.players import Insistence, Insisting, Other, VectorInsisting, Word
 

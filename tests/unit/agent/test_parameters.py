@@ -10,7 +10,7 @@ from swarmwire.agent import Agent, Robot
 from swarmwire.agent.behaviours import Flocking
 from swarmwire.agent.declared import REQUIRED, BadParameter, checked, make, parameters_of
 from swarmwire.agent.loading import NoAgent, agent_sha256, load_agent
-from swarmwire.comms.loading import resolve
+from swarmwire.comms.plugins import resolve
 from tests.support.agent.hosts import PLAYERS, spec
 from tests.support.agent.players import Parametrised, Stateless
 

@@ -10,11 +10,11 @@ from swarmwire.agent import Agent, VectorAgent
 from swarmwire.agent.host import hosted
 from swarmwire.agent.readings import Blob
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
-from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
 from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.bodies.custom import ActuatorSheet
+from swarmwire.comms.bodies.sensors import Battery, Imu, OwnSheet
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import Heard
-from swarmwire.comms.sheets import Battery, Imu, OwnSheet
 from tests.support.agent.hosts import GIVES, group, senses
 
 

@@ -11,12 +11,10 @@ import zenoh
 from swarmwire.agent import runner
 from swarmwire.agent.runner import PLAIN, Inbox, given_robots
 from swarmwire.comms.errors import BadFrame, RunnerLost
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.in_time_frames import encode_packets
 from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.tick_frames import encode_tick
+from swarmwire.comms.wire.tick_frames import encode_packets, encode_tick
 from tests.support.agent.hosts import GIVES, assignment, group, heard_from, senses
 
 

@@ -11,12 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms import errors
-from swarmwire.comms.air.signal.event_queue import SEND, event_queue, schedule
 from swarmwire.comms.bodies.tables import built
+from swarmwire.comms.config import check_plain, from_json, from_toml, parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parameters import parameter
-from swarmwire.comms.parsing import from_json, from_toml
-from swarmwire.comms.plain_values import check_plain
+from swarmwire.comms.radio.phy.event_queue import SEND, event_queue, schedule
 
 
 def test_bad_input_is_a_line_that_a_terminal_can_show_whatever_was_given() -> None:

@@ -5,11 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.fates import FATE_NAMES, Fate
-from swarmwire.comms.notes import checked_state
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions
+from swarmwire.comms.packets import BROADCAST, FATE_NAMES, NO_OUTCOMES, TAG_BYTES, Fate, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.tick_io import Actions, checked_state
 
 ragged = st.lists(st.binary(max_size=5), max_size=6)
 

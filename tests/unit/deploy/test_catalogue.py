@@ -11,17 +11,16 @@ from rich.console import Console
 from swarmwire.agent import behaviours
 from swarmwire.agent.declared import REQUIRED, parameters_of
 from swarmwire.agent.turn import OUTCOMES
-from swarmwire.comms.air.parameters.gives import Gives
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.stages.chain import ORDER
 from swarmwire.comms.bodies.body import body_names, load_body
-from swarmwire.comms.bodies.drives import DRIVES
-from swarmwire.comms.bodies.leds import Leds
+from swarmwire.comms.bodies.drives import DRIVES, Leds
+from swarmwire.comms.bodies.sensors import SHEETS
+from swarmwire.comms.config import limits_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.registry import ACTIONS
-from swarmwire.comms.fates import FATE_NAMES
-from swarmwire.comms.parameters import limits_of
-from swarmwire.comms.sheets import SHEETS
+from swarmwire.comms.packets import FATE_NAMES
+from swarmwire.comms.radio.config.impairments import Gives
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.stages.chain import ORDER
 from swarmwire.deploy.catalogue.entry import Entry
 from swarmwire.deploy.catalogue.find import find
 from swarmwire.deploy.catalogue.kinds import KINDS

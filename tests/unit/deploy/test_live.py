@@ -9,7 +9,7 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.senses import GroupSenses
+from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.deploy.commands.view import view_command
 from swarmwire.deploy.live import viewer_program
 from swarmwire.deploy.live.evened import Evened

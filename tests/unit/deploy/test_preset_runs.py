@@ -2,7 +2,7 @@
 
 import pytest
 
-from swarmwire.comms.air.presets.registry import PRESETS
+from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.deploy import run
 from tests.support.deploy.commands import ROOT
 

@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Recording, run
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record import table_writer

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parameters import parameter
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.moment import Components, Moment, agreement

@@ -7,12 +7,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.in_time import AirTime, Put
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.interfaces import AirTime, Put
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy.new_air import new_air
 from swarmwire.world.air_in_time import AirInTime

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from swarmwire.agent.local_crew import LocalCrew
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.events.selection import Selection
-from swarmwire.comms.events.swarm import Swarm
+from swarmwire.comms.events.selection import Selection, Swarm
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.world.crews import split_robots as assignments
 from swarmwire.world.loop import Loop

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.events.kill import Kill
+from swarmwire.comms.events.robot_events import Kill
 from swarmwire.world.interventions import MOST_WAITING, Intervention, Interventions
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of

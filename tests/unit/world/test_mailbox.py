@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import Heard, Payloads
+from swarmwire.comms.packets import Heard, Outcomes, Payloads
 from swarmwire.world.mailbox import Mailbox
 from swarmwire.world.scenario.scenario_file import scenario_from
 from swarmwire.world.world import World

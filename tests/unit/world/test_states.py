@@ -1,6 +1,6 @@
 import numpy as np
 
-from swarmwire.comms.notes import MOST_STATES, Notes
+from swarmwire.comms.tick_io import MOST_STATES, Notes
 from swarmwire.world.states import States
 
 ALIVE = np.ones(6, np.bool_)

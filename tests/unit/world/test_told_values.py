@@ -1,6 +1,6 @@
 import numpy as np
 
-from swarmwire.comms.values import NO_VALUES, Values
+from swarmwire.comms.tick_io import NO_VALUES, Values
 from swarmwire.world.told_values import ToldValues
 
 ALIVE = np.ones(4, np.bool_)

@@ -11,13 +11,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.news import News
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.in_time import Put
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import Heard, Sent
+from swarmwire.comms.interfaces import Put
+from swarmwire.comms.packets import Heard, Outcomes, Sent
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.results import News
 from swarmwire.comms.truth import Static
 
 NEVER_NS = 2**63 - 1

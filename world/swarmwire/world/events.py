@@ -6,13 +6,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import KeyArray
 from swarmwire.comms.clock import NS_PER_S, to_ns, to_s
-from swarmwire.comms.events.conditions import Conditions
+from swarmwire.comms.events.effects import Conditions
 from swarmwire.comms.events.event import Event
-from swarmwire.comms.events.swarm import Swarm
+from swarmwire.comms.events.selection import Swarm
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.truth import Happened, Static
 from swarmwire.world.world import World
 

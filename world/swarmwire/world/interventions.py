@@ -10,13 +10,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.tuning import with_number
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
-from swarmwire.comms.events.ramp import Ramp
+from swarmwire.comms.events.radio_events import Ramp
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.config.ramps import with_number
 from swarmwire.world.events import Course
 from swarmwire.world.scenario.event_door import event_of
 from swarmwire.world.scenario.scenario import Scenario

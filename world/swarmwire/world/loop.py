@@ -5,16 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.news import News
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.events.event import Event
-from swarmwire.comms.in_time import TimedCrew
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import NOWHERE, Heard, Sent
-from swarmwire.comms.protocols import Crew, Judge, Observer
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.interfaces import Crew, Judge, Observer, TimedCrew
+from swarmwire.comms.packets import NO_OUTCOMES, NOWHERE, Heard, Outcomes, Sent
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.results import News
+from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Tally, Truth
 from swarmwire.world.air_in_time import AirInTime
 from swarmwire.world.events import Events

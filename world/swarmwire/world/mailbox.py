@@ -3,8 +3,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
 from swarmwire.comms.truth import Static
 
 

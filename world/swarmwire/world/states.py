@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.notes import MOST_STATES, Notes
+from swarmwire.comms.tick_io import MOST_STATES, Notes
 
 ONE_TOO_MANY = -1
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.values import Values
+from swarmwire.comms.tick_io import Values
 
 
 class ToldValues:

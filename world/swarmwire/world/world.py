@@ -7,15 +7,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from swarmwire.comms.air.signal.levels import range_of
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.sensors import OwnSheet, Sheet
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.ground import ground_of
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.senses import Actions, GroupSenses, Senses
-from swarmwire.comms.sheets import OwnSheet, Sheet
+from swarmwire.comms.radio.phy.propagation import range_of
+from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.actuation.batteries import Batteries

@@ -10,7 +10,7 @@ from swarmwire.agent.behaviours.sectors import EITHER, LEFT, RIGHT, STRAIGHT, Se
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import IntColumn, State, VectorAgent, column
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.sheets.rim import Rim
+from swarmwire.comms.bodies.ranging_specs import Rim
 
 
 class Turning(State):

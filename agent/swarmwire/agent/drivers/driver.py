@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock
+from swarmwire.comms.config import NoParameters
 from swarmwire.comms.errors import SwarmwireError
-from swarmwire.comms.parameters import NoParameters
 
 
 class DriverLost(SwarmwireError):

@@ -4,9 +4,9 @@ from dataclasses import MISSING, Field, fields
 from typing import Any
 
 from swarmwire.agent.drivers.driver import Driver
+from swarmwire.comms.config import limits_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.installed import installed_class, installed_points
-from swarmwire.comms.parameters import limits_of
+from swarmwire.comms.plugins import installed_class, installed_points
 
 GROUP = "swarmwire.drivers"  # of entry points
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from swarmwire.agent.on_robot.settings_file import NO_FILE, Flags
+from swarmwire.comms.config import from_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.loading import resolve
-from swarmwire.comms.parsing import from_toml
+from swarmwire.comms.plugins import resolve
 
 
 class Flag(NamedTuple):

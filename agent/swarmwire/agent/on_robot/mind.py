@@ -14,9 +14,8 @@ from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import Heard, Sent
-from swarmwire.comms.senses import Actions, GroupSenses
+from swarmwire.comms.packets import Heard, Outcomes, Sent
+from swarmwire.comms.tick_io import Actions, GroupSenses
 
 
 @dataclass(frozen=True, slots=True)

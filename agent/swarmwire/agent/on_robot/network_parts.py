@@ -14,13 +14,13 @@ from swarmwire.agent.on_robot.settings import RobotSettings
 from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.agent.radios.radio_log import RadioLog
 from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.wire.poses import Pose
+from swarmwire.comms.wire.radio_bridge import Pose
 
 if TYPE_CHECKING:
     import zenoh
 
     from swarmwire.agent.radios.tracker import Tracker
-    from swarmwire.comms.wire.swarm_keys import SwarmKeys
+    from swarmwire.comms.wire.robot_network import SwarmKeys
 
 Say = Callable[[str], None]
 
@@ -52,10 +52,9 @@ def network_parts(plan: Plan, clock: DatedClock, log: RadioLog | None, say: Say,
         return NetworkParts()
     # zenoh costs memory and time, and is of no use to a robot by itself.
     from swarmwire.agent.radios.control import ControlPoint
-    from swarmwire.comms.wire.access import access_of
-    from swarmwire.comms.wire.closing import close_session
-    from swarmwire.comms.wire.swarm_keys import SwarmKeys
-    from swarmwire.comms.wire.swarm_session import open_swarm
+    from swarmwire.comms.wire.access_control import access_of
+    from swarmwire.comms.wire.robot_network import SwarmKeys, open_swarm
+    from swarmwire.comms.wire.sessions import close_session
 
     if network.warning:
         say(network.warning)

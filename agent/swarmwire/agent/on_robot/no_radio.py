@@ -1,7 +1,6 @@
 """The radio of a robot that has none."""
 
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
 
 
 class NoRadio:

@@ -19,8 +19,8 @@ from swarmwire.comms.assignment import params_of
 from swarmwire.comms.bodies.body import Body, body_from, load_body
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.clock import DatedClock
+from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.toml_file import read_toml
 
 
 @dataclass(frozen=True)

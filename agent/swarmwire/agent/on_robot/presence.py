@@ -6,7 +6,7 @@ A wrong endpoint, a firewall or a camera that is off look like a quiet swarm: on
 from collections.abc import Callable, Collection, Sequence
 
 from swarmwire.comms.clock import NS_PER_S, Clock, to_ns
-from swarmwire.comms.wire.poses import Pose
+from swarmwire.comms.wire.radio_bridge import Pose
 
 PATIENCE_S = 5.0
 

@@ -16,7 +16,7 @@ from swarmwire.agent.radios.radio_log import HeardPacket, SentPacket
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import BROADCAST
-from swarmwire.comms.wire.poses import Pose
+from swarmwire.comms.wire.radio_bridge import Pose
 
 TICKS = (
     "tick", "t_s", "late", "x_m", "y_m", "heading_rad", "drive", "linear_mps", "angular_radps", "state", "value",

@@ -7,7 +7,7 @@ import numpy as np
 
 from swarmwire.agent.drivers.driver import Driver
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.wire.poses import Pose
+from swarmwire.comms.wire.radio_bridge import Pose
 
 NOT_SEEN = Pose(nan, nan, nan)  # as emulated senses read when a reading is lost
 BATTERY = "battery"

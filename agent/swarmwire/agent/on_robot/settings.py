@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from swarmwire.comms.parameters import parameter
+from swarmwire.comms.config import parameter
 from swarmwire.comms.wire.network import Network
 
 FORMAT = 1  # of `robot.toml`

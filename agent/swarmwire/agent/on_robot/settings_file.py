@@ -7,14 +7,11 @@ from typing import Any
 
 from swarmwire.agent.on_robot.settings import FORMAT, RobotSettings
 from swarmwire.comms.bodies.tables import built, mapping_of
+from swarmwire.comms.config import check_format, check_plain, one_of, read_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
-from swarmwire.comms.loading import resolve
-from swarmwire.comms.one_of import one_of
-from swarmwire.comms.plain_values import check_plain
-from swarmwire.comms.toml_file import read_toml
+from swarmwire.comms.plugins import resolve
+from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.network_names import fault_of_name
 
 NO_FILE = "command line"  # where it is, in errors, when there is no file
 Flags = Mapping[str, tuple[str, Any]]  # key within the settings -> the flag, and what it was given

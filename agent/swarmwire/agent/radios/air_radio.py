@@ -19,13 +19,10 @@ from swarmwire.agent.radios.radio_log import SENT, TOO_LARGE, HeardPacket, NoRad
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import Clock, DatedClock, WallClock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import BROADCAST, Heard, Sent
-from swarmwire.comms.senses import Actions
-from swarmwire.comms.wire.air_frames import MOST_BYTES, decode_air
-from swarmwire.comms.wire.air_terms import AirTerms
-from swarmwire.comms.wire.bounded_inbox import BoundedInbox
-from swarmwire.comms.wire.swarm_keys import SwarmKeys
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, AirTerms, BoundedInbox, decode_air
+from swarmwire.comms.wire.robot_network import SwarmKeys
 from swarmwire.comms.wire.tick_frames import encode_actions
 
 JOIN_S = 10.0  # how long a world may take to answer
@@ -161,7 +158,7 @@ class AirRadio:
 
     def _arrive(self, sample: zenoh.Sample) -> None:
         """Called by the network's thread: it must take no time, and keep nothing that is large."""
-        if len(sample.payload) > MOST_BYTES:
+        if len(sample.payload) > MAX_RADIO_FRAME_BYTES:
             self._far_too_large += 1
             return
         self._inbox.put(_Arrival(sample.payload.to_bytes(), self._clock.now_ns(), self._clock.utc_ns()))

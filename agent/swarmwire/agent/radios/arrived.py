@@ -5,7 +5,7 @@ from typing import NamedTuple
 from swarmwire.agent.radios.packet_header import HEADER_BYTES, PacketHeader
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import TAG_BYTES
-from swarmwire.comms.wire.swarm_keys import SwarmKeys
+from swarmwire.comms.wire.robot_network import SwarmKeys
 
 
 class Arrival(NamedTuple):

@@ -13,8 +13,7 @@ from typing import Any, Protocol
 import zenoh
 from zenoh.handlers import Callback
 
-from swarmwire.comms.wire.swarm_control import ESTOP, STATUS, STOPPED
-from swarmwire.comms.wire.swarm_keys import SwarmKeys
+from swarmwire.comms.wire.robot_network import ESTOP, STATUS, STOPPED, SwarmKeys
 
 MOST_WAITING = 32  # questions; one more goes unanswered, and its asker asks again
 PATIENCE_S = 2.0  # for an answer that is under way when it is closed

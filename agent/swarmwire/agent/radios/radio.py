@@ -2,8 +2,7 @@
 
 from typing import Protocol
 
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import Heard, Sent
+from swarmwire.comms.packets import Heard, Outcomes, Sent
 
 
 class RobotRadio(Protocol):

@@ -2,7 +2,7 @@
 
 import math
 
-from swarmwire.comms.wire.poses import Pose
+from swarmwire.comms.wire.radio_bridge import Pose
 
 
 def range_bearing(own: Pose, sender: Pose) -> tuple[float, float]:

@@ -10,8 +10,8 @@ from zenoh.handlers import Callback
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.wire.poses import POSE_BYTES, Pose, decode_pose
-from swarmwire.comms.wire.swarm_keys import SwarmKeys
+from swarmwire.comms.wire.radio_bridge import POSE_BYTES, Pose, decode_pose
+from swarmwire.comms.wire.robot_network import SwarmKeys
 
 OLDEST_NS = NS_PER_S  # a pose that was seen longer ago, or is dated so far ahead, is not used
 

@@ -18,10 +18,9 @@ from swarmwire.agent.radios.range_bearing import range_bearing
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
-from swarmwire.comms.wire.bounded_inbox import BoundedInbox
-from swarmwire.comms.wire.swarm_keys import SwarmKeys
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.wire.radio_bridge import BoundedInbox
+from swarmwire.comms.wire.robot_network import SwarmKeys
 
 MOST_WAITING = 1024  # packets that may wait for the agent's next step
 GIVES = ("range_m", "bearing_rad")  # with a tracker

@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.agent.readings.number import N
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.sheets import Infrared, Light, Proximity, Rim, Ring
+from swarmwire.comms.bodies.sensors import Infrared, Light, Proximity, Rim, Ring
 
 S = TypeVar("S", bound=Ring)
 R = TypeVar("R", bound=Rim)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.sheets import Scan
+from swarmwire.comms.bodies.sensors import Scan
 
 
 @dataclass(frozen=True)

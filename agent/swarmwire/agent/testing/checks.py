@@ -14,7 +14,7 @@ from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import GroupAssignment, params_of
-from swarmwire.comms.senses import Actions, GroupSenses
+from swarmwire.comms.tick_io import Actions, GroupSenses
 
 
 def assert_equivalent(single: type[Agent], vector: type[VectorAgent[Any]], trial: Trial | None = None) -> None:

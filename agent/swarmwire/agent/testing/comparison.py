@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from swarmwire.agent.testing.deeds import deeds
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.senses import Actions
+from swarmwire.comms.tick_io import Actions
 
 MOST_SHOWN = 8  # deeds of a robot
 

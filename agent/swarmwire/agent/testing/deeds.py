@@ -6,7 +6,7 @@ from itertools import chain
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.messages import DICT_TAG, decode_dict, message_classes
 from swarmwire.comms.packets import BROADCAST, TAG_BYTES, UNTOLD, Sent
-from swarmwire.comms.senses import Actions
+from swarmwire.comms.tick_io import Actions
 
 Deed = tuple[int, str, str]  # robot, what it did, and the value, exactly
 SPEEDS = ("linear_mps", "angular_radps", "lateral_mps")

@@ -13,12 +13,11 @@ from swarmwire.agent.testing.trial import Trial
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.leds import BRIGHTEST
+from swarmwire.comms.bodies.drives import BRIGHTEST
+from swarmwire.comms.bodies.sensors import Camera, GroundColour, OwnSheet
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
-from swarmwire.comms.packets import UNTOLD, Heard, Payloads, Sent
-from swarmwire.comms.senses import GroupSenses
-from swarmwire.comms.sheets import Camera, GroundColour, OwnSheet
+from swarmwire.comms.packets import NO_OUTCOMES, UNTOLD, Heard, Outcomes, Payloads, SendResult, Sent
+from swarmwire.comms.tick_io import GroupSenses
 
 RATE_HZ = 10
 GIVEN = ("range_m", "bearing_rad", "rssi_dbm")

@@ -1,8 +1,4 @@
-"""Bodies: kinds of robot, each a TOML data sheet. Those that come with swarmwire lie in `bodies/`.
-
-A sheet with `like = "epuck"` starts from that body's sheet, table by table, and says only what differs; without a
-name of its own it goes by its file's.
-"""
+"""What in a body's sheet contradicts its size, its drive or how high it flies."""
 
 import tomllib
 from collections.abc import Mapping
@@ -10,21 +6,69 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet, actuator_sheet, told_actuator_sheet
-from swarmwire.comms.bodies.body_faults import fault_of_body, unfit_senses
-from swarmwire.comms.bodies.drives import DRIVES, Drive, Holonomic, Twist, Wheels
-from swarmwire.comms.bodies.leds import Leds
+from swarmwire.comms.bodies.custom import ActuatorSheet, actuator_sheet, own_sheet, told_actuator_sheet, told_own_sheet
+from swarmwire.comms.bodies.drives import DRIVES, Drive, Holonomic, Leds, Twist, Wheels
+from swarmwire.comms.bodies.sensors import SHEETS, Compass, Infrared, Light, Odometry, OwnSheet, Proximity, Scan, Sheet
 from swarmwire.comms.bodies.tables import built, mapping_of
+from swarmwire.comms.config import one_of, parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
-from swarmwire.comms.parameters import parameter
-from swarmwire.comms.sheets import SHEETS, Compass, Infrared, Light, Odometry, OwnSheet, Proximity, Scan, Sheet
-from swarmwire.comms.sheets.own import own_sheet, told_own_sheet
+
+if TYPE_CHECKING:
+    pass
+
+MOST_OF_RADIUS = 1.25  # how far from the axis a ring of LEDs may be: that of ARGoS's e-puck stands out by a fifth
+MOST_OF_HEIGHT = 2.0  # how high a LED may be: the foot-bot's beacon stands on a pole
+
+
+def fault_of_body(body: "Body") -> tuple[str, str] | None:
+    """The key of the first thing that does not go with the others, and what was expected; None if all do."""
+    diameter_m = 2.0 * body.radius_m
+    if not isinstance(body.drive, Holonomic) and body.drive.wheel_base_m > diameter_m:
+        expected = f"expected at most the body's diameter, {diameter_m:g} m; got {body.drive.wheel_base_m!r}"
+        return "drive.wheel_base_m", expected
+    if body.leds is not None and (fault := _fault_of_leds(body.leds, body.radius_m, body.height_m)):
+        return fault
+    unfit = unfit_senses(body.drive.kind, body.altitude_m)
+    for name, sheet in body.senses.items():
+        if name in unfit:
+            return f"senses.{name}", unfit[name]
+        if fault := sheet.fault(body.radius_m):
+            return f"senses.{name}.{fault[0]}", fault[1]
+    return None
+
+
+def unfit_senses(drive: object, altitude_m: object) -> Mapping[str, str]:
+    """The senses that a body with this kind of drive, at this altitude, cannot have, and why."""
+    unfit: dict[str, str] = {}
+    if drive == "holonomic":
+        unfit["odometry"] = "expected a drive with wheels: holonomic has no wheels"
+    if isinstance(altitude_m, int | float) and altitude_m > 0:
+        unfit["ground"] = f"expected altitude_m = 0: it looks at the floor right below, not from {altitude_m:g} m"
+    return unfit
+
+
+def _fault_of_leds(leds: Leds, radius_m: float, height_m: float) -> tuple[str, str] | None:
+    limits: dict[str, tuple[float, float, str]] = {
+        "radius_m": (leds.radius_m, MOST_OF_RADIUS * radius_m, f"{MOST_OF_RADIUS:g} times the body's radius"),
+        "height_m": (leds.height_m, MOST_OF_HEIGHT * height_m, "twice the body's height"),
+        "beacon_height_m": (leds.beacon_height_m, MOST_OF_HEIGHT * height_m, "twice the body's height"),
+    }
+    for key, (value, most, what) in limits.items():
+        if value > most:
+            return f"leds.{key}", f"expected at most {most:g} m, {what}; got {value!r}"
+    return None
+
+
+# --- Bodies: kinds of robot, each a TOML data sheet. Those that come with swarmwire lie in `bodies/`.
+#
+# A sheet with `like = "epuck"` starts from that body's sheet, table by table, and says only what differs; without a
+# name of its own it goes by its file's.
+
 
 S = TypeVar("S", bound=Sheet)
 HERE = Path()

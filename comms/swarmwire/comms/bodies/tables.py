@@ -6,9 +6,8 @@ from math import isfinite
 from types import UnionType
 from typing import Any, cast, get_args, get_origin, get_type_hints
 
+from swarmwire.comms.config import fault_of, limits_of, one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
-from swarmwire.comms.parameters import fault_of, limits_of
 
 GREATEST = 1e9  # of any number of a sheet: nothing on a robot is that large in its unit
 MOST_ITEMS = 1000  # of a list: what is told of each is kept for every robot

@@ -6,14 +6,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from typing import ClassVar, cast
 
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.events.conditions import Conditions
-from swarmwire.comms.events.selection import Selection
-from swarmwire.comms.events.swarm import Groups, Swarm
-from swarmwire.comms.parameters import parameter
+from swarmwire.comms.events.effects import Conditions
+from swarmwire.comms.events.selection import Groups, Selection, Swarm
+from swarmwire.comms.radio.config.radio import Radio
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,15 +1,96 @@
-"""Partition: sets of robots that cannot hear one another."""
+"""Region: a disc or a rectangle of the arena."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from swarmwire.comms.arrays import BoolArray, IntArray
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.events import sides
-from swarmwire.comms.events.conditions import Conditions
+from swarmwire.comms.events.effects import Conditions
 from swarmwire.comms.events.event import LastingEvent, within
-from swarmwire.comms.events.region import Region
-from swarmwire.comms.events.swarm import Groups, Swarm, members_of
-from swarmwire.comms.parameters import parameter
+from swarmwire.comms.events.selection import Groups, Swarm, members_of
+
+
+@dataclass(frozen=True)
+class Region:
+    """{ at, radius_m } is a disc, { at, size_m } a rectangle; the edge belongs to it."""
+
+    at: tuple[float, float] = parameter((0.0, 0.0), help="its centre, in the arena's frame", unit="m")
+    radius_m: float | None = parameter(None, help="radius of the disc", unit="m", above=0, at_most=10_000)
+    size_m: tuple[float, float] | None = parameter(None, help="full extents of the rectangle along x and y", unit="m")
+
+    def check(self) -> None:
+        """Raise BadInput, with a key within this table, unless it is just one of the two."""
+        if (self.radius_m is None) == (self.size_m is None):
+            raise BadInput("", "", "expected either radius_m or size_m")
+        if self.size_m is not None and min(self.size_m) <= 0.0:
+            raise BadInput("", "size_m", f"expected two numbers above 0 (m), got {list(self.size_m)}")
+
+    def holds(self, pose: FloatArray) -> BoolArray:
+        """Which robots that stand at `pose` (rows, 3) have their centre in it, (rows,)."""
+        from_centre_m = pose[:, :2] - self.at
+        if self.radius_m is not None:
+            return np.hypot(from_centre_m[:, 0], from_centre_m[:, 1]) <= self.radius_m
+        inside = np.abs(from_centre_m) <= 0.5 * np.array(self.size_m)
+        return inside[:, 0] & inside[:, 1]
+
+
+# --- Sides: the set of a partition in which each robot is, from 1; 0 is in none.
+
+
+FIRST, SECOND = 1, 2
+
+
+def sides_of_sets(sets: Sequence[Sequence[str]], swarm: Swarm) -> IntArray:
+    """Each robot in the set that names it or its group, (rows,)."""
+    side: IntArray = np.zeros(swarm.robots, np.int64)
+    for place, names in enumerate(sets):
+        side[_indices(names, swarm)] = place + 1
+    return np.tile(side, len(swarm.keys))
+
+
+def sides_of_loners(names: Sequence[str], swarm: Swarm) -> IntArray:
+    """Each robot named in a set of its own, all others in the first, (rows,)."""
+    side = np.full(swarm.robots, FIRST)
+    alone = _indices(names, swarm)
+    side[alone] = SECOND + np.arange(len(alone))
+    return np.tile(side, len(swarm.keys))
+
+
+def sides_of_bridge(names: Sequence[str], swarm: Swarm) -> IntArray:
+    """The robots named in no set; of the others, in their order, the first half against the second, (rows,)."""
+    side: IntArray = np.zeros(swarm.robots, np.int64)
+    others = np.setdiff1d(np.arange(swarm.robots), _indices(names, swarm))
+    side[others] = np.where(np.arange(len(others)) < (len(others) + 1) // 2, FIRST, SECOND)
+    return np.tile(side, len(swarm.keys))
+
+
+def sides_of_halves(axis: str, pose: FloatArray) -> IntArray:
+    """Robots that stand left of (below) the arena's middle against all others, by `axis` "x" ("y"), (rows,)."""
+    return two_sides(pose[:, 0 if axis == "x" else 1] < 0.0)
+
+
+def two_sides(first: BoolArray) -> IntArray:
+    """Those of `first` (rows,) against all others, (rows,)."""
+    return np.where(first, FIRST, SECOND)
+
+
+def without(side: IntArray, names: Sequence[str], swarm: Swarm) -> IntArray:
+    """The same sets, with the robots named in none of them, (rows,)."""
+    named = np.zeros(swarm.robots, np.bool_)
+    named[_indices(names, swarm)] = True
+    return np.where(np.tile(named, len(swarm.keys)), 0, side)
+
+
+def _indices(names: Sequence[str], swarm: Swarm) -> IntArray:
+    """The indices within an arena of groups and robots by name, rising."""
+    return np.array(sorted({index for name in names for index in members_of(name, swarm.groups)}), np.int64)
+
+
+# --- Partition: sets of robots that cannot hear one another.
+
 
 KINDS = ("between", "region", "halves", "isolate", "bridge")
 
@@ -74,14 +155,14 @@ class Partition(LastingEvent):
 
     def _sides(self, swarm: Swarm) -> IntArray:
         if self.between is not None:
-            return sides.sides_of_sets(self.between, swarm)
+            return sides_of_sets(self.between, swarm)
         if self.region is not None:
-            return sides.two_sides(self.region.holds(swarm.pose))
+            return two_sides(self.region.holds(swarm.pose))
         if self.isolate is not None:
-            return sides.sides_of_loners(self.isolate, swarm)
+            return sides_of_loners(self.isolate, swarm)
         if self.halves is not None:
-            return sides.without(sides.sides_of_halves(self.halves, swarm.pose), self.bridge or (), swarm)
-        return sides.sides_of_bridge(self.bridge or (), swarm)
+            return without(sides_of_halves(self.halves, swarm.pose), self.bridge or (), swarm)
+        return sides_of_bridge(self.bridge or (), swarm)
 
 
 def _check_sets(sets: tuple[tuple[str, ...], ...], groups: Groups) -> None:

@@ -4,16 +4,10 @@ What an action changes lies in `Conditions`: a new kind of effect is a new field
 the `Disruption` that it makes, by the air.
 """
 
-from swarmwire.comms.events.blackout import Blackout
 from swarmwire.comms.events.event import Event
-from swarmwire.comms.events.fail import Fail
-from swarmwire.comms.events.gain import Gain
-from swarmwire.comms.events.jammer import Jammer
-from swarmwire.comms.events.kill import Kill
 from swarmwire.comms.events.partition import Partition
-from swarmwire.comms.events.push import Push
-from swarmwire.comms.events.ramp import Ramp
-from swarmwire.comms.events.revive import Revive
+from swarmwire.comms.events.radio_events import Blackout, Gain, Jammer, Ramp
+from swarmwire.comms.events.robot_events import Fail, Kill, Push, Revive
 
 # All that `do` may name.
 ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Fail, Blackout, Partition, Ramp, Gain, Jammer, Push)

@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
-from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry.floor import Floor
 from swarmwire.comms.geometry.obstacles import sides_of
+from swarmwire.comms.kernels import borrowing
 from swarmwire.comms.truth import Boundary
 
 WHITE = Floor()

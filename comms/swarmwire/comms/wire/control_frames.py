@@ -7,9 +7,9 @@ from typing import Any, cast
 
 import msgpack
 
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.one_of import one_of
-from swarmwire.comms.wire.unpacking import unpacked
+from swarmwire.comms.wire.frames import unpacked
 
 CONTROL_VERSION = 1
 MOST_BYTES = 64 * 1024  # of a request

@@ -1,22 +1,60 @@
-"""Frames: msgpack maps of a version, a kind, a tick, named arrays as raw little-endian buffers, and a few plain values.
+"""Msgpack from elsewhere: what it becomes takes no more memory than its bytes allow for.
 
-Nothing is allocated from a number that the frame claims: the bytes are there, and every array must fit its own bytes.
-What else is in a frame is counted while it is unpacked.
+A byte of msgpack may be a list or a map, which takes seventy times as much here; so these are counted as they appear.
 """
 
-# What arrives is of unknown types until it is checked, item by item; a `cast` is a call, here in the busiest of loops.
-# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false, reportUnknownMemberType=false
+# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false, reportUnknownMemberType=false
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sized
 from dataclasses import dataclass, field
 from typing import Any
 
 import msgpack
 import numpy as np
+from msgpack.exceptions import UnpackException
 
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.wire.unpacking import unpacked
+
+# What arrives is of unknown types until it is checked.
+
+
+UNCOUNTED_BYTES = 64 * 1024  # become a few MB at most; pragma: no mutate (only memory differs)
+MOST_ITEMS = 500_000  # lists, maps and what is in them: some 40 MB; of a frame's arrays each is one
+
+
+def unpacked(data: bytes, most_bytes: int) -> Any:
+    """What these bytes are; BadFrame ("oversized" or "malformed") if they are too many, hold too much, or are none."""
+    if len(data) > most_bytes:
+        raise BadFrame("oversized", f"{len(data)} bytes, expected at most {most_bytes}")
+    try:
+        return msgpack.unpackb(data) if len(data) <= UNCOUNTED_BYTES else _counted(data)
+    except (ValueError, UnpackException) as error:
+        raise BadFrame("malformed", f"no msgpack: {error}") from error
+
+
+def _counted(data: bytes) -> Any:
+    items = 0
+
+    def count(found: Sized) -> Sized:
+        nonlocal items
+        items += 1 + len(found)
+        if items > MOST_ITEMS:
+            raise ValueError(f"more than {MOST_ITEMS} items")
+        return found
+
+    return msgpack.unpackb(data, list_hook=count, object_hook=count, max_array_len=MOST_ITEMS, max_map_len=MOST_ITEMS)
+
+
+# --- Frames: msgpack maps of a version, a kind, a tick, named arrays as raw little-endian buffers, and a few plain
+# values.
+#
+# Nothing is allocated from a number that the frame claims: the bytes are there, and every array must fit its own bytes.
+# What else is in a frame is counted while it is unpacked.
+
+
+# What arrives is of unknown types until it is checked, item by item; a `cast` is a call, here in the busiest of loops.
+
 
 VERSION = 1  # of frames between world and runners, and of what runners ask before
 KEYS = {"v", "kind", "tick", "arrays", "values"}
@@ -84,3 +122,18 @@ def _shaped(dtype: np.dtype[Any], shape: list[Any], buffer: bytes) -> AnyArray |
         return None  # numpy masks and counts wrongly with any other byte
     array = np.frombuffer(buffer, dtype)
     return array if axes == 1 else array.reshape(shape)
+
+
+# --- Arrays of a frame that came over the wire, checked before they are used.
+
+
+def checked_array(frame: Frame, name: str, code: str, shape: tuple[int | None, ...]) -> AnyArray:
+    """An array of the frame, of this dtype and shape (None: any length); BadFrame otherwise."""
+    array = frame.arrays.get(name)
+    if array is not None and array.dtype == DTYPES[code] and array.ndim == len(shape):
+        for want, got in zip(shape, array.shape, strict=True):
+            if want is not None and want != got:
+                break
+        else:
+            return array
+    raise BadFrame("malformed", f"{name}: expected {code} of shape {shape}")

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, cast
 
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 
 PROTOCOLS = ("tcp", "udp", "tls", "quic", "ws", "unixsock-stream")  # that zenoh's wheel speaks
 PROVEN = ("tls", "quic")  # where both ends show a certificate

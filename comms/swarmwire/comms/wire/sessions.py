@@ -1,26 +1,113 @@
-"""zenoh sessions: the world routes on some endpoints for runners and on others for observers, who are clients of it.
+"""The end of a process whose sessions are still closing, which zenoh may take ten seconds for.
 
-Nothing scouts, nothing gossips. The two are sessions of their own, so that no runner can see the truth. Routers may
-stand between a world and its runners, in a chain: each listens for the next and calls the one before.
-
-Two peers on one hub are not routed by zenoh, or link past it; so the world is a router and runners are clients. The
-start-up delay of scouting is set to 0 even where it is off (it costs half a second otherwise). Frames in lockstep block
-rather than drop; a put that blocks closes its link after `BLOCK_S` or half a runner's time-out.
+Python must not be torn down meanwhile: a thread that comes back from zenoh then finds no interpreter, and the process
+aborts ("exception not rethrown"). So the end waits for such threads, or is made at once by `end_now`.
 """
 
-# zenoh's stubs leave out the type of what a session answers.
 # pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false
 
+import atexit
 import json
+import logging
 import os
-from collections.abc import Mapping, Sequence
+import sys
+import threading
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import zenoh
 
-from swarmwire.comms.wire.limits import LIMITS, Limits
-from swarmwire.comms.wire.mutual_tls import mutual_tls
+from swarmwire.comms.wire.join import LIMITS, Limits
 from swarmwire.comms.wire.network import Network, protocol_of
+
+LONGEST_S = 12.0  # after ten seconds zenoh gives up
+
+_left: list[threading.Thread] = []
+
+
+def left_closing(closing: threading.Thread) -> None:
+    """A thread that goes on closing a session, for which nobody waits but the end of the process."""
+    _left.append(closing)
+    atexit.register(closing.join, LONGEST_S)
+
+
+def end_now(code: int) -> None:
+    """End this process if a session is still closing, with nothing more done; else return. For the end of programs."""
+    if any(closing.is_alive() for closing in _left):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+# --- Closing zenoh sessions, which may wait ten seconds for a peer that is frozen, out of reach, or about to close,
+# too.
+#
+# zenoh then raises "close operation timed out" (its issue 2675). Nothing is lost by that: the session is of no use any
+# more, and all that it holds ends with the process.
+
+
+# zenoh's stubs leave out the return type of close.
+
+
+PATIENCE_S = 1.0  # whoever is well answers in milliseconds
+
+log = logging.getLogger(__name__)
+
+
+def close_session(session: zenoh.Session, patience_s: float = PATIENCE_S) -> None:
+    """Close a session, waiting no longer than so for those who do not answer; safe to call again."""
+    closing = threading.Thread(target=_close, args=(session,), name="closing", daemon=True)
+    closing.start()
+    closing.join(patience_s)
+    if closing.is_alive():
+        left_closing(closing)
+
+
+@contextmanager
+def closed_after(session: zenoh.Session) -> Generator[zenoh.Session]:
+    """The session, closed with the context."""
+    try:
+        yield session
+    finally:
+        close_session(session)
+
+
+def _close(session: zenoh.Session) -> None:
+    try:
+        session.close()
+    except zenoh.ZError as error:
+        log.info("a session was left to the end of the process: %s", error)
+
+
+# --- The certificates of one end of a zenoh link: both ends show theirs, whoever called.
+
+
+def mutual_tls(network: Network) -> dict[str, Any]:
+    """Zenoh's `transport/link/tls` for a member with these certificates."""
+    certificate, key = str(network.certificate), str(network.key)
+    return {
+        "root_ca_certificate": str(network.ca),
+        "enable_mtls": True,
+        "listen_certificate": certificate,
+        "listen_private_key": key,
+        "connect_certificate": certificate,
+        "connect_private_key": key,
+    }
+
+
+# --- zenoh sessions: the world routes on some endpoints for runners and on others for observers, who are clients of it.
+#
+# Nothing scouts, nothing gossips. The two are sessions of their own, so that no runner can see the truth. Routers may
+# stand between a world and its runners, in a chain: each listens for the next and calls the one before.
+#
+# Two peers on one hub are not routed by zenoh, or link past it; so the world is a router and runners are clients. The
+# start-up delay of scouting is set to 0 even where it is off (it costs half a second otherwise). Frames in lockstep
+# block rather than drop; a put that blocks closes its link after `BLOCK_S` or half a runner's time-out.
+
+
+# zenoh's stubs leave out the type of what a session answers.
+
 
 PRIVATE = "sw-"  # how the name of a private directory for a socket begins
 BLOCK_S = 5.0

@@ -6,21 +6,27 @@ from typing import Any, cast
 
 import numpy as np
 
-from swarmwire.comms.actuations import NO_ACTUATIONS, Actuations
 from swarmwire.comms.arrays import AnyArray, IntArray
-from swarmwire.comms.bodies.leds import BRIGHTEST
+from swarmwire.comms.bodies.drives import BRIGHTEST
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
-from swarmwire.comms.memory import Memory
-from swarmwire.comms.notes import MOST_STATES, Notes, checked_state
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
-from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions, GroupSenses, Senses
-from swarmwire.comms.values import NO_VALUES, Values
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, UNTOLD, Heard, Outcomes, Payloads, SendResult, Sent
+from swarmwire.comms.tick_io import (
+    MOST_STATES,
+    NO_ACTUATIONS,
+    NO_LED_CHANGES,
+    NO_VALUES,
+    Actions,
+    Actuations,
+    GroupSenses,
+    LedChanges,
+    Notes,
+    Senses,
+    Values,
+    checked_state,
+)
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.checked import checked_array
-from swarmwire.comms.wire.frames import Frame
-from swarmwire.comms.wire.memory_frames import memory_arrays
+from swarmwire.comms.wire.agent_memory import Memory, memory_arrays
+from swarmwire.comms.wire.frames import Frame, checked_array
 
 NOTHING_BESIDE: Mapping[str, AnyArray] = MappingProxyType({})
 
@@ -246,3 +252,37 @@ def _own(some: IntArray, rows: IntArray) -> bool:
         return np.count_nonzero(some == rows) == len(some)
     known = np.sort(rows)
     return np.count_nonzero(known[np.searchsorted(known[:-1], some)] == some) == len(some)
+
+
+# --- What crosses the wire in the middle of a tick, in real time with a quantum: packets to a runner, packets back.
+
+
+def encode_packets(tick: int, at_ns: int, number: int, heard: Heard, outcomes: Outcomes) -> bytes:
+    """A `packets` frame: what a runner's robots heard since the last, and learned of their own packets.
+
+    It is handed over at `at_ns` of simulated time, in `tick`; `number` counts these frames to a runner from 0.
+    """
+    return frames.encode("packets", tick, told_arrays(heard, outcomes), {"at_ns": at_ns, "number": number})
+
+
+def decode_packets(frame: Frame, gives: tuple[str, ...]) -> tuple[int, int, Heard, Outcomes]:
+    """Time, number and what else `encode_packets` was given; BadFrame if the frame does not hold it."""
+    at_ns, number = frame.values.get("at_ns"), frame.values.get("number")
+    if type(at_ns) is not int or type(number) is not int:
+        raise BadFrame("malformed", "expected at_ns and number")
+    try:
+        return at_ns, number, *told_of(frame, gives)
+    except (KeyError, ValueError) as error:
+        raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error
+
+
+def encode_sent(tick: int, sent: Sent, missed: int = 0) -> bytes:
+    """A `sent` frame: what robots sent between ticks; `missed` counts `packets` frames that never came."""
+    return frames.encode("sent", tick, sent_arrays(sent), {"missed": missed} if missed else {})
+
+
+def decode_sent(frame: Frame, rows: IntArray) -> Sent:
+    """Packets of the robots `rows`; BadFrame if there are none, or some of others."""
+    if "sent" not in frame.arrays:
+        raise BadFrame("malformed", "expected packets")
+    return sent_of(frame, rows)

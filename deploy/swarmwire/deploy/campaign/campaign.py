@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.config import from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.campaign.columns import Columns
 from swarmwire.deploy.campaign.design import Point
 from swarmwire.deploy.record.known_fields import known_fields

@@ -4,10 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
+from swarmwire.comms.config import check_format, one_of, read_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
-from swarmwire.comms.one_of import one_of
-from swarmwire.comms.toml_file import read_toml
 from swarmwire.deploy.arguments import SEEDS, seed_list
 from swarmwire.deploy.campaign.design import GRID
 from swarmwire.deploy.campaign.plan import Asked

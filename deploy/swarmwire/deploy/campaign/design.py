@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.config import one_of
 from swarmwire.comms.draws import derive_key, uniform
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 from swarmwire.deploy.campaign.vary import Range, Vary
 
 Point = dict[str, Any]  # by path: the value

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, cast
 
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.installed import entry_points_of
-from swarmwire.comms.one_of import one_of
+from swarmwire.comms.plugins import entry_points_of
 from swarmwire.deploy.campaign.task import PieceResult, Task
 
 GROUP = "swarmwire.executors"

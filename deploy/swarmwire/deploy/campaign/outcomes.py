@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from swarmwire.comms.fates import FATE_NAMES
+from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.deploy.campaign.row import LATENCIES, STATISTICS, TOTALS
 from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.metrics.campaign.outcome import Outcome

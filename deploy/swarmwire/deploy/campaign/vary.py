@@ -8,8 +8,8 @@ from fractions import Fraction
 from math import isinf
 from typing import Any, cast
 
+from swarmwire.comms.config import from_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parsing import from_toml
 
 EXPECTED = (
     "expected PATH=FIRST:LAST:COUNT, such as radio.loss=0:0.8:9, or PATH=5,10,20; "

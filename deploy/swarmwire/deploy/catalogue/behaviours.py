@@ -10,7 +10,7 @@ from swarmwire.agent.declared import REQUIRED, TYPES, parameters_of
 from swarmwire.agent.declared import Parameter as Declared
 from swarmwire.agent.loading import AgentClass, NoAgent, load_agent
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.loading import resolve
+from swarmwire.comms.plugins import resolve
 from swarmwire.deploy.catalogue.docs import comments_of, first_line, texts_of
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.units import unit_of

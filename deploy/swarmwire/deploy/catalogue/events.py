@@ -3,9 +3,9 @@
 from dataclasses import fields
 from typing import Any
 
+from swarmwire.comms.config import limits_of
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.registry import ACTIONS
-from swarmwire.comms.parameters import limits_of
 from swarmwire.deploy.catalogue.docs import paragraphs
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass

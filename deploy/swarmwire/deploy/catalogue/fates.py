@@ -1,6 +1,6 @@
 """Fates: what may become of a packet for one intended receiver."""
 
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.deploy.catalogue.entry import Entry
 
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 from swarmwire.deploy.catalogue.behaviours import behaviour
 from swarmwire.deploy.catalogue.bodies import body_of
 from swarmwire.deploy.catalogue.entry import Entry

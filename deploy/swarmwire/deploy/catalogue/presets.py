@@ -2,8 +2,7 @@
 
 from typing import Any, cast
 
-from swarmwire.comms.air.presets.preset import Preset
-from swarmwire.comms.air.presets.registry import PRESETS
+from swarmwire.comms.radio.config.presets import PRESETS, Preset
 from swarmwire.deploy.catalogue.entry import Entry
 
 

@@ -2,8 +2,8 @@
 
 import inspect
 
-from swarmwire.comms.air.stages.chain import ORDER
-from swarmwire.comms.air.stages.stage import Stage
+from swarmwire.comms.radio.stages.chain import ORDER
+from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.deploy.catalogue.docs import first_line, paragraphs
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
 from swarmwire.deploy.catalogue.scenario_keys import all_keys

@@ -6,7 +6,7 @@ from swarmwire.agent.drivers.driver import Driver
 from swarmwire.agent.on_robot.driver_registry import GROUP as DRIVERS
 from swarmwire.agent.on_robot.driver_registry import driver_names, load_driver
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.installed import installed_points
+from swarmwire.comms.plugins import installed_points
 from swarmwire.deploy.catalogue.docs import first_line, texts_of
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass

@@ -7,10 +7,10 @@ from typing import Any, get_args, get_type_hints
 from swarmwire.agent import Packet, Robot
 from swarmwire.agent.robot import RadioPort
 from swarmwire.agent.turn import OUTCOMES
-from swarmwire.comms.air.parameters.gives import Gives
 from swarmwire.comms.bodies.body import body_names, load_body
-from swarmwire.comms.outcomes import SendResult
-from swarmwire.comms.sheets import SHEETS
+from swarmwire.comms.bodies.sensors import SHEETS
+from swarmwire.comms.packets import SendResult
+from swarmwire.comms.radio.config.impairments import Gives
 from swarmwire.deploy.catalogue.docs import first_line, paragraphs
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass

@@ -1,7 +1,7 @@
 """Keys of a body's data sheet: those at its top level, and those of its LEDs."""
 
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.leds import Leds
+from swarmwire.comms.bodies.drives import Leds
 from swarmwire.deploy.catalogue.docs import first_line, paragraphs
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass

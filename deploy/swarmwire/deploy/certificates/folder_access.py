@@ -7,9 +7,8 @@ and keys that belong to that machine.
 from pathlib import Path
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.access import OPERATOR
+from swarmwire.comms.wire.access_control import OPERATOR, WORLD, RunAccess
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.run_access import WORLD, RunAccess
 from swarmwire.deploy.certificates.files import AUTHORITY, REGISTER, certificate_path, key_path
 from swarmwire.deploy.certificates.purposes import OBSERVER, ROUTER, RUNNER
 from swarmwire.deploy.certificates.register import Register

@@ -3,7 +3,7 @@
 from datetime import datetime
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.access import TRACKER
+from swarmwire.comms.wire.access_control import TRACKER
 from swarmwire.deploy.certificates.register import Register
 from swarmwire.deploy.certificates.wanted import Wanted, wanted
 from swarmwire.deploy.fleet.fleet import Fleet

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.access_control import WORLD, RunAccess
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.run_access import WORLD, RunAccess
 from swarmwire.deploy.certificates.files import REGISTER
 from swarmwire.deploy.certificates.folder_access import access_in, network_in
 from swarmwire.deploy.certificates.purposes import ROUTER

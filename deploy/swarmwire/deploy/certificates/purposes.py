@@ -1,9 +1,8 @@
 """What a certificate of a swarm's network is for; the register keeps it, the certificate itself is the same for all."""
 
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
-from swarmwire.comms.wire.access import OPERATOR, TRACKER
-from swarmwire.comms.wire.run_access import WORLD
+from swarmwire.comms.wire.access_control import OPERATOR, TRACKER, WORLD
 
 ROBOT, RUNNER, OBSERVER, ROUTER = "robot", "runner", "observer", "router"
 PURPOSES = (ROBOT, TRACKER, OPERATOR, RUNNER, OBSERVER, ROUTER, WORLD)

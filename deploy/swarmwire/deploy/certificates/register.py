@@ -7,9 +7,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
 
+from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
-from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.certificates.dates import DAY, date_of, text_of
 from swarmwire.deploy.certificates.files import REGISTER
 from swarmwire.metrics.whole_file import write_whole

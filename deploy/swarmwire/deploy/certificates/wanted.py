@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.network_names import fault_of_name
+from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.deploy.certificates.files import AUTHORITY
 from swarmwire.deploy.certificates.purposes import PURPOSES, ROBOT, checked_purpose
 

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
+from swarmwire.comms.config import from_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parsing import from_toml
 from swarmwire.deploy.commands.options import USUAL_SIZE_PX, Overrides, Seed
 
 _ONLY_IN_BODIES = ("like", "drive", "radius_m")

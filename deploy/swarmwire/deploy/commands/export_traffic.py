@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
-    from swarmwire.comms.air.radio import Radio
+    from swarmwire.comms.radio.config.radio import Radio
     from swarmwire.metrics.capture.link_headers import Link
     from swarmwire.metrics.run_folder import RunFolder
 

@@ -56,7 +56,7 @@ def router_command(
 
       swarmwire router --listen tls/0.0.0.0:7447 --connect tls/10.0.0.5:7447 --certs lab-certs
     """
-    from swarmwire.comms.wire.run_access import RunAccess, router_access
+    from swarmwire.comms.wire.access_control import RunAccess, router_access
     from swarmwire.comms.wire.sessions import router_config
     from swarmwire.deploy.certificates.member import member
     from swarmwire.deploy.certificates.purposes import ROUTER
@@ -94,8 +94,7 @@ def _route(of: "Member", listen: list[str], connect: list[str], access: dict[str
     import zenoh
 
     from swarmwire.comms.clock import WallClock, to_ns
-    from swarmwire.comms.wire.closing import closed_after
-    from swarmwire.comms.wire.sessions import listens_at, open_router
+    from swarmwire.comms.wire.sessions import closed_after, listens_at, open_router
     from swarmwire.deploy.interrupt import Interrupt
 
     clock = WallClock()

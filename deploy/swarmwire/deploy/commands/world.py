@@ -78,7 +78,7 @@ def world_command(
       swarmwire world scenarios/flocking-lossy.toml --listen tls/0.0.0.0:7447 --certs lab-certs
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.comms.wire.run_access import WORLD, RunAccess
+    from swarmwire.comms.wire.access_control import WORLD, RunAccess
     from swarmwire.deploy.arguments import choose_seeds
     from swarmwire.deploy.certificates.member import member
     from swarmwire.deploy.compiling import compiling_told

@@ -7,11 +7,10 @@ from typing import Any
 import zenoh
 
 from swarmwire.comms.errors import BadFrame, SwarmwireError
-from swarmwire.comms.wire.closing import closed_after
 from swarmwire.comms.wire.control_frames import Request, decode_reply, encode_request
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.sessions import open_observer
+from swarmwire.comms.wire.sessions import closed_after, open_observer
 from swarmwire.deploy.live.following import RunGone
 
 ANY_PUBLISHED = ObserverKeys("*").published

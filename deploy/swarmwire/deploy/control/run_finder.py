@@ -12,9 +12,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.config import from_json, one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
-from swarmwire.comms.parsing import from_json
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy.live.live_file import goes_on, read_live
 from swarmwire.metrics.whole_file import write_whole

@@ -5,9 +5,9 @@ from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.tuning import numbers_of
 from swarmwire.comms.clock import Clock, tick_start_ns, to_s
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.config.ramps import numbers_of
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy.controls import Controls
 from swarmwire.metrics.viewer.plotted import Measured

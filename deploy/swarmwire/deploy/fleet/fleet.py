@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 from swarmwire.deploy.certificates.revoked import revoked_in
 
 

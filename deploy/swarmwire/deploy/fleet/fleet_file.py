@@ -4,11 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
+from swarmwire.comms.config import check_format, one_of, read_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
-from swarmwire.comms.one_of import one_of
-from swarmwire.comms.toml_file import read_toml
-from swarmwire.comms.wire.network_names import fault_of_name
+from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.deploy.fleet.fleet import Fleet, Host, Robot
 from swarmwire.deploy.fleet.fleet_keys import FORMAT, HOST_KEYS, OF_FLEET, OF_ROBOT, SETTINGS, checked_table
 from swarmwire.deploy.fleet.host_side.folders import TAKEN

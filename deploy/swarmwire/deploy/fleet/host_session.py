@@ -11,7 +11,7 @@ from typing import Any, cast
 import asyncssh
 
 from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.parsing import from_json
+from swarmwire.comms.config import from_json
 from swarmwire.deploy.fleet.archive import Archive
 from swarmwire.deploy.fleet.connecting import CONNECT_S, connected, lost
 from swarmwire.deploy.fleet.fleet import Host

@@ -6,9 +6,9 @@ from typing import Any
 
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.tables import built
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
-from swarmwire.comms.wire.network_names import fault_of_name
+from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.deploy.gateways.gateways import OTHERS, Gateways
 from swarmwire.world.gateways.gateway import Gateway
 from swarmwire.world.gateways.registry import gateway_kind

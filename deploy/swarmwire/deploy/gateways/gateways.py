@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.config import from_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parsing import from_toml
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.certificates.revoked import revoked_in
 

@@ -11,14 +11,12 @@ import zenoh
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadFrame, SwarmwireError
-from swarmwire.comms.glimpse import Glimpse, Scene, Series
-from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.run_views import Glimpse, Scene, Series
 from swarmwire.comms.wire.frames import decode
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.scene_frames import decode_scene
-from swarmwire.comms.wire.sessions import open_observer
-from swarmwire.comms.wire.truth_frames import decode_truth
+from swarmwire.comms.wire.observer_frames import decode_scene, decode_truth
+from swarmwire.comms.wire.sessions import closed_after, open_observer
 from swarmwire.deploy.live.live_file import Live
 
 KEPT = 8  # glimpses that wait here for a viewer that lags; older ones are dropped

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.config import from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.whole_file import write_whole
 
 LIVE = "live.json"

@@ -17,14 +17,11 @@ import zenoh
 
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.glimpse import Glimpse, Scene, Series
-from swarmwire.comms.one_arena import static_of
+from swarmwire.comms.run_views import Glimpse, Scene, Series, static_of
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.comms.wire.closing import closed_after
 from swarmwire.comms.wire.keys import ObserverKeys
-from swarmwire.comms.wire.scene_frames import encode_scene
-from swarmwire.comms.wire.sessions import open_observed
-from swarmwire.comms.wire.truth_frames import encode_truth
+from swarmwire.comms.wire.observer_frames import encode_scene, encode_truth
+from swarmwire.comms.wire.sessions import closed_after, open_observed
 from swarmwire.deploy.endpoint import local_endpoint
 from swarmwire.deploy.live.live_file import Live, forget_live
 from swarmwire.deploy.live.sampling import FRAMES_PER_S, Rate, Sampling, Since

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.glimpse import Glimpse
-from swarmwire.comms.one_arena import senses_within, truth_of
+from swarmwire.comms.run_views import Glimpse, senses_within, truth_of
 from swarmwire.comms.truth import Static, Truth
 
 FRAMES_PER_S = 30

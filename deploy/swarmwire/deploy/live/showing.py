@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from swarmwire.comms.clock import NS_PER_S, Clock
-from swarmwire.comms.glimpse import Glimpse
+from swarmwire.comms.run_views import Glimpse
 from swarmwire.deploy.live.evened import Evened
 from swarmwire.deploy.live.following import Following, following
 from swarmwire.deploy.live.live_file import Live

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.glimpse import Glimpse
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.run_views import Glimpse
 from swarmwire.comms.truth import Happened, Static
 from swarmwire.metrics.event_log import names
 

@@ -6,7 +6,7 @@ from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
-from swarmwire.comms.glimpse import Scene
+from swarmwire.comms.run_views import Scene
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling
 from swarmwire.deploy.live.following import following

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.world.scenario.scenario_file import scenario_from
 
 

@@ -5,12 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from swarmwire.comms.air.antennas import Antennas
-from swarmwire.comms.air.probe.coverage import Coverage
-from swarmwire.comms.air.probe.survey import ByDistance, CoverageMap, by_distance, coverage_map
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.radio.analysis.coverage import ByDistance, Coverage, CoverageMap, by_distance, coverage_map
+from swarmwire.comms.radio.config.phy import Antennas
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.scenario.scenario import Scenario

@@ -7,8 +7,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.comms.air.probe.survey import Band
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.radio.analysis.coverage import Band
 from swarmwire.deploy.radio.coverage_probe import CoverageProbe
 
 ROWS = 16  # of the table over distance

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
-    from swarmwire.comms.air.parameters.propagation import Antenna
+    from swarmwire.comms.radio.config.phy import Antenna
     from swarmwire.metrics.radio_fit.network_fit import NetworkFit
     from swarmwire.metrics.radio_fit.radio_fit import RadioFit
 

@@ -5,11 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from swarmwire.comms.air.traces.link_trace import POSSIBLE, LinkTrace, Quantity, RefusedRow, link_trace
-from swarmwire.comms.air.traces.link_traces import LinkTraces
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.radio.traces import POSSIBLE, LinkTrace, LinkTraces, Quantity, RefusedRow, link_trace
 from swarmwire.metrics.measured_table import MeasuredTable
 from swarmwire.world.scenario.scenario import Scenario
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from swarmwire.comms.air.presets.registry import PRESETS
-from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
+from swarmwire.comms.radio.config.presets import PRESETS
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.deploy.radio.around import checked_radio
 
 

@@ -19,13 +19,11 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.in_time import AirTime, Put, TimedCrew
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard, Sent
-from swarmwire.comms.protocols import Crew
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.interfaces import AirTime, Crew, Put, TimedCrew
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.checked import checked_array
+from swarmwire.comms.wire.frames import checked_array
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions, sent_arrays, sent_of
 from swarmwire.metrics.record.names import INPUTS
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
+from swarmwire.comms.config import from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.record.names import INTERVENTIONS
 from swarmwire.world.interventions import Intervention
 

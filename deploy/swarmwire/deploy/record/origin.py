@@ -9,9 +9,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
-from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.record import machine
 from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.modules import changed_modules, module_digests

@@ -9,9 +9,8 @@ from types import TracebackType
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput, RecordFailed
-from swarmwire.comms.in_time import TimedCrew
+from swarmwire.comms.interfaces import Crew, Observer, TimedCrew
 from swarmwire.comms.messages import DICT_TAG, message_classes
-from swarmwire.comms.protocols import Crew, Observer
 from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.record.inputs import InputsRecord, RecordedCrew

@@ -17,8 +17,8 @@ from typing import Any
 
 import tomli_w
 
-from swarmwire.comms.loading import resolve
-from swarmwire.comms.parsing import from_toml
+from swarmwire.comms.config import from_toml
+from swarmwire.comms.plugins import resolve
 from swarmwire.deploy.radio.link_trace_file import trace_path
 from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.world.placement.grey_image import beside

@@ -7,7 +7,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
-from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Happened, Static, Truth
 from swarmwire.metrics.event_log import names
 from swarmwire.metrics.metrics import Metrics

@@ -6,7 +6,7 @@ from rich.console import Group
 from rich.panel import Panel as Frame
 from rich.text import Text
 
-from swarmwire.comms.fates import FATE_NAMES
+from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.bindings import BINDINGS
 from swarmwire.deploy.terminal.figures import EVENTS, HISTORY_S, Figures

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.deploy.result import ArenaResult, Percentiles, Result, Statistics
 
 if TYPE_CHECKING:

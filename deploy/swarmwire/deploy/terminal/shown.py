@@ -3,7 +3,7 @@
 from rich.console import Console
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.protocols import Observer
+from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.deploy.terminal.panel import Panel
 from swarmwire.deploy.terminal.progress import ProgressLines

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 from swarmwire.deploy.campaign.design import LIST
 from swarmwire.deploy.campaign.plan import Asked, Plan, planned
 from swarmwire.deploy.campaign.vary import Vary

@@ -6,9 +6,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
-from swarmwire.comms.parsing import from_json
 from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER
 from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.scenario_copy import CopiedFile

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
+from swarmwire.comms.config import check_format, from_json, one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
-from swarmwire.comms.one_of import one_of
-from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.campaign.formats import CAMPAIGN_FORMAT
 from swarmwire.metrics.campaign.outcome import KINDS, Outcome
 

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 from swarmwire.metrics.campaign.about import Point
 from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.campaign.point_pairs import point_pairs, shared_paths

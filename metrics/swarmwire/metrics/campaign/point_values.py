@@ -5,7 +5,7 @@ import math
 import tomllib
 from collections.abc import Iterable
 
-from swarmwire.comms.parsing import from_toml
+from swarmwire.comms.config import from_toml
 from swarmwire.metrics.campaign.about import Point, Value
 
 ROUNDING = 1e-9  # relative: 0.1 + 0.2 is 0.3

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.campaign.point_values import same_value, value_from, value_text
 

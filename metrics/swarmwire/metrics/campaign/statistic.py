@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from typing import Literal, NamedTuple, get_args
 
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 from swarmwire.metrics.campaign.outcome import FINAL, Outcome
 
 Stat = Literal["q25", "q50", "q75", "mean", "censored"]  # quartiles, mean, and the share that was cut off

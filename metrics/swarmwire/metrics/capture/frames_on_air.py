@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.comms.fates import FATE_NAMES
+from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.metrics.capture.frame import Frame
 
 if TYPE_CHECKING:

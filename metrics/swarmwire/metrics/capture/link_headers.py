@@ -16,9 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.timing.access_timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G
-from swarmwire.comms.air.timing.frames import acknowledgement_bytes, airtime_ns
+from swarmwire.comms.radio.config.radio import Radio, acknowledgement_bytes, airtime_ns
+from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G
 from swarmwire.metrics.capture.frame import Frame
 
 IEEE802_15_4_TAP, IEEE802_11_RADIOTAP, USER0 = 283, 127, 147

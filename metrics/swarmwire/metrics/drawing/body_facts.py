@@ -4,7 +4,7 @@ import math
 
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic, Twist, Wheels
-from swarmwire.comms.sheets import (
+from swarmwire.comms.bodies.sensors import (
     Battery,
     Bumper,
     Camera,

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.air.probe.survey import Band, ByDistance, CoverageMap
+from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, CoverageMap
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import new_figure, save
 from swarmwire.metrics.drawing.looks import (

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.layout import Layout
 from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Look

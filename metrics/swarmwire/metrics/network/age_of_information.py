@@ -9,7 +9,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Finished, Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment

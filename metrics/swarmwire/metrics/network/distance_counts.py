@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.comms.truth import Departed, Finished, Static, Truth
 from swarmwire.metrics.network.geometry_tick import POSES_KEPT_S, geometry_tick
 

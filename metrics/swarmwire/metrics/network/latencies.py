@@ -7,7 +7,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Finished, Static
 
 HEARD = int(Fate.HEARD)

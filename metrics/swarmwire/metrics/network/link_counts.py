@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.fates import FATE_NAMES
+from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.comms.truth import NOBODY, Finished, Static
 
 FATES = len(FATE_NAMES)

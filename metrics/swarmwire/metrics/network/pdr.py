@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Finished, Static, Tally, Truth
 from swarmwire.metrics.log_histogram import LogHistogram
 from swarmwire.metrics.network.latencies import Latencies

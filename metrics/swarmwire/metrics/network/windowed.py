@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.parameters import parameter
+from swarmwire.comms.config import parameter
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Metric
 

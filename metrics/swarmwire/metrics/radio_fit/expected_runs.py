@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.radio.config.impairments import Bursts
 
 
 def expected_runs(bursts: Bursts, interval_s: float, longest: int) -> FloatArray:

@@ -1,7 +1,7 @@
 """Covariance of links in a shadowing field: what the emulator's model says of two links by where they lie.
 
 The field's covariance is sigma^2 / (2 delta) exp(-|x - y| / delta), and a link of length d collects 1 / sqrt(d) times
-its integral along the line (comms/air/propagation/shadowing.py tells the model and its source). The exponential is a
+its integral along the line (comms/radio/propagation/shadowing.py tells the model and its source). The exponential is a
 mean of plane waves over its spectrum, and the integral of a wave along a line is known, so that the covariance of n
 links is F F' with a row of F a link and two columns a wave.
 """

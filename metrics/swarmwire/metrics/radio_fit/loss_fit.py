@@ -8,8 +8,8 @@ from typing import Any, cast
 import numpy as np
 from scipy import optimize, special
 
-from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.metrics.radio_fit.curvature import standard_errors
 from swarmwire.metrics.radio_fit.estimate import Estimate
 from swarmwire.metrics.radio_fit.loss_sequences import LossSequences

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from swarmwire.comms.air.parameters.propagation import Antenna, Shadowing
-from swarmwire.comms.air.propagation.log_distance import LogDistance
+from swarmwire.comms.radio.config.path_loss_models import LogDistance
+from swarmwire.comms.radio.config.phy import Antenna, Shadowing
 from swarmwire.metrics.radio_fit.loss_fit import NAMES, LossFit
 from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit
 from swarmwire.metrics.radio_fit.radio_fit import RadioFit

@@ -1,6 +1,6 @@
 """The likelihood of losses under a link that changes between a good and a bad state in continuous time.
 
-The chain of Gilbert and Elliott as the emulator has it (comms/air/reception/bursts.py). The state is hidden, so that
+The chain of Gilbert and Elliott as the emulator has it (comms/radio/reception/bursts.py). The state is hidden, so that
 the likelihood of a sequence is a product of 2 x 2 matrices, one a packet: diag(what each state says of the packet)
 times the transition since the one before. The product is taken in pairs, and pairs of pairs, so that arrays do the
 work. Its entries are four columns: from good to good, from bad to good, from good to bad, from bad to bad.
@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from swarmwire.comms.air.parameters.bursts import Bursts
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.metrics.radio_fit.loss_sequences import LossSequences
 
 

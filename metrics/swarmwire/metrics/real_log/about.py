@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from swarmwire.comms.bodies.body import Body, body_from_mapping
+from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
-from swarmwire.comms.parsing import from_json
 
 LOG_FORMAT = 1
 ROBOT = "robot.json"

@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import NOBODY, Finished, Tally
 from swarmwire.metrics.real_log.link_packets import (
     EVERYBODY,

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.parsing import from_json
+from swarmwire.comms.config import from_json
 from swarmwire.metrics.real_log.about import ROBOT, AboutRobot, read_about_robot
 from swarmwire.metrics.real_log.log_table import LogTable
 

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.comms.fates import FATE_NAMES
+from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.metrics.network.link_counts import LinkCounts
 from swarmwire.metrics.record.totals_recorder import TotalsRecorder

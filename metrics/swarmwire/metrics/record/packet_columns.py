@@ -8,8 +8,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.draws import LOW32, derive_key, purpose, uniform
-from swarmwire.comms.fates import FATE_NAMES
-from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.packets import BROADCAST, FATE_NAMES
 from swarmwire.comms.truth import NOBODY, Finished, Static
 from swarmwire.metrics.network.geometry_tick import geometry_tick
 from swarmwire.metrics.torus import shortest

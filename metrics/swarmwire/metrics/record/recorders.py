@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.clock import Clock
-from swarmwire.comms.protocols import Observer
+from swarmwire.comms.interfaces import Observer
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.distance_totals import DistanceTotals
 from swarmwire.metrics.record.event_recorder import EventRecorder

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.metrics.network.robot_counts import RobotCounts
 from swarmwire.metrics.record.totals_recorder import TotalsRecorder

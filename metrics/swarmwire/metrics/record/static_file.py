@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any, cast
 
 from swarmwire.comms.bodies.body import body_from_mapping
+from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
 from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch
-from swarmwire.comms.parsing import from_json
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
 from swarmwire.metrics.record.formats import TABLES_FORMAT
 from swarmwire.metrics.whole_file import write_whole

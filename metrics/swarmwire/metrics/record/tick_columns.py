@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.clock import to_s
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Static, Truth
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S, to_ns
-from swarmwire.comms.parameters import parameter
+from swarmwire.comms.config import parameter
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment, components_of

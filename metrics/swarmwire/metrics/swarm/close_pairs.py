@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from swarmwire.comms.parameters import parameter
+from swarmwire.comms.config import parameter
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.swarm.near_pairs import NearPairs

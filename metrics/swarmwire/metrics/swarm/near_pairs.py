@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.borrowing import borrowing
 from swarmwire.comms.geometry.obstacles import to_nearest
+from swarmwire.comms.kernels import borrowing
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.moment import Moment
 from swarmwire.metrics.swarm.strips import along_m, fill, first_order, room_for

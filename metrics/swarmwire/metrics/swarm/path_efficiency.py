@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.config import parameter
 from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.parameters import parameter
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment

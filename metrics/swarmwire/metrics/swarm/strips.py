@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.kernels import borrowing
 from swarmwire.comms.truth import Static
 
 SLACK = 1.0 + 1e-9  # two robots at just the height may be rounded apart

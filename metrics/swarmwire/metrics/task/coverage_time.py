@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import to_s
-from swarmwire.comms.parameters import parameter
+from swarmwire.comms.config import parameter
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment

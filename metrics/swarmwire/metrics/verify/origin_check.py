@@ -5,9 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
-from swarmwire.comms.parsing import from_json
 from swarmwire.metrics.record.formats import RUN_FORMAT
 from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS, INPUTS, RUN_JSON
 from swarmwire.metrics.verify.finding import Finding, State

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.metrics.record.part_files import scan_files
 from swarmwire.metrics.verify.agreement import BROKEN_OFF, Verdict, per_arena
 from swarmwire.metrics.verify.finding import State

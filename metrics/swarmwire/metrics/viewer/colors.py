@@ -1,6 +1,6 @@
 """What is drawn in which colour (red, green and blue of 255), and texts that the viewer has letters for."""
 
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.metrics.palette import Color
 
 DEAD = (118, 118, 124)

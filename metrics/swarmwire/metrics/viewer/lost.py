@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Finished
 from swarmwire.metrics.viewer.colors import FATES, packed
 from swarmwire.metrics.viewer.rows import RerunRows

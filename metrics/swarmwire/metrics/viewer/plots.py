@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Happened, Static, Truth
 from swarmwire.metrics.palette import Color
 from swarmwire.metrics.registry import DELIVERY

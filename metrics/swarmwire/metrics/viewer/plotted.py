@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.glimpse import Series
+from swarmwire.comms.run_views import Series
 from swarmwire.metrics.metric import Metric
 
 Plotted = Metric | Series  # a name, a unit and bounds

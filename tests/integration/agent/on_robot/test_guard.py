@@ -7,9 +7,7 @@ import psutil
 import pytest
 
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.swarm_control import ESTOP, ask_all
-from swarmwire.comms.wire.swarm_keys import SwarmKeys
-from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm
+from swarmwire.comms.wire.robot_network import ESTOP, SwarmKeys, ask_all, endpoints_of, open_swarm
 from tests.support.agent.on_robot.installed import Command, deeds, install
 from tests.support.agent.on_robot.scripted import PLAYERS
 from tests.support.waiting import until

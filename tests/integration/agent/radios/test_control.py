@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.agent.radios.control import ControlPoint
-from swarmwire.comms.wire.swarm_control import ESTOP, STATUS, STOPPED, ask_all
+from swarmwire.comms.wire.robot_network import ESTOP, STATUS, STOPPED, ask_all
 from tests.support.swarms import KEYS, peers
 from tests.support.waiting import until
 

@@ -12,7 +12,7 @@ from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.swarm_session import open_swarm
+from swarmwire.comms.wire.robot_network import open_swarm
 from swarmwire.world.gateways.air_bridge import AirBridge, LentAir
 from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, peers, radio, words
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from swarmwire.agent.radios.range_bearing import range_bearing
 from swarmwire.agent.radios.tracker import OLDEST_NS, Tracker
 from swarmwire.comms.clock import NS_PER_S, WallClock
-from swarmwire.comms.wire.poses import Pose
+from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.clocks import FakeClock
 from tests.support.swarms import KEYS, ROBOTS, KeptLog, heard_by, meet, peers, radio, words
 from tests.support.waiting import until

@@ -10,7 +10,7 @@ from swarmwire.agent.radios.radio_log import HeardPacket, SentPacket
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm
+from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from tests.support.swarms import (
     ANY_PORT,
     KEYS,

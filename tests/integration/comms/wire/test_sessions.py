@@ -14,12 +14,19 @@ import zenoh
 
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire import ending
-from swarmwire.comms.wire.closing import close_session, closed_after
-from swarmwire.comms.wire.ending import end_now
+from swarmwire.comms.wire import sessions
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.sessions import listens_at, open_router, open_runner, open_world, unix_endpoint
-from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm, swarm_config
+from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm, swarm_config
+from swarmwire.comms.wire.sessions import (
+    close_session,
+    closed_after,
+    end_now,
+    listens_at,
+    open_router,
+    open_runner,
+    open_world,
+    unix_endpoint,
+)
 from tests.support.swarms import ANY_PORT, peers
 from tests.support.waiting import until
 
@@ -182,7 +189,7 @@ def test_what_cannot_be_closed_in_time_is_left_to_the_end_of_the_process(caplog)
 PROGRAM = """
 import atexit, sys, threading
 from swarmwire.comms.wire import ending
-from swarmwire.comms.wire.closing import close_session
+from swarmwire.comms.wire.sessions import close_session
 
 class Slow:
     def __init__(self): self.closed, self.may = False, threading.Event()
@@ -204,7 +211,7 @@ def ended(program: str) -> tuple[int, str, str]:
 
 
 def test_where_nothing_is_closing_it_returns(monkeypatch):
-    monkeypatch.setattr(ending, "_left", [])
+    monkeypatch.setattr(sessions, "_left", [])
     end_now(3)
 
 

@@ -8,10 +8,9 @@ from typer.testing import CliRunner
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import SwarmwireError
-from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.wire.access_control import observers_access
 from swarmwire.comms.wire.keys import ObserverKeys
-from swarmwire.comms.wire.run_access import observers_access
-from swarmwire.comms.wire.sessions import listens_at, open_observed
+from swarmwire.comms.wire.sessions import closed_after, listens_at, open_observed
 from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
 from swarmwire.deploy.certificates.member import member
 from swarmwire.deploy.certificates.wanted import wanted

@@ -4,12 +4,10 @@ from contextlib import contextmanager
 
 import pytest
 
-from swarmwire.comms.wire.access import access_control
-from swarmwire.comms.wire.closing import close_session
+from swarmwire.comms.wire.access_control import access_control
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.swarm_control import ESTOP, STOPPED
-from swarmwire.comms.wire.swarm_keys import SwarmKeys
-from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm
+from swarmwire.comms.wire.robot_network import ESTOP, STOPPED, SwarmKeys, endpoints_of, open_swarm
+from swarmwire.comms.wire.sessions import close_session
 from swarmwire.deploy.fleet import estop as estop_module
 
 PLAIN = Network(listen=("tcp/127.0.0.1:0",))

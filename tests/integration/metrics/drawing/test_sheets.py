@@ -9,9 +9,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.comms.air.probe.survey import Band, ByDistance, CoverageMap
 from swarmwire.comms.bodies.body import body_from, body_names, load_body
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, CoverageMap
 from swarmwire.metrics.drawing import canvas, coverage_sheet, distance_sheet
 from swarmwire.metrics.drawing.body_facts import facts_of
 from swarmwire.metrics.drawing.body_sheet import draw_body

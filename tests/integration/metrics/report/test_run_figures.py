@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.metrics.network.latencies import Latencies
 from swarmwire.metrics.report.lanes import Lane, Span, lanes_of
 from swarmwire.metrics.report.run_figures.delivery_by_distance import delivery_by_distance

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Happened
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics

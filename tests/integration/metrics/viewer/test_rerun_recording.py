@@ -5,8 +5,8 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.floor import Floor, Patch
+from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Finished, Group, Happened, Light, Obstacle
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.verify.finding import State

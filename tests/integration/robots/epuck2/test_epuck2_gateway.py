@@ -14,7 +14,7 @@ import pytest
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.robots.epuck2.command import RobotCommand
+from swarmwire.comms.robots.epuck2.commands import RobotCommand
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
 from swarmwire.world.gateways.epuck2.emulated_robot import Connection, EmulatedRobot
 from swarmwire.world.gateways.epuck2.options import Epuck2GatewayOptions

@@ -7,12 +7,9 @@ from contextlib import closing
 import pytest
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.wire.closing import closed_after
-from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.join import JoinRequest, Limits, Offer, OfferedGroup
 from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.limits import Limits
-from swarmwire.comms.wire.offer import Offer, OfferedGroup
-from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
+from swarmwire.comms.wire.sessions import closed_after, open_runner, unix_endpoint
 from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.remote_crew import RemoteCrew
 from swarmwire.world.crews.runner_crew import Surroundings

@@ -21,9 +21,9 @@ from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import WallClock, to_ns
 from swarmwire.comms.errors import AgentFailed, BadInput, Interrupted, RunnerLost
 from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions
+from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.world.crews import runner_crew

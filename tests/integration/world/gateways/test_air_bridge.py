@@ -9,13 +9,12 @@ from swarmwire.agent.radios import air_radio
 from swarmwire.agent.radios.air_radio import AirRadio
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, SendResult, Sent
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.air_frames import encode_air
-from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.swarm_session import open_swarm
+from swarmwire.comms.wire.radio_bridge import encode_air
+from swarmwire.comms.wire.robot_network import open_swarm
+from swarmwire.comms.wire.sessions import close_session
 from swarmwire.world.gateways.air_bridge import AirBridge, LentAir
 from tests.support.clocks import FakeClock
 from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, KeptLog, Wide, Word, heard_by, words

@@ -5,8 +5,8 @@ them, at most four of them (false alarm 1 in 16 000 each), and those are held to
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.parameters.bursts import Bursts, bursts_from_steps
-from swarmwire.comms.air.parameters.propagation import Antenna, Shadowing
+from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
+from swarmwire.comms.radio.config.phy import Antenna, Shadowing
 from swarmwire.metrics.radio_fit.expected_runs import expected_runs
 from swarmwire.metrics.radio_fit.fit_rows import Row, parameter_rows, residual_rows
 from swarmwire.metrics.radio_fit.link_field import link_covariance

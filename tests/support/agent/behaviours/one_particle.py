@@ -11,7 +11,7 @@ from swarmwire.agent.behaviours.pso.particle_swarm import ParticleSwarm
 from swarmwire.agent.host import hosted
 from swarmwire.comms.messages import Message
 from swarmwire.comms.packets import Heard, Payloads
-from swarmwire.comms.senses import Actions, GroupSenses
+from swarmwire.comms.tick_io import Actions, GroupSenses
 from tests.support.agent.hosts import group
 
 HERE = (1.0, -2.0)

@@ -8,7 +8,7 @@ from swarmwire.agent.host import hosted
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.messages import Message
 from swarmwire.comms.packets import Heard, Payloads
-from swarmwire.comms.senses import Actions, GroupSenses
+from swarmwire.comms.tick_io import Actions, GroupSenses
 from tests.support.agent.hosts import group
 
 RAYS_RAD = np.deg2rad([17.0, 50.0, 90.0, 150.0, 210.0, 270.0, 310.0, 343.0])

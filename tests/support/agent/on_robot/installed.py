@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from swarmwire.agent.drivers.driver import Driver, DriverLost
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parameters import parameter
+from swarmwire.comms.config import parameter
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,9 @@ from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard, Payloads, Sent
-from swarmwire.comms.parameters import parameter
-from swarmwire.comms.wire.poses import Pose
+from swarmwire.comms.config import parameter
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.clocks import FakeClock
 
 UTC_NS = 1_795_000_000 * NS_PER_S  # when fake clocks begin

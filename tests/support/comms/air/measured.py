@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from swarmwire.comms.air.traces.link_trace import LinkTrace, Quantity, link_trace
+from swarmwire.comms.radio.traces import LinkTrace, Quantity, link_trace
 from tests.support.comms.air.runs import TICK_NS, Run
 
 TRIO = 3

@@ -5,16 +5,15 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.news import News
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.traces.link_traces import LinkTraces
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, Sent
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.results import News
+from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.comms.truth import Obstacle, Tally
 
 RATE_HZ = 10

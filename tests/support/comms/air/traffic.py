@@ -3,12 +3,12 @@
 import numpy as np
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.disruption import Disruption
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import BROADCAST, Sent
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import Disruption
+from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.air.runs import RATE_HZ, Run, packets
 

@@ -15,7 +15,7 @@ from swarmwire.agent.on_robot.plan import plan_of
 from swarmwire.agent.on_robot.run import run_robot
 from swarmwire.agent.on_robot.settings_file import read_settings
 from swarmwire.comms.clock import ScaledClock, WallClock
-from swarmwire.comms.protocols import Observer
+from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Recording, Result, Simulation
 from swarmwire.deploy.gateways.gateways import GatewaysGiven
 

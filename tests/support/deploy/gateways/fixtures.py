@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.comms import installed
+from swarmwire.comms import plugins
 from swarmwire.world.gateways import registry
 from tests.support.world.gateways.scripted import ScriptedGateway
 
@@ -45,7 +45,7 @@ def scenario(tmp_path: Path) -> Path:
 def scripted(monkeypatch: pytest.MonkeyPatch) -> list[ScriptedGateway]:
     """The gateways of kind "scripted" that runs of this test make, in order."""
     point = EntryPoint("scripted", "tests.support.world.gateways.scripted:ScriptedGateway", registry.GROUP)
-    monkeypatch.setattr(installed, "entry_points_of", lambda _: [point])
+    monkeypatch.setattr(plugins, "entry_points_of", lambda _: [point])
     made: list[ScriptedGateway] = []
     monkeypatch.setattr(ScriptedGateway, "made", made)
     return made

@@ -12,10 +12,9 @@ import zenoh
 from swarmwire.agent import runner
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.comms.wire.closing import closed_after
-from swarmwire.comms.wire.join_request import JoinRequest
+from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
-from swarmwire.comms.wire.sessions import open_runner
+from swarmwire.comms.wire.sessions import closed_after, open_runner
 from swarmwire.deploy import Recording, Result, Simulation
 from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
 from swarmwire.deploy.certificates.folder_access import access_in, network_in

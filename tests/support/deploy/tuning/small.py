@@ -36,7 +36,7 @@ agent = "careful.py:Careful"
 BOWL = """
 from dataclasses import dataclass
 import numpy as np
-from swarmwire.comms.parameters import parameter
+from swarmwire.comms.config import parameter
 from swarmwire.metrics.metric import Metric
 
 @dataclass(frozen=True)

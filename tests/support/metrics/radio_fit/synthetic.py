@@ -4,12 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.air.parameters.bursts import Bursts
-from swarmwire.comms.air.parameters.propagation import Shadowing
-from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves, shadowing_db
-from swarmwire.comms.air.reception.burst_states import BurstStates
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key
+from swarmwire.comms.radio.config.impairments import Bursts
+from swarmwire.comms.radio.config.phy import Shadowing
+from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves, shadowing_db
+from swarmwire.comms.radio.reception.bursts import BurstStates
 from swarmwire.metrics.radio_fit.loss_sequences import LossSequences
 
 EXPONENT, RSSI_AT_1_M_DBM = 2.7, -40.0

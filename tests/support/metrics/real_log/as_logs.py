@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.clock import to_s
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Static, Tally, Truth
 
 BEGAN_S = 1_767_225_600.0

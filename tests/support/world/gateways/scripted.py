@@ -6,8 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.led_changes import NO_LED_CHANGES, LedChanges
-from swarmwire.comms.parameters import parameter
+from swarmwire.comms.config import parameter
+from swarmwire.comms.tick_io import NO_LED_CHANGES, LedChanges
 from swarmwire.world.gateways.gateway import Commands, Gateway
 
 

@@ -12,10 +12,9 @@ from swarmwire.agent.runner import given_robots
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import AgentFailed, BadFrame, BadInput
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.control_frames import Request, decode_reply, encode_reply, encode_request
-from swarmwire.comms.wire.join_request import JoinRequest
-from swarmwire.comms.wire.memory_frames import encode_memory
-from swarmwire.comms.wire.offer import Offer, OfferedGroup
+from swarmwire.comms.wire.join import JoinRequest, Offer, OfferedGroup
 from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.page.app import MOST_BYTES

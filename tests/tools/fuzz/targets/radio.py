@@ -12,14 +12,11 @@ from swarmwire.agent.radios.control import ControlPoint
 from swarmwire.agent.radios.packet_header import PacketHeader
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.agent.radios.zenoh_radio import ZenohRadio
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import BROADCAST, Payloads, Sent
-from swarmwire.comms.senses import Actions
-from swarmwire.comms.wire.air_frames import encode_air
-from swarmwire.comms.wire.air_terms import AirTerms
+from swarmwire.comms.packets import BROADCAST, Outcomes, Payloads, Sent
+from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.poses import Pose, encode_pose
-from swarmwire.comms.wire.swarm_keys import SwarmKeys
+from swarmwire.comms.wire.radio_bridge import AirTerms, Pose, encode_air, encode_pose
+from swarmwire.comms.wire.robot_network import SwarmKeys
 from swarmwire.comms.wire.tick_frames import encode_actions
 from swarmwire.world.gateways.air_bridge import AirBridge, LentAir
 from tests.support.agent.players import Other, Word

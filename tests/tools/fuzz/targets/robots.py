@@ -13,13 +13,11 @@ from swarmwire.agent.drivers.epuck2.options import Epuck2Options
 from swarmwire.agent.drivers.ros2.feed import Feed
 from swarmwire.agent.drivers.ros2.readers import BatteryReader, ImuReader, LaserReader, LightReader, OdometryReader
 from swarmwire.comms.bodies.body import body_from, load_body
-from swarmwire.comms.robots.epuck2.command import RobotCommand
+from swarmwire.comms.robots.epuck2.commands import Answers, RobotCommand
 from swarmwire.comms.robots.epuck2.packets import Request, Settings
-from swarmwire.comms.robots.epuck2.streams import Answers
-from swarmwire.comms.robots.ros2.attachment import attachment, publisher_id
-from swarmwire.comms.robots.ros2.inlet import Inlet
-from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.twist import Velocities, decode_either, encode_twist, encode_twist_stamped
+from swarmwire.comms.robots.ros2.keys import attachment, publisher_id
+from swarmwire.comms.robots.ros2.links import Inlet
+from swarmwire.comms.robots.ros2.messages import Messages, Velocities, decode_either, encode_twist, encode_twist_stamped
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
 from swarmwire.world.gateways.epuck2.emulated_robot import Connection
 from swarmwire.world.gateways.epuck2.options import Epuck2GatewayOptions

@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 
 from hypothesis.strategies import DrawFn
 
-import swarmwire.comms.bodies.body as body_module
 from swarmwire.agent.on_robot.settings_file import read_settings
+from swarmwire.comms.bodies import body as body_module
 from swarmwire.comms.bodies.body import body_from_mapping
+from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import AgentFailed, BadInput
-from swarmwire.comms.toml_file import read_toml
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
 from swarmwire.deploy.campaign.plan import planned

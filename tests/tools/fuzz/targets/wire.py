@@ -8,13 +8,11 @@ from hypothesis.strategies import DrawFn
 from swarmwire.agent.host import Host
 from swarmwire.agent.runner import Inbox
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted
-from swarmwire.comms.glimpse import Glimpse, Scene, Series
-from swarmwire.comms.senses import Senses
+from swarmwire.comms.run_views import Glimpse, Scene, Series
+from swarmwire.comms.tick_io import Senses
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.in_time_frames import encode_packets, encode_sent
-from swarmwire.comms.wire.scene_frames import decode_scene, encode_scene
-from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick
-from swarmwire.comms.wire.truth_frames import decode_truth, encode_truth
+from swarmwire.comms.wire.observer_frames import decode_scene, decode_truth, encode_scene, encode_truth
+from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_packets, encode_sent
 from swarmwire.world.crews.lockstep import Lockstep
 from swarmwire.world.crews.realtime import RealTime
 from swarmwire.world.crews.roster import Roster

@@ -10,7 +10,7 @@ from swarmwire.agent.behaviours.lennard_jones_flocking import Here
 from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.packets import Heard, Payloads
-from swarmwire.comms.senses import GroupSenses
+from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.deploy import run
 from tests.support.agent.hosts import group
 

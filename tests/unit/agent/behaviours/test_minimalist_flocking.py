@@ -8,7 +8,7 @@ from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import GroupSenses
+from swarmwire.comms.tick_io import GroupSenses
 from tests.support.agent.hosts import group
 
 RAYS = load_body("flockbot").proximity

@@ -17,7 +17,7 @@ from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import GroupSenses
+from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.deploy import run
 from tests.support.agent.hosts import group
 

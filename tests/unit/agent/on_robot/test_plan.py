@@ -19,8 +19,7 @@ from swarmwire.agent.on_robot.plan import Plan, agent_sha256, plan_of
 from swarmwire.agent.on_robot.settings_file import read_settings
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.outcomes import NO_OUTCOMES
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import NO_OUTCOMES, Heard
 from tests.support.agent.on_robot.scripted import PLAYERS, DatedFakeClock
 
 

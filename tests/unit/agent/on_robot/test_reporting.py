@@ -15,7 +15,7 @@ from swarmwire.agent.on_robot.robot_log import TickRow, new_log
 from swarmwire.agent.on_robot.status_file import StatusFile, status_path
 from swarmwire.agent.on_robot.terminal import Terminal, short
 from swarmwire.comms.clock import NS_PER_S, to_ns
-from swarmwire.comms.wire.poses import Pose
+from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.agent.on_robot.scripted import PERIOD_NS, UTC_NS, DatedFakeClock
 from tests.support.clocks import FakeClock
 from tests.support.waiting import until

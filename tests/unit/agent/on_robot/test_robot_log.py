@@ -12,7 +12,7 @@ from swarmwire.agent.on_robot.row_file import RowFile
 from swarmwire.agent.radios.radio_log import HeardPacket, SentPacket
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import BROADCAST
-from swarmwire.comms.wire.poses import Pose
+from swarmwire.comms.wire.radio_bridge import Pose
 
 ROBOTS = ("flock-0", "flock-1", "flock-2")
 AT_NS = 1_795_000_000_000_000_123

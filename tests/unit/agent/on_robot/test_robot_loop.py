@@ -11,13 +11,12 @@ from swarmwire.agent.on_robot.limits import SpeedLimits, limits_for
 from swarmwire.agent.on_robot.mind import Mind, group_of
 from swarmwire.agent.on_robot.pacer import Pacer
 from swarmwire.agent.on_robot.robot_loop import LOST, RUNNING
-from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
 from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.bodies.custom import ActuatorSheet
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.comms.outcomes import NO_OUTCOMES
-from swarmwire.comms.packets import BROADCAST, Heard
-from swarmwire.comms.wire.poses import Pose
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard
+from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.agent.on_robot.robot_players import Count
 from tests.support.agent.on_robot.scripted import PERIOD_NS, PLAYERS, RATE_HZ, UTC_NS, Rig, ScriptedRadio, lost
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock

@@ -8,16 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.accounts import Accounts
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.intake import Intake
-from swarmwire.comms.air.lives import Lives
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.transmissions import Transmissions
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.outcomes import SendResult
-from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SendResult, Sent
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.counters import Accounts, Lives
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.transmissions import Intake, Transmissions
 from tests.support.comms.air.runs import TICK_NS, Run, at, everybody, make_air, packets, run, scattered
 from tests.support.comms.air.signal.radios import METHODS, with_access
 from tests.support.comms.air.traffic import OBSTACLES, RADIOS, random_traffic

@@ -4,10 +4,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.disruption import Disruption
-from swarmwire.comms.air.jammers import Jammers
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.packets import Sent
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import Disruption, Jammers
 from tests.support.comms.air.runs import at, make_air, packets, scattered
 from tests.support.comms.air.traffic import OBSTACLES, RADIOS, random_traffic, run_disrupted
 

@@ -9,15 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.disruption import Disruption
-from swarmwire.comms.air.news import News
-from swarmwire.comms.air.parameters.delays import Delays
-from swarmwire.comms.air.parameters.gives import BearingGiven, Gives, RangeGiven
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import Heard, Sent
+from swarmwire.comms.radio.config.impairments import BearingGiven, Delays, Gives, RangeGiven
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import Disruption
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.results import News
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.air.runs import RATE_HZ, TICK_NS, Run, everybody, make_air, packets, run, scattered
 from tests.support.comms.air.signal.radios import METHODS, with_access

@@ -5,13 +5,13 @@ import pytest
 from scipy import stats
 from scipy.stats import binomtest
 
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.parameters.bursts import Bursts
-from swarmwire.comms.air.presets.registry import PRESETS, with_preset
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.radio.config.impairments import Bursts
+from swarmwire.comms.radio.config.presets import PRESETS, with_preset
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.medium import Air
 from tests.support.comms.air.runs import RATE_HZ, SIZE_M, at, everybody, make_air, packets, run, scattered
 
 # Two-sided, for each of the losses below; the seed is fixed, so a pass stays a pass.

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.timing.send_times import SendTimes
 from swarmwire.comms.clock import to_ns
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.send_times import SendTimes
 from tests.support.comms.air.runs import TICK_NS, at, everybody, make_air, packets, run, scattered
 
 PAIR = at((0, 0), (1, 0))

@@ -9,10 +9,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
-from swarmwire.comms.air.parameters.delays import DISTRIBUTIONS, Delays, refuse_negative
-from swarmwire.comms.air.timing.access_timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G, IEEE_802_15_4
-from swarmwire.comms.air.timing.airtime import (
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.draws import derive_key, uniform
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays, refuse_negative
+from swarmwire.comms.radio.stages.delays import LONGEST_NS, delay_law, varying_delay_ns
+from swarmwire.comms.radio.timing import (
     DSSS_RATES_BPS,
+    IEEE_802_11A,
+    IEEE_802_11B,
+    IEEE_802_11G,
+    IEEE_802_15_4,
     OFDM_BITS_PER_SYMBOL,
     US,
     at_bit_rate_ns,
@@ -20,10 +27,6 @@ from swarmwire.comms.air.timing.airtime import (
     ieee80211b_ns,
     ieee80211g_ns,
 )
-from swarmwire.comms.air.timing.delay_law import LONGEST_NS, delay_law, varying_delay_ns
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.draws import derive_key, uniform
-from swarmwire.comms.errors import BadInput
 
 OCTETS = st.integers(0, 2304)
 

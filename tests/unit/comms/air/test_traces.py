@@ -7,11 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.parameters.trace import Trace
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.traces.link_trace import RefusedRow, link_trace
-from swarmwire.comms.air.traces.link_traces import LinkTraces
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.radio.config.radio import Radio, Trace
+from swarmwire.comms.radio.traces import LinkTraces, RefusedRow, link_trace
 from tests.support.comms.air.measured import TRIO, numbers_heard, trace_of
 from tests.support.comms.air.runs import TICK_NS, Run, at, everybody, make_air, run
 

@@ -5,14 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.antennas import Antennas
-from swarmwire.comms.air.parameters.bursts import Bursts
-from swarmwire.comms.air.parameters.gives import Gives, RangeGiven
-from swarmwire.comms.air.parameters.propagation import Antenna, OwnAntenna
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.burst_states import BurstStates
-from swarmwire.comms.air.tuning import check_number, number_of, numbers_of
 from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.radio.config.impairments import Bursts, Gives, RangeGiven
+from swarmwire.comms.radio.config.phy import Antenna, Antennas, OwnAntenna
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.config.ramps import check_number, number_of, numbers_of
+from swarmwire.comms.radio.reception.bursts import BurstStates
 from tests.support.comms.air.runs import RATE_HZ, Run, at, everybody, make_air, packets, scattered
 
 PAIR = at((0, 0), (1, 0))

@@ -5,13 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.events.conditions import Conditions
-from swarmwire.comms.events.partition import Partition
-from swarmwire.comms.events.region import Region
-from swarmwire.comms.events.swarm import Swarm
+from swarmwire.comms.events.effects import Conditions
+from swarmwire.comms.events.partition import Partition, Region
+from swarmwire.comms.events.selection import Swarm
+from swarmwire.comms.radio.config.radio import Radio
 from tests.support.comms.air.runs import RATE_HZ, Run, at, everybody, make_air
 
 # Robots a-0 to a-3 and b-0 to b-1, all in reach of one another.

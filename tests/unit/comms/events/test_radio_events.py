@@ -6,22 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.disruption import ALL, DROP, NEWEST
-from swarmwire.comms.air.jammers import NO_ROBOT, Jammers
-from swarmwire.comms.air.parameters.bursts import Bursts
-from swarmwire.comms.air.parameters.gives import Gives, RangeGiven
-from swarmwire.comms.air.propagation.log_distance import LogDistance
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.tuning import number_of
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.events.blackout import Blackout
-from swarmwire.comms.events.conditions import Conditions
-from swarmwire.comms.events.gain import Gain
-from swarmwire.comms.events.jammer import Jammer
-from swarmwire.comms.events.ramp import Ramp
-from swarmwire.comms.events.selection import Selection
-from swarmwire.comms.events.swarm import Swarm
+from swarmwire.comms.events.effects import Conditions
+from swarmwire.comms.events.radio_events import Blackout, Gain, Jammer, Ramp
+from swarmwire.comms.events.selection import Selection, Swarm
+from swarmwire.comms.radio.config.impairments import Bursts, Gives, RangeGiven
+from swarmwire.comms.radio.config.path_loss_models import LogDistance
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.config.ramps import number_of
+from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, NO_ROBOT, Jammers
 from tests.support.comms.air.signal.radios import WIFI_B
 
 SWARM = Swarm({"a": range(3)}, 3, np.array([7], np.uint64), np.zeros((3, 3)))

@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.clock import to_ns
-from swarmwire.comms.events.conditions import Conditions
+from swarmwire.comms.events.effects import Conditions
 from swarmwire.comms.events.event import as_toml
-from swarmwire.comms.events.fail import Fail
-from swarmwire.comms.events.ramp import Ramp
-from swarmwire.comms.events.revive import Revive
-from swarmwire.comms.events.selection import Selection
-from swarmwire.comms.events.swarm import Swarm
+from swarmwire.comms.events.radio_events import Ramp
+from swarmwire.comms.events.robot_events import Fail, Revive
+from swarmwire.comms.events.selection import Selection, Swarm
 
 ROBOTS = 2000
 

@@ -6,10 +6,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.cells import MOST_PER_SIDE, cells_over, column_of, row_of, sort
 from swarmwire.comms.geometry.floor import Floor, Patch, packed_image
-from swarmwire.comms.geometry.grid import MOST_CELLS_PER_SIDE, Grid, build, cell_of, is_empty
 from swarmwire.comms.geometry.ground import ground_of, shade_at, shades_over
+from swarmwire.comms.geometry.robot_index import (
+    MOST_CELLS_PER_SIDE,
+    MOST_PER_SIDE,
+    Grid,
+    build,
+    cell_of,
+    cells_over,
+    column_of,
+    is_empty,
+    row_of,
+    sort,
+)
 
 SIDES = st.floats(0.1, 50.0)
 

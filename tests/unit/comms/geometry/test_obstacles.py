@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.obstacle_cells import near_things, ray_to_thing, things_within
+from swarmwire.comms.geometry.obstacle_index import near_things, ray_to_thing, things_within
 from swarmwire.comms.geometry.obstacles import is_blocked, obstacle_arrays, ray_to_circle, ray_to_polygon
 from swarmwire.comms.truth import Obstacle
 

@@ -6,11 +6,17 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.access import access_control, access_of
+from swarmwire.comms.wire.access_control import (
+    RunAccess,
+    access_control,
+    access_of,
+    agents_access,
+    observers_access,
+    router_access,
+)
 from swarmwire.comms.wire.keys import EVERY_WORLD, Keys, ObserverKeys, run_of, runner_of
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.run_access import RunAccess, agents_access, observers_access, router_access
-from swarmwire.comms.wire.swarm_keys import SwarmKeys
+from swarmwire.comms.wire.robot_network import SwarmKeys
 
 KEYS = SwarmKeys("lab")
 ROBOTS = ("flock-0", "flock-1")

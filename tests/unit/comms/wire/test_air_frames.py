@@ -11,13 +11,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.air_frames import MOST_BYTES, decode_air, encode_air
-from swarmwire.comms.wire.air_terms import AirTerms
-from swarmwire.comms.wire.in_time_frames import decode_packets, decode_sent, encode_packets, encode_sent
-from swarmwire.comms.wire.poses import POSE_BYTES, Pose, decode_pose, encode_pose
+from swarmwire.comms.wire.radio_bridge import (
+    MAX_RADIO_FRAME_BYTES,
+    POSE_BYTES,
+    AirTerms,
+    Pose,
+    decode_air,
+    decode_pose,
+    encode_air,
+    encode_pose,
+)
+from swarmwire.comms.wire.tick_frames import decode_packets, decode_sent, encode_packets, encode_sent
 from tests.support.agent.hosts import GIVES, heard_from
 
 ROW = 4  # of the robot, in the world; in its arena there are two
@@ -107,13 +113,13 @@ def test_a_frame_may_have_a_megabyte_and_no_more() -> None:
     sizes = [
         len(encode_air(3, ROW, replace(HEARD, payloads=Payloads.of([b"", bytes(n)])), OUTCOMES)) for n in (0, 2**17)
     ]
-    most = MOST_BYTES - sizes[1] + 2**17
+    most = MAX_RADIO_FRAME_BYTES - sizes[1] + 2**17
     assert sizes[0] < 2**10
-    assert MOST_BYTES == 2**20
+    assert MAX_RADIO_FRAME_BYTES == 2**20
     fits, exceeds = (
         encode_air(3, ROW, replace(HEARD, payloads=Payloads.of([b"", bytes(n)])), OUTCOMES) for n in (most, most + 1)
     )
-    assert len(fits) == MOST_BYTES
+    assert len(fits) == MAX_RADIO_FRAME_BYTES
     assert decode_air(fits, TERMS)[0] == 3
     with pytest.raises(BadFrame, match="oversized"):
         decode_air(exceeds, TERMS)

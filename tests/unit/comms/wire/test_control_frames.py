@@ -6,7 +6,6 @@ import msgpack
 import pytest
 
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.wire.bounded_inbox import BoundedInbox
 from swarmwire.comms.wire.control_frames import (
     MOST_BYTES,
     Request,
@@ -15,6 +14,7 @@ from swarmwire.comms.wire.control_frames import (
     encode_reply,
     encode_request,
 )
+from swarmwire.comms.wire.radio_bridge import BoundedInbox
 
 KILL = {"do": "kill", "robots": {"names": ["flock-1"]}}
 

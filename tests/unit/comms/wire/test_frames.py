@@ -13,8 +13,7 @@ from hypothesis.extra import numpy as npst
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.frames import DTYPES
-from swarmwire.comms.wire.unpacking import MOST_ITEMS, UNCOUNTED_BYTES, unpacked
+from swarmwire.comms.wire.frames import DTYPES, MOST_ITEMS, UNCOUNTED_BYTES, unpacked
 
 shapes = npst.array_shapes(min_dims=1, max_dims=2, min_side=0, max_side=4)
 arrays = st.sampled_from(sorted(DTYPES)).flatmap(lambda code: npst.arrays(DTYPES[code], shapes))

@@ -9,8 +9,7 @@ import pytest
 
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire.frames import VERSION
-from swarmwire.comms.wire.join_request import MOST_BYTES, JoinRequest, versioned
-from swarmwire.comms.wire.offer import Offer, OfferedGroup
+from swarmwire.comms.wire.join import MAX_JOIN_BYTES, JoinRequest, Offer, OfferedGroup, versioned
 
 HASH = "0123456789abcdef" * 4
 
@@ -74,10 +73,10 @@ def test_what_is_no_map_of_texts_is_refused(body: object) -> None:
 
 def test_a_request_may_have_a_megabyte_and_no_more() -> None:
     empty = len(msgpack.packb({"v": VERSION, "x": bytes(2**17)})) - 2**17
-    assert MOST_BYTES == 2**20
-    assert versioned(msgpack.packb({"v": VERSION, "x": bytes(MOST_BYTES - empty)}))["v"] == VERSION
+    assert MAX_JOIN_BYTES == 2**20
+    assert versioned(msgpack.packb({"v": VERSION, "x": bytes(MAX_JOIN_BYTES - empty)}))["v"] == VERSION
     with pytest.raises(BadFrame, match="oversized"):
-        versioned(msgpack.packb({"v": VERSION, "x": bytes(MOST_BYTES - empty + 1)}))
+        versioned(msgpack.packb({"v": VERSION, "x": bytes(MAX_JOIN_BYTES - empty + 1)}))
 
 
 def test_an_offer_of_very_many_robots_comes_over_whole() -> None:
@@ -85,7 +84,7 @@ def test_an_offer_of_very_many_robots_comes_over_whole() -> None:
     group = OfferedGroup("flock", "mine.py:Mine", "a" * 64, len(free), free)
     offer = Offer("RUN", "many", "d" * 64, "1.2.3", 10, 1.5, (group,))
     data = offer.encode()
-    assert len(data) > MOST_BYTES
+    assert len(data) > MAX_JOIN_BYTES
     assert Offer.decode(data) == offer
 
 

@@ -8,6 +8,7 @@ import zenoh
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.network import Network, is_local
+from swarmwire.comms.wire.robot_network import swarm_config
 from swarmwire.comms.wire.sessions import (
     open_observed,
     open_observer,
@@ -16,7 +17,6 @@ from swarmwire.comms.wire.sessions import (
     open_world,
     unix_endpoint,
 )
-from swarmwire.comms.wire.swarm_session import swarm_config
 
 LOCAL = ["tcp/127.0.0.1:0"]
 AFAR = "tls/10.0.0.5:7447"

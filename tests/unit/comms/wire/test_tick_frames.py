@@ -9,15 +9,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.led_changes import LedChanges
-from swarmwire.comms.notes import Notes
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes, SendResult
-from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions, GroupSenses, Senses
-from swarmwire.comms.values import Values
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, UNTOLD, Heard, Outcomes, Payloads, SendResult, Sent
+from swarmwire.comms.tick_io import Actions, Actuations, GroupSenses, LedChanges, Notes, Senses, Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import check_rows, decode_actions, decode_tick, encode_actions, encode_tick
 

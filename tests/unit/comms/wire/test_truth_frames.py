@@ -11,15 +11,19 @@ from hypothesis.extra import numpy as npst
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch, packed_image
-from swarmwire.comms.glimpse import Glimpse, Scene, Series
-from swarmwire.comms.one_arena import static_of, truth_of
-from swarmwire.comms.senses import GroupSenses
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.run_views import Glimpse, Scene, Series, static_of, truth_of
+from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.comms.truth import Departed, Finished, Group, Happened, Light, Obstacle, Static, Tally, Truth
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.scene_frames import OBSERVED_VERSION, decode_scene, encode_scene
-from swarmwire.comms.wire.truth_frames import decode_truth, encode_truth
+from swarmwire.comms.wire.observer_frames import (
+    OBSERVED_VERSION,
+    decode_scene,
+    decode_truth,
+    encode_scene,
+    encode_truth,
+)
 
 ROBOTS, ARENAS = 3, 2
 NOT_SENT = ("rssi_dbm", "payload", "payloads")  # as columns of numbers

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.run_access import RunAccess
+from swarmwire.comms.wire.access_control import RunAccess
 from swarmwire.deploy.certificates.certificate_folder import issue, revoke
 from swarmwire.deploy.certificates.folder_access import access_in, name_in, network_in
 from swarmwire.deploy.certificates.purposes import PURPOSES

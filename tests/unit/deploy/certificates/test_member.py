@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.run_access import RunAccess
+from swarmwire.comms.wire.access_control import RunAccess
 from swarmwire.deploy.certificates.certificate_folder import issue
 from swarmwire.deploy.certificates.member import member
 from swarmwire.deploy.certificates.wanted import wanted

@@ -8,9 +8,9 @@ import pytest
 import zenoh
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.wire.access import access_of
-from swarmwire.comms.wire.closing import close_session, closed_after
-from swarmwire.comms.wire.swarm_session import open_swarm
+from swarmwire.comms.wire.access_control import access_of
+from swarmwire.comms.wire.robot_network import open_swarm
+from swarmwire.comms.wire.sessions import close_session, closed_after
 from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
 from swarmwire.deploy.certificates.wanted import wanted
 from tests.support.deploy.certificates.dated import DatedFakeClock

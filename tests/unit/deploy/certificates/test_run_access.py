@@ -10,11 +10,18 @@ import zenoh
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.closing import closed_after
+from swarmwire.comms.wire.access_control import RunAccess, agents_access, observers_access, router_access
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.run_access import RunAccess, agents_access, observers_access, router_access
-from swarmwire.comms.wire.sessions import listens_at, open_observed, open_observer, open_router, open_runner, open_world
+from swarmwire.comms.wire.sessions import (
+    closed_after,
+    listens_at,
+    open_observed,
+    open_observer,
+    open_router,
+    open_runner,
+    open_world,
+)
 from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
 from swarmwire.deploy.certificates.folder_access import network_in
 from swarmwire.deploy.certificates.wanted import wanted

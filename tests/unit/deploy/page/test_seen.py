@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.glimpse import Glimpse
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.run_views import Glimpse
 from swarmwire.comms.truth import Happened
 from swarmwire.deploy.page.seen import MOST_PLACES, MOST_WHO, Seen
 from tests.support.metrics.truths import static, tally, truth

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.deploy import run
 from tests.integration.metrics.viewer.test_rerun_recording import class_names, column, series
 from tests.support.deploy.commands import LOSSY

@@ -6,7 +6,7 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from swarmwire.comms.fates import FATE_NAMES
+from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.result import Statistics
 from swarmwire.deploy.terminal.report import print_result

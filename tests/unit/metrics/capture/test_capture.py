@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.radio import Radio
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.capture import pcapng
 from swarmwire.metrics.capture.frame import Frame
 from swarmwire.metrics.capture.frames_on_air import frames_on_air

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.packets import FATE_NAMES, Fate
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network import link_counts
 from swarmwire.metrics.network.link_counts import LinkCounts

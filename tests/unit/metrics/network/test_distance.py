@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.metrics.network import distance_counts
 from swarmwire.metrics.network.distance_counts import DistanceCounts, bin_width_m
 from tests.support.metrics.radio_runs import radio_runs, rows_of

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.packets import BROADCAST, Fate
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.network import age_of_information
 from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
 from swarmwire.metrics.network.pdr import PacketDeliveryRatio

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.parameters.delays import Delays
-from swarmwire.comms.air.timing.delay_law import delay_law, varying_delay_ns
 from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.radio.config.impairments import Delays
+from swarmwire.comms.radio.stages.delays import delay_law, varying_delay_ns
 from swarmwire.metrics.radio_fit.delay_fit import fit_delays
 from swarmwire.metrics.radio_fit.latency_fit import LatencyFit, fit_latency
 

@@ -13,7 +13,7 @@ from swarmwire.agent.on_robot.settings import DriverSettings, RobotSettings
 from swarmwire.agent.radios.radio_log import HeardPacket, SentPacket
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.packets import BROADCAST
-from swarmwire.comms.wire.poses import Pose
+from swarmwire.comms.wire.radio_bridge import Pose
 from swarmwire.metrics.real_log.measured_log import measured_log
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from swarmwire.metrics.real_log.robot_log import read_robot_log

@@ -7,8 +7,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.packets import Payloads
+from swarmwire.comms.packets import Fate, Payloads
 from swarmwire.comms.truth import Happened
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.record import packet_recorder

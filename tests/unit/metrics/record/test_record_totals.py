@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.errors import BadInput, RecordFailed
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.metrics.network import distance_counts
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.record.distance_totals import DistanceTotals

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.senses import GroupSenses
+from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.comms.truth import Group
 from swarmwire.metrics.viewer.about import about
 from swarmwire.metrics.viewer.selected import selected_robot

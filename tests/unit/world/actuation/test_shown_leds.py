@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.led_changes import LedChanges
-from swarmwire.comms.senses import Actions
+from swarmwire.comms.tick_io import Actions, LedChanges
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.shown_leds import ShownLeds
 from swarmwire.world.world import World

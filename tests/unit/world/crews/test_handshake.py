@@ -6,7 +6,7 @@ import pytest
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.join_request import MOST_BYTES
+from swarmwire.comms.wire.join import MAX_JOIN_BYTES
 from swarmwire.world.crews.admission import Refused
 from swarmwire.world.crews.lockstep import Lockstep
 from swarmwire.world.crews.realtime import RealTime
@@ -45,7 +45,7 @@ def test_an_assignment_comes_over_whole() -> None:
     ("bad", "why"),
     [
         *((data, "malformed") for data in (b"", b"\xc1", b"\x91" * 5000, msgpack.packb(None), msgpack.packb({1: 2}))),
-        (bytes(MOST_BYTES + 1), "oversized"),
+        (bytes(MAX_JOIN_BYTES + 1), "oversized"),
         *((request(version), f"expected version {frames.VERSION}") for version in (0, frames.VERSION + 1, "1", None)),
         *((request(robots=robots), "robots: expected a number") for robots in (0, -1, 1.5, "3", True)),
         *((request(names=names), "names: expected a list") for names in ("flock-0", [1], {})),

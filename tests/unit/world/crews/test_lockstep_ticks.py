@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import Heard, Payloads, Sent
+from swarmwire.comms.packets import Heard, Outcomes, Payloads, Sent
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.crews.lockstep import Lockstep

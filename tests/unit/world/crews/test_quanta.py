@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from swarmwire.agent.local_crew import LocalCrew
-from swarmwire.comms.in_time import Put
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
+from swarmwire.comms.interfaces import Put
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.quanta import Quanta
 from swarmwire.world.crews.realtime_crew import PacedCrew

@@ -7,15 +7,11 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import RunnerLost
-from swarmwire.comms.led_changes import LedChanges
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions
-from swarmwire.comms.values import Values
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.tick_io import Actions, LedChanges, Values
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.in_time_frames import decode_packets, encode_sent
-from swarmwire.comms.wire.join_request import JoinRequest
-from swarmwire.comms.wire.tick_frames import encode_actions
+from swarmwire.comms.wire.join import JoinRequest
+from swarmwire.comms.wire.tick_frames import decode_packets, encode_actions, encode_sent
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.realtime import RealTime
 from swarmwire.world.crews.roster import OnLoss

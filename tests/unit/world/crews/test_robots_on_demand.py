@@ -10,8 +10,7 @@ import pytest
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, Interrupted, RunnerLost
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.limits import Limits
-from swarmwire.comms.wire.offer import Offer, OfferedGroup
+from swarmwire.comms.wire.join import Limits, Offer, OfferedGroup
 from swarmwire.world.crews.admission import Refused
 from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.lockstep import Lockstep

@@ -6,9 +6,8 @@ from collections.abc import Generator
 import pytest
 import zenoh
 
-from swarmwire.comms.wire.closing import closed_after
-from swarmwire.comms.wire.limits import Limits
-from swarmwire.comms.wire.sessions import open_world, unix_endpoint
+from swarmwire.comms.wire.join import Limits
+from swarmwire.comms.wire.sessions import closed_after, open_world, unix_endpoint
 from swarmwire.world.crews.runner_inbox import RunnerInbox
 from tests.support.waiting import until
 

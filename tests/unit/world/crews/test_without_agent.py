@@ -6,11 +6,10 @@ import msgpack
 import numpy as np
 import pytest
 
-from swarmwire.comms.memory import GroupMemory, Memory
 from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions
+from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.memory_frames import decode_memory
+from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, decode_memory
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.crews.lockstep import Lockstep
 from swarmwire.world.crews.realtime import RealTime

@@ -7,10 +7,8 @@ import pytest
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.led_changes import LedChanges
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import BROADCAST, Heard, Payloads, Sent
-from swarmwire.comms.senses import Actions, GroupSenses
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.tick_io import Actions, GroupSenses, LedChanges
 from swarmwire.comms.truth import Group
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.quanta import Quanta

@@ -4,7 +4,7 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from swarmwire.comms import installed as installed_classes
+from swarmwire.comms import plugins as installed_classes
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.gateways import registry
 from tests.support.world.gateways.scripted import ScriptedGateway

@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.bodies.body import body_from_mapping, load_body
+from swarmwire.comms.bodies.custom import MOST_WIDE
+from swarmwire.comms.bodies.sensors import OwnSheet
 from swarmwire.comms.errors import BadInput, OwnCodeFailed
-from swarmwire.comms.senses import Actions
-from swarmwire.comms.sheets import OwnSheet
-from swarmwire.comms.sheets.own import MOST_WIDE
+from swarmwire.comms.tick_io import Actions, Actuations
 from swarmwire.world.own.fitting import made_actuator, made_sensor
 from swarmwire.world.scenario.bodies import read_body
 from swarmwire.world.scenario.scenario import Scenario

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.events.kill import Kill
 from swarmwire.comms.events.partition import Partition
+from swarmwire.comms.events.robot_events import Kill
 from swarmwire.comms.events.selection import Selection
 from swarmwire.world.scenario.scenario_file import scenario_from
 from tests.support.world.samples import SAMPLE, changed

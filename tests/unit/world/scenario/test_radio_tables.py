@@ -4,11 +4,11 @@ from typing import Any
 
 import pytest
 
-from swarmwire.comms.air.parameters.bursts import Bursts, bursts_from_steps
-from swarmwire.comms.air.parameters.propagation import OwnAntenna
-from swarmwire.comms.air.presets.registry import PRESETS
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
+from swarmwire.comms.radio.config.phy import OwnAntenna
+from swarmwire.comms.radio.config.presets import PRESETS
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.world.scenario.as_mapping import mapping_of
 from swarmwire.world.scenario.scenario_file import scenario_from
 from tests.support.world.samples import SAMPLE

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from swarmwire.comms.air.parameters.gives import BearingGiven, Gives, RangeGiven
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.radio.config.impairments import BearingGiven, Gives, RangeGiven
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.scenario_file import load_scenario, scenario_from, scenario_schema
 from tests.support.world.samples import SAMPLE, changed, without

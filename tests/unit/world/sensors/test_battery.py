@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body
+from swarmwire.comms.bodies.sensors import Battery
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.sheets import Battery
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.events import Events

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.sheets import SHEETS, RangedSheet
+from swarmwire.comms.bodies.sensors import SHEETS, RangedSheet
 from swarmwire.world.scenario.scenario_file import scenario_from
 from swarmwire.world.sensors import SENSORS
 from swarmwire.world.world import World

@@ -8,9 +8,9 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import body_from, load_body
+from swarmwire.comms.bodies.sensors import Scan
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.sheets import Scan
 from tests.support.world.scenes import read, scene
 
 FOOTBOT = load_body("footbot")

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.sheets import Camera, Infrared, Light, Proximity, Scan
+from swarmwire.comms.bodies.sensors import Camera, Infrared, Light, Proximity, Scan
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.comms.truth import Light as Lamp
 from swarmwire.world.sensors import SENSORS, Scene

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body, load_body
+from swarmwire.comms.bodies.sensors import Compass, Odometry, Proximity
 from swarmwire.comms.draws import normal, purpose
-from swarmwire.comms.sheets import Compass, Odometry, Proximity
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.sensors import Scene
 from swarmwire.world.sensors.proximity import ProximitySensor

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.sheets import Sheet
+from swarmwire.comms.bodies.sensors import Sheet
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Field, Noise
 from swarmwire.world.sensors.staged import Staged

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.senses import Actions
+from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.failures import FailedDrives
 from swarmwire.world.actuation.limits import limits_of, take_commands

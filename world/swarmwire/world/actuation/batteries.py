@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.sheets import Battery
+from swarmwire.comms.bodies.sensors import Battery
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.limits import HOLONOMIC, limits_of
 

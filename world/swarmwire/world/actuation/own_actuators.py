@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.errors import OwnCodeFailed
+from swarmwire.comms.tick_io import Actuations
 from swarmwire.comms.truth import Group
 from swarmwire.world.own.actuator import OwnActuator
 from swarmwire.world.own.fitting import made_actuator

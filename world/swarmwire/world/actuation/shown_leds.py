@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.led_changes import LedChanges
+from swarmwire.comms.tick_io import LedChanges
 from swarmwire.comms.truth import Group
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import robots_text
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.wire.join_request import JoinRequest, versioned
+from swarmwire.comms.wire.join import JoinRequest, versioned
 from swarmwire.world.crews.printable import printable
 from swarmwire.world.crews.slots import S, Slots
 from swarmwire.world.crews.terms import Terms

@@ -15,10 +15,9 @@ import numpy as np
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.memory import GroupMemory
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
 from swarmwire.world.crews.change import What

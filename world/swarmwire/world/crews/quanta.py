@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns
-from swarmwire.comms.in_time import AirTime, Put
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.interfaces import AirTime, Put
+from swarmwire.comms.packets import Heard, Outcomes
 from swarmwire.world.crews.pace import Pace
 
 MEAN_OF = 16  # sleeps, about: that were late

@@ -27,21 +27,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.actuations import Actuations
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.in_time import Put
-from swarmwire.comms.led_changes import LedChanges
-from swarmwire.comms.notes import Notes
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard, Sent
-from swarmwire.comms.senses import Actions, Senses
-from swarmwire.comms.values import Values
+from swarmwire.comms.interfaces import Put
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.tick_io import Actions, Actuations, LedChanges, Notes, Senses, Values
 from swarmwire.comms.wire.frames import Frame
-from swarmwire.comms.wire.in_time_frames import decode_sent, encode_packets
-from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
+from swarmwire.comms.wire.tick_frames import decode_actions, decode_sent, encode_packets, encode_tick
 from swarmwire.world.crews.change import What
 from swarmwire.world.crews.roster import GOES_ON, OnLoss, Roster
 from swarmwire.world.crews.runner_health import RunnerHealth

@@ -9,10 +9,9 @@ import zenoh
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock, tick_start_ns, to_s
-from swarmwire.comms.in_time import AirTime, HearingCrew, Put
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard, Sent
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.interfaces import AirTime, HearingCrew, Put
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.world.crews.door import Door
 from swarmwire.world.crews.lateness import Delays
 from swarmwire.world.crews.pace import Pace

@@ -2,9 +2,8 @@
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.world.crews.door import Door
 from swarmwire.world.crews.lockstep import Lockstep
 from swarmwire.world.crews.roster import OnLoss

@@ -25,11 +25,9 @@ import msgpack
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted, RunnerLost
-from swarmwire.comms.memory import GroupMemory
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.limits import Limits
-from swarmwire.comms.wire.memory_frames import decode_memory, encode_memory
-from swarmwire.comms.wire.offer import Offer
+from swarmwire.comms.wire.agent_memory import GroupMemory, decode_memory, encode_memory
+from swarmwire.comms.wire.join import Limits, Offer
 from swarmwire.world.crews.admission import MOST_SAID, Refused, check_version, granted, read_request
 from swarmwire.world.crews.change import Change, What
 from swarmwire.world.crews.printable import printable

@@ -14,13 +14,11 @@ from zenoh.handlers import Callback
 
 from swarmwire.comms.clock import Clock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.keys import Keys, runner_of
-from swarmwire.comms.wire.sessions import listens_at, open_world
+from swarmwire.comms.wire.sessions import close_session, listens_at, open_world
 from swarmwire.world.crews.admission import Refused
 from swarmwire.world.crews.change import Change
 from swarmwire.world.crews.door import Door

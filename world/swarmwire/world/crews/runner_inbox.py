@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import zenoh
 
+from swarmwire.comms.wire.join import LIMITS, Limits
 from swarmwire.comms.wire.keys import runner_of
-from swarmwire.comms.wire.limits import LIMITS, Limits
 
 Item = zenoh.Sample | zenoh.Query
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.memory import GroupMemory
+from swarmwire.comms.wire.agent_memory import GroupMemory
 
 State = Literal["free", "joined", "ready", "waiting", "dead"]
 Move = Literal["joins", "is ready", "is asked", "answers", "is lost", "is given up"]

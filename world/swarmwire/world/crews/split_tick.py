@@ -6,9 +6,8 @@ import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard
-from swarmwire.comms.senses import GroupSenses, Senses
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.tick_io import GroupSenses, Senses
 
 
 def split_senses(senses: Senses, owner: IntArray, assignments: list[Assignment]) -> list[Senses]:

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from swarmwire.comms.memory import Layout
-from swarmwire.comms.wire.limits import LIMITS, Limits
-from swarmwire.comms.wire.offer import Offer
+from swarmwire.comms.wire.agent_memory import Layout
+from swarmwire.comms.wire.join import LIMITS, Limits, Offer
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.geometry.cells import Cells, column_of, row_of
 from swarmwire.comms.geometry.obstacles import Obstacles
+from swarmwire.comms.geometry.robot_index import Cells, column_of, row_of
+from swarmwire.comms.kernels import borrowing
 
 PASSES = 8  # in a corner, what one thing pushes out of itself another may push back
 EPSILON_M = 1e-9  # touching by rounding is no overlap

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from swarmwire.comms.geometry.cells import Cells
-from swarmwire.comms.geometry.obstacle_cells import things_within
+from swarmwire.comms.geometry.obstacle_index import things_within
+from swarmwire.comms.geometry.robot_index import Cells
 from swarmwire.world.engines.engine import Setting
 from swarmwire.world.engines.held_back import Hindrance
 

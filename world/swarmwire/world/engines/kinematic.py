@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.kernels import borrowing
 from swarmwire.world.engines.contacts import count_began, mark
 from swarmwire.world.engines.engine import Setting
 from swarmwire.world.engines.held_back import any_near, held_back, shortest

@@ -5,7 +5,7 @@
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.geometry.grid import cell_of
+from swarmwire.comms.geometry.robot_index import cell_of
 from swarmwire.world.engines.held_back import shortest
 
 

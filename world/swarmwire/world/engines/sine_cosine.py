@@ -8,7 +8,7 @@ to the last bit or two: S. Moshier, Cephes mathematical library (1984-2000), sin
 
 import numpy as np
 
-from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.kernels import borrowing
 
 QUARTERS_PER_RAD = 2.0 / np.pi
 QUARTER_HIGH, QUARTER_LOW = 1.5707963267341256, 6.077100506506192e-11  # pi / 2; the first has 33 bits

@@ -13,16 +13,12 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.outcomes import Outcomes
-from swarmwire.comms.packets import Heard, Sent
+from swarmwire.comms.packets import Heard, Outcomes, Sent
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.air_frames import MOST_BYTES, encode_air
-from swarmwire.comms.wire.air_terms import AirTerms
-from swarmwire.comms.wire.bounded_inbox import BoundedInbox
-from swarmwire.comms.wire.closing import close_session
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.swarm_keys import SwarmKeys
-from swarmwire.comms.wire.swarm_session import endpoints_of, open_swarm
+from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, AirTerms, BoundedInbox, encode_air
+from swarmwire.comms.wire.robot_network import SwarmKeys, endpoints_of, open_swarm
+from swarmwire.comms.wire.sessions import close_session
 from swarmwire.comms.wire.tick_frames import decode_actions
 
 MOST_WAITING = 4096  # frames that may wait for the loop
@@ -127,7 +123,7 @@ class AirBridge:
         row = self._row_of.get(str(sample.key_expr))  # the exact key alone speaks for a robot
         if row is None:
             self._of_nobody += 1
-        elif len(sample.payload) > MOST_BYTES:
+        elif len(sample.payload) > MAX_RADIO_FRAME_BYTES:
             self._far_too_large += 1
         else:
             self._inbox.put((row, sample.payload.to_bytes()))
@@ -146,7 +142,7 @@ class AirBridge:
 
     def _sent(self, row: int, data: bytes) -> Sent | None:
         try:
-            frame = frames.decode(data, MOST_BYTES)
+            frame = frames.decode(data, MAX_RADIO_FRAME_BYTES)
             if frame.kind != "actions":
                 raise BadFrame("malformed", frame.kind)
             return decode_actions(frame, np.array([row])).sent

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.led_changes import LedChanges
-from swarmwire.comms.parameters import NoParameters
+from swarmwire.comms.config import NoParameters
+from swarmwire.comms.tick_io import LedChanges
 
 
 @dataclass(frozen=True, slots=True)

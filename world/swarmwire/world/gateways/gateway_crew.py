@@ -18,10 +18,9 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.in_time import AirTime, HearingCrew, Put
-from swarmwire.comms.outcomes import NO_OUTCOMES, Outcomes
-from swarmwire.comms.packets import Heard, Sent
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.interfaces import AirTime, HearingCrew, Put
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.world.crews.pace import Pace
 from swarmwire.world.crews.quanta import Quanta
 from swarmwire.world.crews.realtime_crew import RealTimeReport, report_of

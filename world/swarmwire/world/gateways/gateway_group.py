@@ -3,8 +3,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.led_changes import LedChanges
-from swarmwire.comms.senses import Actions, Senses
+from swarmwire.comms.tick_io import Actions, LedChanges, Senses
 from swarmwire.comms.truth import Group
 from swarmwire.world.gateways.gateway import Gateway
 

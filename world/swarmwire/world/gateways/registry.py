@@ -1,6 +1,6 @@
 """Gateways by kind: entry points of the group `swarmwire.gateways`, of which one is imported where somebody asks."""
 
-from swarmwire.comms.installed import installed_class, installed_points
+from swarmwire.comms.plugins import installed_class, installed_points
 from swarmwire.world.gateways.gateway import Gateway
 
 GROUP = "swarmwire.gateways"  # of entry points

@@ -5,7 +5,7 @@ from math import isfinite, isnan
 from numbers import Real
 from typing import Any, Literal, cast, get_args, get_type_hints
 
-from swarmwire.comms.sheets.own import MOST_WIDE
+from swarmwire.comms.bodies.custom import MOST_WIDE
 from swarmwire.world.sensors.sensor import Field, Noise
 
 KINDS: tuple[Literal["uniform", "normal"], ...] = get_args(get_type_hints(Noise)["kind"])

@@ -4,14 +4,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, TypeVar, cast
 
-from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
 from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.custom import MOST_WIDE, ActuatorSheet
+from swarmwire.comms.bodies.sensors import OwnSheet, Sheet
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.installed import entry_points_of
-from swarmwire.comms.own_class import own_class
-from swarmwire.comms.sheets import OwnSheet, Sheet
-from swarmwire.comms.sheets.own import MOST_WIDE
+from swarmwire.comms.plugins import entry_points_of, own_class
 from swarmwire.world.own.actuator import OwnActuator
 from swarmwire.world.own.field_faults import field_fault
 from swarmwire.world.own.sensor import OwnSensor

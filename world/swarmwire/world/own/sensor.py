@@ -9,8 +9,8 @@ from typing import Any, cast
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.sensors import OwnSheet
 from swarmwire.comms.errors import OwnCodeFailed
-from swarmwire.comms.sheets import OwnSheet
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import Field

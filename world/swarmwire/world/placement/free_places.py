@@ -7,7 +7,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.geometry.grid import cell_of
+from swarmwire.comms.geometry.robot_index import cell_of
 from swarmwire.world.placement.region import TURN_RAD, Region, candidate
 from swarmwire.world.placement.taken import (
     Disc,

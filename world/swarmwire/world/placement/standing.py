@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.grid import MOST_CELLS_PER_SIDE
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.geometry.robot_index import MOST_CELLS_PER_SIDE
 from swarmwire.comms.truth import Group, Light, Obstacle
 from swarmwire.world.placement.layout import Layout
 from swarmwire.world.placement.obstacles import obstacle_at

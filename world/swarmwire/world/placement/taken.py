@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.geometry.grid import cell_of
 from swarmwire.comms.geometry.obstacles import sides_of
+from swarmwire.comms.geometry.robot_index import cell_of
 
 GAP_M = 1e-3  # least free space between two things at the start
 ROUNDING_M = 1e-9

@@ -4,11 +4,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.bodies.actuator_sheet import ActuatorSheet
 from swarmwire.comms.bodies.body import Body, body_from, load_body, merged
+from swarmwire.comms.bodies.custom import ActuatorSheet
+from swarmwire.comms.bodies.sensors import OwnSheet
+from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.sheets import OwnSheet
-from swarmwire.comms.toml_file import read_toml
 from swarmwire.comms.truth import Static
 from swarmwire.world.own.fitting import fitted
 from swarmwire.world.scenario.scenario import RobotsTable, Scenario

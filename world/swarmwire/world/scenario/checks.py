@@ -5,12 +5,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.radio_checks import check_radio, unfit_for_torus
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
-from swarmwire.comms.events.push import Push
+from swarmwire.comms.events.robot_events import Push
+from swarmwire.comms.radio.config.radio import Radio, check_radio, unfit_for_torus
 from swarmwire.world.actuation.noise import noise_of
 from swarmwire.world.engines.choice import check_engines, engines_of
 from swarmwire.world.placement.layout import read_layout

@@ -5,8 +5,8 @@ from typing import cast
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.one_of import one_of
 from swarmwire.world.scenario.schema import UNFIT
 from swarmwire.world.scenario.schema_words import Node, forms, plain, words
 

@@ -3,8 +3,8 @@
 import tomllib
 from typing import Any, cast
 
+from swarmwire.comms.config import from_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parsing import from_toml
 
 
 def put(mapping: dict[str, Any], text: str) -> str:

@@ -6,12 +6,12 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import Field, PrivateAttr, StringConstraints, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from swarmwire.comms.air.parameters.propagation import OwnAntenna
-from swarmwire.comms.air.presets.registry import with_preset
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.registry import ACTIONS
-from swarmwire.comms.events.swarm import Groups
+from swarmwire.comms.events.selection import Groups
+from swarmwire.comms.radio.config.phy import OwnAntenna
+from swarmwire.comms.radio.config.presets import with_preset
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.world.scenario.arena_tables import ArenaTable
 from swarmwire.world.scenario.metric_tables import MetricItem, StopTable, StopTables
 from swarmwire.world.scenario.place_tables import AtPoses, InArena, PlaceTable

@@ -9,9 +9,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from swarmwire.comms.config import check_format, from_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.format_number import check_format
-from swarmwire.comms.parsing import from_toml
 from swarmwire.world.scenario.checks import check
 from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.overrides import put

@@ -9,8 +9,8 @@ import pydantic
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from swarmwire.comms.config import limits_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parameters import limits_of
 
 TABLE = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True)
 # Their keys have their help from `parameter`; pydantic would search all modules of the process for sources of each.

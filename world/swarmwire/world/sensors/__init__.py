@@ -1,6 +1,6 @@
 """What robots sense, a file per sensor: the truth (`sensor.TrueSense`), of which `staged.Staged` makes readings.
 
-A new one: a sheet in `swarmwire.comms.sheets`, a file here, a line below.
+A new one: a sheet in `swarmwire.comms.bodies.sensors`, a file here, a line below.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """The battery's gauge: its charge, and a voltage that falls evenly with it."""
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.sheets import Battery
+from swarmwire.comms.bodies.sensors import Battery
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import Field, Noise

@@ -1,7 +1,7 @@
 """The bumper: whether the body touched anything in the tick before."""
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.sheets import Bumper
+from swarmwire.comms.bodies.sensors import Bumper
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import Field

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.geometry.cells import sort
-from swarmwire.comms.geometry.obstacle_cells import near_things
-from swarmwire.comms.sheets import Camera
+from swarmwire.comms.bodies.sensors import Camera
+from swarmwire.comms.geometry.obstacle_index import near_things
+from swarmwire.comms.geometry.robot_index import sort
+from swarmwire.comms.kernels import borrowing
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest
 from swarmwire.world.sensors.scene import Scene

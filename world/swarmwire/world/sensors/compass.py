@@ -3,7 +3,7 @@
 from math import pi
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.sheets import Compass
+from swarmwire.comms.bodies.sensors import Compass
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import Field, Noise

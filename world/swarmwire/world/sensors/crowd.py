@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.geometry.cells import Cells, cells_over, column_of, row_of
+from swarmwire.comms.geometry.robot_index import Cells, cells_over, column_of, row_of
+from swarmwire.comms.kernels import borrowing
 from swarmwire.world.sensors.scene import Scene
 
 CELLS_PER_ROBOT = 8  # so that few share one where they gather in a corner of a large arena

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.geometry.cells import sort
-from swarmwire.comms.geometry.obstacle_cells import near_things, ray_to_thing
+from swarmwire.comms.bodies.ranging_specs import FORMS
+from swarmwire.comms.bodies.sensors import Rim
+from swarmwire.comms.geometry.obstacle_index import near_things, ray_to_thing
 from swarmwire.comms.geometry.obstacles import ray_to_circle
-from swarmwire.comms.sheets import Rim
-from swarmwire.comms.sheets.rim import FORMS
+from swarmwire.comms.geometry.robot_index import sort
+from swarmwire.comms.kernels import borrowing
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest
 from swarmwire.world.sensors.scene import Scene

@@ -5,9 +5,9 @@
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.bodies.sensors import GroundColour
 from swarmwire.comms.geometry.ground import shade_at
-from swarmwire.comms.sheets import GroundColour
+from swarmwire.comms.kernels import borrowing
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import Field, Noise

@@ -11,10 +11,10 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.sensors import Imu
 from swarmwire.comms.draws import normal as normals
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
-from swarmwire.comms.sheets import Imu
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import Field, Noise

@@ -4,9 +4,9 @@
 
 import numpy as np
 
-from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.geometry.obstacle_cells import ray_to_thing
+from swarmwire.comms.geometry.obstacle_index import ray_to_thing
 from swarmwire.comms.geometry.obstacles import ray_to_circle
+from swarmwire.comms.kernels import borrowing
 from swarmwire.world.sensors.crowd import nearest
 
 MARGIN_M = 1e-9  # a line along the border of two cells goes through both

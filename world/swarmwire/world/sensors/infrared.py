@@ -1,7 +1,7 @@
 """Passive infrared: rays from the rim that end at the nearest robot alive, unless something stands before it."""
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.sheets import Infrared
+from swarmwire.comms.bodies.sensors import Infrared
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.fan import FanSight
 from swarmwire.world.sensors.scene import Scene

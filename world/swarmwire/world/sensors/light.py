@@ -14,9 +14,9 @@ another robot that is at the same height.
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.geometry.cells import sort
-from swarmwire.comms.sheets import Light
+from swarmwire.comms.bodies.sensors import Light
+from swarmwire.comms.geometry.robot_index import sort
+from swarmwire.comms.kernels import borrowing
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, nearest
 from swarmwire.world.sensors.in_sight import robots_between, things_between

@@ -1,7 +1,7 @@
 """Positioning: where a robot is in the arena's frame, with a normal error that is new in every tick."""
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.sheets import Positioning
+from swarmwire.comms.bodies.sensors import Positioning
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.scene import Scene
 from swarmwire.world.sensors.sensor import Field, Noise

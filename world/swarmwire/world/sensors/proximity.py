@@ -1,7 +1,7 @@
 """Proximity: rays from the rim that end at the nearest robot, obstacle or wall, seen through the sensor's response."""
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.sheets import Proximity
+from swarmwire.comms.bodies.sensors import Proximity
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.fan import FanSight
 from swarmwire.world.sensors.scene import Scene

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.geometry.cells import sort
-from swarmwire.comms.geometry.obstacle_cells import near_things
+from swarmwire.comms.bodies.sensors import Scan
+from swarmwire.comms.geometry.obstacle_index import near_things
 from swarmwire.comms.geometry.obstacles import ray_to_circle, ray_to_polygon
-from swarmwire.comms.sheets import Scan
+from swarmwire.comms.geometry.robot_index import sort
+from swarmwire.comms.kernels import borrowing
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest
 from swarmwire.world.sensors.scene import Scene

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.kernels import borrowing
 
 NEVER = (np.inf, -np.inf)
 END = 1.0 - 1e-6  # a LED on the skin of a body is not hidden by what it sits on

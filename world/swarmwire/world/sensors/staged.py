@@ -6,7 +6,7 @@ from math import ceil, floor
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
-from swarmwire.comms.sheets import RangedSheet, Sheet
+from swarmwire.comms.bodies.sensors import RangedSheet, Sheet
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Following, TrueSense
 from swarmwire.world.sensors.stages import Stages

@@ -1,6 +1,6 @@
 """The obstacles of a scene as a sensor looks at them."""
 
-from swarmwire.comms.geometry.obstacle_cells import Things, things_within
+from swarmwire.comms.geometry.obstacle_index import Things, things_within
 from swarmwire.world.sensors.scene import Scene
 
 

@@ -15,12 +15,9 @@ from swarmwire.agent.drivers.epuck2.options import Epuck2Options
 from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock, to_ns, to_s
-from swarmwire.comms.robots.epuck2.command import RobotCommand
-from swarmwire.comms.robots.epuck2.fitting import SENSES, check_fits
-from swarmwire.comms.robots.epuck2.odometer import Odometer
+from swarmwire.comms.robots.epuck2.commands import SENSES, RobotCommand, check_fits, wheel_steps
 from swarmwire.comms.robots.epuck2.packets import SENSORS, Request, Settings
-from swarmwire.comms.robots.epuck2.readings import Readings
-from swarmwire.comms.robots.epuck2.wheels import wheel_steps
+from swarmwire.comms.robots.epuck2.readings import Odometer, Readings
 
 CALIBRATION_S = 5.0  # the robot is silent for a second or two while it calibrates
 

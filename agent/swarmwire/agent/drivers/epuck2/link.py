@@ -6,8 +6,8 @@ from collections import Counter
 
 from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.robots.epuck2.commands import Answers
 from swarmwire.comms.robots.epuck2.packets import Header
-from swarmwire.comms.robots.epuck2.streams import Answers
 
 _AT_ONCE = 65536  # bytes read in one call
 _MOST_DRAINED = 100  # calls: whoever sends more than that at once is no robot

@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 from math import radians
 
+from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parameters import parameter
-from swarmwire.comms.robots.epuck2.magnetometer import CHIPS, Compass
-from swarmwire.comms.robots.epuck2.readings import Calibration
-from swarmwire.comms.robots.epuck2.units import GROUND_BLACK, GROUND_WHITE
+from swarmwire.comms.robots.epuck2.readings import CHIPS, GROUND_BLACK, GROUND_WHITE, Calibration, Compass
 
 
 @dataclass(frozen=True)

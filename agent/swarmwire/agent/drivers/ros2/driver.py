@@ -16,12 +16,9 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.clock import NS_PER_S, DatedClock, to_ns
-from swarmwire.comms.robots.ros2.kinds import TWIST, TWIST_STAMPED
-from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.names import absolute, ros_name
-from swarmwire.comms.robots.ros2.outlet import Outlet
-from swarmwire.comms.robots.ros2.sessions import check_endpoint, close, is_linked, open_client
-from swarmwire.comms.robots.ros2.twist import Velocities, encode_twist, encode_twist_stamped
+from swarmwire.comms.robots.ros2.keys import TWIST, TWIST_STAMPED, absolute, ros_name
+from swarmwire.comms.robots.ros2.links import Outlet, check_endpoint, close, is_linked, open_client
+from swarmwire.comms.robots.ros2.messages import Messages, Velocities, encode_twist, encode_twist_stamped
 
 FRAME = "base_link"
 LOOK_NS = NS_PER_S // 100  # how often it is looked whether a base is there

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from swarmwire.comms.parameters import parameter
-from swarmwire.comms.robots.ros2.illuminance import FULL_LUX
+from swarmwire.comms.config import parameter
+from swarmwire.comms.robots.ros2.keys import check_name
 from swarmwire.comms.robots.ros2.messages import DISTROS
-from swarmwire.comms.robots.ros2.names import check_name
+from swarmwire.comms.robots.ros2.other_sensors import FULL_LUX
 
 TRANSPORTS = ("bridge", "rmw")
 NO_NAMESPACE = "/"

@@ -7,14 +7,11 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.robots.ros2.battery_state import charge_of
-from swarmwire.comms.robots.ros2.illuminance import brightness_of
-from swarmwire.comms.robots.ros2.inertial import motion_of
-from swarmwire.comms.robots.ros2.kinds import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
-from swarmwire.comms.robots.ros2.laser_as_proximity import LaserAsProximity
-from swarmwire.comms.robots.ros2.laser_as_scan import LaserAsScan
-from swarmwire.comms.robots.ros2.wheel_travel import WheelTravel
-from swarmwire.comms.sheets import Battery
+from swarmwire.comms.bodies.sensors import Battery
+from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
+from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan
+from swarmwire.comms.robots.ros2.motion import WheelTravel, motion_of
+from swarmwire.comms.robots.ros2.other_sensors import brightness_of, charge_of
 
 Fields = dict[str, FloatArray]  # "sense.field" -> (1,) or (1, width)
 

@@ -15,8 +15,8 @@ from swarmwire.agent.drivers.ros2.readers import (
 )
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
-from swarmwire.comms.robots.ros2.illuminance import topics_of_light
-from swarmwire.comms.sheets import Battery
+from swarmwire.comms.bodies.sensors import Battery
+from swarmwire.comms.robots.ros2.other_sensors import topics_of_light
 
 
 def readers_of(body: Body, options: Ros2Options) -> dict[str, Reader]:

@@ -6,12 +6,9 @@ import zenoh
 
 from swarmwire.agent.drivers.ros2.feed import Feed
 from swarmwire.agent.drivers.ros2.options import Ros2Options
-from swarmwire.comms.robots.ros2.bridge_keys import READ, WRITE, bridge_key
-from swarmwire.comms.robots.ros2.inlet import Inlet
+from swarmwire.comms.robots.ros2.keys import READ, WRITE, RmwNode, absolute, bridge_key, rmw_key
+from swarmwire.comms.robots.ros2.links import Inlet, Outlet
 from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.names import absolute
-from swarmwire.comms.robots.ros2.outlet import Outlet
-from swarmwire.comms.robots.ros2.rmw_keys import RmwNode, rmw_key
 
 NODE = "swarmwire_driver"
 

@@ -4,7 +4,7 @@ from enum import IntFlag
 
 import numpy as np
 
-from swarmwire.comms.explained import Explained
+from swarmwire.comms.config import Explained
 
 PORT = 1000  # of TCP, on the robot
 COMMAND_BYTES = 21

@@ -1,4 +1,7 @@
-"""The sensors' packet as readings of the senses in a body's sheet."""
+"""What the numbers of the e-puck2's sensors mean, and which numbers stand for what it senses.
+
+Each function pair works on arrays of any shape; what goes to the robot's numbers is rounded to whole ones and clipped.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,11 +10,171 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.robots.epuck2 import units
-from swarmwire.comms.robots.epuck2.magnetometer import Compass
-from swarmwire.comms.robots.epuck2.odometer import Odometer
-from swarmwire.comms.robots.epuck2.wheels import M_PER_STEP
-from swarmwire.comms.sheets import Battery
+from swarmwire.comms.bodies.ranging_specs import within_a_turn
+from swarmwire.comms.bodies.sensors import Battery, Scan
+from swarmwire.comms.robots.epuck2.commands import FASTEST, M_PER_STEP
+
+PROXIMITY_FULL = 4095  # 12 bits
+AMBIENT_DARK = 4000  # what the proximity sensors tell of ambient light in the dark
+GROUND_BLACK, GROUND_WHITE = 0, 1000  # of robots whose ground sensors nobody has measured
+SEES_NOTHING_MM = 8190  # what the time-of-flight sensor tells then
+DISTANCE_AHEAD_M = 0.035  # of the body's centre: where the time-of-flight sensor sits
+PER_G = 800  # of the accelerometer
+PER_MPS2 = PER_G / 9.80665
+MOST_ACCELERATION = 1536  # 2 g, in the same numbers
+PER_RADPS = 32768 / np.deg2rad(250.0)  # of the gyro
+PER_V = 4096 * 0.6 / 3.0  # of the battery: 12 bits of 3 V, behind a divider
+
+
+def proximity(raw: AnyArray) -> FloatArray:
+    """What the sheet's response curve answers, 0 to 1."""
+    return np.minimum(raw / PROXIMITY_FULL, 1.0)
+
+
+def to_proximity(value: FloatArray) -> AnyArray:
+    """The inverse of `proximity`."""
+    return _whole(value * PROXIMITY_FULL, 0, PROXIMITY_FULL)
+
+
+def light(raw: AnyArray) -> FloatArray:
+    """Brightness, 0 dark to 1."""
+    return np.clip(1.0 - raw / AMBIENT_DARK, 0.0, 1.0)
+
+
+def to_light(value: FloatArray) -> AnyArray:
+    """The inverse of `light`."""
+    return _whole(AMBIENT_DARK * (1.0 - value), 0, AMBIENT_DARK)
+
+
+def shade(raw: AnyArray, black: float, white: float) -> FloatArray:
+    """The floor's shade, 0 black to 1 white, of sensors that tell `black` and `white` there."""
+    return np.clip((raw - black) / (white - black), 0.0, 1.0)
+
+
+def to_shade(value: FloatArray) -> AnyArray:
+    """The inverse of `shade`, of sensors that nobody has measured."""
+    return _whole(GROUND_BLACK + value * (GROUND_WHITE - GROUND_BLACK), GROUND_BLACK, GROUND_WHITE)
+
+
+def distance_m(raw: AnyArray, sheet: Scan) -> FloatArray:
+    """The distance from where the sheet has the scanner; inf beyond its range."""
+    range_m = raw / 1000.0 + (DISTANCE_AHEAD_M - sheet.at_m)
+    return np.where(range_m > sheet.range_m, np.inf, np.maximum(range_m, sheet.range_min_m))
+
+
+def to_distance(range_m: FloatArray, sheet: Scan) -> AnyArray:
+    """The inverse of `distance_m`; inf: what the sensor tells that sees nothing."""
+    seen_m = np.minimum(range_m, 0.001 * SEES_NOTHING_MM) - (DISTANCE_AHEAD_M - sheet.at_m)
+    return np.where(np.isinf(range_m), SEES_NOTHING_MM, _whole(1000.0 * seen_m, 0, SEES_NOTHING_MM))
+
+
+def to_acceleration(value_mps2: FloatArray) -> AnyArray:
+    """The accelerometer's number; it reads two g at most."""
+    return _whole(value_mps2 * PER_MPS2, -MOST_ACCELERATION, MOST_ACCELERATION)
+
+
+def to_turn(value_radps: FloatArray) -> AnyArray:
+    """The gyro's number; it reads 250 degrees/s at most."""
+    return _whole(value_radps * PER_RADPS, -32768, 32767)
+
+
+def to_voltage(value_v: FloatArray) -> AnyArray:
+    """The battery's number."""
+    return _whole(value_v * PER_V, 0, 4095)
+
+
+def charge(voltage_v: FloatArray, sheet: Battery) -> FloatArray:
+    """The share that is left in a battery of this voltage, which falls evenly with it."""
+    return np.clip((voltage_v - sheet.empty_v) / max(sheet.full_v - sheet.empty_v, 1e-9), 0.0, 1.0)
+
+
+def _whole(value: FloatArray, low: float, high: float) -> AnyArray:
+    return np.clip(np.rint(value), low, high)
+
+
+# --- The magnetometer of the e-puck2 as a compass.
+#
+# Its axes depend on the chip, of which there have been two. The x of the chip's accelerometer is to the left, its y to
+# the back (e_lsm330.c); the firmware turns y round on its way into the packet (mpu9250.c, e_acc.c). The older
+# magnetometer has x and y swapped, which agrees with the firmware's own compass (main.c, selector 14: the LED to the
+# north is lit); the newer has x as the accelerometer, and y against it (data sheets).
+
+
+CHIPS = ("mpu9250", "icm20948")  # the second in robots from about 2025 on
+
+
+@dataclass(frozen=True, slots=True)
+class Compass:
+    """One robot's magnetometer, and where magnetic north lies in its arena."""
+
+    chip: str
+    north_rad: float  # heading of magnetic north in the arena, counter-clockwise from its +x
+    offset_x_ut: float = 0.0  # what it reads in no field (hard iron)
+    offset_y_ut: float = 0.0
+
+    def heading_rad(self, field_ut: AnyArray) -> FloatArray:
+        """The robot's heading (n,) in the arena, in (-pi, pi], from what its magnetometer reads (n, 3)."""
+        with np.errstate(invalid="ignore"):  # a nan may be a signalling one
+            wide = field_ut.astype(np.float64)  # the wire has half that
+        x, y = wide[..., 0] - self.offset_x_ut, wide[..., 1] - self.offset_y_ut
+        ahead, left = (-x, y) if self.chip == CHIPS[0] else (y, x)
+        return within_a_turn(self.north_rad - np.arctan2(left, ahead))
+
+    def field_ut(self, heading_rad: FloatArray, level_ut: float, down_ut: float) -> FloatArray:
+        """What the magnetometer of a robot that heads there (n,) reads (n, 3) in a field of such strength."""
+        north = self.north_rad - heading_rad
+        ahead, left = level_ut * np.cos(north), level_ut * np.sin(north)
+        x, y = (-ahead, left) if self.chip == CHIPS[0] else (left, ahead)
+        return np.stack([x + self.offset_x_ut, y + self.offset_y_ut, np.full_like(x, down_ut)], axis=-1)
+
+
+# --- The step counters of the e-puck2 without their wrap.
+
+
+_WRAP = 1 << 16
+_SLACK = 200  # steps: what a time that is measured here may be off by, and wheels that are pushed
+
+
+class Odometer:
+    """Steps of both wheels since the first reading.
+
+    Readings must come before a counter has gone half its range, which takes half a minute at full speed.
+    """
+
+    def __init__(self) -> None:
+        self.left, self.right = 0, 0
+        self._before: tuple[int, int] | None = None
+
+    def read(self, left: int, right: int) -> None:
+        """Count on to what the counters show now."""
+        more_left, more_right = self._since(left, right)
+        self.left, self.right = self.left + more_left, self.right + more_right
+        self._before = left, right
+
+    def resume(self, left: int, right: int, elapsed_s: float) -> bool:
+        """Count on after a connection was lost for so long; false if the counters began anew, and nothing is added.
+
+        A robot that was switched off and on counts from 0 again: what it cannot have gone in that time it has not.
+        """
+        longest = FASTEST * elapsed_s + _SLACK
+        known = longest < _WRAP // 2 and max(map(abs, self._since(left, right))) <= longest
+        if not known:
+            self._before = left, right
+        self.read(left, right)
+        return known
+
+    def _since(self, left: int, right: int) -> tuple[int, int]:
+        before = self._before or (left, right)
+        return _signed(left - before[0]), _signed(right - before[1])
+
+
+def _signed(steps: int) -> int:
+    """Steps from one reading to the next, the shorter way round."""
+    return (steps + _WRAP // 2) % _WRAP - _WRAP // 2
+
+
+# --- The sensors' packet as readings of the senses in a body's sheet.
+
 
 Fields = dict[str, FloatArray]  # "sense.field" -> (1,) or (1, width)
 
@@ -22,8 +185,8 @@ class Calibration:
 
     compass: Compass
     turn_offset_radps: float = 0.0
-    ground_black: float = units.GROUND_BLACK
-    ground_white: float = units.GROUND_WHITE
+    ground_black: float = GROUND_BLACK
+    ground_white: float = GROUND_WHITE
 
 
 class Readings:
@@ -32,8 +195,8 @@ class Readings:
     def __init__(self, body: Body, calibration: Calibration, odometer: Odometer) -> None:
         self._body, self._calibration, self._odometer = body, calibration, odometer
         self._of: dict[str, Callable[[AnyArray], Fields]] = {
-            "proximity": lambda told: {"proximity.value": units.proximity(told["proximity"])},
-            "light": lambda told: {"light.value": units.light(told["ambient"])},
+            "proximity": lambda told: {"proximity.value": proximity(told["proximity"])},
+            "light": lambda told: {"light.value": light(told["ambient"])},
             "ground": self._ground,
             "scan": self._scan,
             "odometry": self._odometry,
@@ -51,12 +214,12 @@ class Readings:
 
     def _ground(self, told: AnyArray) -> Fields:
         of = self._calibration
-        return {"ground.shade": units.shade(told["ground"], of.ground_black, of.ground_white)}
+        return {"ground.shade": shade(told["ground"], of.ground_black, of.ground_white)}
 
     def _scan(self, told: AnyArray) -> Fields:
         sheet = self._body.scan
         assert sheet is not None
-        return {"scan.range_m": units.distance_m(told["distance_mm"], sheet)[:, None]}
+        return {"scan.range_m": distance_m(told["distance_mm"], sheet)[:, None]}
 
     def _odometry(self, told: AnyArray) -> Fields:
         steps = self._odometer.left, self._odometer.right
@@ -65,7 +228,7 @@ class Readings:
 
     def _imu(self, told: AnyArray) -> Fields:
         # The accelerometer's first axis is to the left and its second ahead: GCtronic's driver swaps them, too.
-        acceleration, turn = told["acceleration"] / units.PER_MPS2, told["gyro"][:, 2] / units.PER_RADPS
+        acceleration, turn = told["acceleration"] / PER_MPS2, told["gyro"][:, 2] / PER_RADPS
         return {
             "imu.forward_mps2": acceleration[:, 1].copy(),
             "imu.left_mps2": acceleration[:, 0].copy(),
@@ -75,5 +238,5 @@ class Readings:
     def _battery(self, told: AnyArray) -> Fields:
         sheet = self._body.senses["battery"]
         assert isinstance(sheet, Battery)
-        voltage_v = told["battery"] / units.PER_V
-        return {"battery.charge": units.charge(voltage_v, sheet), "battery.voltage_v": voltage_v}
+        voltage_v = told["battery"] / PER_V
+        return {"battery.charge": charge(voltage_v, sheet), "battery.voltage_v": voltage_v}

@@ -1,14 +1,32 @@
-"""LaserScan messages: what they say, whatever the scanner, and those that an emulated one sends."""
+"""Which of some directions lies nearest to each of others, around the circle."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.bodies.sensors import Proximity, Scan
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.robots.ros2.kinds import LASER_SCAN
+from swarmwire.comms.robots.ros2.keys import LASER_SCAN
 from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.sheets import Scan
+
+TURN_RAD = 2.0 * np.pi
+
+
+def nearest_angle(of_rad: FloatArray, among_rad: FloatArray) -> tuple[IntArray, FloatArray]:
+    """For each angle `of_rad` (n,) the place of the nearest `among_rad` (m,), and how far apart they are, in rad."""
+    among = np.mod(among_rad, TURN_RAD)
+    order = np.argsort(among, kind="stable")
+    around = np.concatenate([among[order[-1:]] - TURN_RAD, among[order], among[order[:1]] + TURN_RAD])
+    at = np.mod(of_rad, TURN_RAD)
+    after = np.clip(np.searchsorted(around, at), 1, len(around) - 1)
+    before_rad, after_rad = at - around[after - 1], around[after] - at
+    place = np.where(before_rad <= after_rad, after - 2, after - 1) % len(order)
+    return order[place].astype(np.int64), np.minimum(before_rad, after_rad)
+
+
+# --- LaserScan messages: what they say, whatever the scanner, and those that an emulated one sends.
+
 
 MOST_RAYS = 100_000
 FRAME = "base_scan"
@@ -67,3 +85,88 @@ def laser_scan(messages: Messages, sheet: Scan, range_m: FloatArray, stamp_ns: i
         range_m.astype(np.float32),
         np.empty(0, np.float32),
     )
+
+
+# --- LaserScan messages as the readings of proximity sensors at the body's rim.
+#
+# A return at range r on a ray at angle b, from a scanner that stands `at_m` ahead of the centre of a body of radius R,
+# is
+#
+#     d = max(r - s(b), 0),    s(b) = sqrt(R^2 - at_m^2 sin(b)^2) - at_m cos(b)
+#
+# away from the rim, where s(b) is the way from the scanner to the rim along that ray. It belongs to the sensor whose
+# angle is nearest to b, which is thus within half the angle between two sensors, and must be within 45 degrees. Each
+# sensor answers to its nearest d as its sheet's response says, or 0 beyond the sheet's range.
+
+
+WIDEST_RAD = np.pi / 4.0  # to either side: further off, a thing is beside a sensor and not before it
+
+
+class LaserAsProximity:
+    """Gives each sensor of the sheet the nearest return before it, measured from the rim."""
+
+    def __init__(self, sheet: Proximity, radius_m: float, at_m: float, scanner_rad: float) -> None:
+        """`scanner_rad` is where the scanner's angle 0 looks in the body's frame."""
+        self._sheet, self._radius_m, self._at_m, self._scanner_rad = sheet, radius_m, at_m, scanner_rad
+        self._geometry: Geometry | None = None
+        self._rays: IntArray = np.empty(0, np.int64)  # those before a sensor, sensor by sensor
+        self._sensor: IntArray = np.empty(0, np.int64)  # of each of these
+        self._to_rim_m: FloatArray = np.empty(0)
+
+    def value(self, message: Any) -> FloatArray:
+        """The sensors' answers (sensors,), 0 to 1; BadFrame if the message's rays cannot lie as it says."""
+        geometry = geometry_of(message)
+        if geometry != self._geometry:
+            self._fit(geometry)
+        nearest_m = np.full(len(self._sheet.angle_rad), np.inf)
+        from_rim_m = np.maximum(returns_m(message)[self._rays] - self._to_rim_m, 0.0)
+        np.minimum.at(nearest_m, self._sensor, from_rim_m)
+        reach_m = self._sheet.range_m
+        return np.where(nearest_m <= reach_m, self._sheet.response.value(np.minimum(nearest_m, reach_m)), 0.0)
+
+    def _fit(self, geometry: Geometry) -> None:
+        angle_rad = angles_rad(geometry, self._scanner_rad)
+        sensor, apart_rad = nearest_angle(angle_rad, self._sheet.angle_rad)
+        self._rays = np.flatnonzero(apart_rad <= WIDEST_RAD)
+        self._sensor, angle_rad = sensor[self._rays], angle_rad[self._rays]
+        across_m = self._at_m * np.sin(angle_rad)
+        self._to_rim_m = np.sqrt(self._radius_m**2 - across_m**2) - self._at_m * np.cos(angle_rad)
+        self._geometry = geometry
+
+
+# --- LaserScan messages of any scanner as the readings of the sheet's scanner.
+
+
+SLACK = 1.001  # of half the angle between two rays: angles come as float32
+
+
+class LaserAsScan:
+    """Gives each ray of the sheet the return on the message's ray of the nearest angle.
+
+    Where that one is further away than half the angle between two rays (of the coarser of both), the scanner does not
+    look there, and the ray meets nothing.
+    """
+
+    def __init__(self, sheet: Scan, scanner_rad: float) -> None:
+        """`scanner_rad` is where the scanner's angle 0 looks in the body's frame."""
+        self._sheet, self._scanner_rad = sheet, scanner_rad
+        self._geometry: Geometry | None = None
+        self._ray: IntArray = np.empty(0, np.int64)
+        self._unseen = np.empty(0, np.bool_)
+
+    def range_m(self, message: Any) -> FloatArray:
+        """The reading (rays,), from the sheet's `range_min_m` to its range, inf where nothing is within it.
+
+        BadFrame if the message's rays cannot lie as it says.
+        """
+        geometry = geometry_of(message)
+        if geometry != self._geometry:
+            self._fit(geometry)
+        range_m = returns_m(message)[self._ray]
+        range_m[self._unseen | (range_m > np.float32(self._sheet.range_m))] = np.inf
+        return np.maximum(range_m, self._sheet.range_min_m)
+
+    def _fit(self, geometry: Geometry) -> None:
+        self._ray, apart_rad = nearest_angle(self._sheet.angle_rad, angles_rad(geometry, self._scanner_rad))
+        self._unseen = apart_rad > SLACK * 0.5 * max(self._sheet.step_rad, abs(geometry.step_rad))
+        self._geometry = geometry

@@ -1,6 +1,8 @@
 """Messages of a ROS 2 distribution and their CDR encoding, by the library rosbags."""
 
-from typing import Any
+import struct
+from math import isfinite
+from typing import Any, NamedTuple
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadFrame, BadInput
@@ -53,3 +55,69 @@ class Messages:
 def stamp_ns(header: Any) -> int:
     """The time of a header in ns since 1970."""
     return header.stamp.sec * NS_PER_S + header.stamp.nanosec
+
+
+# --- Twist and TwistStamped, the commands of a base: short enough to be laid out by hand.
+#
+# CDR: two bytes of zero and endianness, two of options; then fields, each at a multiple of its size from there on.
+
+
+LITTLE = b"\x00\x01\x00\x00"
+SIZE = 4 + 48
+LONGEST_STAMPED = 512  # a frame's name of hundreds of letters is none
+PADDING = 4  # some writers fill up to a multiple of four
+
+
+class Velocities(NamedTuple):
+    """What a base is told, in its own frame."""
+
+    linear_mps: float
+    angular_radps: float  # positive to the left
+    lateral_mps: float = 0.0  # to the left
+
+
+def encode_twist(told: Velocities) -> bytes:
+    """A Twist of 52 bytes."""
+    return LITTLE + struct.pack("<6d", told.linear_mps, told.lateral_mps, 0.0, 0.0, 0.0, told.angular_radps)
+
+
+def encode_twist_stamped(told: Velocities, stamp_ns: int, frame: str) -> bytes:
+    """A TwistStamped of the time in ns since 1970."""
+    name = frame.encode() + b"\0"
+    seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
+    head = struct.pack("<iII", seconds, nanoseconds, len(name)) + name
+    return LITTLE + head + bytes(-len(head) % 8) + encode_twist(told)[4:]
+
+
+def decode_twist(payload: bytes) -> Velocities:
+    """What a Twist says; BadFrame if it is none, or not all of it finite."""
+    return _velocities(payload, SIZE)
+
+
+def decode_twist_stamped(payload: bytes) -> Velocities:
+    """What a TwistStamped says, whenever it was made; BadFrame as `decode_twist`."""
+    if not SIZE < len(payload) <= LONGEST_STAMPED:
+        raise BadFrame("malformed", f"{len(payload)} bytes are no TwistStamped")
+    (length,) = struct.unpack_from(_order(payload) + "I", payload, 12)
+    return _velocities(payload, 4 + (12 + length + 7) // 8 * 8 + 48)
+
+
+def decode_either(payload: bytes) -> Velocities:
+    """What a Twist or a TwistStamped says, which is the longer of the two; BadFrame as `decode_twist`."""
+    return decode_twist(payload) if len(payload) < SIZE + PADDING else decode_twist_stamped(payload)
+
+
+def _velocities(payload: bytes, size: int) -> Velocities:
+    """The last six numbers of a message of `size` bytes."""
+    if not size <= len(payload) < size + PADDING:
+        raise BadFrame("malformed", f"expected {size} bytes, got {len(payload)}")
+    numbers = struct.unpack_from(_order(payload) + "6d", payload, size - 48)
+    if not all(map(isfinite, numbers)):
+        raise BadFrame("malformed", "a velocity that is not finite")
+    return Velocities(numbers[0], numbers[5], numbers[1])
+
+
+def _order(payload: bytes) -> str:
+    if payload[:2] not in (b"\x00\x00", b"\x00\x01"):
+        raise BadFrame("malformed", "no CDR")
+    return "<" if payload[1] else ">"

@@ -41,7 +41,7 @@ class Chosen:
             if self.certs or self.name or any(self.files) or self.insecure:
                 raise BadInput("--endpoint", "", "is missing: certificates are for a run on another machine")
             return None
-        from swarmwire.comms.wire.access import OPERATOR
+        from swarmwire.comms.wire.access_control import OPERATOR
         from swarmwire.deploy.certificates.member import member
 
         of = member(OPERATOR, certs=self.certs, name=self.name, files=self.files, insecure=self.insecure)

@@ -5,8 +5,8 @@ from typing import Annotated, Any, cast
 
 import typer
 
+from swarmwire.comms.config import from_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.parsing import from_toml
 from swarmwire.deploy.commands.ctl.chosen_run import control_of
 from swarmwire.deploy.commands.ctl.told import give, tell
 

@@ -5,7 +5,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from swarmwire.comms.one_of import one_of
+from swarmwire.comms.config import one_of
 from swarmwire.deploy.commands.access_options import Ca, Certificate, Certs, Insecure, Key, Name
 from swarmwire.deploy.commands.ctl.chosen_run import Chosen, Endpoint
 from swarmwire.deploy.commands.ctl.given import end_command, event_command, events_command

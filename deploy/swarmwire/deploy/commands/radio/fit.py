@@ -9,7 +9,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.commands.options import USUAL_SIZE_PX
 
 if TYPE_CHECKING:
-    from swarmwire.comms.air.parameters.propagation import Antenna
+    from swarmwire.comms.radio.config.phy import Antenna
     from swarmwire.metrics.radio_fit.network_fit import NetworkFit
     from swarmwire.metrics.radio_fit.radio_fit import RadioFit
 
@@ -127,8 +127,8 @@ def _antenna(power_dbm: float, gain_dbi: float) -> "Antenna":
     """The antenna that the robots had; BadInput for one that no scenario takes."""
     from dataclasses import fields
 
-    from swarmwire.comms.air.parameters.propagation import Antenna
-    from swarmwire.comms.parameters import fault_of, limits_of
+    from swarmwire.comms.config import fault_of, limits_of
+    from swarmwire.comms.radio.config.phy import Antenna
 
     antenna = Antenna(power_dbm, gain_dbi)
     for of in fields(antenna):

@@ -123,7 +123,7 @@ def _draw(probe: "CoverageProbe", to: Path, size_px: int) -> None:
 def _probe_contention(preset: str, contention: str | None, settings: list[str], runs: int, measured_s: float) -> None:
     from rich.console import Console
 
-    from swarmwire.comms.air.probe.contention import contention as contend
+    from swarmwire.comms.radio.analysis.contention import contention as contend
     from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.radio.probe import radio_of
 

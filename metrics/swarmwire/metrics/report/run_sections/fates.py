@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
 from swarmwire.metrics.network.radio_tally import PERCENTS
 from swarmwire.metrics.report.in_words import number, share
 from swarmwire.metrics.report.run_data import RunData

@@ -2,7 +2,7 @@
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_figures.latency_histogram import latency_histogram

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.fates import FATE_NAMES, Fate
+from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.metrics.report.in_words import counted, share
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_figures.link_histogram import link_histogram

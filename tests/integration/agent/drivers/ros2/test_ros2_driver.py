@@ -13,7 +13,7 @@ from swarmwire.agent.drivers.ros2 import Ros2Driver, Ros2Options
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.robots.ros2.sessions import close, open_client
+from swarmwire.comms.robots.ros2.links import close, open_client
 from tests.support.agent.drivers.ros2.bases import HASHES, RosBase, base_and_driver, turtlebot
 from tests.support.comms.robots.ros2 import independent
 from tests.support.comms.robots.ros2.independent import Quaternion, Vector3, odometry

@@ -5,16 +5,16 @@
 
 import queue
 
-from swarmwire.comms.robots.ros2 import sessions
-from swarmwire.comms.robots.ros2.attachment import attachment
-from swarmwire.comms.robots.ros2.inlet import Inlet
+from swarmwire.comms.robots.ros2 import links
+from swarmwire.comms.robots.ros2.keys import attachment
+from swarmwire.comms.robots.ros2.links import Inlet
 
 WAIT_S = 10.0
 
 
 def test_frames_without_their_attachment_are_refused_by_name():
-    router, endpoint = sessions.open_router("tcp/127.0.0.1:0")
-    client = sessions.open_client(endpoint, 5.0)
+    router, endpoint = links.open_router("tcp/127.0.0.1:0")
+    client = links.open_client(endpoint, 5.0)
     taken: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     refused: queue.SimpleQueue[str] = queue.SimpleQueue()
     inlet = Inlet(router, "0/scan", attached=True, take=taken.put, refuse=refused.put)
@@ -26,5 +26,5 @@ def test_frames_without_their_attachment_are_refused_by_name():
         assert taken.empty()
         inlet.close()
     finally:
-        sessions.close(client)
-        sessions.close(router)
+        links.close(client)
+        links.close(router)

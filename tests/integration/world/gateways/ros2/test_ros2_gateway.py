@@ -13,7 +13,7 @@ from zenoh.ext import Int64, z_deserialize
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.robots.ros2.sessions import close
+from swarmwire.comms.robots.ros2.links import close
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
 from swarmwire.world.gateways.ros2.rate import Rate
 from tests.support.comms.robots.ros2 import independent

@@ -2,14 +2,10 @@
 
 from dataclasses import replace
 
-from swarmwire.comms.air.parameters.access import Access
-from swarmwire.comms.air.parameters.bursts import Bursts
-from swarmwire.comms.air.parameters.gives import BearingGiven, Gives, RangeGiven, RssiGiven
-from swarmwire.comms.air.parameters.propagation import Fading, Shadowing
-from swarmwire.comms.air.parameters.reception import Reception
-from swarmwire.comms.air.propagation.log_distance import LogDistance
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.noise import Noise
+from swarmwire.comms.radio.config.impairments import BearingGiven, Bursts, Gives, RangeGiven, RssiGiven
+from swarmwire.comms.radio.config.path_loss_models import LogDistance
+from swarmwire.comms.radio.config.phy import Access, Fading, Noise, Reception, Shadowing
+from swarmwire.comms.radio.config.radio import Radio
 
 # As in ns-3: 5 MHz of noise, path loss 46.6777 dB at 1 m and exponent 3.
 IEEE_802_15_4 = Radio(

@@ -9,7 +9,7 @@ import numpy as np
 import zenoh
 
 from swarmwire.comms.bodies.body import Body, body_from
-from swarmwire.comms.robots.ros2.sessions import close, open_client
+from swarmwire.comms.robots.ros2.links import close, open_client
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
 from tests.support.clocks import StillClock
 from tests.support.comms.robots.ros2.independent import BY_KIND

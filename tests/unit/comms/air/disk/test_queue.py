@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.disk.queue import ACCEPTED, enter
-from swarmwire.comms.air.disruption import ALL, DROP, NEWEST, Disruption
-from swarmwire.comms.air.intake import Intake
-from swarmwire.comms.air.parameters.access import Access
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.packets import NOWHERE, Sent
+from swarmwire.comms.packets import NOWHERE, Fate, Sent
+from swarmwire.comms.radio.config.phy import Access
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
+from swarmwire.comms.radio.transmissions import Intake
+from swarmwire.comms.radio.unit_disk.tx_queue import ACCEPTED, enter
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.air.runs import TICK_NS, Run, at, make_air, packets, run
 from tests.support.comms.air.signal.radios import with_access

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.parameters.gives import BearingGiven, Gives, RangeGiven
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.fates import Fate
 from swarmwire.comms.geometry.obstacles import is_blocked_on, obstacle_arrays, to_nearest
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.radio.config.impairments import BearingGiven, Gives, RangeGiven
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.air.runs import RATE_HZ, at, everybody, make_air, packets, run, scattered
 

@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.parameters.access import Access
-from swarmwire.comms.air.presets.registry import PRESETS
-from swarmwire.comms.air.probe.contention import Contention, contention
-from swarmwire.comms.air.propagation.path_loss import loss_db
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.receiver import chunk_success
-from swarmwire.comms.air.signal.levels import range_of, receiver_for, sensitivity_of
-from swarmwire.comms.air.timing.frames import acknowledgement_bytes, airtime_ns
-from swarmwire.comms.parameters import fault_of, limits_of
+from swarmwire.comms.config import fault_of, limits_of
+from swarmwire.comms.radio.analysis.contention import Contention, contention
+from swarmwire.comms.radio.config.phy import Access
+from swarmwire.comms.radio.config.presets import PRESETS
+from swarmwire.comms.radio.config.radio import Radio, acknowledgement_bytes, airtime_ns
+from swarmwire.comms.radio.phy.propagation import range_of, receiver_for, sensitivity_of
+from swarmwire.comms.radio.propagation.path_loss import loss_db
+from swarmwire.comms.radio.reception.receiver import chunk_success
 from tests.support.comms.air.parameter_modules import MODULES
 from tests.support.comms.air.runs import at, make_air, packets, run
 from tests.unit.world.scenario.test_radio_tables import radio_of

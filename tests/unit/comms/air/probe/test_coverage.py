@@ -8,15 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.parameters.access import Access
-from swarmwire.comms.air.parameters.bursts import Bursts
-from swarmwire.comms.air.parameters.propagation import Antenna, Fading, Shadowing, Walls
-from swarmwire.comms.air.probe.coverage import Coverage
-from swarmwire.comms.air.probe.survey import by_distance, coverage_map
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.signal.levels import cut_off_dbm
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.radio.analysis.coverage import Coverage, by_distance, coverage_map
+from swarmwire.comms.radio.config.impairments import Bursts
+from swarmwire.comms.radio.config.phy import Access, Antenna, Fading, Shadowing, Walls
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.phy.propagation import cut_off_dbm
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.air.runs import SIZE_M, at, everybody, make_air, packets, run, scattered
 from tests.support.comms.air.signal.radios import IEEE_802_15_4

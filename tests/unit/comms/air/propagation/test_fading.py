@@ -6,12 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import special, stats
 
-from swarmwire.comms.air.parameters.propagation import Fading
-from swarmwire.comms.air.propagation.fading import fading_gain, fading_law
-from swarmwire.comms.air.propagation.gamma import gamma_quantile, gamma_tails
-from swarmwire.comms.air.propagation.nakagami import nakagami_gain
-from swarmwire.comms.air.propagation.scattering import WAVES, scattered_between
 from swarmwire.comms.draws import derive_key
+from swarmwire.comms.radio.config.phy import Fading
+from swarmwire.comms.radio.propagation.fading import (
+    WAVES,
+    fading_gain,
+    fading_law,
+    gamma_quantile,
+    gamma_tails,
+    nakagami_gain,
+    scattered_between,
+)
 
 # Keys are fixed; each statistic is taken over independent pairs. Means are held to 4.4 standard errors (false alarm
 # 1 in 90 000), Kolmogorov-Smirnov tests to 1 in 1000. |h|^2 of 32 waves differs from the exponential by 0.004 at most,

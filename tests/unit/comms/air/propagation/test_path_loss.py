@@ -6,16 +6,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.decibels import from_db
-from swarmwire.comms.air.propagation.friis import Friis, loss_at_1_m_db
-from swarmwire.comms.air.propagation.itu_indoor import ItuIndoor
-from swarmwire.comms.air.propagation.link_budget import rssi_dbm
-from swarmwire.comms.air.propagation.log_distance import LogDistance
-from swarmwire.comms.air.propagation.loss_curve import LossCurve
-from swarmwire.comms.air.propagation.path_loss import loss_db, reach_m
-from swarmwire.comms.air.propagation.two_ray import TwoRay
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.receiver import chunk_success, ieee802154
+from swarmwire.comms.radio.config.path_loss_models import (
+    Friis,
+    ItuIndoor,
+    LogDistance,
+    LossCurve,
+    TwoRay,
+    loss_at_1_m_db,
+)
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.propagation.decibels import from_db
+from swarmwire.comms.radio.propagation.path_loss import loss_db, reach_m, rssi_dbm
+from swarmwire.comms.radio.reception.receiver import chunk_success, ieee802154
 
 getcontext().prec = 40
 PI = Decimal("3.1415926535897932384626433832795028841972")

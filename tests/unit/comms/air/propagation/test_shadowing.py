@@ -7,10 +7,17 @@ from hypothesis import strategies as st
 from numba import njit
 from scipy import stats
 
-from swarmwire.comms.air.parameters.propagation import Shadowing
-from swarmwire.comms.air.propagation.shadowing import amplitude_db, field_waves, shadowing_db
-from swarmwire.comms.air.propagation.waves import SUMS, cosine, sine, total
 from swarmwire.comms.draws import derive_key
+from swarmwire.comms.radio.config.phy import Shadowing
+from swarmwire.comms.radio.propagation.shadowing import (
+    SUMS,
+    amplitude_db,
+    cosine,
+    field_waves,
+    shadowing_db,
+    sine,
+    total,
+)
 
 # Keys are fixed. Each statistic is taken over independent arenas and held to 4.4 standard errors (false alarm
 # 1 in 90 000).

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.propagation.bodies_between import bodies_between, is_on_line
-from swarmwire.comms.air.propagation.walls import crossed_and_inside_m, wall_loss_db
-from swarmwire.comms.geometry import grid
+from swarmwire.comms.geometry import robot_index
 from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked, obstacle_arrays
+from swarmwire.comms.radio.propagation.obstruction import bodies_between, crossed_and_inside_m, is_on_line, wall_loss_db
 from swarmwire.comms.truth import Obstacle
 
 CYLINDER = Obstacle("cylinder", 0.0, 0.0, radius_m=1.0)
@@ -102,7 +101,7 @@ def test_turning_and_moving_everything_changes_nothing(ax, ay, bx, by, turn, dx,
 
 def test_bodies_on_the_line_are_counted_but_not_its_ends():
     x, y = np.array([0.0, 1.0, 2.0, 3.0, 1.5, 4.0]), np.array([0.0, 0.05, 0.2, 0.0, -0.09, 0.0])
-    cells = grid.build(x, y, 1, (10.0, 10.0), 5.0)
+    cells = robot_index.build(x, y, 1, (10.0, 10.0), 5.0)
     radius_m = np.full(6, 0.1)
     # Robot 1 and robot 4 are on it, robot 2 is beside it, robot 5 behind it.
     assert bodies_between(x, y, radius_m, 0.1, cells, 6, 0, 3) == 2
@@ -116,7 +115,7 @@ def test_the_grid_finds_the_bodies_that_a_look_at_all_finds(cell_m: float):
     arenas, robots = 2, 60
     x, y = places.uniform(-5.5, 5.5, (2, arenas * robots))
     radius_m = places.uniform(0.05, 0.4, arenas * robots)
-    cells = grid.build(x, y, arenas, (10.0, 10.0), cell_m)
+    cells = robot_index.build(x, y, arenas, (10.0, 10.0), cell_m)
     total = 0
     for a, b in places.integers(0, robots, (200, 2)) + robots * places.integers(0, arenas, (200, 1)):
         others = [k for k in range(a - a % robots, a - a % robots + robots) if k not in (a, b)]

@@ -10,11 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from swarmwire.comms.air.parameters.bursts import Bursts, bursts_from_steps, bursts_of_mean
-from swarmwire.comms.air.reception.burst_states import LEAST_CAPACITY, BurstStates
-from swarmwire.comms.air.reception.bursts import bad_after
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key
+from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps, bursts_of_mean
+from swarmwire.comms.radio.reception.bursts import LEAST_CAPACITY, BurstStates, bad_after
 
 KEYS = np.array([derive_key("bursts", arena) for arena in range(2)], np.uint64)
 ROBOTS = 20

@@ -10,11 +10,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, special
 
-from swarmwire.comms.air.decibels import from_db
-from swarmwire.comms.air.reception.dsss import RATES_BPS as DSSS_RATES_BPS
-from swarmwire.comms.air.reception.dsss import biorthogonal_errors, dbpsk_bit_errors, dqpsk_bit_errors, dsss_success
-from swarmwire.comms.air.reception.ofdm import RATES_BPS, SPECTRA, ofdm_bit_errors, ofdm_success, raw_bit_errors
-from swarmwire.comms.air.reception.oqpsk import oqpsk_bit_errors, oqpsk_success
+from swarmwire.comms.radio.propagation.decibels import from_db
+from swarmwire.comms.radio.reception.error_rates import DSSS_RATES_BPS
+from swarmwire.comms.radio.reception.error_rates import (
+    OFDM_RATES_BPS,
+    SPECTRA,
+    biorthogonal_errors,
+    dbpsk_bit_errors,
+    dqpsk_bit_errors,
+    dsss_success,
+    ofdm_bit_errors,
+    ofdm_success,
+    oqpsk_bit_errors,
+    oqpsk_success,
+    raw_bit_errors,
+)
 
 getcontext().prec = 60
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
@@ -95,7 +105,7 @@ def test_the_errors_of_802_11ag_are_the_union_bound(rate: int, sinr_db: float):
     ],
 )
 def test_frames_of_802_11ag_survive_as_in_ns3(rate_mbps: int, sinr_db: float, stated: float, tolerance: float):
-    rate = RATES_BPS.index(rate_mbps * 1_000_000)
+    rate = OFDM_RATES_BPS.index(rate_mbps * 1_000_000)
     assert ofdm_success(rate, from_db(sinr_db), FRAME_BITS) == pytest.approx(stated, abs=tolerance)
 
 

@@ -7,12 +7,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.decibels import from_db, to_db
-from swarmwire.comms.air.parameters.reception import Reception, SuccessTable, refuse_unfit, refuse_unless_rising
-from swarmwire.comms.air.reception import dsss, ofdm
-from swarmwire.comms.air.reception.bits import all_right
-from swarmwire.comms.air.reception.noise import Noise, noise_dbm
-from swarmwire.comms.air.reception.receiver import (
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.radio.config.phy import (
+    Noise,
+    Reception,
+    SuccessTable,
+    noise_dbm,
+    refuse_unfit,
+    refuse_unless_rising,
+)
+from swarmwire.comms.radio.propagation.decibels import from_db, to_db
+from swarmwire.comms.radio.reception import error_rates
+from swarmwire.comms.radio.reception.error_rates import all_right
+from swarmwire.comms.radio.reception.receiver import (
+    LEAST_DB,
+    MOST_DB,
     by_table,
     by_threshold,
     chunk_success,
@@ -20,17 +29,17 @@ from swarmwire.comms.air.reception.receiver import (
     ieee80211b,
     ieee802154,
     receiver_of,
+    sensitivity_dbm,
+    sinr_for_db,
 )
-from swarmwire.comms.air.reception.sensitivity import LEAST_DB, MOST_DB, sensitivity_dbm, sinr_for_db
-from swarmwire.comms.errors import BadInput
 
 getcontext().prec = 40
 THRESHOLD = by_threshold(4.0)
 BY_BITS = (
     by_table(SuccessTable((-1.0, 0.0, 3.0), (0.0, 0.2, 1.0), 1000)),
     ieee802154(),
-    *(ieee80211b(rate_bps) for rate_bps in dsss.RATES_BPS),
-    *(ieee80211ag(rate_bps) for rate_bps in ofdm.RATES_BPS),
+    *(ieee80211b(rate_bps) for rate_bps in error_rates.DSSS_RATES_BPS),
+    *(ieee80211ag(rate_bps) for rate_bps in error_rates.OFDM_RATES_BPS),
 )
 
 
@@ -167,8 +176,8 @@ TABLE = SuccessTable((0.0, 6.0), (0.0, 1.0), 800)
         (Reception(), 250_000, ieee802154()),
         (Reception("threshold", least_sinr_db=3.0), 1, by_threshold(3.0)),
         (Reception("table", table=TABLE), 1, by_table(TABLE)),
-        *((Reception("802.11b"), rate_bps, ieee80211b(rate_bps)) for rate_bps in dsss.RATES_BPS),
-        *((Reception("802.11ag"), rate_bps, ieee80211ag(rate_bps)) for rate_bps in ofdm.RATES_BPS),
+        *((Reception("802.11b"), rate_bps, ieee80211b(rate_bps)) for rate_bps in error_rates.DSSS_RATES_BPS),
+        *((Reception("802.11ag"), rate_bps, ieee80211ag(rate_bps)) for rate_bps in error_rates.OFDM_RATES_BPS),
     ],
 )
 def test_the_receiver_is_the_one_that_is_named(reception: Reception, bit_rate_bps: int, expected):

@@ -8,18 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.disruption import Disruption
-from swarmwire.comms.air.jammers import NO_ROBOT, Jammers
-from swarmwire.comms.air.parameters.bursts import Bursts
-from swarmwire.comms.air.parameters.gives import Gives, RangeGiven
-from swarmwire.comms.air.parameters.propagation import Antenna, Bodies, Fading, Shadowing, Walls
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.signal import signal_way
-from swarmwire.comms.air.signal.reports import Reports
-from swarmwire.comms.air.signal.told import Told
-from swarmwire.comms.air.way import Decided
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.packets import BROADCAST, Fate
+from swarmwire.comms.radio.config.impairments import Bursts, Gives, RangeGiven
+from swarmwire.comms.radio.config.phy import Antenna, Bodies, Fading, Shadowing, Walls
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import NO_ROBOT, Disruption, Jammers
+from swarmwire.comms.radio.model import Decided
+from swarmwire.comms.radio.phy import model
+from swarmwire.comms.radio.phy.model import Reports
+from swarmwire.comms.radio.phy.results import Told
 from tests.support.comms.air.runs import TICK_NS, Run, at, everybody, make_air, packets, run, scattered
 from tests.support.comms.air.signal.radios import ALL_GIVEN, METHODS, with_access
 from tests.support.comms.air.traffic import OBSTACLES, random_traffic
@@ -189,7 +186,7 @@ def test_in_how_many_goes_it_is_told_does_not_matter(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(Reports, "decided", counted)
     for room in (1, 200, 300, 400):
-        monkeypatch.setattr(signal_way, "LEAST_ROOM", room)
+        monkeypatch.setattr(model, "LEAST_ROOM", room)
         assert finished(crowded()) == at_once
     assert goes >= {1, 2, 3}
 

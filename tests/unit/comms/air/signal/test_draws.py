@@ -7,14 +7,12 @@ from itertools import chain
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.parameters.bursts import Bursts
-from swarmwire.comms.air.signal.frame_fate import lone_deliveries
-from swarmwire.comms.air.signal.losses import passing_share
-from swarmwire.comms.air.signal.rules import rules_of
 from swarmwire.comms.draws import derive_key, purpose, uniform
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.outcomes import SendResult
-from swarmwire.comms.packets import BROADCAST, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, SendResult, Sent
+from swarmwire.comms.radio.config.impairments import Bursts
+from swarmwire.comms.radio.phy.losses import passing_share
+from swarmwire.comms.radio.phy.params import rules_of
+from swarmwire.comms.radio.phy.reception import lone_deliveries
 from tests.support.comms.air.runs import Run, at, everybody, make_air, packets, run, scattered
 from tests.support.comms.air.signal.radios import METHODS, drawing, with_access
 

@@ -7,15 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.disruption import Disruption
-from swarmwire.comms.air.jammers import NO_ROBOT, Jammers
-from swarmwire.comms.air.parameters.propagation import Shadowing, Walls
-from swarmwire.comms.air.reception.noise import Noise
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.packets import Sent
+from swarmwire.comms.packets import Fate, Sent
+from swarmwire.comms.radio.config.phy import Noise, Shadowing, Walls
+from swarmwire.comms.radio.disruption import NO_ROBOT, Disruption, Jammers
+from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.air.runs import RATE_HZ, Run, at, everybody, make_air, packets, scattered
 from tests.support.comms.air.signal.radios import with_access

@@ -8,13 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.disk.queue import QUEUE_FULL
-from swarmwire.comms.air.disruption import Disruption
-from swarmwire.comms.air.radio import Radio
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.outcomes import Outcomes, SendResult
-from swarmwire.comms.packets import BROADCAST, NOWHERE, UNTOLD, Sent
+from swarmwire.comms.packets import BROADCAST, NOWHERE, UNTOLD, Fate, Outcomes, SendResult, Sent
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import Disruption
+from swarmwire.comms.radio.unit_disk.tx_queue import QUEUE_FULL
 from tests.support.comms.air.runs import Run, at, make_air, packets, run, scattered
 from tests.support.comms.air.signal.radios import METHODS, drawing, with_access
 

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.parameters.bursts import Bursts
-from swarmwire.comms.air.parameters.propagation import Fading, Shadowing
-from swarmwire.comms.air.parameters.reception import Reception
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.oqpsk import oqpsk_bit_errors
-from swarmwire.comms.fates import Fate
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.radio.config.impairments import Bursts
+from swarmwire.comms.radio.config.phy import Fading, Reception, Shadowing
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.reception.error_rates import oqpsk_bit_errors
 from tests.support.comms.air.runs import at, everybody, make_air, packets, run, scattered
 from tests.support.comms.air.signal.radios import METHODS, with_access
 

@@ -6,11 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.disruption import NEWEST, Disruption
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.fates import Fate
-from swarmwire.comms.outcomes import SendResult
-from swarmwire.comms.packets import Sent
+from swarmwire.comms.packets import Fate, SendResult, Sent
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import NEWEST, Disruption
 from tests.support.comms.air.runs import TICK_NS, Run, at, make_air, packets
 from tests.support.comms.air.signal.radios import with_access
 

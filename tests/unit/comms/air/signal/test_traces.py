@@ -10,11 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.air.parameters.propagation import Fading, Shadowing
-from swarmwire.comms.air.parameters.trace import Trace
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.traces.link_traces import LinkTraces
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.radio.config.phy import Fading, Shadowing
+from swarmwire.comms.radio.config.radio import Radio, Trace
+from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.air.measured import TRIO, numbers_heard, trace_of
 from tests.support.comms.air.runs import TICK_NS, Run, at, everybody, make_air, packets, run, scattered

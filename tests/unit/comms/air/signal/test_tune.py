@@ -6,17 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.air.air import Air
-from swarmwire.comms.air.antennas import Antennas
-from swarmwire.comms.air.disruption import ALL, DROP, NEWEST, Disruption
-from swarmwire.comms.air.parameters.propagation import Antenna, Fading, OwnAntenna, Shadowing
-from swarmwire.comms.air.radio import Radio
-from swarmwire.comms.air.reception.noise import Noise
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import Sent
+from swarmwire.comms.radio.config.phy import Antenna, Antennas, Fading, Noise, OwnAntenna, Shadowing
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
+from swarmwire.comms.radio.medium import Air
 from tests.support.comms.air.runs import RATE_HZ, SIZE_M, Run, at, everybody, make_air, packets, scattered
 from tests.support.comms.air.signal.radios import METHODS, with_access
 

@@ -7,21 +7,33 @@ from hypothesis import strategies as st
 from zenoh.ext import Int64, z_deserialize, z_serialize
 
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.robots.ros2 import kinds
-from swarmwire.comms.robots.ros2.attachment import attachment, check_attachment, publisher_id
-from swarmwire.comms.robots.ros2.bridge_keys import READ, WRITE, bridge_itself, bridge_key, bridge_token
+from swarmwire.comms.robots.ros2 import keys
+from swarmwire.comms.robots.ros2.keys import (
+    NAME,
+    READ,
+    WRITE,
+    RmwNode,
+    absolute,
+    attachment,
+    bridge_itself,
+    bridge_key,
+    bridge_token,
+    check_attachment,
+    check_name,
+    publisher_id,
+    rmw_key,
+    ros_name,
+)
 from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.names import NAME, absolute, check_name, ros_name
-from swarmwire.comms.robots.ros2.rmw_keys import RmwNode, rmw_key
 
 # As `ros2 topic info -v` and rmw_zenoh's design page show them.
 HASHES = {
-    kinds.TWIST: "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
-    kinds.TWIST_STAMPED: "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
-    kinds.LASER_SCAN: "RIHS01_64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828",
-    kinds.ODOMETRY: "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0",
-    kinds.IMU: "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b",
-    kinds.BATTERY_STATE: "RIHS01_4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741",
+    keys.TWIST: "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
+    keys.TWIST_STAMPED: "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
+    keys.LASER_SCAN: "RIHS01_64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828",
+    keys.ODOMETRY: "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0",
+    keys.IMU: "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b",
+    keys.BATTERY_STATE: "RIHS01_4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741",
 }
 LONGEST = 2**63 - 1
 
@@ -33,7 +45,7 @@ def test_hashes_are_those_that_ros_shows(distro, kind):
 
 
 def test_humble_has_no_hashes():
-    assert Messages("humble").hash_of(kinds.TWIST) == "TypeHashNotSupported"
+    assert Messages("humble").hash_of(keys.TWIST) == "TypeHashNotSupported"
 
 
 def test_the_string_of_the_design_page_has_its_hash():
@@ -41,10 +53,10 @@ def test_the_string_of_the_design_page_has_its_hash():
 
 
 def test_keys_of_rmw_are_domain_name_kind_and_hash():
-    key = rmw_key(0, "/cmd_vel", kinds.TWIST, HASHES[kinds.TWIST])
-    assert key == f"0/cmd_vel/geometry_msgs::msg::dds_::Twist_/{HASHES[kinds.TWIST]}"
-    assert zenoh.KeyExpr(rmw_key(0, "/cmd_vel", kinds.TWIST)).includes(zenoh.KeyExpr(key))
-    assert not zenoh.KeyExpr(rmw_key(0, "/cmd_vel", kinds.TWIST_STAMPED)).includes(zenoh.KeyExpr(key))
+    key = rmw_key(0, "/cmd_vel", keys.TWIST, HASHES[keys.TWIST])
+    assert key == f"0/cmd_vel/geometry_msgs::msg::dds_::Twist_/{HASHES[keys.TWIST]}"
+    assert zenoh.KeyExpr(rmw_key(0, "/cmd_vel", keys.TWIST)).includes(zenoh.KeyExpr(key))
+    assert not zenoh.KeyExpr(rmw_key(0, "/cmd_vel", keys.TWIST_STAMPED)).includes(zenoh.KeyExpr(key))
 
 
 def test_keys_of_the_bridge_are_names():
@@ -55,18 +67,18 @@ def test_keys_of_the_bridge_are_names():
 def test_tokens_of_rmw_read_as_its_design_page_writes_them():
     node = RmwNode(2, "aa11", 1, "/flock_0", "base")
     assert node.token == "@ros2_lv/2/aa11/10000/10000/NN/%/%flock_0/base"
-    assert node.topic_token(3, "MP", "/flock_0/scan", kinds.LASER_SCAN, "RIHS01_64") == (
+    assert node.topic_token(3, "MP", "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64") == (
         "@ros2_lv/2/aa11/10000/10003/MP/%/%flock_0/base/%flock_0%scan/"
         "sensor_msgs::msg::dds_::LaserScan_/RIHS01_64/::,10:,:,:,,"
     )
     assert RmwNode(0, "aa11", 0, "/", "base").token == "@ros2_lv/0/aa11/0/0/NN/%/%/base"
-    for token in (node.token, node.topic_token(3, "MP", "/flock_0/scan", kinds.LASER_SCAN, "RIHS01_64")):
+    for token in (node.token, node.topic_token(3, "MP", "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64")):
         assert zenoh.KeyExpr("@ros2_lv/2/**").includes(zenoh.KeyExpr(token))
 
 
 def test_tokens_of_the_bridge_read_as_its_source_writes_them():
-    token = bridge_token("aa11", WRITE, "/flock_0/scan", kinds.LASER_SCAN, "RIHS01_64")
-    assert bridge_token("aa11", READ, "/flock_0/cmd_vel", kinds.TWIST, "").startswith("@/aa11/@ros2_lv/MS/")
+    token = bridge_token("aa11", WRITE, "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64")
+    assert bridge_token("aa11", READ, "/flock_0/cmd_vel", keys.TWIST, "").startswith("@/aa11/@ros2_lv/MS/")
     assert token == ("@/aa11/@ros2_lv/MP/flock_0§scan/sensor_msgs§msg§LaserScan/:1:0:0,10:typehash=RIHS01_64;")
     assert zenoh.KeyExpr("@/*/@ros2_lv/**").includes(zenoh.KeyExpr(token))
     assert zenoh.KeyExpr("@/*/@ros2_lv/**").includes(zenoh.KeyExpr(bridge_itself("aa11")))

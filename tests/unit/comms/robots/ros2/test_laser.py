@@ -9,14 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body
+from swarmwire.comms.bodies.sensors import Proximity, Scan
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.robots.ros2.kinds import LASER_SCAN
-from swarmwire.comms.robots.ros2.laser import laser_scan, returns_m
-from swarmwire.comms.robots.ros2.laser_as_proximity import LaserAsProximity
-from swarmwire.comms.robots.ros2.laser_as_scan import LaserAsScan
+from swarmwire.comms.robots.ros2.keys import LASER_SCAN
+from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan, laser_scan, nearest_angle, returns_m
 from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.nearest_angle import nearest_angle
-from swarmwire.comms.sheets import Proximity, Scan
 from tests.support.comms.robots.ros2 import independent
 
 MESSAGES = Messages("jazzy")

@@ -10,13 +10,11 @@ from pycdr2._support import Endianness
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.robots.ros2 import kinds, twist
-from swarmwire.comms.robots.ros2.battery_state import battery_state
-from swarmwire.comms.robots.ros2.illuminance import illuminance
-from swarmwire.comms.robots.ros2.inertial import Motion, imu
+from swarmwire.comms.robots.ros2 import keys, messages
 from swarmwire.comms.robots.ros2.laser import laser_scan
 from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns
-from swarmwire.comms.robots.ros2.wheel_poses import WheelPoses
+from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu
+from swarmwire.comms.robots.ros2.other_sensors import battery_state, illuminance
 from tests.support.comms.robots.ros2 import independent
 
 MESSAGES = Messages("jazzy")
@@ -53,20 +51,20 @@ def singles(most: int = 40):
 
 POSES = st.builds(independent.PoseWithCovariance, st.builds(independent.Pose, vectors(), quaternions()), numbers(36))
 SAMPLES = {
-    kinds.TWIST: twists(),
-    kinds.TWIST_STAMPED: st.builds(independent.TwistStamped, headers(), twists()),
-    kinds.LASER_SCAN: st.builds(independent.LaserScan, headers(), *[SINGLES] * 7, singles(), singles()),
-    kinds.ODOMETRY: st.builds(
+    keys.TWIST: twists(),
+    keys.TWIST_STAMPED: st.builds(independent.TwistStamped, headers(), twists()),
+    keys.LASER_SCAN: st.builds(independent.LaserScan, headers(), *[SINGLES] * 7, singles(), singles()),
+    keys.ODOMETRY: st.builds(
         independent.Odometry,
         headers(),
         FRAMES,
         POSES,
         st.builds(independent.TwistWithCovariance, twists(), numbers(36)),
     ),
-    kinds.IMU: st.builds(
+    keys.IMU: st.builds(
         independent.Imu, headers(), quaternions(), numbers(9), vectors(), numbers(9), vectors(), numbers(9)
     ),
-    kinds.BATTERY_STATE: st.builds(
+    keys.BATTERY_STATE: st.builds(
         independent.BatteryState,
         headers(),
         *[SINGLES] * 7,
@@ -77,8 +75,8 @@ SAMPLES = {
         FRAMES,
         FRAMES,
     ),
-    kinds.ILLUMINANCE: st.builds(independent.Illuminance, headers(), DOUBLES, DOUBLES),
-    kinds.CLOCK: st.builds(independent.Clock, st.builds(independent.Time, st.integers(0, 2**31 - 1), st.just(5))),
+    keys.ILLUMINANCE: st.builds(independent.Illuminance, headers(), DOUBLES, DOUBLES),
+    keys.CLOCK: st.builds(independent.Clock, st.builds(independent.Time, st.integers(0, 2**31 - 1), st.just(5))),
 }
 
 
@@ -114,35 +112,35 @@ def test_half_a_message_is_a_bad_frame(kind, data):
 
 @given(linear=FINITE, angular=FINITE, lateral=FINITE, stamp=STAMPS, frame=FRAMES)
 def test_commands_laid_out_by_hand_are_those_of_the_library(linear, angular, lateral, stamp, frame):
-    told, theirs = twist.Velocities(linear, angular, lateral), independent.twist(linear, angular, lateral)
-    assert twist.encode_twist(told) == theirs.serialize()
+    told, theirs = messages.Velocities(linear, angular, lateral), independent.twist(linear, angular, lateral)
+    assert messages.encode_twist(told) == theirs.serialize()
     assert len(theirs.serialize()) == 52
     stamped = independent.TwistStamped(independent.header(stamp, frame), theirs).serialize()
-    assert twist.encode_twist_stamped(told, stamp, frame) == stamped
-    assert twist.decode_twist(theirs.serialize()) == told
+    assert messages.encode_twist_stamped(told, stamp, frame) == stamped
+    assert messages.decode_twist(theirs.serialize()) == told
     for frame_bytes in (theirs.serialize(), stamped):
-        assert twist.decode_either(frame_bytes) == told
+        assert messages.decode_either(frame_bytes) == told
 
 
 @settings(max_examples=25, deadline=None)
 @given(linear=FINITE, angular=FINITE, frame=FRAMES)
 def test_commands_of_the_other_endianness_mean_the_same(linear, angular, frame):
     message = independent.TwistStamped(independent.header(5, frame), independent.twist(linear, angular))
-    assert twist.decode_either(message.serialize(endianness=Endianness.Big)) == twist.Velocities(linear, angular)
+    assert messages.decode_either(message.serialize(endianness=Endianness.Big)) == messages.Velocities(linear, angular)
     plain = message.twist.serialize(endianness=Endianness.Big)
-    assert twist.decode_either(plain) == twist.Velocities(linear, angular)
+    assert messages.decode_either(plain) == messages.Velocities(linear, angular)
 
 
 @pytest.mark.parametrize("broken", [float("nan"), float("inf"), float("-inf")])
 def test_a_velocity_that_is_not_finite_is_refused(broken):
     with pytest.raises(BadFrame):
-        twist.decode_either(independent.twist(0.1, broken).serialize())
+        messages.decode_either(independent.twist(0.1, broken).serialize())
 
 
 @given(st.binary(max_size=120))
 def test_garbage_is_refused_or_commands_something_finite(payload):
     try:
-        told = twist.decode_either(payload)
+        told = messages.decode_either(payload)
     except BadFrame:
         return
     assert np.all(np.isfinite(told))
@@ -156,12 +154,12 @@ def made() -> dict[str, object]:
     poses.follow(0, np.zeros(2), np.zeros(2))
     poses.follow(100_000_000, np.array([0.0, 0.1]), np.array([0.0, 0.2]))
     return {
-        kinds.LASER_SCAN: laser_scan(MESSAGES, scan, np.full(360, np.inf), 3),
-        kinds.ODOMETRY: poses.message(MESSAGES, 1, 3),
-        kinds.IMU: imu(MESSAGES, Motion(1.0, 2.0, 3.0, 0.5), 0.0, 3),
-        kinds.BATTERY_STATE: battery_state(MESSAGES, 0.5, 11.0, 3),
-        kinds.ILLUMINANCE: illuminance(MESSAGES, 0.5, 800.0, "cell", 3),
-        kinds.CLOCK: MESSAGES.make(kinds.CLOCK, MESSAGES.time(3)),
+        keys.LASER_SCAN: laser_scan(MESSAGES, scan, np.full(360, np.inf), 3),
+        keys.ODOMETRY: poses.message(MESSAGES, 1, 3),
+        keys.IMU: imu(MESSAGES, Motion(1.0, 2.0, 3.0, 0.5), 0.0, 3),
+        keys.BATTERY_STATE: battery_state(MESSAGES, 0.5, 11.0, 3),
+        keys.ILLUMINANCE: illuminance(MESSAGES, 0.5, 800.0, "cell", 3),
+        keys.CLOCK: MESSAGES.make(keys.CLOCK, MESSAGES.time(3)),
     }
 
 

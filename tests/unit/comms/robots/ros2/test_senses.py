@@ -9,15 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.bodies.sensors import Battery
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.robots.ros2.battery_state import battery_state, charge_of
-from swarmwire.comms.robots.ros2.illuminance import brightness_of, illuminance, topics_of_light
-from swarmwire.comms.robots.ros2.inertial import Motion, imu, motion_of
-from swarmwire.comms.robots.ros2.kinds import BATTERY_STATE, ILLUMINANCE, IMU, ODOMETRY
+from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, ODOMETRY
 from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.wheel_poses import WheelPoses
-from swarmwire.comms.robots.ros2.wheel_travel import WheelTravel
-from swarmwire.comms.sheets import Battery
+from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, WheelTravel, imu, motion_of
+from swarmwire.comms.robots.ros2.other_sensors import (
+    battery_state,
+    brightness_of,
+    charge_of,
+    illuminance,
+    topics_of_light,
+)
 from tests.support.comms.robots.ros2 import independent
 from tests.support.comms.robots.ros2.independent import Quaternion, Vector3, odometry
 

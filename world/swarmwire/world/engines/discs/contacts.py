@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, IntArray
-from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.kernels import borrowing
 from swarmwire.world.engines.discs.fixed import ROBOT, gap_to_circle, gap_to_fixed
 
 # Robots look ahead for what their speed may reach in a step and this share of their radius, since others may push them.

@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.kernels import borrowing
 
 ROBOT, LEFT, RIGHT, BOTTOM, TOP, CIRCLE, POLYGON = range(7)  # kinds of things that a disc may meet
 

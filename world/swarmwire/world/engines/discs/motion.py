@@ -9,7 +9,7 @@ turning robot is made of chords of its arc.
 
 import numpy as np
 
-from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.kernels import borrowing
 from swarmwire.world.engines.sine_cosine import sine_cosine
 
 

@@ -11,9 +11,9 @@ L. Verlet (1967), Computer "experiments" on classical fluids, Phys. Rev. 159, 98
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.borrowing import borrowing
-from swarmwire.comms.geometry.grid import build, cell_of
 from swarmwire.comms.geometry.obstacles import Obstacles
+from swarmwire.comms.geometry.robot_index import build, cell_of
+from swarmwire.comms.kernels import borrowing
 from swarmwire.world.engines.discs.fixed import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, gap_to_fixed, gap_to_wall
 from swarmwire.world.engines.discs.obstacle_cells import ObstacleCells
 

@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.geometry.grid import cell_of
 from swarmwire.comms.geometry.obstacles import Obstacles
+from swarmwire.comms.geometry.robot_index import cell_of
 
 CELLS_PER_OBSTACLE = 4
 MOST_CELLS_PER_SIDE = 256

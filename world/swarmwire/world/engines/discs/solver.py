@@ -14,7 +14,7 @@ impulses, Game Developers Conference.
 
 # pyright: basic, reportUnknownMemberType=false
 
-from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.kernels import borrowing
 from swarmwire.world.engines.discs.fixed import ROBOT
 
 SWEEPS = 10

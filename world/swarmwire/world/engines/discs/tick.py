@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.kernels import borrowing
 from swarmwire.world.engines.discs.contacts import LOOK_AHEAD, find_contacts
 from swarmwire.world.engines.discs.motion import drive, follow_targets, move
 from swarmwire.world.engines.discs.solver import separate, solve

@@ -5,7 +5,7 @@ All that is fixed counts as one thing.
 
 # pyright: basic, reportUnknownMemberType=false
 
-from swarmwire.comms.borrowing import borrowing
+from swarmwire.comms.kernels import borrowing
 from swarmwire.world.engines.discs.contacts import BEFORE, NOW, TOUCH_M
 from swarmwire.world.engines.discs.fixed import ROBOT
 

@@ -1,8 +1,8 @@
 """In what a body that an e-puck2 could be is another one, as a program sees that takes it for an e-puck2."""
 
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.robots.epuck2.fitting import SENSES
-from swarmwire.comms.sheets import Light, Proximity
+from swarmwire.comms.bodies.sensors import Light, Proximity
+from swarmwire.comms.robots.epuck2.commands import SENSES
 
 SHOWN = 3  # angles
 

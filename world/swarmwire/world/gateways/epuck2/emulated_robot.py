@@ -7,9 +7,8 @@ from collections.abc import Callable
 from typing import cast
 
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.robots.epuck2.command import RobotCommand
+from swarmwire.comms.robots.epuck2.commands import Commands, RobotCommand
 from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, Header, Request
-from swarmwire.comms.robots.epuck2.streams import Commands
 
 MOST_WAITING = 4  # connections; the one that has waited longest has given up
 MOST_UNREAD_BYTES = 1 << 20  # of answers; whoever reads none of them will not begin to

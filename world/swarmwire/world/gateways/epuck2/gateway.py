@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.robots.epuck2.fitting import SENSES, check_fits
+from swarmwire.comms.robots.epuck2.commands import SENSES, check_fits
 from swarmwire.world.gateways.epuck2.addresses import addresses_of
 from swarmwire.world.gateways.epuck2.differences import differences_of
 from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot

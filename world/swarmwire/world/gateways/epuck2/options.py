@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from math import radians
 
-from swarmwire.comms.parameters import parameter
-from swarmwire.comms.robots.epuck2.magnetometer import CHIPS, Compass
+from swarmwire.comms.config import parameter
+from swarmwire.comms.robots.epuck2.readings import CHIPS, Compass
 
 
 @dataclass(frozen=True)

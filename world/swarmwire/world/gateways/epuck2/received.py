@@ -6,10 +6,9 @@ from threading import Lock
 import numpy as np
 
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.led_changes import LedChanges
-from swarmwire.comms.robots.epuck2.command import RobotCommand
+from swarmwire.comms.robots.epuck2.commands import FASTEST, RobotCommand, body_speeds
 from swarmwire.comms.robots.epuck2.packets import Settings
-from swarmwire.comms.robots.epuck2.wheels import FASTEST, body_speeds
+from swarmwire.comms.tick_io import LedChanges
 from swarmwire.world.gateways.gateway import Commands
 
 

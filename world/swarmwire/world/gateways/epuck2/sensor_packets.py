@@ -6,10 +6,10 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.robots.epuck2 import units
-from swarmwire.comms.robots.epuck2.magnetometer import Compass
+from swarmwire.comms.robots.epuck2 import readings
+from swarmwire.comms.robots.epuck2.commands import M_PER_STEP
 from swarmwire.comms.robots.epuck2.packets import SENSORS, Header
-from swarmwire.comms.robots.epuck2.wheels import M_PER_STEP
+from swarmwire.comms.robots.epuck2.readings import Compass
 
 Fields = dict[str, FloatArray]  # "sense.field" -> (n,) or (n, width)
 
@@ -31,11 +31,11 @@ class SensorPackets:
         self._travelled = np.zeros((robots, 2), np.int64)  # steps, without wrap
         self._counted_from = np.zeros((robots, 2), np.int64)  # what a counter that shows 0 has travelled
         self._to_wire: dict[str, tuple[str, Callable[[FloatArray], AnyArray]]] = {
-            "proximity.value": ("proximity", units.to_proximity),
-            "light.value": ("ambient", units.to_light),
-            "ground.shade": ("ground", units.to_shade),
+            "proximity.value": ("proximity", readings.to_proximity),
+            "light.value": ("ambient", readings.to_light),
+            "ground.shade": ("ground", readings.to_shade),
             "scan.range_m": ("distance_mm", self._distance),
-            "battery.voltage_v": ("battery", units.to_voltage),
+            "battery.voltage_v": ("battery", readings.to_voltage),
             "compass.heading_rad": ("magnetic_field", self._field_ut),
         }
         self._at_rest()
@@ -63,9 +63,9 @@ class SensorPackets:
     def _at_rest(self) -> None:
         """What a robot tells that has none of the senses, or was just switched on."""
         rows = self._rows
-        rows["acceleration"][:, 2] = rows["acceleration_size"] = units.PER_G
-        rows["ambient"], rows["distance_mm"] = units.AMBIENT_DARK, units.SEES_NOTHING_MM
-        rows["temperature_c"], rows["selector"], rows["battery"] = ROOM_C, WIFI_SELECTOR, round(4.2 * units.PER_V)
+        rows["acceleration"][:, 2] = rows["acceleration_size"] = readings.PER_G
+        rows["ambient"], rows["distance_mm"] = readings.AMBIENT_DARK, readings.SEES_NOTHING_MM
+        rows["temperature_c"], rows["selector"], rows["battery"] = ROOM_C, WIFI_SELECTOR, round(4.2 * readings.PER_V)
 
     def _set(self, name: str, value: AnyArray) -> None:
         self._rows[name] = np.where(np.isnan(value), self._rows[name], value)
@@ -73,7 +73,7 @@ class SensorPackets:
     def _distance(self, range_m: FloatArray) -> AnyArray:
         sheet = self._body.scan
         assert sheet is not None
-        return units.to_distance(range_m[:, 0], sheet)
+        return readings.to_distance(range_m[:, 0], sheet)
 
     def _field_ut(self, heading_rad: FloatArray) -> FloatArray:
         return self._compass.field_ut(heading_rad, LEVEL_UT, DOWN_UT)
@@ -87,7 +87,7 @@ class SensorPackets:
     def _set_imu(self, fields: Fields) -> None:
         """Accelerometer, with what the firmware works out of it, and gyro."""
         forward, left = fields["imu.forward_mps2"], fields["imu.left_mps2"]
-        level = units.to_acceleration(np.stack([left, forward], axis=1))
+        level = readings.to_acceleration(np.stack([left, forward], axis=1))
         acceleration = np.concatenate([level, self._rows["acceleration"][:, 2:]], axis=1)
         self._set("acceleration", acceleration)
         x, y, z = self._rows["acceleration"].astype(np.float64).T
@@ -96,7 +96,7 @@ class SensorPackets:
         self._rows["acceleration_size"] = np.sqrt(x * x + y * y + z * z)
         self._rows["inclination_deg"] = inclination
         self._rows["orientation_deg"] = np.where(leans, np.degrees(np.arctan2(x, y)) + 180.0, 0.0)
-        turn = units.to_turn(fields["imu.turn_radps"])
+        turn = readings.to_turn(fields["imu.turn_radps"])
         self._set("gyro", np.stack([np.zeros_like(turn), np.zeros_like(turn), turn], axis=1))
 
 

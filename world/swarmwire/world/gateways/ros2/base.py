@@ -5,14 +5,19 @@ from typing import Any
 
 import zenoh
 
-from swarmwire.comms.robots.ros2.bridge_keys import READ, WRITE, bridge_key, bridge_token
-from swarmwire.comms.robots.ros2.inlet import Inlet
-from swarmwire.comms.robots.ros2.kinds import TWIST, TWIST_STAMPED
-from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.names import absolute
-from swarmwire.comms.robots.ros2.outlet import Outlet
-from swarmwire.comms.robots.ros2.rmw_keys import RmwNode, rmw_key
-from swarmwire.comms.robots.ros2.twist import decode_either, decode_twist, decode_twist_stamped
+from swarmwire.comms.robots.ros2.keys import (
+    READ,
+    TWIST,
+    TWIST_STAMPED,
+    WRITE,
+    RmwNode,
+    absolute,
+    bridge_key,
+    bridge_token,
+    rmw_key,
+)
+from swarmwire.comms.robots.ros2.links import Inlet, Outlet
+from swarmwire.comms.robots.ros2.messages import Messages, decode_either, decode_twist, decode_twist_stamped
 from swarmwire.world.gateways.ros2.command_inbox import CommandInbox
 from swarmwire.world.gateways.ros2.tellers import Teller
 

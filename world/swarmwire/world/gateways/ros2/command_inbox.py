@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.robots.ros2.twist import Velocities
+from swarmwire.comms.robots.ros2.messages import Velocities
 
 REST = Velocities(0.0, 0.0)
 

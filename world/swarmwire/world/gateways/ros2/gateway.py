@@ -12,14 +12,10 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.clock import DatedClock, to_ns
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.led_changes import NO_LED_CHANGES
-from swarmwire.comms.robots.ros2.bridge_keys import bridge_itself, bridge_key
-from swarmwire.comms.robots.ros2.kinds import CLOCK
+from swarmwire.comms.robots.ros2.keys import CLOCK, RmwNode, bridge_itself, bridge_key, rmw_key, ros_name
+from swarmwire.comms.robots.ros2.links import Outlet, check_endpoint, close, open_router
 from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.names import ros_name
-from swarmwire.comms.robots.ros2.outlet import Outlet
-from swarmwire.comms.robots.ros2.rmw_keys import RmwNode, rmw_key
-from swarmwire.comms.robots.ros2.sessions import check_endpoint, close, open_router
+from swarmwire.comms.tick_io import NO_LED_CHANGES
 from swarmwire.world.gateways.gateway import Commands, Gateway
 from swarmwire.world.gateways.ros2.base import NODE, Base
 from swarmwire.world.gateways.ros2.command_inbox import CommandInbox

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from swarmwire.comms.parameters import parameter
-from swarmwire.comms.robots.ros2.illuminance import FULL_LUX
+from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.messages import DISTROS
+from swarmwire.comms.robots.ros2.other_sensors import FULL_LUX
 
 
 @dataclass(frozen=True)

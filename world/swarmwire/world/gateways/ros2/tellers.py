@@ -7,14 +7,12 @@ from typing import Any, ClassVar
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
-from swarmwire.comms.robots.ros2.battery_state import battery_state
-from swarmwire.comms.robots.ros2.illuminance import illuminance, topics_of_light
-from swarmwire.comms.robots.ros2.inertial import Motion, imu
-from swarmwire.comms.robots.ros2.kinds import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
+from swarmwire.comms.bodies.sensors import Scan
+from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
 from swarmwire.comms.robots.ros2.laser import laser_scan
 from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.wheel_poses import WheelPoses
-from swarmwire.comms.sheets import Scan
+from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu
+from swarmwire.comms.robots.ros2.other_sensors import battery_state, illuminance, topics_of_light
 from swarmwire.world.gateways.ros2.options import Ros2GatewayOptions
 
 Fields = dict[str, FloatArray]  # "sense.field" -> (n,) or (n, width)

@@ -1,1 +1,0 @@
-"""The disk's way: queues of senders, who is within range, and the chain of stages."""

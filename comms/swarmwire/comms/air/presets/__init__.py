@@ -1,1 +1,0 @@
-"""Kinds of radio that a scenario may name."""

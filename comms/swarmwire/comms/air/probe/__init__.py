@@ -1,1 +1,0 @@
-"""What a radio does in an arena, without a run."""

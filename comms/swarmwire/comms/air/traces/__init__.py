@@ -1,1 +1,0 @@
-"""Traces: links as they were measured, replayed."""

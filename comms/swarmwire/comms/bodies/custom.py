@@ -1,0 +1,88 @@
+"""A sense of the user's own: what its table in a body's sheet says, and what its class tells agents."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, cast
+
+from swarmwire.comms.bodies.spec import RangedSheet
+from swarmwire.comms.bodies.tables import built, mapping_of
+from swarmwire.comms.config import check_plain, parameter
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.plugins import resolve
+
+MOST_WIDE = 10_000  # numbers of a field, or of an actuator, of one robot
+
+
+@dataclass(frozen=True)
+class OwnSheet(RangedSheet):
+    """A sense whose class is the user's own; what is not listed here are keys of that class. Sense: its fields."""
+
+    kind: str = parameter(
+        help='"file.py:Class" beside the sheet, "package.module:Class", or the name of an entry point'
+    )
+    params: dict[str, Any] = parameter(help="keys of the class, as the sheet gives them; agents are not told")
+    fields: dict[str, int] = parameter(help="the class's fields and their widths; 0: a number per robot")
+
+
+def own_sheet(value: object, where: str, key: str, beside: Path) -> OwnSheet:
+    """The sheet of a user's table, which has a `kind`; its fields are known once the class is."""
+    table = mapping_of(where, key, value)
+    shared = {name: table.pop(name) for name in [of.name for of in fields(RangedSheet)] if name in table}
+    kind = kind_of(table, where, key, beside)
+    check_plain(table, where, key)
+    return built(OwnSheet, {**shared, "kind": kind, "params": table, "fields": {}}, where, key)
+
+
+def kind_of(table: dict[str, Any], where: str, key: str, beside: Path) -> str:
+    """The `kind` of a table, taken out of it, with the path of a file made absolute; BadInput if it is no text."""
+    kind = table.pop("kind")
+    if not isinstance(kind, str) or not kind:
+        expected = 'expected "file.py:Class", "package.module:Class" or the name of an entry point'
+        raise BadInput(where, f"{key}.kind", f"{expected}; got {kind!r}")
+    return resolve(kind, beside)
+
+
+def told_own_sheet(value: object, where: str, key: str) -> OwnSheet:
+    """The sheet that `asdict` made into this table; only that knows `params` and `fields` from keys of the class."""
+    table = mapping_of(where, key, value)
+    mapping_of(where, f"{key}.params", table.get("params"))
+    widths = mapping_of(where, f"{key}.fields", table.get("fields"))
+    known = cast("Mapping[str, object]", widths).values()
+    if not all(type(width) is int and 0 <= width <= MOST_WIDE for width in known):
+        raise BadInput(where, f"{key}.fields", f"expected whole numbers from 0 to {MOST_WIDE}, got {widths!r}")
+    return built(OwnSheet, table, where, key)
+
+
+# --- An actuator of the user's own: what its table in a body's sheet says, and what its class tells agents.
+
+
+@dataclass(frozen=True)
+class ActuatorSheet:
+    """An actuator whose class is the user's own; agents set it by `robot.actuate(name, …)`."""
+
+    kind: str = parameter(
+        help='"file.py:Class" beside the sheet, "package.module:Class", or the name of an entry point'
+    )
+    params: dict[str, Any] = parameter(help="keys of the class, as the sheet gives them; agents are not told")
+    width: int = parameter(0, help="how many numbers it takes; 0: not known yet")
+
+
+def actuator_sheet(value: object, where: str, key: str, beside: Path) -> ActuatorSheet:
+    """The sheet of a user's table, which has a `kind`; its width is known once the class is."""
+    table = mapping_of(where, key, value)
+    if "kind" not in table:
+        raise BadInput(where, f"{key}.kind", "is missing")
+    kind = kind_of(table, where, key, beside)
+    check_plain(table, where, key)
+    return built(ActuatorSheet, {"kind": kind, "params": table}, where, key)
+
+
+def told_actuator_sheet(value: object, where: str, key: str) -> ActuatorSheet:
+    """The sheet that `asdict` made into this table; only that knows `params` and `width` from keys of the class."""
+    table = mapping_of(where, key, value)
+    mapping_of(where, f"{key}.params", table.get("params"))
+    width = table.get("width")
+    if type(width) is not int or not 0 <= width <= MOST_WIDE:
+        raise BadInput(where, f"{key}.width", f"expected a whole number from 0 to {MOST_WIDE}, got {width!r}")
+    return built(ActuatorSheet, table, where, key)

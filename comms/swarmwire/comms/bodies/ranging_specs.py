@@ -1,0 +1,177 @@
+"""Sensors around a body."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.spec import RangedSheet
+from swarmwire.comms.config import parameter
+
+
+def within_a_turn(angle_rad: FloatArray) -> FloatArray:
+    """These angles in (-pi, pi], not to be written to."""
+    wrapped = np.arctan2(np.sin(angle_rad), np.cos(angle_rad))
+    wrapped.setflags(write=False)
+    return wrapped
+
+
+@dataclass(frozen=True)
+class Ring(RangedSheet):
+    """Sensors around the body that look outwards."""
+
+    angles_deg: tuple[float, ...] = parameter(help="where each sensor looks, counter-clockwise from ahead", unit="deg")
+
+    @cached_property
+    def angle_rad(self) -> FloatArray:
+        """Where the sensors look in the body's frame, in (-pi, pi], (sensors,)."""
+        return within_a_turn(np.deg2rad(np.array(self.angles_deg, np.float64)))
+
+    @cached_property
+    def direction(self) -> tuple[FloatArray, FloatArray]:
+        """Cosine and sine of `angle_rad`, (sensors,) each."""
+        return np.cos(self.angle_rad), np.sin(self.angle_rad)
+
+
+# --- Infrared sensors at the body's rim, and how they answer to distance.
+
+
+FORMS = ("rational", "inverse_square", "quadratic")  # compiled code knows them by their places here
+SMALLEST = 1e-9  # values and distances that a curve is asked for, so that nothing is divided by 0
+
+
+@dataclass(frozen=True)
+class ResponseCurve:
+    """How an infrared sensor answers to distance d in m from the rim: a falling curve, clipped to [0, 1].
+
+    `rational`: 1 below `full_m`, else a / (d + b), zero beyond `reach_m`.
+    `inverse_square`: the same with a / (d + b)^2.
+    `quadratic`: a d^2 + b d + c, zero beyond `reach_m`; linear if a is 0.
+    """
+
+    kind: str = parameter(help="form of the curve", choices=FORMS)
+    a: float = parameter(help="coefficient a")
+    b: float = parameter(help="coefficient b")
+    reach_m: float = parameter(help="beyond this the answer is 0", unit="m", above=0)
+    c: float = parameter(0.0, help="coefficient c (quadratic)")
+    full_m: float = parameter(0.0, help="below this the answer is 1 (not quadratic)", unit="m", at_least=0)
+
+    def value(self, distance_m: FloatArray) -> FloatArray:
+        """The response, 0 to 1, to these distances (any shape)."""
+        if self.kind == "quadratic":
+            value = self.a * distance_m * distance_m + self.b * distance_m + self.c
+        else:
+            beyond_m = np.maximum(distance_m, max(self.full_m, SMALLEST)) + self.b
+            falling = self.a / (beyond_m if self.kind == "rational" else beyond_m * beyond_m)
+            value = np.where(distance_m < self.full_m, 1.0, falling)
+        return np.where(distance_m <= self.reach_m, np.clip(value, 0.0, 1.0), 0.0)
+
+    def distance_m(self, value: FloatArray) -> FloatArray:
+        """The distance at which an ideal sensor answers `value`; `reach_m` where nothing is seen (any shape)."""
+        seen = np.maximum(value, SMALLEST)
+        if self.kind == "rational":
+            distance = self.a / seen - self.b
+        elif self.kind == "inverse_square":
+            distance = np.sqrt(self.a / seen) - self.b
+        elif self.a == 0.0:
+            distance = (seen - self.c) / self.b
+        else:
+            root = np.sqrt(np.maximum(self.b * self.b - 4.0 * self.a * (self.c - seen), 0.0))
+            distance = (-self.b - root) / (2.0 * self.a)
+        return np.where(value > 0.0, np.clip(distance, 0.0, self.reach_m), self.reach_m)
+
+
+@dataclass(frozen=True)
+class Rim(Ring):
+    """Rays that start at the body's rim and answer to the nearest thing that they see."""
+
+    range_m: float = parameter(help="length of a ray from the rim", unit="m", above=0)
+    response: ResponseCurve = parameter(help="answer to distance")
+    noise: float = parameter(0.0, help="half width of the uniform noise added to the response", at_least=0, at_most=1)
+
+    def fault(self, radius_m: float) -> tuple[str, str] | None:
+        """As `Sheet.fault`."""
+        told = self.response.value(np.linspace(0.0, self.response.reach_m, 100))
+        if np.any(np.diff(told) > 0.0) or told[0] <= told[-1]:
+            return "response", "expected a curve that falls from the rim to reach_m"
+        return None
+
+
+# --- Proximity: active infrared, which sees its own light come back from robots, obstacles and walls.
+
+
+@dataclass(frozen=True)
+class Proximity(Rim):
+    """Rays from the body's rim that answer to the nearest thing on them. Sense: value (n, rays), 0 to 1."""
+
+
+# --- Passive infrared: a sensor with its own light off, which sees the light of other robots alone.
+
+
+@dataclass(frozen=True)
+class Infrared(Rim):
+    """Rays from the body's rim that answer to the nearest robot on them, unless an obstacle hides it; not to walls.
+
+    Beside proximity, which sees both, it tells robots from walls. Sense: value (n, rays), 0 to 1.
+    """
+
+
+# --- Light: photocells around the body.
+
+
+@dataclass(frozen=True)
+class Light(Ring):
+    """Photocells that answer to the arena's lights. Sense: value (n, sensors), 0 dark to 1."""
+
+    noise: float = parameter(0.0, help="half width of the uniform noise added to the response", at_least=0, at_most=1)
+
+
+# --- A laser scanner: the distance to the nearest thing on each of many rays.
+
+
+FULL_DEG = 360.0
+
+
+@dataclass(frozen=True)
+class Scan(RangedSheet):
+    """A laser scanner that turns at one height. Sense: range_m (n, rays), inf where nothing is within the range."""
+
+    rays: int = parameter(help="how many rays", at_least=1, at_most=10_000)
+    range_m: float = parameter(help="length of a ray from the scanner", unit="m", above=0)
+    range_min_m: float = parameter(0.0, help="what is nearer than this reads as if it were there", unit="m", at_least=0)
+    first_deg: float = parameter(0.0, help="where the first ray looks, counter-clockwise from ahead", unit="deg")
+    span_deg: float = parameter(
+        FULL_DEG,
+        help="angle from the first ray to the last; 360: rays all around, the last one step before the first",
+        unit="deg",
+        above=0,
+        at_most=FULL_DEG,
+    )
+    at_m: float = parameter(0.0, help="how far ahead of the body's centre the scanner stands", unit="m")
+    noise_m: float = parameter(0.0, help="standard deviation of the error", unit="m", at_least=0)
+    noise_relative: float = parameter(0.0, help="and that share of the distance", at_least=0, at_most=1)
+
+    def fault(self, radius_m: float) -> tuple[str, str] | None:
+        """As `Sheet.fault`."""
+        if self.range_min_m >= self.range_m:
+            return "range_min_m", f"expected less than range_m, got {self.range_min_m!r}"
+        if abs(self.at_m) > radius_m:
+            return "at_m", f"expected a place on the body, whose radius is {radius_m:g} m; got {self.at_m!r}"
+        return None
+
+    @property
+    def step_rad(self) -> float:
+        """The angle between two rays."""
+        gaps = self.rays if self.span_deg == FULL_DEG else max(self.rays - 1, 1)
+        return float(np.deg2rad(self.span_deg) / gaps)
+
+    @cached_property
+    def angle_rad(self) -> FloatArray:
+        """Where the rays look in the body's frame, in (-pi, pi], (rays,)."""
+        return within_a_turn(np.deg2rad(self.first_deg) + self.step_rad * np.arange(self.rays))
+
+    @cached_property
+    def direction(self) -> tuple[FloatArray, FloatArray]:
+        """Cosine and sine of `angle_rad`, (rays,) each."""
+        return np.cos(self.angle_rad), np.sin(self.angle_rad)

@@ -1,0 +1,39 @@
+"""What every sense's data sheet says: how often it reads, how late it tells, how much it loses, in which steps."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from swarmwire.comms.config import parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sheet:
+    """The data sheet of a sense; these keys all senses have, and each has its own beside them.
+
+    A reading passes through these stages, in this order: the truth, taken at `rate_hz`; noise; outliers; rounding to
+    steps; clipping to the range; drop-out. It is shown `delay_s` later, and until the next one is.
+    """
+
+    is_global: ClassVar[bool] = False  # whether it tells more than what is around the robot
+
+    rate_hz: float = parameter(
+        0.0, help="new readings per second, taken at ticks; 0: one in each tick", unit="Hz", at_least=0
+    )
+    delay_s: float = parameter(0.0, help="a reading is shown that much later, in whole ticks", unit="s", at_least=0)
+    drop_out: float = parameter(0.0, help="probability that a reading is lost", at_least=0, at_most=1)
+    step: float = parameter(
+        0.0, help="readings are rounded to whole multiples of it, in their unit; 0: they are not", at_least=0
+    )
+
+    def fault(self, radius_m: float) -> tuple[str, str] | None:
+        """A key whose value does not go with the others or a body of this radius, and what was expected; else None."""
+        return None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RangedSheet(Sheet):
+    """The data sheet of a sense whose readings lie within a known range."""
+
+    outlier: float = parameter(
+        0.0, help="probability that a reading is anything within the range instead", at_least=0, at_most=1
+    )

@@ -1,0 +1,198 @@
+"""Blackout: radios neither send nor receive."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.clock import to_ns
+from swarmwire.comms.config import parameter
+from swarmwire.comms.draws import purpose, uniform
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.events.effects import Conditions, alone
+from swarmwire.comms.events.event import LastingEvent
+from swarmwire.comms.events.selection import Groups, Selection, Swarm
+from swarmwire.comms.radio.config.radio import Radio, check_radio
+from swarmwire.comms.radio.config.ramps import Slope, check_number, radio_at
+from swarmwire.comms.radio.disruption import BACKLOGS, NO_ROBOT, Jammers
+
+
+@dataclass(frozen=True, kw_only=True)
+class Blackout(LastingEvent):
+    """The robots go on, deaf and mute, and do not know it.
+
+    What they send meanwhile ends, unless `backlog` has it wait until the radio is on again: then it goes on air, packet
+    after packet. Where blackouts overlap, the strictest backlog counts.
+    """
+
+    do: str = parameter("blackout", help="radios neither send nor receive", choices=("blackout",))
+    robots: Selection = parameter(help="whose radios; share and count choose among robots alive")
+    backlog: str = parameter(
+        "drop",
+        help="packets meanwhile: end at the usual pace, only the newest waits, or all do up to queue_limit",
+        choices=BACKLOGS,
+    )
+    needs_radio = True
+
+    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+        """Hold the radios off."""
+        conditions.backlogs[serial] = BACKLOGS.index(self.backlog)
+        conditions.blackouts[serial] = self.robots.rows(serial, swarm, conditions.alive)
+
+    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+        """Those whose radios nothing else holds off."""
+        return alone(serial, conditions.blackouts)
+
+
+# --- Gain: antennas that send or hear better or worse than they should.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gain(LastingEvent):
+    """The antennas of robots gain or lose, for what they send and what they hear each for itself; gains add up.
+
+    A robot whose `receive_db` alone has fallen is heard as before, but hears less: links differ by their direction.
+    """
+
+    do: str = parameter("gain", help="antennas send or hear better or worse", choices=("gain",))
+    robots: Selection = parameter(help="whose antennas; share and count choose among robots alive")
+    send_db: float = parameter(
+        0.0, help="added to the strength of all that they send", unit="dB", at_least=-200, at_most=100
+    )
+    receive_db: float = parameter(
+        0.0, help="added to the strength of all that they hear", unit="dB", at_least=-200, at_most=100
+    )
+    needs_radio = needs_signals = True
+
+    def check(self, groups: Groups) -> None:
+        """Raise BadInput for robots that there are not, or if nothing would change."""
+        super().check(groups)
+        if self.send_db == 0.0 and self.receive_db == 0.0:
+            raise BadInput("", "", "expected send_db or receive_db")
+
+    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+        """Change the antennas."""
+        chosen = self.robots.rows(serial, swarm, conditions.alive)
+        conditions.gains[serial] = np.where(chosen, np.array([[self.send_db], [self.receive_db]]), 0.0)
+
+    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+        """All that were chosen."""
+        return (conditions.gains[serial] != 0.0).any(axis=0)
+
+
+# --- Jammer: noise that drowns what robots near it should hear.
+
+
+PHASE = purpose("jammer phase")
+LEAST_PERIOD_S = 10e-6  # less than a symbol of any radio here: noise that comes and goes so fast is constant noise
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jammer(LastingEvent):
+    """A jammer adds its power to the noise of every robot of its arena: frames drown, and the air counts as busy.
+
+    It stands at a place, or robots carry it; who carries one is spared by it, and goes on carrying it when dead. Its
+    power falls by the radio's own path loss, shadowing and walls. It is on for `duty` of each period, from a phase
+    drawn for each jammer. A packet that would have been right without ends as `jammed`.
+    """
+
+    do: str = parameter("jammer", help="noise drowns what robots near it should hear", choices=("jammer",))
+    at: tuple[float, float] | None = parameter(None, help="where it stands, in the arena's frame", unit="m")
+    robots: Selection | None = parameter(None, help="who carry one each; share and count choose among robots alive")
+    power_dbm: float = parameter(
+        help="what it radiates, alike in all directions", unit="dBm", at_least=-100, at_most=100
+    )
+    duty: float = parameter(1.0, help="the share of time for which it is on", above=0, at_most=1)
+    period_s: float = parameter(0.01, help="from one time that it goes on to the next", unit="s", above=0, at_most=1e6)
+    needs_radio = needs_signals = True
+
+    def check(self, groups: Groups) -> None:
+        """Raise BadInput for neither or both of place and robots, or robots that there are not."""
+        if (self.at is None) == (self.robots is None):
+            raise BadInput("", "", "expected either at = [x, y] or robots")
+        super().check(groups)
+        if self.period_s < LEAST_PERIOD_S:
+            raise BadInput("", "period_s", f"expected at least {LEAST_PERIOD_S:f} s, got {self.period_s!r}")
+
+    def check_radio(self, radio: Radio) -> None:
+        """Raise BadInput for a disk, or where nothing on air disturbs anything."""
+        super().check_radio(radio)
+        if radio.access_or_default.method == "none":
+            raise BadInput("", "do", 'expected another radio.access.method than "none", with which nothing disturbs')
+
+    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+        """Put them up."""
+        if self.robots is None:
+            arena = np.arange(len(swarm.keys))
+            carrier = np.full(len(arena), NO_ROBOT)
+        else:
+            carrier = np.flatnonzero(self.robots.rows(serial, swarm, conditions.alive))
+            arena = carrier // swarm.robots
+        conditions.jammers[serial] = self._jammers(serial, swarm, arena, carrier)
+
+    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+        """Those who carry one, or all robots."""
+        changed = np.full(conditions.rows, self.robots is None)
+        if self.robots is not None:
+            changed[conditions.jammers[serial].carrier] = True
+        return changed
+
+    def _jammers(self, serial: int, swarm: Swarm, arena: IntArray, carrier: IntArray) -> Jammers:
+        k, period_ns = len(arena), to_ns(self.period_s)
+        index = np.where(carrier == NO_ROBOT, swarm.robots, carrier % swarm.robots)
+        u = uniform(swarm.keys[arena], index, serial, 0, PHASE)
+        x_m, y_m = self.at or (0.0, 0.0)
+        return Jammers(
+            arena=arena,
+            carrier=carrier,
+            x_m=np.full(k, x_m),
+            y_m=np.full(k, y_m),
+            power_dbm=np.full(k, self.power_dbm),
+            on_ns=np.full(k, max(round(self.duty * period_ns), 1)),
+            period_ns=np.full(k, period_ns),
+            phase_ns=(u * period_ns).astype(np.int64),
+        )
+
+
+# --- Ramp: a number of the radio moves to another value.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ramp(LastingEvent):
+    """A number of `[radio]` moves evenly to `to`, tick by tick, and stays there; undone, it is at once what it was.
+
+    Any number that the scenario or its preset gives, but `send_offset`, which holds for the whole run; groups' own
+    power and gain stay, and bursts given by steps move by `bad_s` and `good_s`. Packets that wait or are on air stay
+    so; airtime and limits are those of the moment at which a packet is handed over. A ramp sets out from what those
+    before it have made of the number.
+    """
+
+    do: str = parameter("ramp", help="a number of the radio moves to another value", choices=("ramp",))
+    what: str = parameter(help='the key of the number, such as "radio.loss" or "radio.bursts.bad_s"')
+    to: float = parameter(
+        help="where it ends, in the key's own unit and bounds; rounded on the way if it must be whole"
+    )
+    over_s: float = parameter(0.0, help="how long it takes; 0: it steps", unit="s", at_least=0, at_most=1e9)
+    needs_radio = True
+
+    def check_radio(self, radio: Radio) -> None:
+        """Raise BadInput for what is no number of this radio, or a value that contradicts its other keys."""
+        check_number(radio, self.what, self.to)
+        slope = replace(self._slope(), start_ns=0)
+        # Some keys take only certain values, which may lie at the end of the way but not along it.
+        for key, at_ns in (("to", slope.lasts_ns), ("over_s", slope.lasts_ns // 2)):
+            try:
+                check_radio(radio_at(radio, [slope], at_ns), "")
+            except BadInput as error:
+                raise BadInput("", key, f"{error.key}: {error.expected}") from None
+
+    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+        """Let the number move; without it, it is at once what it was."""
+        conditions.slopes[serial] = self._slope()
+
+    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+        """All robots."""
+        return np.ones(conditions.rows, np.bool_)
+
+    def _slope(self) -> Slope:
+        return Slope(self.what, self.to, to_ns(self.at_s), to_ns(self.over_s))

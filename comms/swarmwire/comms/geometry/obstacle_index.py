@@ -1,0 +1,132 @@
+"""Obstacles sorted into cells once, so that what a robot looks at does not depend on how many there are. Compiled.
+
+A cell lists every obstacle within a given reach of it: a robot reads the list of its own cell and no other. On a torus
+obstacles are there once more, as images, wherever they reach into the arena over its edge.
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.geometry.obstacles import Obstacles, ray_to_circle, ray_to_polygon
+from swarmwire.comms.geometry.robot_index import Cells, cells_over, column_of, row_of
+from swarmwire.comms.kernels import borrowing
+
+CELLS_PER_OBSTACLE = 4
+MARGIN_M = 1e-9  # an obstacle that is left out is farther than any rounding
+
+
+class Things(NamedTuple):
+    """Obstacles of all arenas in one list; things with sides are polygons, those without circles."""
+
+    shape: FloatArray  # (things, 4) x, y, radius of a circle around it, height of its top in m
+    side_start: IntArray  # (things + 1,) thing k has the sides side_start[k] to side_start[k + 1] - 1
+    side: FloatArray  # (sides, 5) as `geometry.sides_of` has them
+    cells: Cells
+
+
+def things_within(
+    obstacles: Obstacles, size_m: tuple[float, float], reach_m: float, torus: bool, images_m: float | None = None
+) -> Things:
+    """The obstacles of arenas of this size by cell, for looking `reach_m` far.
+
+    On a torus their images are among them that are within `images_m` of the arena, which is the reach if left out.
+    """
+    arenas = len(obstacles.circle_start) - 1
+    shape = np.concatenate(
+        [
+            np.column_stack([obstacles.circle, obstacles.circle_top_m]),
+            np.column_stack([obstacles.polygon, obstacles.polygon_top_m]),
+        ]
+    )
+    starts = obstacles.circle_start, obstacles.polygon_start
+    arena = np.concatenate([np.repeat(np.arange(arenas), np.diff(start)) for start in starts])
+    sides = np.concatenate([np.zeros(len(obstacles.circle), np.int64), np.diff(obstacles.side_start)])
+    shape, arena, sides, side = _with_images(shape, arena, sides, obstacles.side, size_m, images_m or reach_m, torus)
+    side_start = np.concatenate([[0], np.cumsum(sides)])
+    per_obstacle_m = np.sqrt(size_m[0] * size_m[1] * arenas / (CELLS_PER_OBSTACLE * max(len(shape), 1)))
+    cell_m = max(0.5 * reach_m, float(per_obstacle_m)) if len(shape) else max(size_m)
+    cells = cells_over(size_m, cell_m, arenas, 0)
+    facts = shape, arena, side_start, side, cells, reach_m + MARGIN_M
+    count = np.zeros(len(cells.start) - 1, np.int64)
+    _list(count, np.empty(0, np.int64), *facts)
+    start = np.concatenate([[0], np.cumsum(count)])
+    item = np.empty(start[-1], np.int64)
+    _list(start[:-1].copy(), item, *facts)
+    return Things(shape, side_start, side, cells._replace(start=start, item=item))
+
+
+def _with_images(shape, arena, sides, side, size_m, reach_m, torus):
+    """The same arrays, with the images of what is within reach of the arena from beyond an edge."""
+    owner = np.repeat(np.arange(len(shape)), sides)
+    parts = [(shape, arena, sides, side)]
+    offsets = (-1, 0, 1) if torus else (0,)
+    for i, j in ((i, j) for i in offsets for j in offsets if i or j):
+        shift_x, shift_y = i * size_m[0], j * size_m[1]
+        moved = shape + np.array([shift_x, shift_y, 0.0, 0.0])
+        beyond = np.abs(moved[:, :2]) - moved[:, 2:3] - 0.5 * np.array(size_m)
+        near = (beyond < reach_m + MARGIN_M).all(axis=1)
+        moved_side = side + np.array([shift_x, shift_y, 0.0, 0.0, 0.0])
+        moved_side[:, 4] += side[:, 2] * shift_x + side[:, 3] * shift_y
+        parts.append((moved[near], arena[near], sides[near], moved_side[near[owner]]))
+    return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
+
+
+@njit(cache=True)
+def _list(start, item, shape, arena, side_start, side, cells, reach_m):
+    """Count what is within reach of each cell into start[c], or, given `item`, write it from start[c] on."""
+    wide, high = 1.0 / cells.per_x, 1.0 / cells.per_y
+    for k in range(len(shape)):
+        x, y, radius = shape[k, 0], shape[k, 1], shape[k, 2] + reach_m
+        left, below = np.floor((x - radius) / wide + 0.5 * cells.nx), np.floor((y - radius) / high + 0.5 * cells.ny)
+        columns = int(np.floor((x + radius) / wide + 0.5 * cells.nx) - left) + 1
+        rows = int(np.floor((y + radius) / high + 0.5 * cells.ny) - below) + 1
+        around = columns > cells.nx or rows > cells.ny  # some cells come up twice: it is listed in all, once
+        for j in range(min(rows, cells.ny)):
+            for i in range(min(columns, cells.nx)):
+                at_x, at_y = (left + i + 0.5 - 0.5 * cells.nx) * wide, (below + j + 0.5 - 0.5 * cells.ny) * high
+                if around or _is_near(at_x, at_y, 0.5 * wide, 0.5 * high, shape[k], side_start, side, k, reach_m):
+                    c = (arena[k] * cells.ny + int(below + j) % cells.ny) * cells.nx + int(left + i) % cells.nx
+                    if len(item):
+                        item[start[c]] = k
+                    start[c] += 1
+
+
+@njit(cache=True)
+def _is_near(x, y, half_x, half_y, shape, side_start, side, k, reach_m):
+    """Whether an obstacle may be within reach of a cell around x, y; in doubt it is."""
+    if side_start[k] == side_start[k + 1]:
+        apart_x, apart_y = max(abs(shape[0] - x) - half_x, 0.0), max(abs(shape[1] - y) - half_y, 0.0)
+        return apart_x * apart_x + apart_y * apart_y <= (shape[2] + reach_m) ** 2
+    for i in range(side_start[k], side_start[k + 1]):
+        nx, ny = side[i, 2], side[i, 3]
+        if nx * x + ny * y - side[i, 4] - half_x * abs(nx) - half_y * abs(ny) > reach_m:
+            return False
+    return True
+
+
+@borrowing(from_python=True)
+def near_things(found, things, arena, x, y, reach_m, bottom_m):
+    """Write into `found` the obstacles higher than `bottom_m` that may be within reach of a place; how many."""
+    count = 0
+    cells = things.cells
+    c = (arena * cells.ny + row_of(cells, y)) * cells.nx + column_of(cells, x)
+    for at in range(cells.start[c], cells.start[c + 1]):
+        k = cells.item[at]
+        ox, oy, reach = things.shape[k, 0] - x, things.shape[k, 1] - y, reach_m + things.shape[k, 2]
+        if things.shape[k, 3] > bottom_m and ox * ox + oy * oy < reach * reach:
+            found[count] = k
+            count += 1
+    return count
+
+
+@borrowing(from_python=True)
+def ray_to_thing(px, py, dx, dy, things, k):
+    """Distance along the unit ray (dx, dy) from (px, py) to an obstacle; 0 from inside, inf if it misses."""
+    if things.side_start[k] == things.side_start[k + 1]:
+        return ray_to_circle(px, py, dx, dy, things.shape[k, 0], things.shape[k, 1], things.shape[k, 2])
+    return ray_to_polygon(px, py, dx, dy, things, k)

@@ -1,0 +1,1 @@
+"""Measurements of a radio without a run: coverage and contention."""

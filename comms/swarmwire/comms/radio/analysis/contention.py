@@ -1,0 +1,68 @@
+"""Contention: nodes in one spot that all send at an interval, as the figure by which simulators are compared."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.clock import NS_PER_S, tick_start_ns
+from swarmwire.comms.draws import derive_key
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, Sent
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.truth import Finished
+
+SPOT_M = (2.0, 2.0)
+LATE_S = 0.5  # after the last packet that counts, its reception does too
+
+
+@dataclass(frozen=True, slots=True)
+class Contention:
+    """What came of it, over all packets handed over after the warm-up."""
+
+    packets: int
+    delivery_ratio: float  # receptions / (packets x other nodes)
+    mean_delay_s: float | None  # from handing over to hearing; None if nothing was heard
+    access_failure_share: float  # packets given up for want of a free channel
+
+
+def contention(
+    radio: Radio,
+    nodes: int,
+    payload_bytes: int,
+    interval_s: float,
+    seeds: Sequence[int],
+    warm_up_s: float = 0.5,
+    measured_s: float = 2.0,
+) -> Contention:
+    """Each of `nodes` broadcasts so many bytes in each interval (rounded to 1/n s), as the radio's send_offset says.
+
+    An arena per seed. Traffic goes on after the measured time, until its packets have arrived.
+    """
+    rate_hz = max(round(1.0 / interval_s), 1)
+    rows = nodes * len(seeds)
+    keys = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
+    air = Air(radio, keys, nodes, SPOT_M, obstacle_arrays(((),) * len(seeds)), rate_hz)
+    payloads = Payloads.of([bytes(payload_bytes)] * rows)
+    sent = Sent(np.arange(rows), np.full(rows, BROADCAST), payloads)
+    first, last = round(warm_up_s * rate_hz), round((warm_up_s + measured_s) * rate_hz)
+    air.hold(np.zeros((rows, 3)), np.ones(rows, np.bool_))
+    counted = (last - first) * rows
+    heard = delay_ns = gave_up = 0
+    for tick in range(last + round(LATE_S * rate_hz) + 1):
+        at_ns = tick_start_ns(tick, rate_hz)
+        finished = air.advance(at_ns).finished
+        due = (finished.sequence >= first) & (finished.sequence < last)
+        reached = due & (finished.fate == Fate.HEARD)
+        heard += int(finished.receivers[reached].sum())
+        delay_ns += int((finished.final_at_ns - finished.sent_at_ns)[reached].sum())
+        gave_up += _packets(finished, due & (finished.fate == Fate.CHANNEL_BUSY))
+        air.send(at_ns, tick, sent)
+    mean_delay_s = delay_ns / heard / NS_PER_S if heard else None
+    return Contention(counted, heard / (counted * (nodes - 1)), mean_delay_s, gave_up / counted)
+
+
+def _packets(finished: Finished, which: BoolArray) -> int:
+    return int(np.count_nonzero(which & (finished.receiver < 0)))

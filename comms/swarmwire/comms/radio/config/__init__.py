@@ -1,0 +1,1 @@
+"""What a scenario says of a radio: tables, checks, presets. No compiled code."""

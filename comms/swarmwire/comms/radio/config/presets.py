@@ -1,0 +1,299 @@
+"""A preset: a kind of radio as a table of a scenario's `[radio]`, with the source of its figures."""
+
+import math
+from collections.abc import Callable, Mapping
+from copy import deepcopy
+from typing import Any, NamedTuple, cast
+
+
+class Preset(NamedTuple):
+    """A kind of radio."""
+
+    told: str  # what it is
+    source: str  # of its figures
+    radio: dict[str, Any]  # keys of [radio]
+    otherwise: str = ""  # where it is other than what it is named after
+
+
+# --- Success tables of modulations that have no receiver of their own here, as a scenario writes them.
+
+
+STEP_DB = 0.5
+DIGITS = 9  # a bit in a billion more or less is none in a frame
+
+
+def fsk_success() -> dict[str, Any]:
+    """A bit by binary FSK, received without its phase: bit errors 0.5 exp(-SINR / 2) (Proakis, Digital Communications).
+
+    GFSK with Bluetooth's deviation is no better; a bit a symbol in a bandwidth of the bit rate, so that SINR is Eb/N0.
+    """
+    return _table(0.0, 18.0, 1, lambda sinr: 1.0 - 0.5 * math.exp(-0.5 * sinr))
+
+
+def qpsk_success_of_bytes() -> dict[str, Any]:
+    """A byte as the simulators gz and SubT have it: erfc(sqrt(SINR)) is the loss of a byte, not of a bit."""
+    return _table(-10.0, 15.0, 8, lambda sinr: 1.0 - math.erfc(math.sqrt(sinr)))
+
+
+def _table(least_db: float, most_db: float, bits: int, success: Callable[[float], float]) -> dict[str, Any]:
+    rows = round((most_db - least_db) / STEP_DB) + 1
+    sinr_db = [least_db + STEP_DB * row for row in range(rows)]
+    found = [round(success(10.0 ** (0.1 * db)), DIGITS) for db in sinr_db]
+    return {"sinr_db": sinr_db, "success": found, "frame_bits": bits}
+
+
+# --- Presets that reach to a fixed distance: textbooks' models, and the range and bearing of simulated robots.
+
+
+DISKS: dict[str, Preset] = {
+    "ideal": Preset(
+        "reaches everywhere, loses nothing, takes next to no time",
+        "what abstract swarm models assume",
+        {"model": "disk", "range_m": 10_000.0, "line_of_sight": False, "bit_rate_bps": 10**9},
+    ),
+    "disk": Preset("reaches 2 m, up to the next obstacle", "unit disk graphs", {"model": "disk", "range_m": 2.0}),
+    "bernoulli": Preset(
+        "a disk that loses every tenth packet",
+        "the independent losses of textbooks",
+        {"model": "disk", "range_m": 2.0, "loss": 0.1},
+    ),
+    "gilbert": Preset(
+        "a disk whose links fail for half a second in ten",
+        "E. N. Gilbert, Bell Syst. Tech. J. 39, 1960",
+        {"model": "disk", "range_m": 2.0, "bursts": {"bad_s": 0.5, "good_s": 10.0}},
+    ),
+    "argos-rab": Preset(
+        "ARGoS's range and bearing of the foot-bot: 3 m in line of sight, 10 bytes, from step to step",
+        "ARGoS 3, ci_range_and_bearing, the foot-bot's entity, and rab_medium for what blocks",
+        {
+            "model": "disk",
+            "range_m": 3.0,
+            "line_of_sight": True,
+            "bodies_block": True,
+            "max_payload_bytes": 10,
+            "bit_rate_bps": 10**9,
+            "send_offset": "tick",
+            "gives": {"range": {}, "bearing": {}},
+        },
+    ),
+    "infrared-epuck": Preset(
+        "ARGoS's range and bearing of the e-puck: 0.8 m in line of sight, 2 bytes beside the tag",
+        "ARGoS 3, the e-puck's entity, and rab_medium for what blocks",
+        {
+            "model": "disk",
+            "range_m": 0.8,
+            "line_of_sight": True,
+            "bodies_block": True,
+            "max_payload_bytes": 4,
+            "bit_rate_bps": 10**9,
+            "send_offset": "tick",
+            "gives": {"range": {}, "bearing": {}},
+        },
+    ),
+}
+
+
+# --- Presets with the figures of other simulators' radios, for scenarios that come from there.
+
+
+_GAZEBO: dict[str, Any] = {
+    "model": "log-distance",
+    "max_payload_bytes": 1500,
+    "shadowing": {"deviation_db": 10.0, "correlation_m": 1.0},
+    "noise": {"bandwidth_hz": 20e6, "figure_db": 10.965},  # -90 dBm
+    "reception": {"model": "table", "table": qpsk_success_of_bytes(), "preamble_sinr_db": -10.0},
+    "access": {"method": "none"},
+}
+_SPREAD_AND_RATE = (
+    "the spread of 10 dB stays with the place, where the simulator draws it anew for each packet; what exceeds the bit "
+    "rate waits, where the simulator drops it"
+)
+SIMULATORS: dict[str, Preset] = {
+    "gz-rfcomms": Preset(
+        "Gazebo's RFComms as it comes: 27 dBm, 40 dB + 25 log d, 50 m at most, 54 Mbit/s, no interference",
+        "gz-sim, systems/rf_comms/RFComms.cc, defaults; constant below 1 m, where it has no bound",
+        {
+            **_GAZEBO,
+            "range_m": 50.0,
+            "bit_rate_bps": 54_000_000,
+            "log_distance": {"exponent": 2.5, "reference_loss_db": 40.0},
+            "antenna": {"power_dbm": 27.0},
+        },
+        _SPREAD_AND_RATE,
+    ),
+    "subt": Preset(
+        "the DARPA SubT simulator's: 20 dBm, 40 dB + 15 log(0.55 d), 500 m at most, 1 Mbit/s, no interference",
+        "osrf/subt, competition.ign and subt_rf_interface; 0.2 x 10 log(0.55 x 50 m) = 3 dB per unit of visibility",
+        {
+            **_GAZEBO,
+            "range_m": 500.0,
+            "bit_rate_bps": 1_000_000,
+            "log_distance": {"exponent": 1.5, "reference_loss_db": 36.105},  # 40 dB + 15 log 0.55
+            "antenna": {"power_dbm": 20.0},
+            "walls": {"crossing_db": 3.0},
+        },
+        f"{_SPREAD_AND_RATE}; 3 dB in each obstacle stand for its table of visibility, which raises the exponent by "
+        "0.2 per unit and cuts off at 10; there are no breadcrumbs",
+    ),
+}
+
+
+# --- Presets of radio standards, with the timing that they prescribe.
+
+
+_IEEE_802_15_4: dict[str, Any] = {
+    "model": "log-distance",
+    "frequency_hz": 2.44e9,
+    "bit_rate_bps": 250_000,
+    "overhead_bytes": 17,
+    "max_payload_bytes": 116,
+    "log_distance": {"exponent": 3.0},
+    "antenna": {"power_dbm": 0.0},
+    "noise": {"bandwidth_hz": 2e6, "figure_db": 9.5},
+    "reception": {"model": "802.15.4", "preamble_sinr_db": -5.0},
+    "access": {"method": "csma-802154"},
+}
+_WIFI: dict[str, Any] = {
+    "model": "log-distance",
+    "overhead_bytes": 64,
+    "max_payload_bytes": 1472,
+    "queue_limit": 500,
+    "log_distance": {"exponent": 3.0},
+    "antenna": {"power_dbm": 16.0},
+    "access": {"method": "dcf"},
+}
+STANDARDS: dict[str, Preset] = {
+    "ieee802154": Preset(
+        "IEEE 802.15.4 at 2.4 GHz, 0 dBm, sensitivity -101 dBm, unslotted CSMA/CA, short addresses",
+        "IEEE 802.15.4-2006; sensitivity of the AT86RF233's data sheet; preamble as in ns-3",
+        _IEEE_802_15_4,
+    ),
+    "wifi-b-1M": Preset(
+        "IEEE 802.11b ad hoc at 1 Mbit/s in channel 1, UDP over IPv4",
+        "IEEE 802.11-2007; power, noise figure and preamble as in ns-3",
+        {
+            **_WIFI,
+            "frequency_hz": 2.412e9,
+            "bit_rate_bps": 1_000_000,
+            "frame": "802.11b",
+            "noise": {"bandwidth_hz": 22e6, "figure_db": 7.0},
+            "reception": {"model": "802.11b", "preamble_sinr_db": 4.0, "preamble_dbm": -94.0, "take_over_s": 4e-6},
+        },
+    ),
+    "wifi-a-6M": Preset(
+        "IEEE 802.11a ad hoc at 6 Mbit/s in channel 36, UDP over IPv4",
+        "IEEE 802.11-2007; power, noise figure and preamble as in ns-3",
+        {
+            **_WIFI,
+            "frequency_hz": 5.18e9,
+            "bit_rate_bps": 6_000_000,
+            "frame": "802.11a",
+            "noise": {"bandwidth_hz": 20e6, "figure_db": 7.0},
+            "reception": {"model": "802.11ag", "preamble_sinr_db": 4.0, "preamble_dbm": -82.0, "take_over_s": 4e-6},
+        },
+    ),
+    "ble-1M": Preset(
+        "Bluetooth LE advertising at 1 Mbit/s, 0 dBm, sensitivity -96 dBm: 27 bytes, sent without listening",
+        "Bluetooth Core Specification 5.4, 6.B; sensitivity of the nRF54L15's data sheet, at 0.1 % of bits wrong",
+        {
+            "model": "log-distance",
+            "frequency_hz": 2.402e9,
+            "bit_rate_bps": 1_000_000,
+            # Preamble 1, access address 4, header 2, advertiser 6, check 3; of the data: length, type, company 4.
+            "overhead_bytes": 20,
+            "max_payload_bytes": 27,
+            "log_distance": {"exponent": 3.0},
+            "antenna": {"power_dbm": 0.0},
+            "noise": {"bandwidth_hz": 1e6, "figure_db": 7.04},  # what makes the sensitivity of it
+            "reception": {
+                "model": "table",
+                "table": fsk_success(),
+                "preamble_sinr_db": 5.0,  # below it hardly any access address is right
+                "sensitivity_dbm": -96.0,
+            },
+            "access": {"method": "aloha"},
+        },
+        "one channel, where advertisers send on three in turn, and a scanner that never pauses; errors are those of "
+        "binary FSK, with interference as noise",
+    ),
+}
+
+
+# --- Presets of what is no radio: infrared light, and sound in water.
+#
+# Sound is told in dBm of acoustic power: a level in dB re 1 uPa, less 140.8 dB, is the power through a sphere of 1 m.
+
+
+OTHER_MEDIA: dict[str, Preset] = {
+    "kilobot": Preset(
+        "the Kilobot's infrared: 0.1 m, 9 bytes beside the tag, 30 kbit/s, carrier sense, distances to 2 mm",
+        "M. Rubenstein et al., ICRA 2012; kilolib, message.h",
+        {
+            "model": "log-distance",
+            "range_m": 0.1,
+            "line_of_sight": True,
+            "bit_rate_bps": 30_000,
+            "overhead_bytes": 1,  # the tag's two bytes stand for the type and half of the checksum
+            "max_payload_bytes": 11,
+            "queue_limit": 1,
+            "log_distance": {"reference_loss_db": 40.0},
+            "reception": {"model": "threshold", "least_sinr_db": 6.0, "preamble_sinr_db": 6.0},
+            "access": {"method": "csma-802154", "acknowledged": False},
+            "gives": {"range": {"noise_m": 0.002}},
+        },
+        "messages that overlap are lost; carrier sense is that of IEEE 802.15.4, which gives up after 5 tries, where "
+        "Kilobots go on trying; strength does not fall with distance, and its dBm tell nothing",
+    ),
+    "acoustic": Preset(
+        "a small acoustic modem in the sea: 24 to 32 kHz, 640 bit/s, 168 dB re 1 uPa at 1 m (27.2 dBm), 1500 m/s",
+        "Newcastle University, nanomodem v3 (USMART, 2018; Sherlock et al., Electronics 11, 2022: right from -4.5 dB); "
+        "absorption: Thorp; noise: Coates, in M. Stojanovic, ACM MC2R 11, 2007",
+        {
+            "model": "log-distance",
+            "frequency_hz": 28e3,
+            "propagation_mps": 1500.0,
+            "bit_rate_bps": 640,
+            "overhead_bytes": 24,  # 64 bytes then take 1.1 s, the 463 bit/s of the data sheet
+            "max_payload_bytes": 64,
+            "log_distance": {"exponent": 2.0, "reference_loss_db": 0.0, "absorption_db_per_m": 0.0074},
+            "antenna": {"power_dbm": 27.2},
+            "noise": {"bandwidth_hz": 8e3, "figure_db": 70.8},  # 37.6 dB re 1 uPa in 1 Hz
+            "reception": {"model": "threshold", "least_sinr_db": -4.5, "preamble_sinr_db": -4.5},
+            "access": {"method": "aloha"},
+        },
+        "spherical spreading with absorption and the noise of 5 m/s of wind, without echoes, layers and Doppler shift; "
+        "of two frames as strong the first survives, other frames being noise to it; which overlap is decided by when "
+        "they were sent, whatever the distance: only what is heard is late",
+    ),
+}
+
+
+# --- Presets: kinds of radio as tables of a scenario's `[radio]`, each with the source of its figures.
+#
+# A preset gives values where the scenario gives none; what the scenario says wins, key by key, within tables, too.
+
+
+PATH_LOSS = ("log_distance", "two_ray", "itu_indoor")
+PRESETS: dict[str, Preset] = {**DISKS, **STANDARDS, **SIMULATORS, **OTHER_MEDIA}  # by name
+
+
+def with_preset(radio: Mapping[str, Any]) -> dict[str, Any]:
+    """The radio's table with the values of its preset, if it names a known one, where it has none itself."""
+    name = radio.get("preset")
+    preset = PRESETS.get(name) if isinstance(name, str) else None
+    if preset is None:
+        return dict(radio)
+    values = dict(preset.radio)
+    if radio.get("model", values["model"]) != values["model"]:  # another model's path loss goes with it
+        values = {key: value for key, value in values.items() if key not in PATH_LOSS}
+    return _filled(radio, values)
+
+
+def _filled(given: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
+    filled = deepcopy(dict(given))
+    for key, value in defaults.items():
+        if isinstance(value, dict) and isinstance(filled.get(key), dict):
+            filled[key] = _filled(cast("dict[str, Any]", filled[key]), cast("dict[str, Any]", value))
+        else:
+            filled.setdefault(key, deepcopy(cast(object, value)))
+    return filled

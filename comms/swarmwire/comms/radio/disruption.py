@@ -1,0 +1,134 @@
+"""Jammers: what sends noise, where, how strong, and when."""
+
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+
+NO_ROBOT = -1
+
+
+class Jammers(NamedTuple):
+    """A row per jammer and arena: on for `on_ns` of each period, which begins at its phase, and off for the rest."""
+
+    arena: IntArray  # (k,)
+    carrier: IntArray  # (k,) robot row with which it moves, or NO_ROBOT
+    x_m: FloatArray  # (k,) where it stands, if nobody carries it
+    y_m: FloatArray  # (k,)
+    power_dbm: FloatArray  # (k,) radiated
+    on_ns: IntArray  # (k,)
+    period_ns: IntArray  # (k,)
+    phase_ns: IntArray  # (k,) 0 to period - 1
+
+    @classmethod
+    def none(cls) -> "Jammers":
+        """No jammers."""
+        whole, real = np.empty(0, np.int64), np.empty(0)
+        return cls(whole, whole, real, real, real, whole, whole, whole)
+
+    def followed_by(self, later: "Jammers") -> "Jammers":
+        """These and then the later ones."""
+        if not len(self.arena):
+            return later
+        return Jammers._make(np.concatenate(columns) for columns in zip(self, later, strict=True))
+
+    def places(self, pose: FloatArray) -> FloatArray:
+        """Where each is while robots stand at `pose` (rows, 3): x and y in m, (k, 2)."""
+        own = np.stack([self.x_m, self.y_m], axis=1)
+        return np.where((self.carrier == NO_ROBOT)[:, None], own, pose[self.carrier, :2])
+
+    def is_on(self, at_ns: int) -> BoolArray:
+        """Which are on at a time, and from it on, (k,)."""
+        return (at_ns - self.phase_ns) % self.period_ns < self.on_ns
+
+    @property
+    def duty(self) -> FloatArray:
+        """The share of time for which each is on, (k,)."""
+        return self.on_ns / self.period_ns
+
+    def toggles(self, from_ns: int, until_ns: int) -> tuple[IntArray, IntArray]:
+        """When jammers go on or off from `from_ns` on and before `until_ns`, and which, in the order (time, row)."""
+        at_ns, which = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+        for row in np.flatnonzero(self.on_ns < self.period_ns).tolist():
+            period_ns = self.period_ns[row]
+            for first_ns in (self.phase_ns[row], self.phase_ns[row] + self.on_ns[row]):
+                start_ns = from_ns + (first_ns - from_ns) % period_ns
+                times_ns = np.arange(start_ns, until_ns, period_ns, dtype=np.int64)
+                at_ns.append(times_ns)
+                which.append(np.full(len(times_ns), row))
+        times_ns, rows = np.concatenate(at_ns), np.concatenate(which)
+        order = np.lexsort((rows, times_ns))
+        return times_ns[order], rows[order]
+
+
+# --- What keeps robots from sending and hearing, whatever the medium would do.
+
+
+# What becomes of the packets that a radio should send while it is off: DROP, they end at the usual pace; NEWEST, the
+# newest waits until it is on again; ALL, they wait in its queue.
+BACKLOGS = ("drop", "newest", "all")
+DROP, NEWEST, ALL = range(3)
+
+
+@dataclass(slots=True)
+class Disruption:
+    """The state of robots and radios at one time."""
+
+    alive: BoolArray  # (rows,)
+    radio_on: BoolArray  # (rows,)
+    backlog: IntArray  # (rows,) DROP, NEWEST or ALL: for when the radio is off
+    sides: IntArray  # (partitions, rows) each robot's set in each partition, from 1; 0: in none
+    one_way: IntArray  # (partitions, rows) the same, of those in which only the second does not hear the first
+    send_gain_db: FloatArray  # (rows,) added to the strength of all that a robot sends
+    receive_gain_db: FloatArray  # (rows,) added to the strength of all that a robot hears
+    jammers: Jammers
+
+    @classmethod
+    def none(cls, rows: int) -> "Disruption":
+        """All are alive, with radios on, and no one is kept from anyone."""
+        nobody = np.empty((0, rows), np.int64)
+        return cls(
+            alive=np.ones(rows, np.bool_),
+            radio_on=np.ones(rows, np.bool_),
+            backlog=np.full(rows, DROP),
+            sides=nobody,
+            one_way=nobody,
+            send_gain_db=np.zeros(rows),
+            receive_gain_db=np.zeros(rows),
+            jammers=Jammers.none(),
+        )
+
+    def become(self, other: "Disruption") -> None:
+        """Take over all that holds in another; the arrays are shared."""
+        for of in fields(self):
+            setattr(self, of.name, getattr(other, of.name))
+
+    @property
+    def anything(self) -> bool:
+        """Whether anybody is kept from anything."""
+        return len(self.sides) + len(self.one_way) > 0 or self.anyone_out
+
+    @property
+    def anyone_out(self) -> bool:
+        """Whether anybody is dead, or a radio off."""
+        return not (self.alive.all() and self.radio_on.all())
+
+    @property
+    def backlog_now(self) -> IntArray:
+        """What waits at each radio until it is on again, (rows,): NEWEST or ALL; DROP where nothing does."""
+        return np.where(self.radio_on | ~self.alive, DROP, self.backlog)
+
+    def apart(self, sender: IntArray, receiver: IntArray) -> BoolArray:
+        """From which senders some partition keeps which receivers, pairs of robot rows, (k,)."""
+        found = np.zeros(len(sender), np.bool_)
+        for side in self.sides:
+            found |= (side[sender] != side[receiver]) & (side[sender] > 0) & (side[receiver] > 0)
+        for side in self.one_way:
+            found |= (side[sender] == 1) & (side[receiver] == 2)
+        return found
+
+    def joined(self, a: IntArray, b: IntArray) -> BoolArray:
+        """Which pairs of robot rows have radios that are on, and no partition between them either way, (k,)."""
+        return self.radio_on[a] & self.radio_on[b] & ~self.apart(a, b) & ~self.apart(b, a)

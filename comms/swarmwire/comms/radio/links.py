@@ -1,0 +1,105 @@
+"""What becomes of packets at their receivers, as a table: the one thing that all stages of the channel work on."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.radio.transmissions import Transmissions
+
+THE_REST = -1
+HEARD, OUT_OF_RANGE = int(Fate.HEARD), int(Fate.OUT_OF_RANGE)
+
+
+class Links(NamedTuple):
+    """A row per packet and receiver that it might reach, and one row per packet for the rest of its intended receivers.
+
+    That last row (receiver THE_REST) only counts: out of range by subtraction, or the fate that the sender's radio gave
+    to all. Stages never see it. Fate HEARD means, until the chain has ended, "nothing has stopped it so far".
+    """
+
+    packet: IntArray  # (k,) row in the table of transmissions
+    sender: IntArray  # (k,) robot row
+    receiver: IntArray  # (k,) robot row, or THE_REST
+    sequence: IntArray  # (k,) of the packet
+    receivers: IntArray  # (k,) how many intended receivers the row stands for
+    in_range: IntArray  # (k,) how many of them were in range after path loss and walls
+    fate: IntArray  # (k,) a Fate
+    final_at_ns: IntArray  # (k,) when the fate becomes final
+    rssi_dbm: FloatArray  # (k,) strength at the receiver; NaN where there is none
+    given: FloatArray  # (k, columns) what the receiver learns, in the order of the radio's `gives.columns`
+
+    @classmethod
+    def under_way(
+        cls,
+        packet: IntArray,
+        sender: IntArray,
+        receiver: IntArray,
+        sequence: IntArray,
+        final_at_ns: IntArray,
+        columns: int,
+    ) -> "Links":
+        """Links that nothing has stopped so far, as the first stage gets them."""
+        k = len(packet)
+        one, zero = np.ones(k, np.int64), np.full(k, HEARD, np.int64)
+        given, rssi_dbm = np.zeros((k, columns)), np.full(k, np.nan)
+        return cls(packet, sender, receiver, sequence, one, one.copy(), zero, final_at_ns, rssi_dbm, given)
+
+    @classmethod
+    def with_the_rest(
+        cls, packets: Transmissions, packet: IntArray, receiver: IntArray, in_range: IntArray, columns: int
+    ) -> "Links":
+        """Links of packets that go on air, which nothing has stopped so far, then the row of each packet for the rest.
+
+        `packet` and `receiver` are those of the links; `in_range` (packets,) are the receivers that a packet would have
+        reached that never goes on air, else 0.
+        """
+        sender, sequence, off_air_at_ns = packets.sender, packets.sequence, packets.off_air_at_ns
+        numbers = _with_the_rest(
+            packet, receiver, sender, sequence, off_air_at_ns, packets.intended, packets.fate, in_range
+        )
+        rows = numbers.shape[1]
+        return cls._make([*numbers, np.full(rows, np.nan), np.zeros((rows, columns))])
+
+    @classmethod
+    def none(cls, columns: int) -> "Links":
+        """No links."""
+        nothing = np.empty(0, np.int64)
+        return cls.under_way(nothing, nothing, nothing, nothing, nothing, columns)
+
+    def select(self, index: IntArray) -> "Links":
+        """The rows of `index`, in its order."""
+        return Links._make(column.take(index, axis=0) for column in self)
+
+    def first(self, rows: int) -> "Links":
+        """The first so many rows; what is changed in them changes here."""
+        return Links._make(column[:rows] for column in self)
+
+    def followed_by(self, later: "Links") -> "Links":
+        """These rows and then the later ones."""
+        if not len(self.packet):
+            return later
+        return Links._make(np.concatenate(columns) for columns in zip(self, later, strict=True))
+
+
+@njit(cache=True)
+def _with_the_rest(packet, receiver, sender, sequence, off_air_at_ns, intended, fate, in_range):
+    """The columns of `Links` that are whole numbers, in their order, (8, links + packets)."""
+    links, packets = len(packet), len(sender)
+    table = np.empty((8, links + packets), np.int64)
+    others = intended.copy()
+    for row in range(links):
+        p = packet[row]
+        others[p] -= 1
+        table[0, row], table[1, row], table[2, row], table[3, row] = p, sender[p], receiver[row], sequence[p]
+        table[4, row], table[5, row], table[6, row], table[7, row] = 1, 1, HEARD, off_air_at_ns[p]
+    for p in range(packets):
+        row = links + p
+        table[0, row], table[1, row], table[2, row], table[3, row] = p, sender[p], THE_REST, sequence[p]
+        table[4, row], table[5, row], table[7, row] = others[p], in_range[p], off_air_at_ns[p]
+        table[6, row] = OUT_OF_RANGE if fate[p] == HEARD else fate[p]
+    return table

@@ -1,0 +1,1 @@
+"""The physical layer: signals, interference, medium access."""

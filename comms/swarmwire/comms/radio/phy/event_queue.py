@@ -1,0 +1,106 @@
+"""What is due, and when: at most one event of each kind for each robot, in the order (time, kind, robot row)."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.kernels import borrowing
+
+# In the order in which events of one moment happen: a frame that ends makes room for one that starts.
+OFF_AIR, LISTENED, TIMER, SEND, ANSWER, ENTER = range(6)
+KINDS = 6
+ABSENT = -1
+
+
+class EventQueue(NamedTuple):
+    """A binary heap with places, so that events can be moved and taken back.
+
+    Event e is that of kind e // rows and robot row e % rows.
+    """
+
+    at_ns: IntArray  # (KINDS x rows,) when each event is due, if it is
+    heap: IntArray  # (KINDS x rows,) events, the next one first
+    place: IntArray  # (KINDS x rows,) where in the heap each event is, or ABSENT
+    size: IntArray  # (1,)
+
+
+def event_queue(rows: int) -> EventQueue:
+    """A queue for so many robots, in which nothing is due."""
+    events = KINDS * rows
+    return EventQueue(
+        np.zeros(events, np.int64), np.zeros(events, np.int64), np.full(events, ABSENT), np.zeros(1, np.int64)
+    )
+
+
+@borrowing()
+def schedule(queue, kind, row, at_ns):
+    """The robot's event of this kind is due at `at_ns`, whenever it was due before."""
+    event = kind * (len(queue.at_ns) // KINDS) + row
+    place = queue.place[event]
+    queue.at_ns[event] = at_ns
+    if place == ABSENT:
+        place = queue.size[0]
+        queue.size[0] += 1
+        queue.heap[place], queue.place[event] = event, place
+    _sink(queue, _rise(queue, place))
+
+
+@borrowing()
+def cancel(queue, kind, row):
+    """The robot's event of this kind is not due any more, if it was."""
+    event = kind * (len(queue.at_ns) // KINDS) + row
+    place = queue.place[event]
+    if place == ABSENT:
+        return
+    queue.place[event] = ABSENT
+    queue.size[0] -= 1
+    last = queue.heap[queue.size[0]]
+    if last != event:
+        queue.heap[place], queue.place[last] = last, place
+        _sink(queue, _rise(queue, place))
+
+
+@borrowing()
+def due_ns(queue, kind, row):
+    """When the robot's event of this kind is due, in ns; -1 if it is not."""
+    event = kind * (len(queue.at_ns) // KINDS) + row
+    return queue.at_ns[event] if queue.place[event] != ABSENT else -1
+
+
+@borrowing()
+def _earlier(queue, a, b):
+    return queue.at_ns[a] < queue.at_ns[b] or (queue.at_ns[a] == queue.at_ns[b] and a < b)
+
+
+@borrowing()
+def _rise(queue, place):
+    event = queue.heap[place]
+    while place > 0:
+        above = (place - 1) // 2
+        if not _earlier(queue, event, queue.heap[above]):
+            break
+        queue.heap[place] = queue.heap[above]
+        queue.place[queue.heap[place]] = place
+        place = above
+    queue.heap[place], queue.place[event] = event, place
+    return place
+
+
+@borrowing()
+def _sink(queue, place):
+    event, size = queue.heap[place], queue.size[0]
+    while True:
+        below = 2 * place + 1
+        if below >= size:
+            break
+        if below + 1 < size and _earlier(queue, queue.heap[below + 1], queue.heap[below]):
+            below += 1
+        if not _earlier(queue, queue.heap[below], event):
+            break
+        queue.heap[place] = queue.heap[below]
+        queue.place[queue.heap[place]] = place
+        place = below
+    queue.heap[place], queue.place[event] = event, place

@@ -1,0 +1,1 @@
+"""What weakens a signal on its way."""

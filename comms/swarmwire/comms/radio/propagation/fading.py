@@ -1,0 +1,277 @@
+"""The gamma distribution: its two tails, and its quantile."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.draws import purpose
+from swarmwire.comms.draws_compiled import uniform
+from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS
+from swarmwire.comms.radio.config.phy import FADINGS, Fading
+from swarmwire.comms.radio.propagation.shadowing import SUMS, cosine, sine, total
+
+MOST_TERMS = 1000
+MOST_STEPS = 60
+PRECISION = 1e-16
+SMALLEST = 1e-300
+
+
+@njit(cache=True)
+def gamma_tails(shape, x):
+    """P(X <= x) and P(X > x) of X ~ Gamma(shape, 1), x >= 0; the smaller one to 1e-13 relative for shapes up to 200.
+
+    Series below shape + 1, above it the continued fraction by Lentz's method (Abramowitz and Stegun 6.5.29, 6.5.31).
+    """
+    if x <= 0.0:
+        return 0.0, 1.0
+    scale = math.exp(shape * math.log(x) - x - math.lgamma(shape))
+    if x < shape + 1.0:
+        term = 1.0 / shape
+        below = term
+        for n in range(1, MOST_TERMS):
+            term *= x / (shape + n)
+            below += term
+            if term < below * PRECISION:
+                break
+        below = min(below * scale, 1.0)
+        return below, 1.0 - below
+    b = x + 1.0 - shape
+    c, d = 1.0 / SMALLEST, 1.0 / b
+    fraction = d
+    for n in range(1, MOST_TERMS):
+        a = -n * (n - shape)
+        b += 2.0
+        d = a * d + b
+        d = 1.0 / (d if abs(d) > SMALLEST else SMALLEST)
+        c = b + a / c
+        c = c if abs(c) > SMALLEST else SMALLEST
+        fraction *= c * d
+        if abs(c * d - 1.0) < PRECISION:
+            break
+    above = min(fraction * scale, 1.0)
+    return 1.0 - above, above
+
+
+@njit(cache=True)
+def gamma_quantile(shape, below, above):
+    """The x with P(X <= x) = below = 1 - above, X ~ Gamma(shape, 1); to 1e-11 relative for shapes from 0.5 to 200.
+
+    Both tails are given, so that neither end loses digits: the smaller one counts. Newton's steps with Halley's
+    correction (Press et al., Numerical Recipes, 3rd ed., 6.2.1), kept within what is known to hold the root.
+    """
+    if below <= 0.0:
+        return 0.0
+    if above <= 0.0:
+        return math.inf
+    low, high = 0.0, math.inf
+    x = _start(shape, below, above)
+    log_scale = math.lgamma(shape)
+    for _ in range(MOST_STEPS):
+        found_below, found_above = gamma_tails(shape, x)
+        excess = found_below - below if below < above else above - found_above
+        if excess > 0.0:
+            high = x
+        else:
+            low = x
+        density = math.exp((shape - 1.0) * math.log(x) - x - log_scale)
+        step = excess / density if density > 0.0 else math.inf
+        curvature = (shape - 1.0) / x - 1.0
+        x_next = x - step / (1.0 - 0.5 * min(1.0, step * curvature))
+        if not low < x_next < high:
+            x_next = 0.5 * (low + high) if high < math.inf else 2.0 * x
+        if abs(x_next - x) <= 1e-12 * x:
+            return x_next
+        x = x_next
+    return x
+
+
+@njit(cache=True)
+def _start(shape, below, above):
+    """A first guess: by a normal quantile above shape 1 (Wilson and Hilferty, 1931), by the ends' asymptotes below."""
+    if shape > 1.0:
+        t = math.sqrt(-2.0 * math.log(min(below, above)))
+        z = t - (2.30753 + t * 0.27061) / (1.0 + t * (0.99229 + t * 0.04481))  # Abramowitz and Stegun 26.2.22
+        z = -z if below < above else z
+        root = 1.0 - 1.0 / (9.0 * shape) + z / (3.0 * math.sqrt(shape))
+        if root > 0.1:
+            return shape * root**3
+        return math.exp((math.log(below) + math.lgamma(shape + 1.0)) / shape)
+    split = 1.0 - shape * (0.253 + shape * 0.12)
+    if below < split:
+        return max((below / split) ** (1.0 / shape), SMALLEST)
+    return 1.0 - math.log(above / (1.0 - split))
+
+
+# --- Nakagami-m fading: power gains between Rayleigh's (m = 1), worse (m < 1) and none (m large), as measurements fit
+# it.
+#
+# g = Q(F(r)), with r Rayleigh's gain, F its distribution and Q the quantile of Gamma(m, 1/m): mean 1, variance 1/m, and
+# correlated in time as r is (M. Nakagami, 1960; by quantiles: Beaulieu and Cheng, IEEE Trans. Vehicular Techn. 54,
+# 2005).
+
+
+@njit(cache=True)
+def nakagami_gain(rayleigh_gain, m):
+    """The power gain of which Rayleigh's would be as rare; m >= 0.5. About 0.5 us; nothing to do for m = 1."""
+    if m == 1.0:
+        return rayleigh_gain
+    return gamma_quantile(m, -math.expm1(-rayleigh_gain), math.exp(-rayleigh_gain)) / m
+
+
+# --- Scattering: waves that arrive over many paths add up or cancel, and a fraction of a wavelength decides.
+#
+# The power gain g of a link (E g = 1) is that of a sum of N plane waves in the positions of both its robots,
+#
+#     h = 1/sqrt(N) sum_n exp(2 pi i (u_n . x_a / lambda + v_n . x_b / lambda + phase_n)),     g = |h|^2,
+#
+# with unit vectors u_n and v_n all around either robot (Clarke, Bell Syst. Tech. J. 47, 1968; for two that move: Akki
+# and Haber, IEEE Trans. Vehicular Techn. 35, 1986). So no link has a state, both directions agree, a packet's gain does
+# not depend on what was sent before, and while one end moves by s, h is correlated by J0(2 pi s / lambda), Jakes'
+# spectrum; while both move, by the product.
+#
+# The directions are a lattice of N points over both circles, which keyed amounts turn around either robot, and each
+# wave has a keyed phase, all by the arena's key. On top of that each unordered pair of robots gives each wave a sign,
+# by keyed numbers of both, which makes pairs independent. So the waves at a robot are worked out once for all its
+# links. |h|^2 is exponential but for O(1/N): E g^2 = 2 - 1/N, its distribution is within 0.004 of the exponential's,
+# and it is never above N (15 dB).
+
+
+WAVES = 2 * SUMS  # as `scattered` adds them up
+GENERATOR = 19  # v's index is so many times u's: near the golden section of WAVES, and without common divisor
+SCALE = np.float64(1.0 / math.sqrt(WAVES))  # a plain float would leave sums of float32 what they are, but for numba
+FADING = purpose("fading")
+TURN_U, TURN_V, PHASE, OWN = range(4)  # what draws are for
+_MIX = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB), np.uint64(0x9E3779B97F4A7C15)
+
+
+@njit(cache=True)
+def scatter_waves(key, wave_number):
+    """The waves of the arena with this key, (5, WAVES): u and v as x, y in cycles per m, and phases in turns.
+
+    `wave_number` is 1 / lambda in cycles per m.
+    """
+    waves = np.empty((5, WAVES))
+    turn_u, turn_v = uniform(key, 0, 0, TURN_U, FADING), uniform(key, 0, 0, TURN_V, FADING)
+    for n in range(WAVES):
+        u, v = n / WAVES + turn_u, n * GENERATOR / WAVES + turn_v
+        waves[0, n], waves[1, n] = wave_number * cosine(u), wave_number * sine(u)
+        waves[2, n], waves[3, n] = wave_number * cosine(v), wave_number * sine(v)
+        waves[4, n] = uniform(key, n, 0, PHASE, FADING)
+    return waves
+
+
+@njit(cache=True, error_model="numpy")
+def arriving(waves, x, y, out):
+    """Waves u and v at (x, y) in m, into `out` (4, WAVES): real and imaginary parts of u, then of v."""
+    for n in range(WAVES):
+        u = waves[0, n] * x + waves[1, n] * y + waves[4, n]
+        v = waves[2, n] * x + waves[3, n] * y
+        out[0, n], out[1, n] = cosine(u), sine(u)
+        out[2, n], out[3, n] = cosine(v), sine(v)
+
+
+@njit(cache=True)
+def own_number(key, robot):
+    """A robot's keyed number, 53 random bits."""
+    return np.uint64(uniform(key, robot, 0, OWN, FADING) * 2.0**53)
+
+
+@njit(cache=True)
+def signs_of(number_a, number_b):
+    """64 random bits of a pair: its robots' numbers, mixed as SplitMix64 does (Steele et al., OOPSLA 2014)."""
+    z = number_a * _MIX[2] + number_b
+    z = (z ^ (z >> np.uint64(30))) * _MIX[0]
+    z = (z ^ (z >> np.uint64(27))) * _MIX[1]
+    return z ^ (z >> np.uint64(31))
+
+
+@borrowing(error_model="numpy")
+def scattered(signs, at, a, b, real, imaginary):
+    """Real and imaginary part of h for robots a < b (indices in the arena); 0.013 us.
+
+    `signs` are the pair's, `at` (rows, 4, WAVES) the waves arriving at robots, of which a and b are rows; `real` and
+    `imaginary` (SUMS,) are for use in here.
+    """
+    half, a, b = np.uint32(signs >> np.uint64(WAVES)), np.uint64(a), np.uint64(b)
+    for n in range(SUMS):
+        one_real, one_imaginary = _wave(half, at, a, b, np.uint64(n))
+        other_real, other_imaginary = _wave(half, at, a, b, np.uint64(n + SUMS))
+        real[n], imaginary[n] = one_real + other_real, one_imaginary + other_imaginary
+    return total(real) * SCALE, total(imaginary) * SCALE
+
+
+@borrowing(error_model="numpy")
+def _wave(half, at, a, b, n):
+    sign = np.float32(1) - np.float32(2) * np.float32((half >> np.uint32(n)) & np.uint32(1))
+    u_real, u_imaginary, v_real, v_imaginary = at[a, 0, n], at[a, 1, n], at[b, 2, n], at[b, 3, n]
+    return sign * (u_real * v_real - u_imaginary * v_imaginary), sign * (u_real * v_imaginary + u_imaginary * v_real)
+
+
+@njit(cache=True)
+def scattered_between(key, wave_number, a, b, ax, ay, bx, by):
+    """`scattered` of one link: robots a and b, indices in the arena with this key, at (ax, ay) and (bx, by) in m."""
+    if b < a:
+        a, ax, ay, b, bx, by = b, bx, by, a, ax, ay
+    at, parts = np.empty((2, 4, WAVES), np.float32), np.empty((2, SUMS), np.float32)
+    waves = scatter_waves(key, wave_number)
+    arriving(waves, ax, ay, at[0])
+    arriving(waves, bx, by, at[1])
+    return scattered(signs_of(own_number(key, a), own_number(key, b)), at, 0, 1, parts[0], parts[1])
+
+
+# --- Fast fading: the power gain g of a link, mean 1, by how its waves arrive. See `scattering` for what moves it.
+
+
+RAYLEIGH, RICIAN, NAKAGAMI = range(len(FADINGS))
+
+
+class FadingLaw(NamedTuple):
+    """A distribution's numbers, as kernels take them."""
+
+    distribution: int
+    k: float
+    m: float
+    wave_number: float  # 1 / wavelength, in cycles per m
+
+
+def fading_law(fading: Fading, frequency_hz: float, speed_mps: float = SPEED_OF_LIGHT_MPS) -> FadingLaw:
+    """The law at this frequency of waves with this speed."""
+    kind = FADINGS.index(fading.distribution)
+    return FadingLaw(kind, fading.k, fading.m, frequency_hz / speed_mps)
+
+
+@njit(cache=True)
+def fading_gain(law, key, a, b, ax, ay, bx, by):
+    """Power gain between robots a and b, indices in the arena with this key, at (ax, ay) and (bx, by) in m.
+
+    A ratio, mean 1; equal both ways to the last bit. For many links between few robots see `gain_of`.
+    """
+    h = scattered_between(key, law.wave_number, a, b, ax, ay, bx, by)
+    return gain_of(law, h, math.sqrt((bx - ax) ** 2 + (by - ay) ** 2))
+
+
+@borrowing()
+def gain_of(law, h, distance_m):
+    """The gain by the law, of `scattered`'s h between robots so many m apart; a ratio, mean 1."""
+    real, imaginary = h
+    if law.distribution == RICIAN:
+        return rician_gain(real, imaginary, law.k, law.wave_number * distance_m)
+    gain = real * real + imaginary * imaginary
+    return nakagami_gain(gain, law.m) if law.distribution == NAKAGAMI else gain
+
+
+@njit(cache=True)
+def rician_gain(real, imaginary, k, path):
+    """Rice's gain: beside the scattered waves a direct one, with k >= 0 times their power.
+
+    Its phase is its path's length in wavelengths. k = 0 is Rayleigh.
+    """
+    direct, others = math.sqrt(k / (k + 1.0)), math.sqrt(1.0 / (k + 1.0))
+    real = direct * cosine(path) + others * real
+    imaginary = direct * sine(path) + others * imaginary
+    return real * real + imaginary * imaginary

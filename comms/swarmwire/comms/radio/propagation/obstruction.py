@@ -1,0 +1,119 @@
+"""Walls: what a straight line loses in the obstacles that it passes, per obstacle and per metre inside.
+
+The multi-wall model (COST 231 final report, 1999) with exact chords through the obstacles of the arena. A radio
+that any obstacle stops is `line_of_sight`, not this.
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import math
+
+from numba import njit
+
+from swarmwire.comms.geometry import robot_index
+
+PARALLEL = 1e-12  # as in `geometry.ray_to_polygon`
+
+
+@njit(cache=True)
+def wall_loss_db(obstacles, arena, crossing_db, inside_db_per_m, ax, ay, bx, by):
+    """The loss in dB between two points in m; equal both ways to the last bit."""
+    crossed, inside_m = crossed_and_inside_m(obstacles, arena, ax, ay, bx, by)
+    return crossed * crossing_db + inside_m * inside_db_per_m
+
+
+@njit(cache=True)
+def crossed_and_inside_m(obstacles, arena, ax, ay, bx, by):
+    """How many obstacles of the arena the line between two points enters, and its length inside them in m.
+
+    A line that only touches an obstacle does not enter it; where two overlap, both count.
+    """
+    if (bx, by) < (ax, ay):  # always from the same end, so that both directions agree to the last bit
+        ax, ay, bx, by = bx, by, ax, ay
+    dx, dy = bx - ax, by - ay
+    length = math.sqrt(dx * dx + dy * dy)
+    crossed, inside_m = 0, 0.0
+    if length == 0.0:
+        return crossed, inside_m
+    dx, dy = dx / length, dy / length
+    for i in range(obstacles.circle_start[arena], obstacles.circle_start[arena + 1]):
+        circle = obstacles.circle[i]
+        chord_m = chord_in_circle(ax, ay, dx, dy, length, circle[0], circle[1], circle[2])
+        crossed += chord_m > 0.0
+        inside_m += chord_m
+    for k in range(obstacles.polygon_start[arena], obstacles.polygon_start[arena + 1]):
+        around = obstacles.polygon[k]
+        if chord_in_circle(ax, ay, dx, dy, length, around[0], around[1], around[2]) > 0.0:
+            chord_m = chord_in_polygon(ax, ay, dx, dy, length, obstacles, k)
+            crossed += chord_m > 0.0
+            inside_m += chord_m
+    return crossed, inside_m
+
+
+@njit(cache=True)
+def chord_in_circle(px, py, dx, dy, length, cx, cy, radius):
+    """How much of a line of `length` from (px, py) along the unit vector (dx, dy) lies in a circle; all in m."""
+    along = (cx - px) * dx + (cy - py) * dy
+    apart = (cx - px) * dy - (cy - py) * dx
+    half2 = radius * radius - apart * apart
+    if half2 <= 0.0:
+        return 0.0
+    half = math.sqrt(half2)
+    return max(min(along + half, length) - max(along - half, 0.0), 0.0)
+
+
+@njit(cache=True)
+def chord_in_polygon(px, py, dx, dy, length, obstacles, k):
+    """As `chord_in_circle`, in polygon k: the line is clipped by one side after the other (Cyrus and Beck, 1978)."""
+    enter, leave = 0.0, length
+    for i in range(obstacles.side_start[k], obstacles.side_start[k + 1]):
+        nx, ny = obstacles.side[i, 2], obstacles.side[i, 3]
+        outside = nx * px + ny * py - obstacles.side[i, 4]
+        speed = nx * dx + ny * dy
+        if abs(speed) < PARALLEL:
+            if outside >= 0.0:
+                return 0.0
+        elif speed < 0.0:
+            enter = max(enter, -outside / speed)
+        else:
+            leave = min(leave, -outside / speed)
+    return max(leave - enter, 0.0)
+
+
+# --- Bodies: robots that stand on the line between two others weaken their signal.
+
+
+@njit(cache=True)
+def bodies_between(x, y, radius_m, most_radius_m, cells, robots, a, b):
+    """How many robots, rows a and b apart, have their disc on the line between a and b; equal both ways.
+
+    `x`, `y`, `radius_m` (rows,) in m; `most_radius_m` is the greatest radius; `cells` is a `grid.Grid` of x and y with
+    `robots` to each arena. The cost is that of the cells that the line's bounding box touches.
+    """
+    a, b = min(a, b), max(a, b)
+    left, bottom = min(x[a], x[b]) - most_radius_m, min(y[a], y[b]) - most_radius_m
+    right, top = max(x[a], x[b]) + most_radius_m, max(y[a], y[b]) + most_radius_m
+    first_row = (a // robots) * cells.ny
+    count = 0
+    for j in range(
+        robot_index.cell_of(bottom, cells.bottom_m, cells.cell_m, cells.ny),
+        robot_index.cell_of(top, cells.bottom_m, cells.cell_m, cells.ny) + 1,
+    ):
+        row = (first_row + j) * cells.nx
+        first = cells.start[row + robot_index.cell_of(left, cells.left_m, cells.cell_m, cells.nx)]
+        stop = cells.start[row + robot_index.cell_of(right, cells.left_m, cells.cell_m, cells.nx) + 1]
+        for at in range(first, stop):
+            k = cells.order[at]
+            if k not in (a, b) and is_on_line(x[a], y[a], x[b], y[b], x[k], y[k], radius_m[k]):
+                count += 1
+    return count
+
+
+@njit(cache=True)
+def is_on_line(ax, ay, bx, by, cx, cy, radius_m):
+    """Whether a disc around (cx, cy) covers a point of the line from (ax, ay) to (bx, by); all in m."""
+    dx, dy = bx - ax, by - ay
+    length2 = dx * dx + dy * dy
+    share = 0.0 if length2 == 0.0 else min(max(((cx - ax) * dx + (cy - ay) * dy) / length2, 0.0), 1.0)
+    px, py = ax + share * dx - cx, ay + share * dy - cy
+    return px * px + py * py < radius_m * radius_m

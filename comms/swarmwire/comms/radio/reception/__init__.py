@@ -1,0 +1,1 @@
+"""Whether a receiver gets a frame right."""

@@ -1,0 +1,171 @@
+"""Bursts: a link changes between a good and a bad state and loses a share of its packets in either.
+
+The chain of E. N. Gilbert (Bell Syst. Tech. J. 39, 1960) and E. O. Elliott (42, 1963) in continuous time, so that a
+burst lasts as long however often robots speak: good turns bad at rate a, bad turns good at rate b, and
+
+    P(bad at t + dt) = pi + (bad at t - pi) exp(-(a + b) dt),     pi = a / (a + b).
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import BoolArray, IntArray, KeyArray
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.draws import purpose
+from swarmwire.comms.draws_compiled import uniform
+from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.radio.config.impairments import Bursts
+
+# Beyond this many relaxation times 1 / (a + b) the past counts for nothing: exp(-40) is lost in a draw's 53 bits.
+FORGOTTEN = 40.0
+
+
+@njit(cache=True)
+def bad_after(was_bad, dt_s, a, b, u):
+    """Whether a link is bad `dt_s` after it was in a known state; rates a and b in 1/s, u uniform in [0, 1).
+
+    dt_s = inf is the stationary state, and so is anything beyond `FORGOTTEN` relaxation times.
+    """
+    share = a / (a + b)
+    elapsed = (a + b) * dt_s
+    if elapsed >= FORGOTTEN:
+        return u < share
+    return u < share + ((1.0 if was_bad else 0.0) - share) * math.exp(-elapsed)
+
+
+# --- Burst states: which links were good or bad when they were last used, kept for as long as it matters.
+
+
+STATE, LOSS = purpose("burst state"), purpose("burst loss")
+NO_LINK = -1  # a free place of the table
+LEAST_CAPACITY = 1024
+SCATTER = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden section: Knuth's multiplicative hashing
+
+
+class Bursting(NamedTuple):
+    """Which links were good or bad, by place in a hash table, and the numbers by which they change."""
+
+    link: IntArray  # (capacity,) sender x rows + receiver, or NO_LINK
+    at_ns: IntArray  # (capacity,) when it was last used
+    bad: BoolArray  # (capacity,)
+    added: IntArray  # (1,) links that kernels have added
+    a: float  # in 1/s: good turns bad
+    b: float  # in 1/s: bad turns good
+    loss_bad: float
+    loss_good: float
+
+
+class BurstStates:
+    """A sparse table of directed links: a hash by sender and receiver row, open addressing, at most half full.
+
+    Draws are keyed by (sender, receiver, sequence), so packets have the same fates however they are batched, as long as
+    those of a link come in the order of their time. A link that has been silent until its past no longer counts is
+    forgotten, which changes nothing.
+    """
+
+    def __init__(self, bursts: Bursts, keys: KeyArray, robots: int) -> None:
+        self._bursts, self._keys, self._robots = bursts, keys, robots
+        self._rows = len(keys) * robots
+        self._clear(LEAST_CAPACITY)
+
+    def __len__(self) -> int:
+        """How many links are kept."""
+        return self._kept
+
+    def change(self, bursts: Bursts, now_ns: int) -> None:
+        """Links are good and bad by other numbers from `now_ns` on."""
+        # All that no longer counts is forgotten now: slower bursts must not find what chance has kept of the faster.
+        self._rebuild(now_ns, 0)
+        self._bursts = bursts
+
+    def lost(self, sender: IntArray, receiver: IntArray, sequence: IntArray, at_ns: IntArray) -> BoolArray:
+        """Which packets (k,) bursts take; rows of sender and receiver, times in ns that never fall for a link."""
+        if not len(sender):
+            return np.zeros(0, np.bool_)
+        self.make_room(int(at_ns.min()), len(sender))
+        bursting = self.bursting
+        ends = _lost(bursting, self._keys, self._robots, self._rows, sender, receiver, sequence, at_ns)
+        self.count_added(bursting)
+        return ends
+
+    def make_room(self, now_ns: int, links: int) -> None:
+        """So many links may be added at `now_ns` or later."""
+        if 2 * (self._kept + links) > len(self._link):
+            self._rebuild(now_ns, links)
+
+    @property
+    def bursting(self) -> Bursting:
+        """For kernels, which add at most as many links as there is room for; then call `count_added`."""
+        bursts, added = self._bursts, np.zeros(1, np.int64)
+        a, b = 1.0 / bursts.good_s, 1.0 / bursts.bad_s
+        return Bursting(self._link, self._at_ns, self._bad, added, a, b, bursts.loss_bad, bursts.loss_good)
+
+    def count_added(self, bursting: Bursting) -> None:
+        """Kernels added links to the table."""
+        self._kept += int(bursting.added[0])
+
+    def _clear(self, capacity: int) -> None:
+        self._link = np.full(capacity, NO_LINK, np.int64)
+        self._at_ns = np.zeros(capacity, np.int64)
+        self._bad = np.zeros(capacity, np.bool_)
+        self._kept = 0
+
+    def _rebuild(self, now_ns: int, room: int) -> None:
+        """A table for what still counts at `now_ns` and `room` links more, with as much to spare."""
+        relaxation_s = 1.0 / (1.0 / self._bursts.good_s + 1.0 / self._bursts.bad_s)
+        # One relaxation time more than `bad_after` needs: rounding then cannot make a difference.
+        silent_ns = math.ceil((FORGOTTEN + 1.0) * relaxation_s * NS_PER_S)
+        counts = (self._link != NO_LINK) & (now_ns - self._at_ns <= silent_ns)
+        link, at_ns, bad = self._link[counts], self._at_ns[counts], self._bad[counts]
+        self._clear(max(1 << (4 * (len(link) + room) - 1).bit_length(), LEAST_CAPACITY))
+        _insert(self._link, self._at_ns, self._bad, link, at_ns, bad)
+        self._kept = len(link)
+
+
+@njit(cache=True)
+def _place(links, link):
+    """Where a link is, or where it belongs."""
+    mask = np.uint64(len(links) - 1)
+    # The upper half of the product depends on all bits of the link; its lowest bits would only on the lowest.
+    at = ((np.uint64(link) * SCATTER) >> np.uint64(32)) & mask
+    while links[at] != NO_LINK and links[at] != link:
+        at = (at + np.uint64(1)) & mask
+    return at
+
+
+@njit(cache=True)
+def _insert(links, links_at_ns, links_bad, link, at_ns, bad):
+    for i in range(len(link)):
+        at = _place(links, link[i])
+        links[at], links_at_ns[at], links_bad[at] = link[i], at_ns[i], bad[i]
+
+
+@njit(cache=True)
+def _lost(bursting, keys, robots, rows, sender, receiver, sequence, at_ns):
+    ends = np.zeros(len(sender), np.bool_)
+    for i in range(len(sender)):
+        key, s, r = keys[sender[i] // robots], sender[i] % robots, receiver[i] % robots
+        link = sender[i] * rows + receiver[i]
+        ends[i] = takes(bursting, link, key, s, r, sequence[i], 0, at_ns[i])
+    return ends
+
+
+@borrowing()
+def takes(bursting, link, key, s, r, sequence, attempt, at_ns):
+    """Whether a burst takes a packet from s to r, indices in the arena, at `at_ns`."""
+    at = _place(bursting.link, link)
+    silent_s = np.inf
+    if bursting.link[at] == NO_LINK:
+        bursting.link[at] = link
+        bursting.added[0] += 1
+    else:
+        silent_s = (at_ns - bursting.at_ns[at]) / NS_PER_S
+    u = uniform(key, s, r, sequence, STATE + attempt)
+    bad = bad_after(bursting.bad[at], silent_s, bursting.a, bursting.b, u)
+    bursting.at_ns[at], bursting.bad[at] = at_ns, bad
+    return uniform(key, s, r, sequence, LOSS + attempt) < (bursting.loss_bad if bad else bursting.loss_good)

@@ -1,0 +1,200 @@
+"""From bits to frames: errors that strike each bit alike and on its own."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import math
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.radio.propagation.decibels import to_db
+from swarmwire.comms.radio.timing import DSSS_RATES_BPS, OFDM_BITS_PER_SYMBOL
+
+
+@njit(cache=True)
+def all_right(error_rate, bits):
+    """(1 - error_rate)^bits, without losing the digits of small rates; 1 for no bits, which may be a fraction."""
+    if bits <= 0.0 or error_rate <= 0.0:
+        return 1.0
+    if error_rate >= 1.0:
+        return 0.0
+    return math.exp(bits * math.log1p(-error_rate))
+
+
+# --- IEEE 802.15.4 at 2.4 GHz: O-QPSK, four bits to one of sixteen spread symbols (250 kbit/s).
+
+
+# (-1)^k C(16, k) for k = 2 .. 16
+_TERMS = tuple((-1.0) ** k * math.comb(16, k) for k in range(2, 17))
+
+
+@njit(cache=True)
+def oqpsk_bit_errors(sinr):
+    """BER = 8/15 1/16 sum_{k=2..16} (-1)^k C(16, k) exp(20 SINR (1/k - 1)); 0.5 at SINR 0.
+
+    IEEE 802.15.4-2006, E.4.1.7.
+    """
+    total = 0.0
+    for i in range(15):
+        total += _TERMS[i] * math.exp(20.0 * sinr * (1.0 / (i + 2) - 1.0))
+    return min(max(total * 8.0 / 15.0 / 16.0, 0.0), 0.5)
+
+
+@njit(cache=True)
+def oqpsk_success(sinr, bits):
+    """The probability that so many bits arrive right; a frame's are those of the whole PPDU, 8 x (PSDU + 6)."""
+    return all_right(oqpsk_bit_errors(sinr), bits)
+
+
+# --- IEEE 802.11b: direct sequence at 1 and 2 Mbit/s, complementary codes (CCK) at 5.5 and 11, in 22 MHz.
+#
+# Formulas as in ns-3 (G. Pei and T. R. Henderson, Validation of ns-3 802.11b PHY model, 2009). A CCK symbol is four
+# (5.5) or eight (11 Mbit/s) bits, chosen among biorthogonal codes (J. G. Proakis, Digital Communications, 4th ed.,
+# 5.2).
+
+
+DBPSK_1, DQPSK_2, CCK_5_5, CCK_11 = range(4)
+SQRT2 = math.sqrt(2.0)
+# The integrand of CCK is a bell of variance 1/2 or less: 48 nodes over 6 to either side give 1e-12 of the greatest.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
+HALF_WIDTH = 6.0
+
+
+@njit(cache=True)
+def dbpsk_bit_errors(sinr):
+    """1 Mbit/s: BER = 1/2 exp(-Eb/N0), Eb/N0 = SINR 22 MHz / 1 Mbit/s."""
+    return 0.5 * math.exp(-22.0 * sinr)
+
+
+@njit(cache=True)
+def dqpsk_bit_errors(sinr):
+    """2 Mbit/s: BER = (sqrt 2 + 1) / sqrt(8 pi sqrt 2 x) exp(-(2 - sqrt 2) x), x = Eb/N0 = 11 SINR; at most 1/2."""
+    x = 11.0 * sinr
+    if x <= 0.0:
+        return 0.5
+    return min((SQRT2 + 1.0) / math.sqrt(8.0 * math.pi * SQRT2 * x) * math.exp(-(2.0 - SQRT2) * x), 0.5)
+
+
+@njit(cache=True)
+def biorthogonal_errors(signal):
+    """How often one of 16 biorthogonal codes is mistaken; `signal` is the right one's correlation in units of noise.
+
+    1 - integral_0^inf erf(y / sqrt 2)^7 phi(y - signal) dy, phi the standard normal density: computed as what is
+    missing, so that small rates keep their digits.
+    """
+    low = max(0.5 * signal - HALF_WIDTH, 0.0)
+    high = 0.5 * signal + HALF_WIDTH
+    missing = 0.0
+    for i in range(len(_NODES)):
+        y = low + 0.5 * (high - low) * (_NODES[i] + 1.0)
+        not_all_lower = -math.expm1(7.0 * math.log1p(-math.erfc(y / SQRT2)))
+        missing += _WEIGHTS[i] * not_all_lower * math.exp(-0.5 * (y - signal) ** 2)
+    missing *= 0.5 * (high - low) / math.sqrt(2.0 * math.pi)
+    return min(missing + 0.5 * math.erfc(signal / SQRT2), 1.0)
+
+
+@njit(cache=True)
+def dsss_success(rate, sinr, bits):
+    """The probability that so many bits arrive right at one of RATES_BPS, by index; 1.5 us for CCK, else 0.1 us.
+
+    At 5.5 Mbit/s four bits are one choice, at 11 eight are two of half the signal: so both count quarters of the bits.
+    """
+    if rate == DBPSK_1:
+        return all_right(dbpsk_bit_errors(sinr), bits)
+    if rate == DQPSK_2:
+        return all_right(dqpsk_bit_errors(sinr), bits)
+    signal = math.sqrt((16.0 if rate == CCK_5_5 else 8.0) * sinr)
+    return all_right(biorthogonal_errors(signal), 0.25 * bits)
+
+
+# --- IEEE 802.11a/g: OFDM at 6 to 54 Mbit/s in 20 MHz, with convolutional codes.
+#
+# The NIST model, as in ns-3 (G. Pei and T. R. Henderson, Validation of OFDM error rate model in ns-3, 2010): errors of
+# the raw bits by modulation, then the union bound over the weight spectrum of the code (K = 7, generators 133 and 171).
+
+
+OFDM_RATES_BPS = tuple(OFDM_BITS_PER_SYMBOL)
+# By rate: points of the constellation, and the code of SPECTRA.
+_POINTS = (2, 2, 4, 4, 16, 16, 64, 64)
+_CODE = (0, 2, 0, 2, 0, 2, 1, 2)
+# Rates 1/2, 2/3 and 3/4: first exponent of D, its step, the factor before the sum, and the coefficients.
+SPECTRA = (
+    (10, 2, 1 / 2, (36, 211, 1404, 11633, 77433, 502690, 3322763, 21292910, 134365911)),
+    (6, 1, 1 / 4, (3, 70, 285, 1276, 6160, 27128, 117019, 498860, 2103891, 8784123)),
+    (5, 1, 1 / 6, (42, 201, 1492, 10469, 62935, 379644, 2253373, 13073811, 75152755, 428005675)),
+)
+_FIRST = tuple(spectrum[0] for spectrum in SPECTRA)
+_STEP = tuple(spectrum[1] for spectrum in SPECTRA)
+_COEFFICIENTS = np.zeros((3, 10))
+for _code, (_, _, _factor, _weights) in enumerate(SPECTRA):
+    _COEFFICIENTS[_code, : len(_weights)] = np.multiply(_factor, _weights)
+
+
+@njit(cache=True)
+def raw_bit_errors(points, sinr):
+    """The share of bits that are wrong before decoding, by the points of the constellation; s = SINR in 20 MHz.
+
+    BPSK 1/2 erfc(sqrt s), QPSK 1/2 erfc(sqrt(s / 2)), M-QAM with L = sqrt M
+    (L - 1) / (L log2 L) erfc(sqrt(3 s / (2 (M - 1)))).
+    """
+    if points == 2:
+        return 0.5 * math.erfc(math.sqrt(sinr))
+    if points == 4:
+        return 0.5 * math.erfc(math.sqrt(0.5 * sinr))
+    side = math.sqrt(points)
+    return (side - 1.0) / (side * math.log2(side)) * math.erfc(math.sqrt(1.5 * sinr / (points - 1.0)))
+
+
+@njit(cache=True)
+def ofdm_bit_errors(rate, sinr):
+    """The bound after decoding, at one of RATES_BPS by index: sum of coefficient x D^exponent, at most 1.
+
+    D = sqrt(4 p (1 - p)), p the share of raw bits that are wrong.
+    """
+    p = raw_bit_errors(_POINTS[rate], sinr)
+    code = _CODE[rate]
+    d = math.sqrt(4.0 * p * (1.0 - p))
+    step = d if _STEP[code] == 1 else d * d
+    total = 0.0
+    for i in range(9, -1, -1):
+        total = total * step + _COEFFICIENTS[code, i]
+    return min(total * d ** _FIRST[code], 1.0)
+
+
+@njit(cache=True)
+def ofdm_success(rate, sinr, bits):
+    """The probability that so many bits of payload arrive right; 0.1 us."""
+    return all_right(ofdm_bit_errors(rate, sinr), bits)
+
+
+# --- Success table: what was measured instead of a formula, frames received by SINR.
+
+
+@njit(cache=True)
+def table_success(sinr_db, success, frame_bits, sinr, bits):
+    """The probability that so many bits arrive right: success^(bits / frame_bits), so that chunks of a frame multiply.
+
+    `sinr_db` and `success` (rows,) are the table's, `sinr` a ratio.
+    """
+    at_db = to_db(sinr)
+    last = len(sinr_db) - 1
+    if at_db <= sinr_db[0]:
+        whole = success[0]
+    elif at_db >= sinr_db[last]:
+        whole = success[last]
+    else:
+        i = 0
+        while sinr_db[i + 1] < at_db:
+            i += 1
+        share = (at_db - sinr_db[i]) / (sinr_db[i + 1] - sinr_db[i])
+        whole = success[i] + share * (success[i + 1] - success[i])
+    return 1.0 if bits <= 0.0 else whole ** (bits / frame_bits)
+
+
+# --- Threshold: a frame is right if the signal stands so far above noise and interference.
+
+
+@njit(cache=True)
+def threshold_success(least_sinr, sinr):
+    """1 if SINR, a ratio, reaches the least, else 0; whatever the number of bits."""
+    return 1.0 if sinr >= least_sinr else 0.0

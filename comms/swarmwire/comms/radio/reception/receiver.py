@@ -1,0 +1,131 @@
+"""Reception: the probability that a chunk of a frame is right, by the model that the radio has.
+
+A frame is cut where its interference changes: its success is the product over its chunks of constant SINR.
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.radio.config.phy import Reception, SuccessTable
+from swarmwire.comms.radio.propagation.decibels import from_db
+from swarmwire.comms.radio.reception import error_rates
+from swarmwire.comms.radio.reception.error_rates import (
+    dsss_success,
+    ofdm_success,
+    oqpsk_success,
+    table_success,
+    threshold_success,
+)
+
+
+class Model(IntEnum):
+    """What turns SINR into success."""
+
+    THRESHOLD = 0  # a fixed SINR
+    TABLE = 1  # measured
+    OQPSK = 2  # IEEE 802.15.4, 2.4 GHz
+    DSSS = 3  # IEEE 802.11b
+    OFDM = 4  # IEEE 802.11a/g
+
+
+class Receiver(NamedTuple):
+    """A model with its numbers, as kernels take it; made by one of the functions below."""
+
+    model: int
+    rate: int  # index among the rates of DSSS or OFDM
+    least_sinr: float  # of THRESHOLD, a ratio
+    frame_bits: float  # of TABLE
+    sinr_db: FloatArray  # of TABLE, (rows,)
+    success: FloatArray  # of TABLE, (rows,)
+
+
+_NO_ROWS = np.empty(0)
+_THRESHOLD, _TABLE, _OQPSK, _DSSS = int(Model.THRESHOLD), int(Model.TABLE), int(Model.OQPSK), int(Model.DSSS)
+
+
+def by_threshold(least_sinr_db: float) -> Receiver:
+    """A frame is right if its SINR never falls below this."""
+    return Receiver(_THRESHOLD, 0, from_db(least_sinr_db), 0.0, _NO_ROWS, _NO_ROWS)
+
+
+def by_table(table: SuccessTable) -> Receiver:
+    """A measured receiver."""
+    rows = np.array(table.sinr_db, np.float64), np.array(table.success, np.float64)
+    return Receiver(_TABLE, 0, 0.0, float(table.frame_bits), *rows)
+
+
+def ieee802154() -> Receiver:
+    """A receiver of IEEE 802.15.4 at 2.4 GHz."""
+    return Receiver(_OQPSK, 0, 0.0, 0.0, _NO_ROWS, _NO_ROWS)
+
+
+def ieee80211b(rate_bps: int) -> Receiver:
+    """A receiver of IEEE 802.11b at one of `dsss.RATES_BPS`; ValueError at any other."""
+    return Receiver(_DSSS, error_rates.DSSS_RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
+
+
+def ieee80211ag(rate_bps: int) -> Receiver:
+    """A receiver of IEEE 802.11a or g at one of `ofdm.RATES_BPS`; ValueError at any other."""
+    return Receiver(int(Model.OFDM), error_rates.OFDM_RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
+
+
+def receiver_of(reception: Reception, bit_rate_bps: int) -> Receiver:
+    """The receiver that a scenario asks for, which `refuse_unfit` has let pass."""
+    if reception.model == "threshold":
+        return by_threshold(reception.least_sinr_db)
+    if reception.table is not None and reception.model == "table":
+        return by_table(reception.table)
+    if reception.model == "802.11b":
+        return ieee80211b(bit_rate_bps)
+    return ieee80211ag(bit_rate_bps) if reception.model == "802.11ag" else ieee802154()
+
+
+@njit(cache=True)
+def chunk_success(receiver, sinr, bits):
+    """The probability that so many bits (may be a fraction) arrive right at a constant SINR, a ratio of powers."""
+    if receiver.model == _THRESHOLD:
+        return threshold_success(receiver.least_sinr, sinr)
+    if receiver.model == _TABLE:
+        return table_success(receiver.sinr_db, receiver.success, receiver.frame_bits, sinr, bits)
+    if receiver.model == _OQPSK:
+        return oqpsk_success(sinr, bits)
+    if receiver.model == _DSSS:
+        return dsss_success(receiver.rate, sinr, bits)
+    return ofdm_success(receiver.rate, sinr, bits)
+
+
+# --- Sensitivity: the least power at which frames get through, derived from the receiver's model and its noise.
+
+
+LEAST_DB, MOST_DB = -60.0, 100.0
+HALVINGS = 60
+
+
+def sinr_for_db(receiver: Receiver, success: float, bits: int) -> float:
+    """The SINR in dB from which a frame of so many bits is right with probability `success`; by bisection.
+
+    `LEAST_DB` if it is so everywhere, `MOST_DB` if nowhere.
+    """
+    low, high = LEAST_DB, MOST_DB
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if chunk_success(receiver, from_db(middle), bits) >= success:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+def sensitivity_dbm(receiver: Receiver, noise_dbm: float, success: float, bits: int) -> float:
+    """The power in dBm at which, without interference, a frame of so many bits is right with probability `success`.
+
+    Data sheets of IEEE 802.15.4 state it for 99 % of frames with a PSDU of 20 octets, of 802.11b for 92 % of 1024, of
+    802.11a/g for 90 % of 1000.
+    """
+    return noise_dbm + sinr_for_db(receiver, success, bits)

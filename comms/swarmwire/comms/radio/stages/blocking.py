@@ -1,0 +1,148 @@
+"""Line of sight: obstacles block the signal."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.geometry import robot_index
+from swarmwire.comms.geometry.obstacles import is_blocked, is_blocked_on
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.radio.links import HEARD, Links
+from swarmwire.comms.radio.propagation.obstruction import bodies_between
+from swarmwire.comms.radio.stages.stage import Medium, Stage
+
+
+class LineOfSight(Stage):
+    """A link is blocked if an obstacle touches the straight line between the centres of sender and receiver."""
+
+    name = "line_of_sight"
+    keys = ("line_of_sight",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio needs a line of sight and there are obstacles."""
+        any_obstacle = len(medium.obstacles.circle) or len(medium.obstacles.polygon)
+        return LineOfSight(medium) if medium.radio.needs_line_of_sight and any_obstacle else None
+
+    def __init__(self, medium: Medium) -> None:
+        self._obstacles, self._robots, self._wrap_m = medium.obstacles, medium.robots, medium.wrap_m
+
+    def decide(self, links: Links, pose: FloatArray) -> None:
+        """Blocked links end, and were not in range."""
+        ends = blocked(self._obstacles, self._robots, self._wrap_m, pose, links.sender, links.receiver, links.fate)
+        links.fate[ends] = Fate.BLOCKED
+        links.in_range[ends] = 0
+
+    def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
+        """0 where blocked, else 1."""
+        ends = blocked(self._obstacles, self._robots, self._wrap_m, pose, links.sender, links.receiver, links.fate)
+        return (~ends).astype(np.float64)
+
+
+@njit(cache=True)
+def blocked(obstacles, robots, wrap_m, pose, sender, receiver, fate):
+    """Which of the links under way an obstacle blocks, (k,)."""
+    ends = np.zeros(len(sender), np.bool_)
+    wraps = wrap_m[0] > 0.0
+    for i in range(len(ends)):
+        # From the lower row to the higher: both directions of a link then agree to the last bit.
+        a, b = min(sender[i], receiver[i]), max(sender[i], receiver[i])
+        if fate[i] != HEARD:
+            continue
+        ax, ay, bx, by = pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1]
+        if wraps:
+            ends[i] = is_blocked_on(obstacles, a // robots, ax, ay, bx, by, *wrap_m)
+        else:
+            ends[i] = is_blocked(obstacles, a // robots, ax, ay, bx, by)
+    return ends
+
+
+# --- Bodies block: robots between two others stop the signal of a disk, as with infrared.
+
+
+class BodiesBlock(Stage):
+    """A link is blocked if the disc of a third robot, dead or alive, covers a point of the line between the centres."""
+
+    name = "bodies_block"
+    keys = ("bodies_block",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio says so and there are bodies."""
+        return BodiesBlock(medium) if medium.radio.bodies_block and medium.radius_m.any() else None
+
+    def __init__(self, medium: Medium) -> None:
+        assert medium.radio.range_m is not None  # `Air` has refused a disk without
+        self._running, self._robots, self._size_m = medium.running, medium.robots, medium.size_m
+        self._radius_m, self._range_m = medium.radius_m, medium.radio.range_m
+
+    def decide(self, links: Links, pose: FloatArray) -> None:
+        """Blocked links end, and were not in range."""
+        ends = self._blocked(links, pose)
+        links.fate[ends] = Fate.BLOCKED
+        links.in_range[ends] = 0
+
+    def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
+        """0 where blocked, else 1."""
+        return (~self._blocked(links, pose)).astype(np.float64)
+
+    def _blocked(self, links: Links, pose: FloatArray) -> BoolArray:
+        x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
+        cells = robot_index.build(x, y, len(self._running), self._size_m, self._range_m, self._running)
+        return behind_bodies(x, y, self._radius_m, cells, self._robots, links.sender, links.receiver, links.fate)
+
+
+@njit(cache=True)
+def behind_bodies(x, y, radius_m, cells, robots, sender, receiver, fate):
+    """Which of the links under way have a robot between their ends, (k,); equal both ways.
+
+    `x`, `y`, `radius_m` (rows,) in m; `cells` is a `grid.Grid` of x and y with `robots` to each arena.
+    """
+    ends = np.zeros(len(sender), np.bool_)
+    most_radius_m = radius_m.max()
+    for i in range(len(ends)):
+        if fate[i] == HEARD:
+            ends[i] = bodies_between(x, y, radius_m, most_radius_m, cells, robots, sender[i], receiver[i]) > 0
+    return ends
+
+
+# --- Disruption: receivers that are dead, radios that are off, and robots that a partition keeps apart.
+
+
+class Disrupted(Stage):
+    """Ends links by the disruption that holds. They were in range: that asks for path loss and walls alone."""
+
+    name = "disrupted"
+    keys = ()  # events bring them
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage; every radio has it, since events may come."""
+        return Disrupted(medium)
+
+    def __init__(self, medium: Medium) -> None:
+        self._disruption = medium.disruption
+
+    def decide(self, links: Links, pose: FloatArray) -> None:
+        """RECEIVER_DEAD before BLACKOUT before PARTITIONED; that the sender is dead or off, its own side has told."""
+        now, receiver = self._disruption, links.receiver
+        if not now.anything:
+            return
+        under_way = links.fate == HEARD
+        for ends, fate in (
+            (now.apart(links.sender, receiver), Fate.PARTITIONED),
+            (~now.radio_on[receiver], Fate.BLACKOUT),
+            (~now.alive[receiver], Fate.RECEIVER_DEAD),
+        ):
+            links.fate[under_way & ends] = fate
+
+    @property
+    def lets_all_pass(self) -> bool:
+        """As it mostly is."""
+        return not self._disruption.anything
+
+    def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
+        """0 where a radio is off or a partition between, be it one-way, else 1; the radio graph knows the dead."""
+        return self._disruption.joined(links.sender, links.receiver).astype(np.float64)

@@ -1,0 +1,166 @@
+"""Fixed loss: the medium loses the same share everywhere, each packet for each receiver on its own."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.draws import purpose
+from swarmwire.comms.draws_compiled import uniform
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.radio.links import HEARD, Links
+from swarmwire.comms.radio.reception.bursts import BurstStates
+from swarmwire.comms.radio.stages.stage import Medium, Stage
+from swarmwire.comms.radio.traces import LinkTrace
+
+LOSS = purpose("fixed loss")
+
+
+class FixedLoss(Stage):
+    """A Bernoulli trial with probability `loss` for each packet and receiver."""
+
+    name = "fixed_loss"
+    keys = ("loss",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio loses anything."""
+        return FixedLoss(medium) if medium.radio.loss > 0.0 else None
+
+    def __init__(self, medium: Medium) -> None:
+        self._loss, self._keys, self._robots = medium.radio.loss, medium.keys, medium.robots
+
+    def decide(self, links: Links, pose: FloatArray) -> None:
+        """Lost links end; they were in range."""
+        ends = lost(self._keys, self._robots, links.sender, links.receiver, links.sequence, links.fate, self._loss)
+        links.fate[ends] = Fate.LOST
+
+    def delivery(self, links: Links, pose: FloatArray) -> float:
+        """1 - loss."""
+        return 1.0 - self._loss
+
+
+@njit(cache=True)
+def lost(keys, robots, sender, receiver, sequence, fate, loss):
+    """Which of the links under way are lost: u < loss, u keyed by (sender, receiver, sequence), (k,)."""
+    ends = np.zeros(len(sender), np.bool_)
+    for i in range(len(ends)):
+        if fate[i] == HEARD:
+            key = keys[sender[i] // robots]
+            ends[i] = uniform(key, sender[i] % robots, receiver[i] % robots, sequence[i], LOSS) < loss
+    return ends
+
+
+# --- Burst loss: links that are bad for a while lose more.
+
+
+class BurstLoss(Stage):
+    """Gilbert's and Elliott's chain for each directed link, in continuous time."""
+
+    name = "burst_loss"
+    keys = ("bursts",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio has bursts; of a signal, its reception asks for them."""
+        return BurstLoss(medium) if medium.radio.bursts is not None and not medium.radio.is_signal else None
+
+    remembers = True
+
+    def __init__(self, medium: Medium) -> None:
+        assert medium.radio.bursts is not None
+        self._bursts, self._loss = medium.radio.bursts, medium.radio.bursts.loss
+        self._states = BurstStates(medium.radio.bursts, medium.keys, medium.robots)
+
+    def go_on_from(self, before: Stage, at_ns: int) -> None:
+        """Links are as good or bad as they were."""
+        assert isinstance(before, BurstLoss)
+        before._states.change(self._bursts, at_ns)
+        self._states = before._states
+
+    def decide(self, links: Links, pose: FloatArray) -> None:
+        """Links end that a burst takes; they were in range. A link's packets come in the order of their time."""
+        index = np.flatnonzero(links.fate == HEARD)
+        index = index[np.argsort(links.final_at_ns[index], kind="stable")]
+        sender, receiver, at_ns = links.sender[index], links.receiver[index], links.final_at_ns[index]
+        ends = self._states.lost(sender, receiver, links.sequence[index], at_ns)
+        links.fate[index[ends]] = Fate.BURST
+
+    def delivery(self, links: Links, pose: FloatArray) -> float:
+        """1 - loss, in the long run."""
+        return 1.0 - self._loss
+
+
+# --- Trace: links that were measured lose and delay packets as they did then.
+
+
+TRACE = purpose("trace")
+
+
+class Replay(Stage):
+    """A Bernoulli trial with the measured delivery ratio for each packet and receiver, then the measured delay.
+
+    The values are those at the end of the airtime. Links without any are out of range, unless the model is to decide.
+    """
+
+    name = "trace"
+    keys = ("trace",)
+
+    @classmethod
+    def of(cls, medium: Medium) -> Stage | None:
+        """The stage, where the radio has a trace; of a signal, its links have all but the delays."""
+        return None if medium.traces is None else Replay(medium)
+
+    def __init__(self, medium: Medium) -> None:
+        assert medium.traces is not None
+        assert medium.radio.trace is not None
+        self._traces, self._keys, self._robots = medium.traces, medium.keys, medium.robots
+        self._others_end = medium.radio.trace.others == "none"
+        self._only_delays = medium.radio.is_signal
+
+    def decide(self, links: Links, pose: FloatArray) -> None:
+        """Links end that are lost, or that nobody measured; those that are heard become final later."""
+        sender, receiver = links.sender % self._robots, links.receiver % self._robots
+        if not self._only_delays:
+            self._end(links, sender, receiver)
+        if self._traces.delay_s is not None:
+            delay_s = np.nan_to_num(self._traces.delay_s.at(sender, receiver, links.final_at_ns))
+            late_ns = np.where(links.fate == HEARD, np.round(delay_s * NS_PER_S), 0.0)
+            np.add(links.final_at_ns, late_ns.astype(np.int64), out=links.final_at_ns)
+
+    def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
+        """The ratio of the worse direction at the time of the links."""
+        a, b = links.sender % self._robots, links.receiver % self._robots
+        return np.minimum(self._ratio(a, b, links.final_at_ns), self._ratio(b, a, links.final_at_ns))
+
+    def _end(self, links: Links, sender: IntArray, receiver: IntArray) -> None:
+        under_way, at_ns = links.fate == HEARD, links.final_at_ns
+        if self._others_end:
+            ends = under_way & ~self._traces.known(sender, receiver, at_ns)
+            links.fate[ends] = Fate.OUT_OF_RANGE
+            links.in_range[ends] = 0
+        ratio = _measured(self._traces.delivery_ratio, sender, receiver, at_ns)
+        ends = trace_lost(self._keys, self._robots, links.sender, links.receiver, links.sequence, links.fate, ratio)
+        links.fate[ends] = Fate.LOST
+
+    def _ratio(self, sender: IntArray, receiver: IntArray, at_ns: IntArray) -> FloatArray:
+        ratio = _measured(self._traces.delivery_ratio, sender, receiver, at_ns)
+        return ratio * self._traces.known(sender, receiver, at_ns) if self._others_end else ratio
+
+
+def _measured(trace: LinkTrace | None, sender: IntArray, receiver: IntArray, at_ns: IntArray) -> FloatArray:
+    """The delivery ratio, (k,); 1 where none was measured."""
+    return np.ones(len(sender)) if trace is None else np.nan_to_num(trace.at(sender, receiver, at_ns), nan=1.0)
+
+
+@njit(cache=True)
+def trace_lost(keys, robots, sender, receiver, sequence, fate, ratio):
+    """Which of the links under way are lost: u >= ratio, u keyed by (sender, receiver, sequence), (k,)."""
+    ends = np.zeros(len(sender), np.bool_)
+    for i in range(len(ends)):
+        if fate[i] == HEARD and ratio[i] < 1.0:
+            key = keys[sender[i] // robots]
+            ends[i] = uniform(key, sender[i] % robots, receiver[i] % robots, sequence[i], TRACE) >= ratio[i]
+    return ends

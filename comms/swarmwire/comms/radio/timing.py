@@ -1,0 +1,111 @@
+"""Airtime: how long a frame occupies the air, in whole ns. Octets may be a number or an array of integers.
+
+Which octets count is stated with each standard; headers of higher layers are the caller's to add.
+"""
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.clock import NS_PER_S
+
+Octets = TypeVar("Octets", int, IntArray)
+
+US = 1_000  # ns
+DSSS_RATES_BPS = (1_000_000, 2_000_000, 5_500_000, 11_000_000)
+OFDM_BITS_PER_SYMBOL = {
+    6_000_000: 24,
+    9_000_000: 36,
+    12_000_000: 48,
+    18_000_000: 72,
+    24_000_000: 96,
+    36_000_000: 144,
+    48_000_000: 192,
+    54_000_000: 216,
+}
+
+
+def at_bit_rate_ns(octets: Octets, bit_rate_bps: int) -> Octets:
+    """8 x octets / bit rate, rounded up: a radio without further structure.
+
+    So is IEEE 802.15.4 at 2.4 GHz: 250 kbit/s, and 6 octets of preamble, delimiter and length before a PSDU of at most
+    127.
+    """
+    return -(-octets * 8 * NS_PER_S // bit_rate_bps)
+
+
+def ieee80211b_ns(psdu_octets: Octets, rate_bps: int, *, short_preamble: bool) -> Octets:
+    """IEEE 802.11b: 192 us (short preamble 96) + 8 x PSDU / rate, rounded up to whole us (18.2.3.5).
+
+    The PSDU holds MAC header (24 octets), FCS (4) and what is between. There is no short preamble at 1 Mbit/s.
+    """
+    return (96 if short_preamble else 192) * US - (-psdu_octets * 8_000_000 // rate_bps) * US
+
+
+def ieee80211a_ns(psdu_octets: Octets, rate_bps: int) -> Octets:
+    """IEEE 802.11a: 20 us + 4 us x ceil((22 + 8 x PSDU) / bits per symbol) (17.4.3)."""
+    return 20 * US - (-(22 + 8 * psdu_octets) // OFDM_BITS_PER_SYMBOL[rate_bps]) * 4 * US
+
+
+def ieee80211g_ns(psdu_octets: Octets, rate_bps: int) -> Octets:
+    """IEEE 802.11g (OFDM at 2.4 GHz): as 802.11a, and 6 us of silence for the receiver (19.8.3)."""
+    return ieee80211a_ns(psdu_octets, rate_bps) + 6 * US
+
+
+# --- Access timing: what the standards prescribe for the wait before a frame goes on air. All times in ns.
+
+
+@dataclass(frozen=True, slots=True)
+class UnslottedCsma:
+    """Unslotted CSMA/CA of IEEE 802.15.4 at 2.4 GHz, with the standard's defaults (2006: 6.4.2, 7.4.2, 7.5.1.4).
+
+    A sender waits U{0 .. 2^BE - 1} backoff periods, then listens for `cca_ns`; if the air is busy BE grows by one, and
+    after more than `most_backoffs` busy times the frame fails. Sent `turnaround_ns` after the air was found free.
+    """
+
+    symbol_ns: int = 16 * US
+    backoff_ns: int = 320 * US  # aUnitBackoffPeriod, 20 symbols
+    cca_ns: int = 128 * US  # 8 symbols
+    busy_above_sensitivity_db: float = 10.0  # energy that counts as busy (6.9.9)
+    turnaround_ns: int = 192 * US  # aTurnaroundTime, 12 symbols
+    short_space_ns: int = 192 * US  # SIFS, 12 symbols: after frames of up to `short_frame_octets`
+    long_space_ns: int = 640 * US  # LIFS, 40 symbols
+    short_frame_octets: int = 18  # aMaxSIFSFrameSize
+    acknowledgement_wait_ns: int = 864 * US  # macAckWaitDuration, 54 symbols
+    least_exponent: int = 3  # macMinBE
+    most_exponent: int = 5  # macMaxBE
+    most_backoffs: int = 4  # macMaxCSMABackoffs
+    most_retries: int = 3  # macMaxFrameRetries, of unicast frames
+
+    def space_ns(self, psdu_octets: IntArray) -> IntArray:
+        """The silence that follows frames of so many octets, (k,)."""
+        return np.where(psdu_octets <= self.short_frame_octets, self.short_space_ns, self.long_space_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class Dcf:
+    """The distributed coordination function of IEEE 802.11 (2007: 9.2, and 15 to 19 for the numbers).
+
+    A sender waits until the air was free for DIFS, then U{0 .. CW} slots of free air. A broadcast goes out at a basic
+    rate, without acknowledgement and retries, so its CW stays at the least.
+    """
+
+    short_space_ns: int  # SIFS
+    slot_ns: int
+    least_window: int  # CWmin, slots
+    most_window: int = 1023  # CWmax, slots
+    most_retries: int = 7  # of short unicast frames
+    busy_energy_dbm: float = -62.0  # anything else
+
+    @property
+    def difs_ns(self) -> int:
+        """SIFS + 2 slots."""
+        return self.short_space_ns + 2 * self.slot_ns
+
+
+IEEE_802_15_4 = UnslottedCsma()
+IEEE_802_11B = Dcf(10 * US, 20 * US, 31)  # of frames by DSSS and CCK
+IEEE_802_11A = Dcf(16 * US, 9 * US, 15)  # of frames by OFDM at 5 GHz
+IEEE_802_11G = Dcf(10 * US, 9 * US, 15)  # where no station of 802.11b is near: short slots, CWmin of OFDM

@@ -1,0 +1,1 @@
+"""The unit disk: a packet reaches everybody within a fixed range."""

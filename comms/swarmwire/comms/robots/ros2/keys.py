@@ -1,0 +1,165 @@
+"""Kinds of ROS 2 messages that drivers and gateways exchange."""
+
+import re
+import struct
+from dataclasses import dataclass
+from hashlib import blake2b
+
+from swarmwire.comms.errors import BadFrame, BadInput
+
+TWIST = "geometry_msgs/msg/Twist"  # what a base is to drive
+TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"  # the same with the time at which it was said
+LASER_SCAN = "sensor_msgs/msg/LaserScan"  # distances around
+ODOMETRY = "nav_msgs/msg/Odometry"  # where a base believes to be, by its wheels
+IMU = "sensor_msgs/msg/Imu"  # acceleration, turn rate, orientation
+BATTERY_STATE = "sensor_msgs/msg/BatteryState"  # voltage and charge
+ILLUMINANCE = "sensor_msgs/msg/Illuminance"  # of a photocell, in lux
+CLOCK = "rosgraph_msgs/msg/Clock"  # the time in an emulation
+
+
+def dds_kind(kind: str) -> str:
+    """The name of a kind of message in DDS, which rmw_zenoh writes into its keys.
+
+    >>> dds_kind("geometry_msgs/msg/Twist")
+    'geometry_msgs::msg::dds_::Twist_'
+    """
+    package, folder, name = kind.split("/")
+    return f"{package}::{folder}::dds_::{name}_"
+
+
+# --- Names as ROS 2 takes them: robots as namespaces, topics within them.
+
+
+TOKEN = r"(?!.*__)[A-Za-z_][A-Za-z0-9_]*"
+NAME = re.compile(rf"/?{TOKEN}(?:/{TOKEN})*")
+
+
+def ros_name(robot: str) -> str:
+    """The name of a robot as a ROS name: letters, digits and single underscores, none of the digits first.
+
+    >>> ros_name("flock-0"), ros_name("7.left")
+    ('flock_0', 'r7_left')
+    """
+    name = re.sub(r"[^A-Za-z0-9]+", "_", robot)
+    return f"r{name}" if name[:1].isdigit() else name
+
+
+def absolute(namespace: str, topic: str) -> str:
+    """The full name of a topic: within the namespace, unless it starts with a slash itself.
+
+    >>> absolute("flock_0", "scan"), absolute("/", "scan"), absolute("flock_0", "/clock")
+    ('/flock_0/scan', '/scan', '/clock')
+    """
+    return topic if topic.startswith("/") else "/" + "/".join(filter(None, (namespace.strip("/"), topic)))
+
+
+def check_name(name: str, where: str, key: str) -> None:
+    """Raise BadInput with `where` and `key` if ROS 2 has no such names."""
+    if not NAME.fullmatch(name):
+        raise BadInput(where, key, f"expected a ROS name such as scan or robot_1/scan, got {name!r}")
+
+
+# --- Keys and liveliness tokens of zenoh-bridge-ros2dds (zenoh-plugin-ros2dds: ros2_utils.rs, liveliness_mgt.rs).
+#
+# A message travels under the full name of its topic without the first slash, as raw CDR. Tokens tell other bridges what
+# to announce in their own ROS graph.
+
+
+BRIDGE_QOS = ":1:0:0,10"  # without a key, reliable, volatile, the last ten kept: what publishers have by default
+READ, WRITE = "MS", "MP"  # the two directions of a topic in a token
+
+
+def bridge_key(topic: str) -> str:
+    """The key of a topic of this full name.
+
+    >>> bridge_key("/flock_0/scan")
+    'flock_0/scan'
+    """
+    return topic.removeprefix("/")
+
+
+def bridge_token(zid: str, direction: str, topic: str, kind: str, type_hash: str) -> str:
+    """The token of a topic that the bridge of this zenoh id writes or reads; READ or WRITE, seen from ROS."""
+    names = "/".join(part.replace("/", "§") for part in (bridge_key(topic), kind))
+    return f"{bridge_itself(zid)}/{direction}/{names}/{BRIDGE_QOS}:typehash={type_hash};"
+
+
+def bridge_itself(zid: str) -> str:
+    """The token of the bridge of this zenoh id."""
+    return f"@/{zid}/@ros2_lv"
+
+
+# --- Keys and liveliness tokens of rmw_zenoh (rmw_zenoh: docs/design.md, liveliness_utils.cpp).
+#
+# A message travels under domain, full name of the topic, kind and its hash. Tokens make up the ROS graph: they let
+# `ros2 topic list` show what there is, and are not needed for messages to arrive.
+
+
+QOS = "::,10:,:,:,,"  # what differs from the defaults: nothing
+ANY = "*"
+MOST_TOPICS = 10_000  # of a node: ids of nodes and of their topics are whole numbers that no two in a session share
+
+
+def rmw_key(domain: int, topic: str, kind: str, type_hash: str = ANY) -> str:
+    """The key of a topic of this full name; with ANY for its hash, one to subscribe by.
+
+    >>> rmw_key(0, "/cmd_vel", "geometry_msgs/msg/Twist", "RIHS01_9c45")
+    '0/cmd_vel/geometry_msgs::msg::dds_::Twist_/RIHS01_9c45'
+    """
+    return f"{domain}{topic}/{dds_kind(kind)}/{type_hash}"
+
+
+@dataclass(frozen=True)
+class RmwNode:
+    """A node of the ROS graph, as tokens name it."""
+
+    domain: int
+    zid: str  # of the zenoh session
+    place: int  # among the nodes of the session
+    namespace: str  # "/flock_0", "/" for none
+    name: str
+
+    @property
+    def token(self) -> str:
+        """The token of the node itself."""
+        return self._token(0, "NN")
+
+    def topic_token(self, place: int, direction: str, topic: str, kind: str, type_hash: str) -> str:
+        """The token of a topic that the node writes (MP) or reads (MS); `place` counts them, from 1."""
+        return f"{self._token(place, direction)}/{_mangled(topic)}/{dds_kind(kind)}/{type_hash}/{QOS}"
+
+    def _token(self, place: int, direction: str) -> str:
+        node = self.place * MOST_TOPICS
+        space = _mangled(self.namespace)
+        return f"@ros2_lv/{self.domain}/{self.zid}/{node}/{node + place}/{direction}/%/{space}/{self.name}"
+
+
+def _mangled(name: str) -> str:
+    return name.replace("/", "%")
+
+
+# --- What rmw_zenoh attaches to each message; a subscriber drops those that come without.
+#
+# Sequence number and time of the source as little-endian int64, then the publisher's id of 16 bytes, as zenoh's
+# serializer writes them: 33 bytes. (rmw_zenoh: attachment_helpers.cpp.)
+
+
+LAYOUT = struct.Struct("<qqB16s")
+ID_BYTES = 16
+
+
+def publisher_id(token: str) -> bytes:
+    """An id of 16 bytes that follows from the publisher's liveliness token, so none has that of another."""
+    return blake2b(token.encode(), digest_size=ID_BYTES).digest()
+
+
+def attachment(sequence: int, utc_ns: int, publisher: bytes) -> bytes:
+    """The attachment of a message; `publisher` is its `publisher_id`."""
+    return LAYOUT.pack(sequence, utc_ns, ID_BYTES, publisher)
+
+
+def check_attachment(attached: bytes | None) -> None:
+    """Raise BadFrame if a message has no attachment, or one of another layout."""
+    if attached is None or len(attached) != LAYOUT.size or attached[16] != ID_BYTES:
+        size = 0 if attached is None else len(attached)
+        raise BadFrame("no_attachment", f"expected an attachment of {LAYOUT.size} bytes, got {size}")

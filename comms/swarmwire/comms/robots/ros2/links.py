@@ -1,0 +1,138 @@
+"""zenoh sessions of a gateway, which routes as a ROS 2 router does, and of a driver, which is a client of one."""
+
+import json
+import re
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+
+from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.robots.ros2.keys import attachment, check_attachment, publisher_id
+from swarmwire.comms.wire.sessions import close_session
+
+ENDPOINT = re.compile(r"(tcp|udp|ws)/.+:\d+|unixsock-stream/.+")
+EXAMPLE = "tcp/192.168.1.7:7447"
+LEASE_MS = 2000  # a peer that is cut off is noticed after this
+CLOSE_S = 10.0  # as long as zenoh itself waits: a robot's last command may be on its way
+
+
+def check_endpoint(endpoint: str, where: str, key: str) -> None:
+    """Raise BadInput with `where` and `key` if this is no endpoint of zenoh."""
+    if not ENDPOINT.fullmatch(endpoint):
+        raise BadInput(where, key, f"expected an endpoint of zenoh such as {EXAMPLE}, got {endpoint!r}")
+
+
+def open_router(endpoint: str) -> tuple[zenoh.Session, str]:
+    """A router that listens on `endpoint`, and where it does so; zenoh.ZError if it is taken.
+
+    It gossips, as rmw_zenoh's router does: without one, nodes find one another through it.
+    """
+    more: dict[str, object] = {
+        "listen": {"endpoints": [endpoint]},
+        "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},  # tells the port
+    }
+    session = zenoh.open(_config("router", more, gossip=True))
+    for reply in session.get(f"@/{session.zid()}/router", timeout=2.0):
+        if reply.ok is not None:
+            return session, json.loads(reply.ok.payload.to_string())["locators"][0]
+    return session, endpoint
+
+
+def open_client(endpoint: str, connect_s: float) -> zenoh.Session:
+    """A client of the router at `endpoint`, tried for `connect_s`; zenoh.ZError if nobody answers."""
+    connect = {
+        "endpoints": [endpoint],
+        "timeout_ms": round(connect_s * 1000),
+        "retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5},
+    }
+    return zenoh.open(_config("client", {"connect": connect}, gossip=False))
+
+
+def close(session: zenoh.Session) -> None:
+    """Close a session; what was put before still goes out."""
+    close_session(session, CLOSE_S)
+
+
+def is_linked(session: zenoh.Session) -> bool:
+    """Whether a client has its router."""
+    return bool(session.info.routers_zid() or session.info.peers_zid())
+
+
+def _config(mode: str, more: dict[str, object], *, gossip: bool) -> zenoh.Config:
+    return zenoh.Config.from_json5(
+        json.dumps(
+            {
+                "mode": mode,
+                "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": gossip}},
+                "transport": {"shared_memory": {"enabled": False}, "link": {"tx": {"lease": LEASE_MS}}},
+                **more,
+            }
+        )
+    )
+
+
+# --- One topic on its way in: payloads as they come, those that rmw_zenoh would drop counted instead.
+
+
+class Inlet:
+    """A subscriber on one key. `take` gets each payload, in the thread of the network, so it must be done at once."""
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        key: str,
+        *,
+        attached: bool,
+        take: Callable[[bytes], None],
+        refuse: Callable[[str], None],
+    ) -> None:
+        """`attached` is whether messages come with rmw_zenoh's attachment; `refuse` gets the fault of one without."""
+        self._attached, self._take, self._refuse = attached, take, refuse
+        self._subscriber: Any = session.declare_subscriber(key, zenoh.handlers.Callback(self._receive, indirect=False))
+
+    def close(self) -> None:
+        """Nobody subscribes any more."""
+        self._subscriber.undeclare()
+
+    def _receive(self, sample: zenoh.Sample) -> None:
+        if self._attached:
+            try:
+                check_attachment(None if sample.attachment is None else sample.attachment.to_bytes())
+            except BadFrame as error:
+                self._refuse(error.fault)
+                return
+        self._take(sample.payload.to_bytes())
+
+
+# --- One topic on its way out, with or without rmw_zenoh's attachment.
+
+
+class Outlet:
+    """A publisher on one key. Payloads are dropped where the network cannot keep up.
+
+    Attributes:
+        wanted: whether anybody subscribes. It is told from the thread of the network: to ask costs 1 to 20 us, and a
+            gateway has hundreds of these.
+    """
+
+    def __init__(self, session: zenoh.Session, key: str, token: str | None) -> None:
+        """`token`: that of a publisher of rmw_zenoh, whose messages have attachments; None: it is a bridge's."""
+        self._publisher: Any = session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
+        self._id = None if token is None else publisher_id(token)
+        self._sequence = 0
+        self.wanted = False
+        self._publisher.declare_matching_listener(zenoh.handlers.Callback(self._match, indirect=False))
+        # Whoever was there before is not told of. The listener may tell of a change while that is asked: the last word
+        # must be the newest, or a base that is there would never be found.
+        while self.wanted != (now := self._publisher.matching_status.matching):
+            self.wanted = now
+
+    def put(self, payload: bytes, utc_ns: int) -> None:
+        """Send a message, which was made at this time since 1970."""
+        self._sequence += 1
+        attached = None if self._id is None else attachment(self._sequence, utc_ns, self._id)
+        self._publisher.put(payload, attachment=attached)
+
+    def _match(self, status: Any) -> None:
+        self.wanted = status.matching  # the object itself is true in any case

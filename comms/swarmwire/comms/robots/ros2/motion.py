@@ -1,0 +1,192 @@
+"""Turns about the vertical as ROS's quaternions have them."""
+
+from math import atan2, cos, hypot, isfinite, isnan, nan, pi, radians, remainder, sin
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.clock import to_s
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.robots.ros2.keys import IMU, ODOMETRY
+from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns
+
+
+def yaw_of(quaternion: Any) -> float:
+    """The turn about the vertical of a quaternion, in rad, in [-pi, pi]; nan if it is none."""
+    x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
+    if not x * x + y * y + z * z + w * w > 0.0:
+        return float("nan")
+    return atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+
+
+def quaternion(messages: Messages, yaw_rad: float) -> Any:
+    """The quaternion of a turn about the vertical."""
+    return messages.make("geometry_msgs/msg/Quaternion", 0.0, 0.0, sin(0.5 * yaw_rad), cos(0.5 * yaw_rad))
+
+
+def within_turn(angle_rad: float) -> float:
+    """This angle in (-pi, pi]."""
+    wrapped = remainder(angle_rad, 2.0 * pi)
+    return pi if wrapped == -pi else wrapped
+
+
+# --- Where bases believe to be, from what their wheels have rolled: the pose in the Odometry messages that they send.
+
+
+ODOMETRY_FRAME, CHILD_FRAME = "odom", "base_footprint"
+
+
+class WheelPoses:
+    """The poses of n bases, each of which drives an arc between two readings, and up to the first one from the origin.
+
+    Attributes:
+        pose: (n, 3) x and y in m, turn since the start in rad, which is not wrapped.
+        speed: (n, 2) in m/s and rad/s, between the last two readings.
+    """
+
+    def __init__(self, bases: int, wheel_base_m: float) -> None:
+        self.pose, self.speed = np.zeros((bases, 3)), np.zeros((bases, 2))
+        self._wheel_base_m = wheel_base_m
+        self._before_ns, self._before_m = 0, np.zeros((2, bases))
+
+    def follow(self, time_ns: int, left_m: FloatArray, right_m: FloatArray) -> None:
+        """Add the travel (n,) of both wheels since the last reading; where it is nan, as soon as it is told again."""
+        travel_m = np.stack([left_m, right_m])
+        travel_m = np.where(np.isnan(travel_m), self._before_m, travel_m)
+        by_m, for_ns = travel_m - self._before_m, time_ns - self._before_ns
+        self._before_ns, self._before_m = time_ns, travel_m
+        arc_m, turn_rad = 0.5 * (by_m[0] + by_m[1]), (by_m[1] - by_m[0]) / self._wheel_base_m
+        chord_m = arc_m * np.sinc(turn_rad / (2.0 * np.pi))
+        course_rad = self.pose[:, 2] + 0.5 * turn_rad
+        self.pose += np.stack([chord_m * np.cos(course_rad), chord_m * np.sin(course_rad), turn_rad], axis=1)
+        if for_ns > 0:
+            self.speed = np.stack([arc_m, turn_rad], axis=1) / to_s(for_ns)
+
+    def message(self, messages: Messages, base: int, stamp_ns: int) -> Any:
+        """The Odometry message of one base; covariances are 0: not known."""
+        x_m, y_m, turn_rad = map(float, self.pose[base])
+        linear_mps, angular_radps = map(float, self.speed[base])
+        make, unknown = messages.make, np.zeros(36)
+        place = make("geometry_msgs/msg/Point", x_m, y_m, 0.0)
+        pose = make("geometry_msgs/msg/Pose", place, quaternion(messages, within_turn(turn_rad)))
+        linear = make("geometry_msgs/msg/Vector3", linear_mps, 0.0, 0.0)
+        angular = make("geometry_msgs/msg/Vector3", 0.0, 0.0, angular_radps)
+        twist = make("geometry_msgs/msg/Twist", linear, angular)
+        return make(
+            ODOMETRY,
+            messages.header(stamp_ns, ODOMETRY_FRAME),
+            CHILD_FRAME,
+            make("geometry_msgs/msg/PoseWithCovariance", pose, unknown),
+            make("geometry_msgs/msg/TwistWithCovariance", twist, unknown),
+        )
+
+
+# --- What the two wheels of a base have rolled, from the poses that it tells in Odometry messages.
+#
+# Between two of them the base is taken to drive an arc: of chord c and turn a it is c (a / 2) / sin(a / 2) long,
+# forwards or backwards as the chord lies to the heading half way. The wheels roll that length -+ a times half the wheel
+# base.
+
+
+SPARE_M, SPARE = 0.1, 2.0  # a base may be measured that much further on, and that many times as fast as it can drive
+STRAIGHT_RAD = 1e-6  # below this an arc is as long as its chord
+
+Pose = tuple[float, float, float]
+
+
+class WheelTravel:
+    """Adds up the travel of both wheels since the first message.
+
+    Attributes:
+        left_m: travelled by the left wheel.
+        right_m: travelled by the right wheel.
+        jumps: how often the pose went further than the base can drive: it began anew there.
+    """
+
+    def __init__(self, wheel_base_m: float, max_linear_mps: float) -> None:
+        self.left_m = self.right_m = 0.0
+        self.jumps = 0
+        self._half_base_m, self._max_mps = 0.5 * wheel_base_m, max_linear_mps
+        self._last: tuple[int, Pose] | None = None
+
+    def follow(self, message: Any) -> None:
+        """Add what an Odometry message says, later than the last one; BadFrame if its pose is none."""
+        pose, at = message.pose.pose, stamp_ns(message.header)
+        x_m, y_m, yaw_rad = pose.position.x, pose.position.y, yaw_of(pose.orientation)
+        if not (isfinite(x_m) and isfinite(y_m) and isfinite(yaw_rad)):
+            raise BadFrame("malformed", "a pose that is not finite")
+        if self._last is not None:
+            before_ns, before = self._last
+            self._add((x_m - before[0], y_m - before[1], yaw_rad - before[2]), before[2], to_s(at - before_ns))
+        self._last = at, (x_m, y_m, yaw_rad)
+
+    def _add(self, by: Pose, yaw_rad: float, for_s: float) -> None:
+        chord_m, turn_rad = hypot(by[0], by[1]), within_turn(by[2])
+        if chord_m > SPARE * self._max_mps * max(for_s, 0.0) + SPARE_M:
+            self.jumps += 1
+            return
+        half_rad = 0.5 * turn_rad
+        ahead = by[0] * cos(yaw_rad + half_rad) + by[1] * sin(yaw_rad + half_rad)
+        arc_m = chord_m * (half_rad / sin(half_rad) if abs(half_rad) > STRAIGHT_RAD else 1.0)
+        arc_m = arc_m if ahead >= 0.0 else -arc_m
+        self.left_m += arc_m - turn_rad * self._half_base_m
+        self.right_m += arc_m + turn_rad * self._half_base_m
+
+
+# --- Imu messages: accelerations, turn rate and heading of a base on a level floor.
+
+
+IMU_FRAME = "imu_link"
+GRAVITY_MPS2 = 9.80665  # what an accelerometer at rest feels upwards
+
+
+class Motion(NamedTuple):
+    """What an Imu message says, in the frame of the base; nan: it does not tell."""
+
+    forward_mps2: float = nan
+    left_mps2: float = nan
+    turn_radps: float = nan
+    heading_rad: float = nan  # in (-pi, pi]
+
+
+def motion_of(message: Any, north_deg: float) -> Motion:
+    """What a message says; the heading is its yaw turned by `north_deg`.
+
+    Orientation, turn rate or acceleration whose first covariance is -1 it does not tell (its definition says so).
+    """
+    turn, acceleration = message.angular_velocity, message.linear_acceleration
+    told = message.linear_acceleration_covariance[0] != -1.0
+    yaw_rad = yaw_of(message.orientation) if message.orientation_covariance[0] != -1.0 else nan
+    return Motion(
+        acceleration.x if told else nan,
+        acceleration.y if told else nan,
+        turn.z if message.angular_velocity_covariance[0] != -1.0 else nan,
+        within_turn(yaw_rad + radians(north_deg)) if not isnan(yaw_rad) else nan,
+    )
+
+
+def imu(messages: Messages, motion: Motion, north_deg: float, stamp_ns: int) -> Any:
+    """The message of a motion; what is nan it does not tell."""
+    make = messages.make
+    known = not isnan(motion.forward_mps2 + motion.left_mps2)
+    turn_radps, heading_rad = motion.turn_radps, motion.heading_rad
+    yaw_rad = 0.0 if isnan(heading_rad) else within_turn(heading_rad - radians(north_deg))
+    forward_mps2, left_mps2 = (motion.forward_mps2, motion.left_mps2) if known else (0.0, 0.0)
+    return make(
+        IMU,
+        messages.header(stamp_ns, IMU_FRAME),
+        quaternion(messages, yaw_rad),
+        _covariance(told=not isnan(heading_rad)),
+        make("geometry_msgs/msg/Vector3", 0.0, 0.0, 0.0 if isnan(turn_radps) else turn_radps),
+        _covariance(told=not isnan(turn_radps)),
+        make("geometry_msgs/msg/Vector3", forward_mps2, left_mps2, GRAVITY_MPS2),
+        _covariance(told=known),
+    )
+
+
+def _covariance(told: bool) -> Any:
+    """Zeros: not known; its first element -1: there is no such measurement."""
+    covariance = np.zeros(9)
+    covariance[0] = 0.0 if told else -1.0
+    return covariance

@@ -1,0 +1,74 @@
+"""BatteryState messages."""
+
+from math import isnan, nan
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.bodies.sensors import Battery
+from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE
+from swarmwire.comms.robots.ros2.messages import Messages
+
+FRAME = ""
+DISCHARGING, GOOD, LITHIUM_ION = 2, 1, 2  # constants of the message
+
+
+def charge_of(message: Any, sheet: Battery) -> float:
+    """The charge, 0 to 1: as told, else as the voltage lies between the sheet's when empty and when full; nan: neither.
+
+    `percentage` is a share by its definition. A base that tells more than 1 means per cent, and 1 could be either: then
+    the voltage counts.
+    """
+    share = float(message.percentage)
+    if 0.0 <= share <= 1.0 and message.present:
+        return share
+    span_v = sheet.full_v - sheet.empty_v
+    if isnan(message.voltage) or span_v <= 0.0:
+        return nan
+    return min(max((float(message.voltage) - sheet.empty_v) / span_v, 0.0), 1.0)
+
+
+def battery_state(messages: Messages, charge: float, voltage_v: float, stamp_ns: int) -> Any:
+    """The message of a battery that is being drained; what nobody measures is nan, as its definition wants it."""
+    none = np.empty(0, np.float32)
+    return messages.make(
+        BATTERY_STATE,
+        messages.header(stamp_ns, FRAME),
+        voltage_v,
+        *(nan, nan, nan, nan, nan),  # temperature, current, charge in Ah, capacity, capacity when new
+        charge,
+        DISCHARGING,
+        GOOD,
+        LITHIUM_ION,
+        True,  # it is there
+        none,
+        none,
+        "",
+        "",
+    )
+
+
+# --- Illuminance messages: one photocell each.
+
+
+FULL_LUX = 1000.0  # that a photocell's reading of 1 stands for, unless somebody measured it
+
+
+def topics_of_light(topic: str, cells: int) -> tuple[str, ...]:
+    """The topic of each of some photocells: numbered, unless there is one.
+
+    >>> topics_of_light("illuminance", 1), topics_of_light("illuminance", 2)
+    (('illuminance',), ('illuminance_0', 'illuminance_1'))
+    """
+    return (topic,) if cells == 1 else tuple(f"{topic}_{cell}" for cell in range(cells))
+
+
+def brightness_of(message: Any, full_lux: float) -> float:
+    """What a photocell reads, 0 dark to 1 at `full_lux` and more; 0 if the message does not tell."""
+    lux = float(message.illuminance)
+    return min(lux / full_lux, 1.0) if lux > 0.0 else 0.0
+
+
+def illuminance(messages: Messages, brightness: float, full_lux: float, frame: str, stamp_ns: int) -> Any:
+    """The message of a photocell that reads `brightness`, 0 to 1."""
+    return messages.make(ILLUMINANCE, messages.header(stamp_ns, frame), brightness * full_lux, 0.0)

@@ -1,0 +1,313 @@
+"""What a run tells once to whoever looks on, as a frame: names and types are those of `Scene`, checked on arrival."""
+
+import zlib
+from dataclasses import asdict, fields, is_dataclass
+from math import inf, isfinite
+from types import NoneType, UnionType
+from typing import Any, Literal, cast, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray
+from swarmwire.comms.bodies.body import Body, body_from_mapping
+from swarmwire.comms.bodies.drives import BRIGHTEST
+from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.geometry.floor import FloorImage
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.run_views import Glimpse, Scene
+from swarmwire.comms.tick_io import LONGEST_STATE, GroupSenses, Senses
+from swarmwire.comms.truth import Finished, Happened, Obstacle, Static, Tally, Truth
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.frames import Frame, checked_array
+
+OBSERVED_VERSION = 1  # of the frames for observers
+_MAY_BE_INFINITE = ".height_m"  # of an obstacle
+
+
+def encode_scene(scene: Scene) -> bytes:
+    """A `scene` frame."""
+    return frames.encode("scene", -1, {}, {"version": OBSERVED_VERSION, "scene": asdict(scene)})
+
+
+def decode_scene(frame: Frame) -> Scene:
+    """The scene of a `scene` frame; BadFrame if it holds none, or one that contradicts itself."""
+    check_version(frame, "scene")
+    scene: Scene = _build(Scene, frame.values.get("scene"), "scene")
+    _check(scene.static)
+    if scene.selected not in scene.static.robot_names:
+        raise BadFrame("malformed", "selected: expected one of the robots")
+    return scene
+
+
+def check_version(frame: Frame, kind: str) -> None:
+    """Return if the frame is of this kind and of a version that is understood; BadFrame otherwise."""
+    version = frame.values.get("version")
+    if frame.kind != kind or type(version) is not int or version != OBSERVED_VERSION:
+        raise BadFrame("malformed", f"{frame.kind} {version!r}: expected {kind} {OBSERVED_VERSION}")
+
+
+def _check(static: Static) -> None:
+    """Numbers of things that must agree, and values that are divided by."""
+    starts = [0, *(group.stop for group in static.groups)]
+    image = static.floor.image if static.floor else None
+    faults = {
+        "seeds: expected an arena": not static.seeds,
+        "rate_hz: expected 1 or more": static.rate_hz < 1,
+        "arena_size_m: expected more than 0": min(static.arena_size_m) <= 0,
+        "obstacles: expected those of each arena": len(static.obstacles) != static.arenas,
+        "obstacles: expected as many movable ones in each arena": len(set(map(_movable_told, static.obstacles))) > 1,
+        "lights: expected those of each arena": len(static.lights) not in (0, static.arenas),
+        "floor.image: expected a grey for each row and column": image is not None and not _is_whole(image),
+        "groups: expected each robot in one": [group.start for group in static.groups] != starts[:-1]
+        or starts != sorted(set(starts))
+        or starts[-1] != static.robots,
+        "act_every_ticks: expected 1 or more": any(group.act_every_ticks < 1 for group in static.groups),
+    }
+    for fault, found in faults.items():
+        if found:
+            raise BadFrame("malformed", fault)
+
+
+def _movable_told(obstacles: tuple[Obstacle, ...]) -> int:
+    return sum(obstacle.movable for obstacle in obstacles)
+
+
+def _is_whole(image: FloorImage) -> bool:
+    try:
+        return min(image.grey.shape) > 0
+    except (ValueError, zlib.error):
+        return False
+
+
+def _build(hint: Any, value: object, key: str) -> Any:
+    """`value`, made of maps, lists and plain values, as the type that `hint` names."""
+    if hint is Body:
+        return _body(value, key)
+    if is_dataclass(hint):
+        return _record(cast("type[Any]", hint), value, key)
+    if get_origin(hint) is tuple and isinstance(value, list | tuple):
+        return _tuple(get_args(hint), cast("list[object]", value), key)
+    if get_origin(hint) is UnionType:
+        [inner] = [choice for choice in get_args(hint) if choice is not NoneType]
+        return None if value is None else _build(inner, value, key)
+    if hint is float and type(value) in (int, float):
+        number = float(cast("float", value))
+        if isfinite(number) or (number == inf and key.endswith(_MAY_BE_INFINITE)):
+            return number
+    elif get_origin(hint) is Literal:
+        if value in get_args(hint):
+            return value
+    elif type(value) is hint:
+        return value
+    raise BadFrame("malformed", f"{key}: expected {hint}, got {str(value)[:40]}")
+
+
+def _tuple(kinds: tuple[Any, ...], items: list[object], key: str) -> tuple[Any, ...]:
+    if kinds[-1] is Ellipsis:
+        kinds = (kinds[0],) * len(items)
+    if len(items) != len(kinds):
+        raise BadFrame("malformed", f"{key}: expected {len(kinds)} values")
+    return tuple(_build(kind, item, f"{key}[{i}]") for i, (kind, item) in enumerate(zip(kinds, items, strict=True)))
+
+
+def _record(kind: type[Any], value: object, key: str) -> Any:
+    names = [field.name for field in fields(kind)]
+    if type(value) is not dict or cast("dict[object, object]", value).keys() != set(names):
+        raise BadFrame("malformed", f"{key}: expected a map of {', '.join(names)}")
+    hints, given = get_type_hints(kind), cast("dict[str, object]", value)
+    return kind(**{name: _build(hints[name], given[name], f"{key}.{name}") for name in names})
+
+
+def _body(value: object, key: str) -> Body:
+    if type(value) is not dict:
+        raise BadFrame("malformed", f"{key}: expected a body")
+    try:
+        return body_from_mapping(cast("dict[str, Any]", value), where=key)
+    except BadInput as error:
+        raise BadFrame("malformed", str(error)) from error
+
+
+# --- A glimpse of a run as a frame: the tick's arrays, and what was measured; checked on arrival.
+
+
+_FINISHED = tuple(of.name for of in fields(Finished) if of.name not in ("rssi_dbm", "payload", "payloads"))
+_COUNTED = ("sent", "intended", "in_range")  # a row each; the fates have an array of their own
+_EVENT = [int, float, str, bool, str, bool]  # serial, at_s, do, ended, part, singly
+
+
+def encode_truth(glimpse: Glimpse) -> bytes:
+    """A `truth` frame."""
+    truth = glimpse.truth
+    values: dict[str, Any] = {
+        "version": OBSERVED_VERSION,
+        "time_ns": truth.time_ns,
+        "serial": glimpse.serial,
+        "ticks": glimpse.ticks,
+        "states": truth.states,
+        "events": [
+            (event.serial, float(event.at_s), event.do, event.ended, event.part, event.singly) for event in truth.events
+        ],
+    }
+    return frames.encode("truth", truth.tick, _arrays(glimpse), values)
+
+
+def _arrays(glimpse: Glimpse) -> dict[str, AnyArray]:
+    """The arrays that a tick has."""
+    truth = glimpse.truth
+    arrays: dict[str, AnyArray] = {
+        "alive": truth.alive,
+        "pose": truth.pose,
+        "velocity": truth.velocity,
+        "command": truth.command,
+        "state": truth.state,
+        "leds": truth.leds,
+        "contact_onsets": truth.contact_onsets,
+        "values": glimpse.values,
+    }
+    for name, group in truth.senses.items():
+        arrays[f"sense/{name}/rows"] = group.rows
+        for sense, column in group.fields.items():
+            arrays[f"sense/{name}/{sense}"] = column
+    if truth.movable is not None:
+        arrays["movable"] = truth.movable.reshape(len(truth.movable), -1)
+    if truth.edges is not None:
+        arrays["edges"] = truth.edges
+    if truth.tally is not None:
+        arrays["tally"] = np.array([getattr(truth.tally, name) for name in _COUNTED])
+        arrays["tally/fates"] = truth.tally.fates
+    if truth.finished is not None:
+        arrays["finished"] = np.array([getattr(truth.finished, name) for name in _FINISHED])
+        if truth.finished.rssi_dbm is not None:
+            arrays["finished/rssi_dbm"] = truth.finished.rssi_dbm
+    if truth.events:
+        arrays["events"] = np.array([event.changed for event in truth.events])
+    return arrays
+
+
+def decode_truth(frame: Frame, scene: Scene) -> Glimpse:
+    """The glimpse of a `truth` frame of this scene's run; BadFrame if it holds none, or one that contradicts itself."""
+    check_version(frame, "truth")
+    static = scene.static
+    n = static.arenas * static.robots
+    states = _states(frame)
+    state = checked_array(frame, "state", "<i8", (n,))
+    _within("state", state, len(states))
+    leds = checked_array(frame, "leds", "<i8", (n, static.most_leds))
+    _within("leds", leds, BRIGHTEST + 1)
+    truth = Truth(
+        tick=_least(frame.tick, 0, "tick"),
+        time_ns=_least(frame.values.get("time_ns"), 0, "time_ns"),
+        running=np.ones(static.arenas, np.bool_),  # none is published of an arena that left
+        alive=checked_array(frame, "alive", "|b1", (n,)),
+        pose=checked_array(frame, "pose", "<f8", (n, 3)),
+        velocity=checked_array(frame, "velocity", "<f8", (n, 3)),
+        command=checked_array(frame, "command", "<f8", (n, 3)),
+        state=state,
+        states=states,
+        leds=leds,
+        senses=_senses(frame, static),
+        contact_onsets=checked_array(frame, "contact_onsets", "<i8", (static.arenas, 2)),
+        edges=_edges(frame, n),
+        tally=_tally(frame, static.arenas),
+        finished=_finished(frame, static),
+        events=_events(frame, n),
+        movable=_movable(frame, static),
+    )
+    values = checked_array(frame, "values", "<f8", (len(scene.series), static.arenas))
+    serial, ticks = _least(frame.values.get("serial"), 0, "serial"), _least(frame.values.get("ticks"), 1, "ticks")
+    return Glimpse(truth, serial, ticks, values)
+
+
+def _least(value: object, least: int, name: str) -> int:
+    if type(value) is not int or value < least:
+        raise BadFrame("malformed", f"{name}: expected a whole number of at least {least}")
+    return value
+
+
+def _within(name: str, array: AnyArray, end: int, first: int = 0) -> None:
+    if ((array < first) | (array >= end)).any():
+        raise BadFrame("malformed", f"{name}: expected {first} to {end - 1}")
+
+
+def _states(frame: Frame) -> tuple[str, ...]:
+    found: object = frame.values.get("states")
+    if type(found) is list:
+        states = cast("list[object]", found)
+        if states and all(type(state) is str and len(state) <= LONGEST_STATE for state in states):
+            return tuple(cast("list[str]", states))
+    raise BadFrame("malformed", "states: expected a list of texts")
+
+
+def _edges(frame: Frame, n: int) -> AnyArray | None:
+    if "edges" not in frame.arrays:
+        return None
+    edges = checked_array(frame, "edges", "<i8", (None, 2))
+    _within("edges", edges, n)
+    return edges
+
+
+def _movable(frame: Frame, static: Static) -> AnyArray | None:
+    if not static.movable:
+        return None
+    poses = checked_array(frame, "movable", "<f8", (static.arenas, 3 * static.movable))
+    return poses.reshape(static.arenas, static.movable, 3)
+
+
+def _tally(frame: Frame, arenas: int) -> Tally | None:
+    if "tally" not in frame.arrays:
+        return None
+    sent, intended, in_range = checked_array(frame, "tally", "<i8", (len(_COUNTED), arenas))
+    return Tally(sent, intended, in_range, checked_array(frame, "tally/fates", "<i8", (arenas, len(Fate))))
+
+
+def _finished(frame: Frame, static: Static) -> Finished | None:
+    if "finished" not in frame.arrays:
+        return None
+    columns = dict(zip(_FINISHED, checked_array(frame, "finished", "<i8", (len(_FINISHED), None)), strict=True))
+    _within("finished.arena", columns["arena"], static.arenas)
+    _within("finished.sender", columns["sender"], static.robots)
+    _within("finished.receiver", columns["receiver"], static.robots, first=-1)
+    _within("finished.to", columns["to"], static.robots, first=-1)
+    _within("finished.fate", columns["fate"], len(Fate))
+    rssi_dbm = None
+    if "finished/rssi_dbm" in frame.arrays:
+        rssi_dbm = checked_array(frame, "finished/rssi_dbm", "<f8", (len(columns["arena"]),))
+    return Finished(**columns, rssi_dbm=rssi_dbm)
+
+
+def _events(frame: Frame, n: int) -> tuple[Happened, ...]:
+    found: object = frame.values.get("events")
+    if type(found) is not list:
+        raise BadFrame("malformed", "events: expected a list")
+    told = cast("list[object]", found)
+    if not told:
+        return ()
+    changed = checked_array(frame, "events", "|b1", (len(told), n))
+    return tuple(_event(item, row) for item, row in zip(told, changed, strict=True))
+
+
+def _event(item: object, changed: AnyArray) -> Happened:
+    if type(item) is list and [type(part) for part in cast("list[object]", item)] == _EVENT:
+        serial, at_s, do, ended, failed, singly = cast("tuple[int, float, str, bool, str, bool]", item)
+        return Happened(serial, at_s, do, ended, changed, failed, singly)
+    raise BadFrame("malformed", "events: expected serial, at_s, do, ended, part and singly of each")
+
+
+def _senses(frame: Frame, static: Static) -> Senses:
+    """The senses of some robots; of which groups and in which shapes must agree, which senses is the bodies' affair."""
+    found: dict[str, dict[str, AnyArray]] = {}
+    for key in frame.arrays:
+        if key.startswith("sense/"):
+            _, name, sense = (*key.split("/", 2), "")[:3]
+            found.setdefault(name, {})[sense] = frame.arrays[key]
+    if not found.keys() <= {group.name for group in static.groups}:
+        raise BadFrame("malformed", "sense: expected groups of this run")
+    senses: Senses = {}
+    for name, columns in found.items():
+        rows = checked_array(frame, f"sense/{name}/rows", "<i8", (None,))
+        _within(f"sense/{name}/rows", rows, static.arenas * static.robots)
+        del columns["rows"]
+        if any(column.dtype != np.float64 or len(column) != len(rows) for column in columns.values()):
+            raise BadFrame("malformed", f"sense/{name}: expected a row of numbers for each robot")
+        senses[name] = GroupSenses(rows, columns)
+    return senses
