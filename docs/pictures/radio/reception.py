@@ -18,6 +18,7 @@ from swarmwire.comms.radio.reception.receiver import (
     ieee802154,
     sinr_for_db,
 )
+from swarmwire.comms.radio.timing import DSSS_RATES_BPS
 
 POINTS = 141
 OCTETS_154, OCTETS_B, OCTETS_AG = (20, 40, 127), 1024, 1000
@@ -29,7 +30,7 @@ def draw() -> None:
     receivers = [(str(octets), ieee802154(), 8 * octets) for octets in OCTETS_154]
     _draw(short, receivers, (-5.0, 3.0))
     say(short, "802.15.4, by octets", "SINR in dB", "share of frames that are right")
-    receivers = [(f"{rate / 1e6:g}", ieee80211b(rate), 8 * OCTETS_B) for rate in error_rates.DSSS_RATES_BPS]
+    receivers = [(f"{rate / 1e6:g}", ieee80211b(rate), 8 * OCTETS_B) for rate in DSSS_RATES_BPS]
     _draw(dsss_axes, receivers, (-6.0, 10.0))
     say(dsss_axes, f"802.11b, {OCTETS_B} octets, by Mbit/s", "SINR in dB", "")
     receivers = [(f"{rate / 1e6:g}", ieee80211ag(rate), 8 * OCTETS_AG) for rate in error_rates.OFDM_RATES_BPS]

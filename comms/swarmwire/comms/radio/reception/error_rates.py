@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.radio.propagation.decibels import to_db
-from swarmwire.comms.radio.timing import DSSS_RATES_BPS, OFDM_BITS_PER_SYMBOL
+from swarmwire.comms.radio.timing import OFDM_BITS_PER_SYMBOL
 
 
 @njit(cache=True)

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from scipy import integrate, special
 
 from swarmwire.comms.radio.propagation.decibels import from_db
-from swarmwire.comms.radio.reception.error_rates import DSSS_RATES_BPS
 from swarmwire.comms.radio.reception.error_rates import (
     OFDM_RATES_BPS,
     SPECTRA,
@@ -25,6 +24,7 @@ from swarmwire.comms.radio.reception.error_rates import (
     oqpsk_success,
     raw_bit_errors,
 )
+from swarmwire.comms.radio.timing import DSSS_RATES_BPS
 
 getcontext().prec = 60
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")

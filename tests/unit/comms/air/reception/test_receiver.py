@@ -32,13 +32,14 @@ from swarmwire.comms.radio.reception.receiver import (
     sensitivity_dbm,
     sinr_for_db,
 )
+from swarmwire.comms.radio.timing import DSSS_RATES_BPS
 
 getcontext().prec = 40
 THRESHOLD = by_threshold(4.0)
 BY_BITS = (
     by_table(SuccessTable((-1.0, 0.0, 3.0), (0.0, 0.2, 1.0), 1000)),
     ieee802154(),
-    *(ieee80211b(rate_bps) for rate_bps in error_rates.DSSS_RATES_BPS),
+    *(ieee80211b(rate_bps) for rate_bps in DSSS_RATES_BPS),
     *(ieee80211ag(rate_bps) for rate_bps in error_rates.OFDM_RATES_BPS),
 )
 
@@ -176,7 +177,7 @@ TABLE = SuccessTable((0.0, 6.0), (0.0, 1.0), 800)
         (Reception(), 250_000, ieee802154()),
         (Reception("threshold", least_sinr_db=3.0), 1, by_threshold(3.0)),
         (Reception("table", table=TABLE), 1, by_table(TABLE)),
-        *((Reception("802.11b"), rate_bps, ieee80211b(rate_bps)) for rate_bps in error_rates.DSSS_RATES_BPS),
+        *((Reception("802.11b"), rate_bps, ieee80211b(rate_bps)) for rate_bps in DSSS_RATES_BPS),
         *((Reception("802.11ag"), rate_bps, ieee80211ag(rate_bps)) for rate_bps in error_rates.OFDM_RATES_BPS),
     ],
 )
