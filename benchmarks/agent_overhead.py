@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmarks.agents import Ping
 from benchmarks.lines import print_line, spread
-from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.agent.local_backend import LocalCrew
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import Clock, WallClock

@@ -11,12 +11,12 @@ import sys
 import time
 from pathlib import Path
 
-from swarmwire.agent.on_robot.end import End
+from swarmwire.agent.on_robot.assembly import run_robot
+from swarmwire.agent.on_robot.log import TickRow
+from swarmwire.agent.on_robot.loop import RobotLoop
 from swarmwire.agent.on_robot.plan import plan_of
-from swarmwire.agent.on_robot.robot_log import TickRow
-from swarmwire.agent.on_robot.robot_loop import RobotLoop
-from swarmwire.agent.on_robot.run import run_robot
-from swarmwire.agent.on_robot.settings_file import read_settings
+from swarmwire.agent.on_robot.safety import End
+from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.clock import WallClock
 
 WARM_UP = 30  # steps that are left out: what is called for the first time takes longer

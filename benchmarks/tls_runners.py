@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from swarmwire.agent import runner
-from swarmwire.agent.loading import load_agent
+from swarmwire.agent.agent import load_agent
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import closed_after, open_runner

@@ -14,7 +14,7 @@ from typer.main import get_command
 
 from swarmwire import agent, deploy
 from swarmwire.agent import behaviours, readings, testing
-from swarmwire.agent.declared import parameters_of
+from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms import errors
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Holonomic, Leds, Twist, Wheels

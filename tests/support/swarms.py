@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import numpy as np
 import zenoh
 
-from swarmwire.agent.radios.radio_log import HeardPacket, NoRadioLog, SentPacket
+from swarmwire.agent.radios.radio import HeardPacket, NoRadioLog, SentPacket
 from swarmwire.agent.radios.zenoh_radio import ZenohRadio
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.messages import Message, f4

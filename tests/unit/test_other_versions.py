@@ -9,9 +9,9 @@ import msgpack
 import pytest
 
 from swarmwire.agent import API_VERSION
-from swarmwire.agent.loading import NoAgent, load_agent
-from swarmwire.agent.on_robot.settings_file import read_settings
-from swarmwire.agent.radios.packet_header import PacketHeader
+from swarmwire.agent.agent import NoAgent, load_agent
+from swarmwire.agent.on_robot.settings import read_settings
+from swarmwire.agent.radios.zenoh_radio import PacketHeader
 from swarmwire.agent.runner import given_robots
 from swarmwire.comms.config import check_format
 from swarmwire.comms.errors import BadFrame, BadInput

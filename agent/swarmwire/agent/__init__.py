@@ -2,12 +2,19 @@
 
 from swarmwire.agent.agent import Agent
 from swarmwire.agent.api_version import API_VERSION
-from swarmwire.agent.outcome import Outcome
-from swarmwire.agent.packet import Packet
-from swarmwire.agent.per_robot import PerRobot, per_robot
+from swarmwire.agent.packet import Outcome, Packet
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, IntColumn, State, VectorAgent, column
+from swarmwire.agent.vector_agent import (
+    BoolColumn,
+    FloatColumn,
+    IntColumn,
+    PerRobot,
+    State,
+    VectorAgent,
+    column,
+    per_robot,
+)
 from swarmwire.comms.messages import Message, f4, f8, i1, i2, i4, u1, u2, u4
 from swarmwire.comms.packets import Outcomes, SendResult
 

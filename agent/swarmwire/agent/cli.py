@@ -10,13 +10,22 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import NoReturn
 
-from swarmwire.agent.join_cli import ABOUT as JOIN
-from swarmwire.agent.join_cli import add_join, join_parsed
-from swarmwire.agent.on_robot.end import SIGNALS, End, by_signals
-from swarmwire.agent.on_robot.exit_codes import BAD_INPUT, ENDED, FAILED, INTERRUPTED
-from swarmwire.agent.on_robot.flags import AGENT, add_flags, by_flag, given_flags
-from swarmwire.agent.on_robot.settings import RobotSettings
-from swarmwire.agent.on_robot.settings_file import NO_FILE, read_settings
+from swarmwire.agent.joining import ABOUT as JOIN
+from swarmwire.agent.joining import add_join, join_parsed
+from swarmwire.agent.on_robot.safety import SIGNALS, End, by_signals
+from swarmwire.agent.on_robot.settings import (
+    AGENT,
+    BAD_INPUT,
+    ENDED,
+    FAILED,
+    INTERRUPTED,
+    NO_FILE,
+    RobotSettings,
+    add_flags,
+    by_flag,
+    given_flags,
+    read_settings,
+)
 from swarmwire.comms.clock import DatedClock, ScaledClock, WallClock
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.comms.wire.sessions import end_now
@@ -125,9 +134,9 @@ def _run(parsed: argparse.Namespace) -> int:
         from swarmwire.agent.on_robot.guarded import become_guard
 
         become_guard(settings, parsed.given, ["stop-motors", *parsed.given[1:]])
+    from swarmwire.agent.on_robot.assembly import run_robot
     from swarmwire.agent.on_robot.guard import CLOSED
     from swarmwire.agent.on_robot.plan import plan_of
-    from swarmwire.agent.on_robot.run import run_robot
 
     end, wall, pipe = End(), WallClock(), parsed.heartbeats
     clock = _clock(settings, wall)
@@ -179,7 +188,7 @@ def _wanted() -> bool:
 
 
 def _drivers(_: argparse.Namespace) -> int:
-    from swarmwire.agent.on_robot.driver_registry import told_drivers
+    from swarmwire.agent.drivers.driver import told_drivers
 
     sys.stdout.write("\n".join(told_drivers()) + "\n")
     return ENDED

@@ -1,19 +1,17 @@
-"""The host runs the agents of some robots, tick by tick: the same code in a local crew and in every runner."""
+"""What robots are told of the radio: packets heard, and outcomes of their own."""
 
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from swarmwire.agent.agent import Agent
-from swarmwire.agent.declared import make, parameters_of
-from swarmwire.agent.loading import AgentClass, load_agent
+from swarmwire.agent.agent import Agent, AgentClass, load_agent
+from swarmwire.agent.parameters import make, parameters_of
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.told import Told
-from swarmwire.agent.turn import Turn
+from swarmwire.agent.step_context import Turn
 from swarmwire.agent.vector_agent import State, VectorAgent, freeze, state_of
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
@@ -22,6 +20,42 @@ from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
 from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
+
+
+class Told(NamedTuple):
+    """Packets heard and outcomes, in the orders that these promise; true if there is any."""
+
+    heard: Heard
+    outcomes: Outcomes
+
+    def __bool__(self) -> bool:
+        return bool(len(self.heard) or len(self.outcomes))
+
+    def followed_by(self, other: "Told") -> "Told":
+        """Both together."""
+        return Told(Heard.joined([self.heard, other.heard]), Outcomes.joined([self.outcomes, other.outcomes]))
+
+    def of(self, rows: IntArray) -> "Told":
+        """What is for these robot rows, (n,), rising."""
+        return self.parted(rows)[0]
+
+    def parted(self, rows: IntArray) -> "tuple[Told, Told]":
+        """What is for these robot rows, (n,), and what is for others."""
+        heard, told = np.isin(self.heard.receiver, rows), np.isin(self.outcomes.row, rows)
+        if heard.all() and told.all():
+            return self, Told(self.heard.select(NONE), self.outcomes.select(NONE))
+        ours, theirs = (
+            Told(self.heard.select(np.flatnonzero(h)).compacted(), self.outcomes.select(np.flatnonzero(o)))
+            for h, o in ((heard, told), (~heard, ~told))
+        )
+        return ours, theirs
+
+
+NONE = np.empty(0, np.int64)
+
+
+# --- The host runs the agents of some robots, tick by tick: the same code in a local crew and in every runner.
+
 
 NOT_OWN = -1
 NOBODY = np.empty(0, np.int64)

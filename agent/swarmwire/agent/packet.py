@@ -1,13 +1,31 @@
-"""Packets as agents see them: one object each for an Agent, columns for a VectorAgent."""
+"""What an Agent's radio tells of a packet that it is done with."""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.packets import TAG_BYTES, Heard
+from swarmwire.comms.packets import TAG_BYTES, Heard, SendResult
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One addressed packet whose fate the sender's radio knows, as far as it can."""
+
+    id: int  # that `send` returned
+    result: SendResult
+
+    @property
+    def acknowledged(self) -> bool:
+        """Whether it arrived for certain; if not, it may have arrived all the same, and its acknowledgement not."""
+        return self.result == SendResult.ACKNOWLEDGED
+
+
+# --- Packets as agents see them: one object each for an Agent, columns for a VectorAgent.
+
 
 M = TypeVar("M", covariant=True)
 

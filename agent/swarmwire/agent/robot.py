@@ -5,13 +5,11 @@ from typing import Any, TypeVar, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarmwire.agent.draw import Draw
-from swarmwire.agent.outcome import Outcome
-from swarmwire.agent.packet import Packet
+from swarmwire.agent.packet import Outcome, Packet
 from swarmwire.agent.readings import BumperReading, CameraReading, OwnReading
-from swarmwire.agent.robots import forward_and_turn
-from swarmwire.agent.sensing import Sensing
-from swarmwire.agent.turn import Turn
+from swarmwire.agent.robots import Draw, forward_and_turn
+from swarmwire.agent.sensors import Sensing
+from swarmwire.agent.step_context import Turn
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.drives import rgb_of
 from swarmwire.comms.messages import DICT_TAG, Message, dict_in, encode_dict, message_class

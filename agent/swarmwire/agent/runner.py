@@ -22,8 +22,8 @@ import numpy as np
 import zenoh
 from zenoh.handlers import Callback
 
+from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.host import Host, layout_of
-from swarmwire.agent.loading import NoAgent, load_agent
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
 from swarmwire.comms.packets import Heard, Outcomes

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_args, get_type_hints, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,7 +118,7 @@ class VectorAgent(ABC, Generic[S]):
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
         """Called before anything runs with the parameters that were given for so many robots, each of its type.
 
-        Raises BadParameter of swarmwire.agent.declared for values that do not go together; here none are refused.
+        Raises BadParameter of swarmwire.agent.parameters for values that do not go together; here none are refused.
         """
 
     @abstractmethod
@@ -142,3 +142,37 @@ def state_of(kind: type[VectorAgent[Any]]) -> type[State]:
                 if isinstance(arg, type) and issubclass(arg, State):
                     return arg
     return State
+
+
+# --- PerRobot: a parameter of a VectorAgent that has a value for each robot.
+
+
+T = TypeVar("T", int, float)
+
+
+class PerRobot(Generic[T]):
+    """Declares `lane: PerRobot[int] = per_robot(0)`, without default `lane: PerRobot[int]`.
+
+    A scenario gives one number for all or a list with one for each robot, by its index in the group. In `step`,
+    `self.lane` is the array (n,) of the robots that act: int64 or float64.
+    """
+
+    if TYPE_CHECKING:
+
+        @overload
+        def __get__(self: "PerRobot[int]", agent: object, owner: Any) -> IntArray: ...
+        @overload
+        def __get__(self: "PerRobot[float]", agent: object, owner: Any) -> FloatArray: ...
+        def __get__(self, agent: object, owner: Any) -> Any: ...
+
+
+class PerRobotDefault:
+    """One number for all robots, unless the scenario says otherwise."""
+
+    def __init__(self, value: float) -> None:
+        self.value = value
+
+
+def per_robot(default: float) -> Any:
+    """The default of a PerRobot parameter: one number for all robots."""
+    return PerRobotDefault(default)

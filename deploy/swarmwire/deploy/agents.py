@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from swarmwire.agent.declared import BadParameter, checked
-from swarmwire.agent.loading import AgentClass, NoAgent, load_agent
+from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
+from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import resolve
 from swarmwire.world.scenario.bodies import bodies_of

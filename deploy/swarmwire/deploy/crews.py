@@ -5,7 +5,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.agent.local_backend import LocalCrew
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.interfaces import Crew
@@ -158,6 +158,6 @@ class Crews:
             self.say(f"lost runner {loss}; its robots stand still")
             return
         agents = ",".join(sorted(set(self.agents.values())))
-        takeover = f"python -m swarmwire.agent.nursery {endpoint} {self.run_id} {agents} NAME"
+        takeover = f"python -m swarmwire.agent.fork_server {endpoint} {self.run_id} {agents} NAME"
         until = "waiting for another" if self.scenario.run.on_runner_loss == "wait" else "another may take over"
         self.say(f"lost runner {loss}; {until}, such as: {takeover}")

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
+from swarmwire.agent.agent import agent_sha256, load_agent
 from swarmwire.agent.host import layout_of
-from swarmwire.agent.loading import agent_sha256, load_agent
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.join import Offer, OfferedGroup
 from swarmwire.deploy.listening import Listening

@@ -14,7 +14,7 @@ LEAVE_S = 3.0
 class RunnerProcesses:
     """The processes of all runners of one run; none of them outlives `stop` or this process."""
 
-    program = "swarmwire.agent.nursery"  # that forks them
+    program = "swarmwire.agent.fork_server"  # that forks them
 
     def __init__(
         self, endpoint: str, run_id: str, agents: Sequence[str], names: Sequence[str], *, waited_for: bool = False

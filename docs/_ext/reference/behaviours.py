@@ -9,7 +9,7 @@ from reference.docstrings import told_of
 from reference.field_comments import comments_of
 from reference.markdown import code, table, toml_code
 from swarmwire.agent import behaviours
-from swarmwire.agent.declared import REQUIRED, parameters_of
+from swarmwire.agent.parameters import REQUIRED, parameters_of
 from swarmwire.agent.vector_agent import VectorAgent
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios" / "behaviours"

@@ -27,7 +27,9 @@ sys.exit(nursery.main(sys.argv[1:]))
 class Nursery:
     """A nursery with a pipe to its life line and one from its reports; `program` starts it."""
 
-    def __init__(self, endpoint: str, *names: str, program: Sequence[str] = ("-m", "swarmwire.agent.nursery")) -> None:
+    def __init__(
+        self, endpoint: str, *names: str, program: Sequence[str] = ("-m", "swarmwire.agent.fork_server")
+    ) -> None:
         command = [sys.executable, *program, endpoint, "run1", spec("Counter"), *names]
         self.process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -26,7 +26,7 @@ class Policies:
 
     def see(self, truth: Truth) -> None:
         """Ask, in every tick."""
-        nursery = [child for child in psutil.Process().children() if "swarmwire.agent.nursery" in child.cmdline()]
+        nursery = [child for child in psutil.Process().children() if "swarmwire.agent.fork_server" in child.cmdline()]
         self.found = [os.sched_getscheduler(runner.pid) for process in nursery for runner in process.children()]
 
     def end(self, last: Tally | None) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarmwire.agent.drivers.driver import Command, DriverLost
-from swarmwire.agent.on_robot.watchdog import Watchdog
+from swarmwire.agent.on_robot.safety import Watchdog
 from swarmwire.comms.clock import to_s
 from tests.support.robots.faulty_link import Before, ByteByByte, CutAfter, FaultyLink, Late, Nothing
 from tests.support.robots.rig import OwnWireRig, Rig, opened, readings, sense_until_lost

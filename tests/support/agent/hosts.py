@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.host import Hosted, hosted
-from swarmwire.agent.loading import AgentClass
 from swarmwire.comms import draws
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body

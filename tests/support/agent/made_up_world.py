@@ -10,7 +10,7 @@ import msgpack
 import zenoh
 from zenoh.handlers import Callback
 
-from swarmwire.agent.loading import agent_sha256, load_agent
+from swarmwire.agent.agent import agent_sha256, load_agent
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import Offer, OfferedGroup
 from swarmwire.comms.wire.keys import Keys, runner_of

@@ -12,8 +12,8 @@ from typing import Any
 
 import zenoh
 
+from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import layout_of
-from swarmwire.agent.loading import load_agent
 from swarmwire.agent.runner import Inbox, answers, given_robots
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes

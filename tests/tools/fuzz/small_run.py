@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import Host, layout_of
-from swarmwire.agent.loading import load_agent
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
 from swarmwire.comms.tick_io import Actions, Actuations, Notes, Senses, Values

@@ -5,7 +5,7 @@ import pytest
 
 from swarmwire.agent import Agent, Robot
 from swarmwire.agent.host import Host, _Single
-from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.agent.local_backend import LocalCrew
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, Sent
 from tests.support.agent.hosts import SILENCE, assignment, group, heard_from, senses, spec, words

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
+from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.host import Host
-from swarmwire.agent.loading import AgentClass
-from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.agent.local_backend import LocalCrew
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.messages import encode_dict
 from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Heard, Payloads, Sent

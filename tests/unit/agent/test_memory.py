@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import Host, layout_of
-from swarmwire.agent.loading import load_agent
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import Heard, Outcomes
 from swarmwire.comms.tick_io import Actions

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
+from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.host import hosted
-from swarmwire.agent.loading import AgentClass
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import Heard, Sent
 from tests.support.agent.hosts import group, heard_from, senses

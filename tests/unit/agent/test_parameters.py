@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from swarmwire.agent import Agent, Robot
+from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
 from swarmwire.agent.behaviours import Flocking
-from swarmwire.agent.declared import REQUIRED, BadParameter, checked, make, parameters_of
-from swarmwire.agent.loading import NoAgent, agent_sha256, load_agent
+from swarmwire.agent.parameters import REQUIRED, BadParameter, checked, make, parameters_of
 from swarmwire.comms.plugins import resolve
 from tests.support.agent.hosts import PLAYERS, spec
 from tests.support.agent.players import Parametrised, Stateless

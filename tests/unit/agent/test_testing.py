@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swarmwire.agent import Agent, Robot, VectorAgent
+from swarmwire.agent.agent import load_agent
 from swarmwire.agent.behaviours import Diffusion, Flocking, PsoSearch, PsoSearchPositioned
-from swarmwire.agent.loading import load_agent
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.errors import AgentFailed
 from tests.support.agent.players import (

@@ -18,10 +18,10 @@ from swarmwire.agent import (
     State,
     VectorAgent,
     column,
-    per_robot,
+    vector_agent,
 )
-from swarmwire.agent.declared import BadParameter, checked, parameters_of
 from swarmwire.agent.host import hosted
+from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import state_of
 from swarmwire.comms.packets import Heard
@@ -139,7 +139,7 @@ def test_an_agents_state_is_the_one_that_its_class_names() -> None:
 class Lanes(VectorAgent):
     needs: ClassVar[tuple[str, ...]] = ()
     lane: PerRobot[int]
-    speed_mps: PerRobot[float] = per_robot(0.02)
+    speed_mps: PerRobot[float] = vector_agent(0.02)
     gain: float = 2.0
 
     def step(self, robots: Robots, state: State) -> None:

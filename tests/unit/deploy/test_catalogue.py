@@ -9,8 +9,8 @@ import pytest
 from rich.console import Console
 
 from swarmwire.agent import behaviours
-from swarmwire.agent.declared import REQUIRED, parameters_of
-from swarmwire.agent.turn import OUTCOMES
+from swarmwire.agent.parameters import REQUIRED, parameters_of
+from swarmwire.agent.step_context import OUTCOMES
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Leds
 from swarmwire.comms.bodies.sensors import SHEETS

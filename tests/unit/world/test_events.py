@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.agent.local_backend import LocalCrew
 from swarmwire.comms.events.selection import Selection, Swarm
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes

@@ -5,9 +5,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours.limits import check_above_zero, check_not_negative
-from swarmwire.agent.behaviours.random_walk import spell_lengths, turns_at_random
-from swarmwire.agent.behaviours.walking import Walk, begin_spells, ended, turns_away, walk_on
+from swarmwire.agent.behaviours._common import check_above_zero, check_not_negative
+from swarmwire.agent.behaviours.random_walk import (
+    Walk,
+    begin_spells,
+    ended,
+    spell_lengths,
+    turns_at_random,
+    turns_away,
+    walk_on,
+)
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import IntColumn, VectorAgent, column
 from swarmwire.comms.arrays import BoolArray, FloatArray

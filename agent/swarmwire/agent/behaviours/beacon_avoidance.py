@@ -5,8 +5,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours.limits import check_above_zero, check_not_negative, check_order
-from swarmwire.agent.behaviours.remembered import Remembered, forget, known, pass_time, remember
+from swarmwire.agent.behaviours._common import check_above_zero, check_not_negative, check_order
+from swarmwire.agent.behaviours.neighbour_table import Remembered, forget, known, pass_time, remember
 from swarmwire.agent.fields import Vectors, along, hysteresis, low_pass, steered
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, VectorAgent, column

@@ -4,9 +4,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.agent.per_robot import PerRobot, per_robot
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import FloatColumn, State, VectorAgent, column
+from swarmwire.agent.vector_agent import FloatColumn, PerRobot, State, VectorAgent, column, per_robot
 from swarmwire.comms.messages import Message, f8
 
 

@@ -3,15 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from swarmwire.agent.behaviours.limits import check_above_zero
-from swarmwire.agent.fields import (
-    ahead,
-    alignment,
-    mean_heard,
-    repulsion_of_rays,
-    spacing,
-    steered,
-)
+from swarmwire.agent.behaviours._common import check_above_zero
+from swarmwire.agent.fields import ahead, alignment, mean_heard, repulsion_of_rays, spacing, steered
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import State, VectorAgent
 from swarmwire.comms.messages import Message, f4

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours.limits import check_above_zero, check_order
+from swarmwire.agent.behaviours._common import check_above_zero, check_order
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, State, VectorAgent, column
 from swarmwire.comms.arrays import BoolArray, FloatArray

@@ -1,15 +1,63 @@
-"""Random walk: straight spells, and turns at random between them."""
+"""Walking: straight spells with turns on the spot between them, and away from what is in the way."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours.limits import check_above_zero, check_share
-from swarmwire.agent.behaviours.walking import Walk, begin_spells, ended, turns_away, walk_on
+from swarmwire.agent.behaviours._common import check_above_zero, check_share, wrapped
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import VectorAgent
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.agent.vector_agent import FloatColumn, State, VectorAgent, column
+from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.messages import Message
+
+
+class Walk(State):
+    """What a walker remembers."""
+
+    left_m: FloatColumn = column(0.0)  # of the present spell
+    turn_rad: FloatColumn = column(0.0)  # yet to be made before it goes on, positive to the left
+
+
+W = TypeVar("W", bound=Walk)
+
+
+def begin_spells(state: Walk, rows: BoolArray, turn_rad: FloatArray, length_m: FloatArray | float) -> None:
+    """The robots of the mask `rows` turn so far, (n,), and then go straight for so long."""
+    np.copyto(state.turn_rad, wrapped(turn_rad), where=rows)
+    np.copyto(state.left_m, length_m, where=rows)
+
+
+def ended(state: Walk) -> BoolArray:
+    """Who has neither a way nor a turn left, (n,)."""
+    return (state.left_m <= 0.0) & (state.turn_rad == 0.0)
+
+
+def turns_away(robots: Robots, faint: float) -> tuple[BoolArray, FloatArray]:
+    """Who has something in the way, and a turn to a heading uniform over the half circle away from it, (n,) each.
+
+    In the way is what rays of the front half answer to by at least `faint`; it is where their vector sum points.
+    """
+    near, ahead = robots.proximity, np.cos(robots.proximity.angle_rad) > 0.0
+    value = np.where(ahead, near.value, 0.0)
+    blocked = np.max(value, axis=1) >= faint
+    x = np.add.reduce(value * np.cos(near.angle_rad), 1)
+    y = np.add.reduce(value * np.sin(near.angle_rad), 1)
+    half_circle = robots.draw.uniform("turn away", -0.5 * np.pi, 0.5 * np.pi)
+    return blocked, np.arctan2(y, x) + np.pi + half_circle
+
+
+def walk_on(robots: Robots, state: Walk, speed_mps: float, turn_radps: float, goes: BoolArray | None = None) -> None:
+    """Turn on the spot where a turn is left, else straight on; who is not in the mask `goes` stands."""
+    period_s, going = robots.period_s, 1.0 if goes is None else goes.astype(np.float64)
+    turned = going * np.clip(state.turn_rad, -turn_radps * period_s, turn_radps * period_s)
+    linear = going * np.where(state.turn_rad == 0.0, speed_mps, 0.0)
+    robots.drive(linear_mps=linear, angular_radps=turned / period_s)
+    state.turn_rad -= turned
+    state.left_m -= linear * period_s
+
+
+# --- Random walk: straight spells, and turns at random between them.
 
 
 class RandomWalk(VectorAgent[Walk]):
@@ -58,3 +106,81 @@ def turns_at_random(robots: Robots, persistence: float) -> FloatArray:
     """Turns from the wrapped Cauchy distribution of this mean cosine, (n,)."""
     half = robots.draw.uniform("turn", -0.5 * np.pi, 0.5 * np.pi)
     return 2.0 * np.arctan2((1.0 - persistence) * np.sin(half), (1.0 + persistence) * np.cos(half))
+
+
+# --- Diffusion: drive straight until something is near, then turn away on one wheel.
+
+
+class Diffusion(VectorAgent):
+    """ARGoS's diffusion rule (argos3-examples, footbot_diffusion.cpp), by proximity alone.
+
+    The mean of the rays' vectors (value towards angle) says where things are. While it is short and points into the
+    go-straight sector the robot drives straight; otherwise one wheel stops, so that it turns away.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("proximity",)
+    speed_mps: float = 0.05  # of a driven wheel
+    go_straight_rad: float = 0.1309  # half width of the sector ahead in which a weak reading is ignored (7.5 degrees)
+    nearness: float = 0.1  # length of the mean vector above which the way ahead counts as blocked, 0 to 1
+
+    def step(self, robots: Robots, state: State) -> None:
+        """Straight, or one wheel."""
+        proximity = robots.proximity
+        rays = len(proximity.angle_rad)
+        x, y = proximity.vector_sum()
+        angle = np.arctan2(y, x)
+        straight = (np.abs(angle) <= self.go_straight_rad) & (np.hypot(x, y) < self.nearness * rays)
+        turn = self.speed_mps / robots.body.wheels.wheel_base_m
+        linear = np.where(straight, self.speed_mps, 0.5 * self.speed_mps)
+        angular = np.where(straight, 0.0, np.where(angle > 0.0, -turn, turn))
+        robots.drive(linear_mps=linear, angular_radps=angular)
+
+
+# --- Coverage: a random walk that leads away from the neighbours heard.
+
+
+class Present(Message):
+    """What a covering robot broadcasts in every step: that it is there. Range and bearing tell where."""
+
+
+class Coverage(VectorAgent[Walk]):
+    """Robots spread, and sweep what is between them: a random walk that neighbours heard push away.
+
+    Neighbours push as in the potential field of Howard, Mataric and Sukhatme (2002), which spreads a network of sensors
+    over a building and then rests. To go on sweeping, ours turns the directions of a random walk by that push: at the
+    end of a spell, the next heading is that of
+
+        u - repulsion_m2 sum of r / |r|^3,    u a unit vector at random, r from the robot to each neighbour heard
+
+    over the packets of the last step alone: there is no memory of who was where. Who hears nobody walks as `RandomWalk`
+    does. Walls push by rays instead of by a field: the next heading is uniform over the half circle away from them.
+    The source's viscous friction, which ends the motion, is left out.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("proximity", "radio.range", "radio.bearing")
+    speed_mps: float = 0.1  # straight ahead
+    spell_m: float = 2.0  # mean length of a spell, exponential
+    repulsion_m2: float = 1.0  # a neighbour at the root of this, in m, pushes as much as chance
+    nearest_m: float = 0.1  # who is nearer than this pushes as if it were not
+    turn_radps: float = 2.0  # turn rate, on the spot
+    faint: float = 0.1  # least answer of a ray, 0 to 1, to a thing; above the noise of the bodies' rays
+
+    @classmethod
+    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
+        """Spells end, turns too, and nobody pushes without bound."""
+        check_above_zero(params, "spell_m", "nearest_m", "turn_radps", "faint")
+
+    def step(self, robots: Robots, state: Walk) -> None:
+        """On with the spell, or with the turn to the next; and be heard."""
+        heard = robots.radio.heard(Present)
+        push = self.repulsion_m2 / np.maximum(heard.range_m, self.nearest_m) ** 2
+        chance = turns_at_random(robots, 0.0)
+        x = np.cos(chance) - heard.sum(push * np.cos(heard.bearing_rad))
+        y = np.sin(chance) - heard.sum(push * np.sin(heard.bearing_rad))
+
+        length = spell_lengths(robots, self.spell_m)
+        begin_spells(state, ended(state), np.arctan2(y, x), length)
+        blocked, away = turns_away(robots, self.faint)
+        begin_spells(state, blocked & (state.turn_rad == 0.0), away, length)
+        walk_on(robots, state, self.speed_mps, self.turn_radps)
+        robots.radio.send(Present)

@@ -5,8 +5,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours.limits import check_above_zero, check_not_negative, check_order
-from swarmwire.agent.fields import Vectors, ahead, hysteresis, low_pass, repulsion_of_ranges, steered
+from swarmwire.agent.behaviours._common import check_above_zero, check_not_negative, check_order
+from swarmwire.agent.fields import Vectors, ahead, hysteresis, low_pass, repulsion_of_ranges, repulsion_of_rays, steered
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, State, VectorAgent, column
 
@@ -73,3 +73,24 @@ class SmoothedAvoidance(VectorAgent[Smoothed]):
         state.side = np.where(state.blocked, state.side, side)
         state.blocked = hysteresis(state.blocked, np.abs(wanted.angle_rad), self.blocked_rad, self.free_rad)
         return Vectors(wanted.x, np.where(state.blocked, state.side * np.abs(wanted.y), wanted.y))
+
+
+# --- Smoothed avoidance by short rays around the body.
+
+
+class SmoothedAvoidanceProximity(SmoothedAvoidance):
+    """Smoothed avoidance for bodies that have proximity rays instead of a scanner.
+
+    As SmoothedAvoidance, but that the repulsion is the sum of the rays, each as long as its answer; how far they reach
+    is the body's.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("proximity",)
+    strength: float = 2.0  # weight of the repulsion against the way ahead
+    speed_mps: float = 0.1  # straight ahead
+    turn_gain_per_s: float = 3.0  # turn rate per angle to the wanted direction
+    smooth_s: float = 0.1  # time constant of the commands' low-pass
+
+    def repulsion(self, robots: Robots) -> Vectors:
+        """Away from what is near, (n,)."""
+        return repulsion_of_rays(robots.proximity)

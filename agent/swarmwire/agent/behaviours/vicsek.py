@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours.angles import wrapped
+from swarmwire.agent.behaviours._common import wrapped
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import State, VectorAgent
 from swarmwire.comms.arrays import FloatArray

@@ -2,14 +2,15 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import MISSING, Field, dataclass, field, fields
 from typing import Any, ClassVar
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.config import NoParameters
-from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.config import NoParameters, limits_of
+from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.plugins import installed_class, installed_points
 
 
 class DriverLost(SwarmwireError):
@@ -82,3 +83,41 @@ class Driver(ABC):
     @abstractmethod
     def close(self) -> None:
         """Motors off, if the robot can be reached, and the connection closed; safe to call more than once."""
+
+
+# --- Drivers that are installed, by entry points of the group `swarmwire.drivers`; imported when one is asked for.
+
+
+GROUP = "swarmwire.drivers"  # of entry points
+
+
+def driver_names() -> list[str]:
+    """The names of all drivers that are installed."""
+    return list(installed_points(GROUP))
+
+
+def load_driver(name: str, where: str, key: str) -> type[Driver]:
+    """The driver of that name; BadInput at `where` and `key` as `installed_class`."""
+    return installed_class(GROUP, name, Driver, "driver", where, key)
+
+
+def told_drivers() -> list[str]:
+    """Every driver in lines for people: its name, body and options, or why it cannot be used."""
+    lines: list[str] = []
+    for name in driver_names():
+        try:
+            kind = load_driver(name, "", "")
+        except BadInput as error:
+            lines.append(f"{name}: {error.expected}")
+            continue
+        told = (kind.__doc__ or "").strip().partition("\n")[0]
+        lines.append(f"{name}: {told} Body: {kind.body_name}")
+        lines += [f"  {told_option(of)}" for of in fields(kind.options)]
+    return lines or ["no drivers are installed"]
+
+
+def told_option(of: "Field[Any]") -> str:
+    """An option in a line: its name, default, unit and meaning."""
+    limits = limits_of(of)
+    value = "must be given" if of.default is MISSING else f"{of.default!r}{f' {limits.unit}' if limits.unit else ''}"
+    return f"{of.name} ({value}): {limits.help}"

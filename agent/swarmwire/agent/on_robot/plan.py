@@ -1,26 +1,132 @@
-"""What the settings of a robot come to: agent, body, driver and limits, found and checked at the door."""
+"""Whether an agent finds what it needs on its robot: on the body, from driver, radio and tracker."""
 
 import hashlib
 import inspect
-from dataclasses import dataclass
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
+from math import hypot
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from swarmwire.agent.declared import BadParameter, checked
-from swarmwire.agent.drivers.driver import Driver
-from swarmwire.agent.loading import AgentClass, NoAgent, load_agent
-from swarmwire.agent.on_robot.driver_registry import load_driver
-from swarmwire.agent.on_robot.limits import SpeedLimits, limits_for
-from swarmwire.agent.on_robot.needs import OF_POSES, Offer, check_needs
+from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
+from swarmwire.agent.drivers.driver import Command, Driver, load_driver
 from swarmwire.agent.on_robot.settings import RobotSettings
+from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.comms.assignment import params_of
 from swarmwire.comms.bodies.body import Body, body_from, load_body
+from swarmwire.comms.bodies.drives import Wheels
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
+
+OF_TRACKER = ("positioning", "compass")  # senses that poses of a tracker stand in for
+OF_POSES = ("radio.range", "radio.bearing")  # what poses add to a real radio
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What there is on a robot."""
+
+    body: Body
+    driver: str  # its name
+    driver_gives: AbstractSet[str]
+    radio: str  # its kind
+    radio_gives: AbstractSet[str]
+    tracker: bool
+
+
+def check_needs(agent: str, needs: tuple[str, ...], offer: Offer, where: str) -> None:
+    """BadInput at `agent` in `where` for the first need that is not met: which, and what would give it."""
+    for need in needs:
+        fault = _of_radio(need, offer) if need.startswith("radio.") else _of_robot(need, offer)
+        if fault:
+            raise BadInput(where, "agent", f"{agent} needs {need!r}, which {fault}")
+
+
+def tracked(needs: tuple[str, ...], offer: Offer) -> frozenset[str]:
+    """The senses that the tracker gives: those of the body that the driver does not."""
+    if not offer.tracker:
+        return frozenset()
+    return frozenset(need for need in needs if need in OF_TRACKER and need not in offer.driver_gives)
+
+
+def _of_robot(need: str, offer: Offer) -> str | None:
+    body = offer.body
+    if need not in body.senses:
+        return f"the body {body.name} lacks: it has {', '.join(body.senses) or 'no senses'}"
+    if need in offer.driver_gives or need in tracked((need,), offer):
+        return None
+    gives = ", ".join(sorted(offer.driver_gives)) or "nothing"
+    cure = ": expected tracker = true" if need in OF_TRACKER else ""
+    return f"the driver {offer.driver} does not give (it gives {gives}){cure}"
+
+
+def _of_radio(need: str, offer: Offer) -> str | None:
+    if need in offer.radio_gives:
+        return None
+    if offer.radio == "none":
+        return 'only a radio tells: expected radio.kind "zenoh" or "air"'
+    if need in OF_POSES and offer.radio == "zenoh":
+        return "a real radio does not tell: expected tracker = true"
+    gives = ", ".join(sorted(offer.radio_gives)) or "nothing of a packet"
+    return f"the radio {offer.radio} does not tell: it tells {gives}"
+
+
+# --- Speed limits of a robot, below what its hardware can do.
+
+
+SHARE = 0.5  # of what the body can do, unless the settings say otherwise
+FASTEST = 1e6  # in place of inf, so that a command keeps its direction
+
+
+@dataclass(frozen=True)
+class SpeedLimits:
+    """How fast the robot may go: a command above is slowed down as a whole, so that its curve stays."""
+
+    linear_mps: float  # in any direction of the plane
+    angular_radps: float
+    wheel_mps: float | None = None  # of each of two wheels, which drive and turn share
+    wheel_base_m: float = 0.0
+
+    def clipped(self, command: Command) -> Command:
+        """The command within the limits, the same object if it is; its numbers may be infinite, but not nan."""
+        linear, angular, lateral = (
+            max(-FASTEST, min(FASTEST, speed))
+            for speed in (command.linear_mps, command.angular_radps, command.lateral_mps)
+        )
+        excess = max(hypot(linear, lateral) / self.linear_mps, abs(angular) / self.angular_radps)
+        if self.wheel_mps is not None:
+            excess = max(excess, (abs(linear) + 0.5 * self.wheel_base_m * abs(angular)) / self.wheel_mps)
+        if excess <= 1.0:
+            return command
+        return replace(
+            command, linear_mps=linear / excess, angular_radps=angular / excess, lateral_mps=lateral / excess
+        )
+
+
+def limits_for(body: Body, max_linear_mps: float | None, max_angular_radps: float | None, where: str) -> SpeedLimits:
+    """The limits that the settings in `where` ask for; BadInput where they are above the body's own."""
+    linear = _limit(max_linear_mps, body.max_linear_mps, where, "max_linear_mps", f"m/s, which the {body.name} can do")
+    turn = _limit(
+        max_angular_radps, body.max_angular_radps, where, "max_angular_radps", f"rad/s, which the {body.name} can do"
+    )
+    if isinstance(body.drive, Wheels):
+        return SpeedLimits(linear, turn, body.drive.max_wheel_mps, body.drive.wheel_base_m)
+    return SpeedLimits(linear, turn)
+
+
+def _limit(given: float | None, most: float, where: str, key: str, unit: str) -> float:
+    if given is None:
+        return SHARE * most
+    if given > most:
+        raise BadInput(where, key, f"expected at most {most:.4g} {unit}; got {given!r}")
+    return given
+
+
+# --- What the settings of a robot come to: agent, body, driver and limits, found and checked at the door.
 
 
 @dataclass(frozen=True)
@@ -73,7 +179,7 @@ def plan_of(settings: RobotSettings, where: str, clock: DatedClock) -> Plan:
         needs = tuple(need for need in needs if not need.startswith("radio."))
     check_needs(agent.__name__, needs, plan.offer, where)
     if settings.network and settings.network.proves:
-        from swarmwire.agent.on_robot.proof import check_proof  # ssl costs memory
+        from swarmwire.agent.on_robot.network_check import check_proof  # ssl costs memory
 
         check_proof(settings.network, where)
     return plan

@@ -1,8 +1,8 @@
 """What every radio of an agent on a robot is."""
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
-from swarmwire.comms.packets import Heard, Outcomes, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
 
 
 class RobotRadio(Protocol):
@@ -38,3 +38,87 @@ class RobotRadio(Protocol):
     def close(self) -> None:
         """Leave the network; safe to call more than once."""
         ...
+
+
+# --- The radio of a robot that has none.
+
+
+class NoRadio:
+    """Nothing is heard; what the agent sends is counted, and goes nowhere."""
+
+    needs: frozenset[str] = frozenset()
+    gives: tuple[str, ...] = ()
+
+    def __init__(self) -> None:
+        self._unsent = 0
+
+    def open(self) -> None:
+        """There is nothing to take part in."""
+
+    def heard(self, now_ns: int) -> tuple[Heard, Outcomes]:
+        """Nothing."""
+        return Heard.none(), NO_OUTCOMES
+
+    def send(self, sent: Sent) -> None:
+        """Count the packets."""
+        self._unsent += len(sent)
+
+    def counts(self) -> dict[str, int]:
+        """How many packets went nowhere."""
+        return {"packets_without_radio": self._unsent} if self._unsent else {}
+
+    def close(self) -> None:
+        """There is nothing to leave."""
+
+
+# --- What a robot's radio tells its log: each packet that arrived, also for others, and each that it was to send.
+
+
+SENT, TOO_LARGE = "sent", "too_large"  # fates of a packet at its sender
+
+
+class HeardPacket(NamedTuple):
+    """A packet that arrived; robots are places in the swarm's list."""
+
+    utc_ns: int  # when it arrived
+    sender: int
+    sequence: int
+    to: int  # whom it was meant for, or BROADCAST
+    size_bytes: int  # of the message, tag included
+    tag: int
+    latency_ns: int | None  # from the sender's clock to this robot's; None: not known
+    distance_m: float | None  # None: not known
+    given: bool  # whether the agent gets it
+
+
+class SentPacket(NamedTuple):
+    """A packet that the agent sent."""
+
+    utc_ns: int
+    sequence: int
+    to: int  # a place in the swarm's list, or BROADCAST
+    size_bytes: int  # of the message, tag included
+    tag: int
+    fate: str  # SENT or TOO_LARGE
+
+
+class RadioLog(Protocol):
+    """Whoever keeps them; told from the thread that calls the radio."""
+
+    def heard(self, packet: HeardPacket) -> None:
+        """A packet arrived."""
+        ...
+
+    def sent(self, packet: SentPacket) -> None:
+        """The agent sent a packet."""
+        ...
+
+
+class NoRadioLog:
+    """Nobody keeps them."""
+
+    def heard(self, packet: HeardPacket) -> None:
+        """Nothing is kept."""
+
+    def sent(self, packet: SentPacket) -> None:
+        """Nothing is kept."""

@@ -1,26 +1,158 @@
-"""The robots' own network as a radio: each packet is one message from peer to peer, and may be lost like any other."""
+"""The header of a packet on the robots' network: what an emulated packet needs not say, before the message.
 
-# zenoh's stubs leave out the return types of put and undeclare.
+    >>> PacketHeader(to=-1, sequence=7, sent_utc_ns=1_767_225_600_000_000_000).encode().hex()
+    '01ffff070000000000faed51728618'
+
+The sender stands in the key, where access control can see it; the message is encoded as in emulation.
+"""
+
 # pyright: reportUnknownMemberType=false
 
+import math
+import struct
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import zenoh
 from zenoh.handlers import Callback
 
-from swarmwire.agent.radios.arrived import Arrival, Arrived, arrived, sender_in
-from swarmwire.agent.radios.links import Link
-from swarmwire.agent.radios.packet_header import HEADER_BYTES, SEQUENCES, PacketHeader
-from swarmwire.agent.radios.radio_log import SENT, TOO_LARGE, HeardPacket, NoRadioLog, RadioLog, SentPacket
-from swarmwire.agent.radios.range_bearing import range_bearing
+from swarmwire.agent.radios.radio import SENT, TOO_LARGE, HeardPacket, NoRadioLog, RadioLog, SentPacket
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
-from swarmwire.comms.wire.radio_bridge import BoundedInbox
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, TAG_BYTES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.wire.radio_bridge import BoundedInbox, Pose
 from swarmwire.comms.wire.robot_network import SwarmKeys
+
+VERSION = 1
+_LAYOUT = struct.Struct("<BhIq")  # version, to, sequence, sent_utc_ns
+HEADER_BYTES = _LAYOUT.size
+SEQUENCES = 2**32  # after so many packets a sender counts from 0 again
+
+
+class PacketHeader(NamedTuple):
+    """What stands before each message."""
+
+    to: int  # index of the one receiver, or BROADCAST
+    sequence: int  # how many packets the sender had sent before this one
+    sent_utc_ns: int  # by the sender's clock
+
+    def encode(self) -> bytes:
+        """The bytes of the header."""
+        return _LAYOUT.pack(VERSION, self.to, self.sequence % SEQUENCES, self.sent_utc_ns)
+
+    @classmethod
+    def decode(cls, packet: bytes) -> "PacketHeader":
+        """The header at the start of a packet; BadFrame ("malformed") if there is none."""
+        if len(packet) < HEADER_BYTES:
+            raise BadFrame("malformed", f"{len(packet)} bytes, expected {HEADER_BYTES} before the message")
+        version, to, sequence, sent_utc_ns = _LAYOUT.unpack_from(packet)
+        if version != VERSION or to < BROADCAST:
+            raise BadFrame("malformed", f"version {version} to {to}, expected {VERSION} and {BROADCAST} or more")
+        return cls(to, sequence, sent_utc_ns)
+
+
+# --- A packet as it came from the robots' network, checked, with what was stamped on it when it arrived.
+
+
+class Arrival(NamedTuple):
+    """What the network's thread puts in the inbox."""
+
+    key: str
+    packet: bytes  # header and message
+    at_ns: int  # when it arrived, by the robot's monotonic clock
+    utc_ns: int
+
+
+class Arrived(NamedTuple):
+    """One packet."""
+
+    sender: int  # index in the swarm
+    header: PacketHeader
+    message: bytes  # as encoded in emulation, tag first
+    tag: int
+    at_ns: int
+    utc_ns: int
+
+
+def sender_in(key: str) -> str:
+    """The robot that a packet's key names, if it is one; it may still be of another form, with wildcards."""
+    return key.rpartition("/")[0].rpartition("/")[2]
+
+
+def arrived(arrival: Arrival, keys: SwarmKeys, sender: int, robots: int, max_payload_bytes: int) -> Arrived:
+    """The packet of a sender among so many robots; BadFrame if it breaks the protocol, or is too large for it."""
+    header = PacketHeader.decode(arrival.packet)
+    message = arrival.packet[HEADER_BYTES:]
+    if len(message) > max_payload_bytes:
+        raise BadFrame("oversized", f"{len(message)} bytes, expected at most {max_payload_bytes}")
+    if len(message) < TAG_BYTES or header.to >= robots or header.to == sender:
+        raise BadFrame("malformed", f"{len(message)} bytes to {header.to}")
+    tag = int.from_bytes(message[:TAG_BYTES], "little")
+    if arrival.key != keys.radio(sender_in(arrival.key), tag):
+        raise BadFrame("malformed", f"a message {tag:04x} under {arrival.key}")
+    return Arrived(sender, header, message, tag, arrival.at_ns, arrival.utc_ns)
+
+
+# --- What a robot's radio knows of its neighbours: how many of each one's packets arrived, and how many did not.
+
+
+@dataclass(slots=True)
+class Link:
+    """From one sender to this robot.
+
+    Attributes:
+        heard: packets that arrived.
+        missed: numbers that were left out before one that arrived.
+        heard_at_ns: when the last one arrived, by the robot's monotonic clock.
+    """
+
+    heard: int = 0
+    missed: int = 0
+    heard_at_ns: int = 0
+    newest: int = -1  # highest number that the sender had used
+    newest_utc_ns: int = 0  # when it sent that, by its own clock
+
+    def add(self, sequence: int, sent_utc_ns: int, heard_at_ns: int) -> None:
+        """A packet arrived. One that was overtaken fills its gap; a sender that began anew counts from 0 again."""
+        first = self.heard == 0
+        self.heard += 1
+        self.heard_at_ns = heard_at_ns
+        if sequence > self.newest:
+            self.missed += 0 if first else sequence - self.newest - 1
+        elif sent_utc_ns <= self.newest_utc_ns:
+            self.missed -= sequence < self.newest and self.missed > 0
+            return
+        self.newest, self.newest_utc_ns = sequence, sent_utc_ns
+
+    @property
+    def delivery(self) -> float:
+        """Share of packets that arrived, 0 to 1, since the first one did; NaN before it."""
+        return self.heard / (self.heard + self.missed) if self.heard else float("nan")
+
+
+# --- How far a sender is, and in which direction, from two poses that a tracker saw.
+
+
+def range_bearing(own: Pose, sender: Pose) -> tuple[float, float]:
+    """Distance in m and direction to the sender in the own frame, in (-pi, pi], positive to the left.
+
+    >>> range_bearing(Pose(1.0, 1.0, math.pi / 2), Pose(-1.0, 1.0, 0.0))
+    (2.0, 1.5707963267948966)
+    """
+    dx_m, dy_m = sender.x_m - own.x_m, sender.y_m - own.y_m
+    turn_rad = math.remainder(math.atan2(dy_m, dx_m) - own.heading_rad, math.tau)
+    return math.hypot(dx_m, dy_m), math.pi if turn_rad <= -math.pi else turn_rad
+
+
+# --- The robots' own network as a radio: each packet is one message from peer to peer, and may be lost like any other.
+
+
+# zenoh's stubs leave out the return types of put and undeclare.
+
 
 MOST_WAITING = 1024  # packets that may wait for the agent's next step
 GIVES = ("range_m", "bearing_rad")  # with a tracker

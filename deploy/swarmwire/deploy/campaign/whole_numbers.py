@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any, cast
 
-from swarmwire.agent.declared import parameters_of
-from swarmwire.agent.loading import load_agent
+from swarmwire.agent.agent import load_agent
+from swarmwire.agent.parameters import parameters_of
 from swarmwire.deploy.agents import agent_specs
 from swarmwire.world.scenario.as_mapping import mapping_of
 from swarmwire.world.scenario.scenario import Scenario

@@ -6,9 +6,9 @@ from typing import Generic
 
 from swarmwire.agent import Agent, VectorAgent
 from swarmwire.agent import behaviours as shipped
-from swarmwire.agent.declared import REQUIRED, TYPES, parameters_of
-from swarmwire.agent.declared import Parameter as Declared
-from swarmwire.agent.loading import AgentClass, NoAgent, load_agent
+from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
+from swarmwire.agent.parameters import REQUIRED, TYPES, parameters_of
+from swarmwire.agent.parameters import Parameter as Declared
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import resolve
 from swarmwire.deploy.catalogue.docs import comments_of, first_line, texts_of

@@ -2,9 +2,8 @@
 
 from abc import ABC
 
-from swarmwire.agent.drivers.driver import Driver
-from swarmwire.agent.on_robot.driver_registry import GROUP as DRIVERS
-from swarmwire.agent.on_robot.driver_registry import driver_names, load_driver
+from swarmwire.agent.drivers.driver import GROUP as DRIVERS
+from swarmwire.agent.drivers.driver import Driver, driver_names, load_driver
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import installed_points
 from swarmwire.deploy.catalogue.docs import first_line, texts_of

@@ -6,7 +6,7 @@ from typing import Any, get_args, get_type_hints
 
 from swarmwire.agent import Packet, Robot
 from swarmwire.agent.robot import RadioPort
-from swarmwire.agent.turn import OUTCOMES
+from swarmwire.agent.step_context import OUTCOMES
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.sensors import SHEETS
 from swarmwire.comms.packets import SendResult

@@ -47,8 +47,7 @@ def join_command(
       swarmwire join tls/10.0.0.5:7447 --robots 5 --certs lab-certs --name r1
     """
     # Imported here: zenoh takes a moment, which --help and typing errors should not.
-    from swarmwire.agent.join_cli import names_in, play_told
-    from swarmwire.agent.joining import Joining
+    from swarmwire.agent.joining import Joining, names_in, play_told
     from swarmwire.deploy.certificates.member import member
     from swarmwire.deploy.certificates.purposes import RUNNER
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from swarmwire.agent.on_robot.plan import plan_of
-from swarmwire.agent.on_robot.settings_file import read_settings
+from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.fleet.archive import Entry

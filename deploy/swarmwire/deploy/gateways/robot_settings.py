@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from swarmwire.agent.on_robot.driver_registry import load_driver
+from swarmwire.agent.drivers.driver import load_driver
 from swarmwire.comms.assignment import params_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.agent.declared import parameters_of
-from swarmwire.agent.loading import NoAgent, load_agent
+from swarmwire.agent.agent import NoAgent, load_agent
+from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.agents import agent_specs
 from swarmwire.deploy.parity.emulation import Emulation

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from swarmwire.agent import cli
-from swarmwire.agent.on_robot import run
-from swarmwire.agent.on_robot.network_parts import NetworkParts
+from swarmwire.agent.on_robot import assembly
+from swarmwire.agent.on_robot.assembly import NetworkParts
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, STATUS, SwarmKeys, ask_all, endpoints_of, open_swarm
 from swarmwire.metrics.real_log.real_logs import read_real_logs
@@ -91,7 +91,7 @@ def test_the_guard_hears_of_an_agent_until_all_is_closed(tmp_path, monkeypatch):
         parts[-1].callback(lambda: heard.append(any(thread.name == "watchdog" for thread in threading.enumerate())))
         return NetworkParts()
 
-    monkeypatch.setattr(run, "network_parts", slow_to_close)
+    monkeypatch.setattr(assembly, "network_parts", slow_to_close)
     assert cli.main(["run", DRIVING, *robot_flags(tmp_path / "deeds", "--no-guard", "--duration-s", "0.2")]) == 0
     assert heard == [True]
 

@@ -6,9 +6,9 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from swarmwire.agent.radios.air_radio import AirRadio
 from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.agent.radios.tracker import Tracker
+from swarmwire.agent.radios.world_radio import AirRadio
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
 from swarmwire.comms.wire.network import Network

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent.radios.range_bearing import range_bearing
 from swarmwire.agent.radios.tracker import OLDEST_NS, Tracker
+from swarmwire.agent.radios.zenoh_radio import range_bearing
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.clocks import FakeClock

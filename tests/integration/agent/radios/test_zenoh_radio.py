@@ -5,8 +5,8 @@ import pytest
 import zenoh
 
 from swarmwire.agent.radios import zenoh_radio
-from swarmwire.agent.radios.packet_header import PacketHeader
-from swarmwire.agent.radios.radio_log import HeardPacket, SentPacket
+from swarmwire.agent.radios.radio import HeardPacket, SentPacket
+from swarmwire.agent.radios.zenoh_radio import PacketHeader
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
 from swarmwire.comms.wire.network import Network

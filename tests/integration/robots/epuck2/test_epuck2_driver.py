@@ -9,7 +9,7 @@ import pytest
 
 from swarmwire.agent.drivers.driver import Command
 from swarmwire.agent.drivers.epuck2 import Epuck2Driver
-from swarmwire.agent.drivers.epuck2.options import Epuck2Options
+from swarmwire.agent.drivers.epuck2.driver import Epuck2Options
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput

@@ -16,7 +16,7 @@ import psutil
 import pytest
 
 from swarmwire.agent import runner
-from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.agent.local_backend import LocalCrew
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import WallClock, to_ns
 from swarmwire.comms.errors import AgentFailed, BadInput, Interrupted, RunnerLost
@@ -61,7 +61,7 @@ def opened(endpoint: str, slots: list[Assignment], timeout_s: float = TIMEOUT_S)
 @contextmanager
 def processes(endpoint: str, names: list[str], agent: str = "Chatter") -> Generator["subprocess.Popen[bytes]"]:
     """A nursery and its runners; none is left afterwards, whatever happened."""
-    command = [sys.executable, "-m", "swarmwire.agent.nursery", endpoint, RUN, spec(agent), *names]
+    command = [sys.executable, "-m", "swarmwire.agent.fork_server", endpoint, RUN, spec(agent), *names]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True, env=environment

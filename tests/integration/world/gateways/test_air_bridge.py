@@ -5,8 +5,8 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from swarmwire.agent.radios import air_radio
-from swarmwire.agent.radios.air_radio import AirRadio
+from swarmwire.agent.radios import world_radio
+from swarmwire.agent.radios.world_radio import AirRadio
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, SendResult, Sent
@@ -276,7 +276,7 @@ def test_what_is_no_frame_of_the_air_is_counted_by_the_robot_and_never_stops_it(
 
 
 def test_a_robot_that_is_slow_loses_what_does_not_fit_and_counts_it(monkeypatch):
-    monkeypatch.setattr(air_radio, "MOST_WAITING", 10)
+    monkeypatch.setattr(world_radio, "MOST_WAITING", 10)
     with bridged() as (bridge, session):
         radio = joined(session())
         exchange(bridge, radio)

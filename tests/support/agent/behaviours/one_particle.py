@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.behaviours import PsoSearchPositioned
-from swarmwire.agent.behaviours.pso.by_places import BestPlace
-from swarmwire.agent.behaviours.pso.particle import Particle
-from swarmwire.agent.behaviours.pso.particle_swarm import ParticleSwarm
+from swarmwire.agent.behaviours.pso.core import Particle, ParticleSwarm
+from swarmwire.agent.behaviours.pso.variants import BestPlace
 from swarmwire.agent.host import hosted
 from swarmwire.comms.messages import Message
 from swarmwire.comms.packets import Heard, Payloads

@@ -4,7 +4,7 @@ import ctypes
 import os
 from typing import ClassVar
 
-from swarmwire.agent import Agent, Message, PerRobot, Robot, Robots, State, VectorAgent, i2, per_robot
+from swarmwire.agent import Agent, Message, PerRobot, Robot, Robots, State, VectorAgent, i2, vector_agent
 
 
 class Count(Message):
@@ -142,7 +142,7 @@ class Scribbling(Agent):
 class Laned(VectorAgent):
     """Drives as fast as its lane says."""
 
-    lane: PerRobot[int] = per_robot(0)
+    lane: PerRobot[int] = vector_agent(0)
 
     def step(self, robots: Robots, state: State) -> None:
         robots.drive(0.01 * self.lane, 0.0)

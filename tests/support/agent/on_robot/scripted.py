@@ -8,14 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from swarmwire.agent.drivers.driver import Command, Driver, DriverLost
-from swarmwire.agent.on_robot.end import End
-from swarmwire.agent.on_robot.limits import SpeedLimits, limits_for
-from swarmwire.agent.on_robot.mind import Mind, group_of
-from swarmwire.agent.on_robot.motors import Motors
-from swarmwire.agent.on_robot.robot_log import TickRow
-from swarmwire.agent.on_robot.robot_loop import RobotLoop, RobotParts
-from swarmwire.agent.on_robot.senses import SensesOnRobot
-from swarmwire.agent.on_robot.watchdog import Watchdog
+from swarmwire.agent.on_robot.controller import Mind, SensesOnRobot, group_of
+from swarmwire.agent.on_robot.log import TickRow
+from swarmwire.agent.on_robot.loop import RobotLoop, RobotParts
+from swarmwire.agent.on_robot.plan import SpeedLimits, limits_for
+from swarmwire.agent.on_robot.safety import End, Motors, Watchdog
 from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.agent.drivers.driver import Driver
-from swarmwire.agent.on_robot.end import End
+from swarmwire.agent.on_robot.assembly import run_robot
 from swarmwire.agent.on_robot.plan import plan_of
-from swarmwire.agent.on_robot.run import run_robot
-from swarmwire.agent.on_robot.settings_file import read_settings
+from swarmwire.agent.on_robot.safety import End
+from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.clock import ScaledClock, WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Recording, Result, Simulation

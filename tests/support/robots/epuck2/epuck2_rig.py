@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from swarmwire.agent.drivers.driver import Driver
 from swarmwire.agent.drivers.epuck2 import Epuck2Driver
-from swarmwire.agent.drivers.epuck2.options import Epuck2Options
+from swarmwire.agent.drivers.epuck2.driver import Epuck2Options
 from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
 from swarmwire.world.gateways.epuck2.options import Epuck2GatewayOptions

@@ -6,8 +6,8 @@ import msgpack
 from hypothesis.strategies import DrawFn
 from pydantic import TypeAdapter, ValidationError
 
+from swarmwire.agent.agent import NoAgent
 from swarmwire.agent.host import Host
-from swarmwire.agent.loading import NoAgent
 from swarmwire.agent.runner import given_robots
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import AgentFailed, BadFrame, BadInput

@@ -7,11 +7,10 @@ import numpy as np
 import zenoh
 from hypothesis.strategies import DrawFn
 
-from swarmwire.agent.radios.air_radio import AirRadio, _Arrival
 from swarmwire.agent.radios.control import ControlPoint
-from swarmwire.agent.radios.packet_header import PacketHeader
 from swarmwire.agent.radios.tracker import Tracker
-from swarmwire.agent.radios.zenoh_radio import ZenohRadio
+from swarmwire.agent.radios.world_radio import AirRadio, _Arrival
+from swarmwire.agent.radios.zenoh_radio import PacketHeader, ZenohRadio
 from swarmwire.comms.packets import BROADCAST, Outcomes, Payloads, Sent
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire.network import Network

@@ -7,11 +7,10 @@ import numpy as np
 from hypothesis.strategies import DrawFn
 
 from swarmwire.agent.drivers.driver import DriverLost
-from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver
+from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver, Epuck2Options
 from swarmwire.agent.drivers.epuck2.link import Link
-from swarmwire.agent.drivers.epuck2.options import Epuck2Options
 from swarmwire.agent.drivers.ros2.feed import Feed
-from swarmwire.agent.drivers.ros2.readers import BatteryReader, ImuReader, LaserReader, LightReader, OdometryReader
+from swarmwire.agent.drivers.ros2.topics import BatteryReader, ImuReader, LaserReader, LightReader, OdometryReader
 from swarmwire.comms.bodies.body import body_from, load_body
 from swarmwire.comms.robots.epuck2.commands import Answers, RobotCommand
 from swarmwire.comms.robots.epuck2.packets import Request, Settings

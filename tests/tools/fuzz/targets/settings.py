@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from hypothesis.strategies import DrawFn
 
-from swarmwire.agent.on_robot.settings_file import read_settings
+from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.bodies import body as body_module
 from swarmwire.comms.bodies.body import body_from_mapping
 from swarmwire.comms.config import read_toml

@@ -60,7 +60,7 @@ class Nursed(Actors):
         found: list[Own] = []
         for one in psutil.Process().children():
             with suppress(psutil.Error):  # a nursery whose runners are all dead has ended
-                if "swarmwire.agent.nursery" in one.cmdline():
+                if "swarmwire.agent.fork_server" in one.cmdline():
                     found += [Own(child) for child in sorted(one.children(), key=lambda child: child.pid)]
         return found
 

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.agent.behaviours import BeaconAvoidance
 from swarmwire.agent.behaviours.beacon_avoidance import Beacon, Traffic
-from swarmwire.agent.behaviours.remembered import NOBODY, SLOTS, Remembered, forget, remember
+from swarmwire.agent.behaviours.neighbour_table import NOBODY, SLOTS, Remembered, forget, remember
 from swarmwire.agent.fields import Vectors
 from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_rows_independent

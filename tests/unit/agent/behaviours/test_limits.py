@@ -18,8 +18,8 @@ from swarmwire.agent.behaviours import (
     SmoothedAvoidance,
     SmoothedAvoidanceProximity,
 )
-from swarmwire.agent.behaviours.angles import wrapped
-from swarmwire.agent.declared import BadParameter, checked, parameters_of
+from swarmwire.agent.behaviours._common import wrapped
+from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 
 ABOVE_ZERO: dict[type, tuple[str, ...]] = {
     Aggregation: ("spell_m", "approach_m", "turn_radps", "faint"),

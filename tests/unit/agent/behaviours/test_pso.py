@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from swarmwire.agent.behaviours import PsoModel, PsoSearch, PsoSearchPositioned
-from swarmwire.agent.behaviours.pso.particle_swarm import ParticleSwarm
-from swarmwire.agent.behaviours.pso_search import BestVector
-from swarmwire.agent.declared import BadParameter, checked
+from swarmwire.agent.behaviours.pso.core import ParticleSwarm
+from swarmwire.agent.behaviours.pso.variants import BestVector
+from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from tests.support.agent.behaviours.one_particle import HERE, One, place
 

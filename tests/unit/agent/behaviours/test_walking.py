@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.agent.behaviours import Aggregation, Coverage, RandomWalk
 from swarmwire.agent.behaviours.aggregation import APPROACH, REPEL, WAIT, Beacon
-from swarmwire.agent.behaviours.coverage import Present
+from swarmwire.agent.behaviours.random_walk import Present
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.deploy import run
 from tests.support.agent.behaviours.walker import Walker

@@ -10,13 +10,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent.drivers.driver import Command, Driver
-from swarmwire.agent.on_robot.driver_registry import GROUP, driver_names, load_driver
-from swarmwire.agent.on_robot.limits import SpeedLimits, limits_for
-from swarmwire.agent.on_robot.mind import Mind, group_of
-from swarmwire.agent.on_robot.needs import OF_POSES, Offer, check_needs, tracked
-from swarmwire.agent.on_robot.plan import Plan, agent_sha256, plan_of
-from swarmwire.agent.on_robot.settings_file import read_settings
+from swarmwire.agent.drivers.driver import GROUP, Command, Driver, driver_names, load_driver
+from swarmwire.agent.on_robot.controller import Mind, group_of
+from swarmwire.agent.on_robot.plan import (
+    OF_POSES,
+    Offer,
+    Plan,
+    SpeedLimits,
+    agent_sha256,
+    check_needs,
+    limits_for,
+    plan_of,
+    tracked,
+)
+from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import NO_OUTCOMES, Heard

@@ -8,12 +8,10 @@ from pathlib import Path
 import pytest
 
 from swarmwire.agent.drivers.driver import Command
-from swarmwire.agent.on_robot.control import Control
-from swarmwire.agent.on_robot.onlookers import NOT_YET, Onlookers
-from swarmwire.agent.on_robot.presence import Presence
-from swarmwire.agent.on_robot.robot_log import TickRow, new_log
-from swarmwire.agent.on_robot.status_file import StatusFile, status_path
-from swarmwire.agent.on_robot.terminal import Terminal, short
+from swarmwire.agent.on_robot.log import TickRow, new_log
+from swarmwire.agent.on_robot.network_check import Presence
+from swarmwire.agent.on_robot.reporting import NOT_YET, Onlookers, StatusFile, Terminal, short, status_path
+from swarmwire.agent.on_robot.safety import Control
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.agent.on_robot.scripted import PERIOD_NS, UTC_NS, DatedFakeClock

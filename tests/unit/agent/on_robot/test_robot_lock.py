@@ -2,8 +2,7 @@ import signal
 
 import pytest
 
-from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver
-from swarmwire.agent.drivers.epuck2.options import Epuck2Options
+from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver, Epuck2Options
 from swarmwire.agent.on_robot.robot_lock import ASKS_BY, OUT_OF_REACH, STOPPED, NotStopped, RobotLock
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput

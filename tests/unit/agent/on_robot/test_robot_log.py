@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from swarmwire.agent.drivers.driver import Command
-from swarmwire.agent.on_robot.robot_log import TickRow, new_log
-from swarmwire.agent.on_robot.row_file import RowFile
-from swarmwire.agent.radios.radio_log import HeardPacket, SentPacket
+from swarmwire.agent.on_robot.log import RowFile, TickRow, new_log
+from swarmwire.agent.radios.radio import HeardPacket, SentPacket
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.wire.radio_bridge import Pose

@@ -6,11 +6,10 @@ from itertools import pairwise
 import pytest
 
 from swarmwire.agent.drivers.driver import STOP, Command, DriverLost
-from swarmwire.agent.on_robot.control import STOPPED
-from swarmwire.agent.on_robot.limits import SpeedLimits, limits_for
-from swarmwire.agent.on_robot.mind import Mind, group_of
-from swarmwire.agent.on_robot.pacer import Pacer
-from swarmwire.agent.on_robot.robot_loop import LOST, RUNNING
+from swarmwire.agent.on_robot.controller import Mind, group_of
+from swarmwire.agent.on_robot.loop import LOST, RUNNING, Pacer
+from swarmwire.agent.on_robot.plan import SpeedLimits, limits_for
+from swarmwire.agent.on_robot.safety import STOP_REQUESTED
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.custom import ActuatorSheet
 from swarmwire.comms.clock import tick_start_ns
@@ -189,14 +188,14 @@ def test_an_emergency_stop_is_at_once_and_for_good():
     assert rig.driver.commands == [Command(0.03, 0.5)] * 2
     assert [row.command for row in rows[2:]] == [STOP] * 3
     assert not any(row.drive for row in rows[2:])
-    assert rig.loop.status()["state"] == STOPPED
+    assert rig.loop.status()["state"] == STOP_REQUESTED
 
 
 def test_whoever_asks_a_robot_whose_agent_hangs_is_told_that_it_was_stopped():
     control = Rig("Driving").motors.control
     control.tell({"state": RUNNING, "tick": 3})
     control.estop()
-    assert control.status() == {"state": STOPPED, "tick": 3}
+    assert control.status() == {"state": STOP_REQUESTED, "tick": 3}
 
 
 def test_an_emergency_stop_that_meets_a_command_on_its_way_wins():

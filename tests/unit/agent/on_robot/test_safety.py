@@ -9,11 +9,8 @@ from contextlib import suppress
 import pytest
 
 from swarmwire.agent.drivers.driver import Command, DriverLost
-from swarmwire.agent.on_robot.end import SIGNALS, End, by_signals
 from swarmwire.agent.on_robot.guard import RUNS, STOPPED
-from swarmwire.agent.on_robot.heartbeats import Heartbeats
-from swarmwire.agent.on_robot.motors import Motors
-from swarmwire.agent.on_robot.watchdog import Watchdog
+from swarmwire.agent.on_robot.safety import SIGNALS, End, Heartbeats, Motors, Watchdog, by_signals
 from swarmwire.comms.clock import WallClock
 from tests.support.agent.on_robot.scripted import Rig
 from tests.support.clocks import MS, FakeClock

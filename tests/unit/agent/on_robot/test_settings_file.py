@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from swarmwire.agent.on_robot.proof import check_proof
-from swarmwire.agent.on_robot.settings_file import NO_FILE, read_settings
+from swarmwire.agent.on_robot.network_check import check_proof
+from swarmwire.agent.on_robot.settings import NO_FILE, read_settings
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.network import Network

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent.radios.links import Link
-from swarmwire.agent.radios.packet_header import HEADER_BYTES, PacketHeader
+from swarmwire.agent.radios.zenoh_radio import HEADER_BYTES, Link, PacketHeader
 from swarmwire.comms.errors import BadFrame
 
 

@@ -5,12 +5,11 @@ import pytest
 
 from swarmwire.agent.behaviours import Flocking
 from swarmwire.agent.drivers.driver import Command
-from swarmwire.agent.on_robot.limits import SpeedLimits
-from swarmwire.agent.on_robot.plan import Plan
-from swarmwire.agent.on_robot.robot_log import TickRow, new_log
-from swarmwire.agent.on_robot.run import robot_facts
+from swarmwire.agent.on_robot.assembly import robot_facts
+from swarmwire.agent.on_robot.log import TickRow, new_log
+from swarmwire.agent.on_robot.plan import Plan, SpeedLimits
 from swarmwire.agent.on_robot.settings import DriverSettings, RobotSettings
-from swarmwire.agent.radios.radio_log import HeardPacket, SentPacket
+from swarmwire.agent.radios.radio import HeardPacket, SentPacket
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.wire.radio_bridge import Pose

@@ -1,6 +1,6 @@
 """The pace of real time: the clock is asked to wait until each tick is over, and every lag is counted and told."""
 
-from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.agent.local_backend import LocalCrew
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import Heard
 from swarmwire.world.crews.pace import Pace

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from swarmwire.agent.local_crew import LocalCrew
+from swarmwire.agent.local_backend import LocalCrew
 from swarmwire.comms.interfaces import Put
 from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
 from swarmwire.world.crews.pace import Pace

@@ -1,22 +1,197 @@
-"""The topics that the senses of a body come from."""
+"""Options of the ROS 2 driver."""
 
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from math import radians
+from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.agent.drivers.ros2.options import Ros2Options
-from swarmwire.agent.drivers.ros2.readers import (
-    BatteryReader,
-    ImuReader,
-    LaserReader,
-    LightReader,
-    OdometryReader,
-    Reader,
-)
+from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
 from swarmwire.comms.bodies.sensors import Battery
-from swarmwire.comms.robots.ros2.other_sensors import topics_of_light
+from swarmwire.comms.config import parameter
+from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY, check_name
+from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan
+from swarmwire.comms.robots.ros2.messages import DISTROS
+from swarmwire.comms.robots.ros2.motion import WheelTravel, motion_of
+from swarmwire.comms.robots.ros2.other_sensors import FULL_LUX, brightness_of, charge_of, topics_of_light
+
+TRANSPORTS = ("bridge", "rmw")
+NO_NAMESPACE = "/"
+
+
+@dataclass(frozen=True)
+class Ros2Options:
+    """How the base is reached, what its topics are called, and what its readings mean."""
+
+    transport: str = parameter(
+        "bridge",
+        help="what the base speaks zenoh by: zenoh-bridge-ros2dds, or rmw_zenoh",
+        choices=TRANSPORTS,
+    )
+    namespace: str = parameter("", help="where its topics lie; empty: the robot's name as ROS takes it; /: nowhere")
+    domain: int = parameter(0, help="ROS_DOMAIN_ID of rmw_zenoh", at_least=0, at_most=232)
+    distro: str = parameter("jazzy", help="distribution of ROS 2 on the base", choices=DISTROS)
+    stamped: bool = parameter(False, help="whether the base takes TwistStamped, not Twist")
+    command_topic: str = parameter("cmd_vel", help="topic of commands")
+    scan_topic: str = parameter("scan", help="topic of LaserScan")
+    odometry_topic: str = parameter("odom", help="topic of Odometry")
+    imu_topic: str = parameter("imu", help="topic of Imu")
+    battery_topic: str = parameter("battery_state", help="topic of BatteryState")
+    light_topic: str = parameter("illuminance", help="topic of Illuminance; of several photocells with _0, _1, …")
+    full_lux: float = parameter(FULL_LUX, help="illuminance at which a photocell reads 1", unit="lx", above=0)
+    north_deg: float = parameter(0.0, help="heading in the arena at which the IMU's yaw is 0", unit="deg")
+    scanner_deg: float = parameter(
+        0.0, help="where the scanner's angle 0 looks, counter-clockwise from ahead", unit="deg"
+    )
+    stale_s: float = parameter(
+        1.0, help="a base whose scanner, odometry or IMU is silent so long is lost", unit="s", above=0
+    )
+    connect_s: float = parameter(
+        3.0, help="how long a connection, a base behind it and its first message are waited for", unit="s", above=0
+    )
+
+    def check(self) -> None:
+        """Raise BadInput with the key of a name that ROS 2 does not have."""
+        if self.namespace not in ("", NO_NAMESPACE):
+            check_name(self.namespace, "driver", "namespace")
+        for key in ("command", "scan", "odometry", "imu", "battery", "light"):
+            check_name(getattr(self, f"{key}_topic"), "driver", f"{key}_topic")
+
+
+# --- What a message of each topic means to an agent: the fields of the senses that it gives.
+
+
+Fields = dict[str, FloatArray]  # "sense.field" -> (1,) or (1, width)
+
+
+class Reader(ABC):
+    """One topic.
+
+    Attributes:
+        kind: of its messages.
+        keeps: how many messages count that came since the last look.
+        is_steady: whether silence on it means that the base is lost.
+        fields: the newest readings; what a lost one reads, until a message came.
+    """
+
+    kind: ClassVar[str]
+    keeps: ClassVar[int] = 1
+    is_steady: ClassVar[bool] = True
+    fields: Fields
+
+    @abstractmethod
+    def read(self, message: Any) -> None:
+        """Take over what a message says; BadFrame, and nothing is changed, if it cannot be."""
+
+    def counts(self) -> dict[str, int]:
+        """Oddities so far, by name."""
+        return {}
+
+
+class LaserReader(Reader):
+    """LaserScan: `scan` and `proximity`, whichever the body has."""
+
+    kind = LASER_SCAN
+
+    def __init__(self, body: Body, scanner_rad: float) -> None:
+        at_m = body.scan.at_m if body.scan else 0.0
+        self._scan = LaserAsScan(body.scan, scanner_rad) if body.scan else None
+        near = body.proximity
+        self._proximity = LaserAsProximity(near, body.radius_m, at_m, scanner_rad) if near else None
+        self.fields = {}
+        if body.scan:
+            self.fields["scan.range_m"] = np.full((1, body.scan.rays), np.inf)
+        if near:
+            self.fields["proximity.value"] = np.zeros((1, len(near.angle_rad)))
+
+    def read(self, message: Any) -> None:
+        """As `Reader.read`."""
+        fields: Fields = {}
+        if self._scan:
+            fields["scan.range_m"] = self._scan.range_m(message)[np.newaxis]
+        if self._proximity:
+            fields["proximity.value"] = self._proximity.value(message)[np.newaxis]
+        self.fields = fields
+
+
+class OdometryReader(Reader):
+    """Odometry: `odometry`, the travel of both wheels since the driver was made."""
+
+    kind = ODOMETRY
+    keeps = 64
+
+    def __init__(self, wheel_base_m: float, max_linear_mps: float) -> None:
+        self._travel = WheelTravel(wheel_base_m, max_linear_mps)
+        self.fields = _numbers("odometry", left_m=np.nan, right_m=np.nan)
+
+    def read(self, message: Any) -> None:
+        """As `Reader.read`."""
+        self._travel.follow(message)
+        self.fields = _numbers("odometry", left_m=self._travel.left_m, right_m=self._travel.right_m)
+
+    def counts(self) -> dict[str, int]:
+        """As `Reader.counts`."""
+        return {"odometry_jumps": self._travel.jumps}
+
+
+class ImuReader(Reader):
+    """Imu: `imu` and `compass`."""
+
+    kind = IMU
+
+    def __init__(self, north_deg: float) -> None:
+        self._north_deg = north_deg
+        self.fields = _motion(np.nan, np.nan, np.nan, np.nan)
+
+    def read(self, message: Any) -> None:
+        """As `Reader.read`."""
+        self.fields = _motion(*motion_of(message, self._north_deg))
+
+
+class BatteryReader(Reader):
+    """BatteryState: `battery`."""
+
+    kind = BATTERY_STATE
+    is_steady = False
+
+    def __init__(self, sheet: Battery) -> None:
+        self._sheet = sheet
+        self.fields = _numbers("battery", charge=np.nan, voltage_v=np.nan)
+
+    def read(self, message: Any) -> None:
+        """As `Reader.read`."""
+        self.fields = _numbers("battery", charge=charge_of(message, self._sheet), voltage_v=message.voltage)
+
+
+class LightReader(Reader):
+    """Illuminance: one cell of `light`; all cells share the field."""
+
+    kind = ILLUMINANCE
+    is_steady = False
+
+    def __init__(self, value: FloatArray, cell: int, full_lux: float) -> None:
+        """`value` (1, cells) is shared."""
+        self._cell, self._full_lux = cell, full_lux
+        self.fields = {"light.value": value}
+
+    def read(self, message: Any) -> None:
+        """As `Reader.read`."""
+        self.fields["light.value"][0, self._cell] = brightness_of(message, self._full_lux)
+
+
+def _motion(forward_mps2: float, left_mps2: float, turn_radps: float, heading_rad: float) -> Fields:
+    imu = _numbers("imu", forward_mps2=forward_mps2, left_mps2=left_mps2, turn_radps=turn_radps)
+    return {**imu, **_numbers("compass", heading_rad=heading_rad)}
+
+
+def _numbers(sense: str, **values: float) -> Fields:
+    return {f"{sense}.{name}": np.array([value], np.float64) for name, value in values.items()}
+
+
+# --- The topics that the senses of a body come from.
 
 
 def readers_of(body: Body, options: Ros2Options) -> dict[str, Reader]:

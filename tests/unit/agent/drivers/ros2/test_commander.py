@@ -3,7 +3,7 @@
 import threading
 
 from swarmwire.agent.drivers.driver import STOP, Command
-from swarmwire.agent.drivers.ros2.commander import STOPS, Commander
+from swarmwire.agent.drivers.ros2.driver import STOPS, Commander
 
 DRIVE = Command(0.1, 0.5)
 

@@ -1,0 +1,225 @@
+"""The ring of a particle swarm: neighbours by index, wherever they are."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from swarmwire.agent.behaviours._common import check_above_zero
+from swarmwire.agent.fields import Vectors
+from swarmwire.agent.parameters import BadParameter, parameters_of
+from swarmwire.agent.robots import Robots
+from swarmwire.agent.vector_agent import FloatColumn, IntColumn, PerRobot, State, VectorAgent, column, per_robot
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+
+
+def ring_neighbours(sender: IntArray, index: IntArray, count: int, width: int) -> BoolArray:
+    """Who of the senders (k,) is at most `width` places from the index (k,) of the robot that heard it."""
+    apart = np.mod(sender - index, count)
+    return np.minimum(apart, count - apart) <= width
+
+
+def check_ring(kind: type, params: Mapping[str, Any], robots: int) -> None:
+    """BadParameter unless count, width and indices of so many robots can be a ring, or there is none.
+
+    One that is not given has the default of the class `kind`.
+    """
+    declared = parameters_of(kind)
+    count, width, index = (
+        params.get(name, declared[name].default) for name in ("ring_count", "ring_width", "ring_index")
+    )
+    if count < 0:
+        raise BadParameter("ring_count", f"expected 0 (no ring) or how many robots are on the ring, got {count}")
+    if width < 1:
+        raise BadParameter("ring_width", f"expected at least 1 neighbour on each side, got {width}")
+    for_all = isinstance(index, int) and robots > 1
+    if count > 0 and (for_all or not np.all((np.array(index) >= 0) & (np.array(index) < count))):
+        expected = f"expected a list with the index in the arena of each robot, 0 to {count - 1}"
+        raise BadParameter("ring_index", f"{expected}, got {index}")
+
+
+# --- Particle: what a robot of a particle swarm remembers, and how what it senses and hears changes that.
+
+
+DARK = -1.0  # below any light: nothing seen, or heard of, yet
+
+
+class Particle(State):
+    """What a particle remembers; vectors lead from the robot, in m, along the axes of the compass."""
+
+    steps: IntColumn = column(0)
+    own_brightness: FloatColumn = column(DARK)
+    own_readings: IntColumn = column(0)  # of which the own brightness is the mean
+    own_x: FloatColumn = column(0.0)
+    own_y: FloatColumn = column(0.0)
+    best_brightness: FloatColumn = column(DARK)  # of the neighbours, as heard
+    best_x: FloatColumn = column(0.0)
+    best_y: FloatColumn = column(0.0)
+    velocity_x: FloatColumn = column(0.0)  # m per update
+    velocity_y: FloatColumn = column(0.0)
+    target_x: FloatColumn = column(0.0)
+    target_y: FloatColumn = column(0.0)
+
+
+class Bests(NamedTuple):
+    """Bests that were heard, (k,) each."""
+
+    row: IntArray  # of the robot that heard it
+    sender: IntArray  # index in the arena
+    brightness: FloatArray
+    x: FloatArray  # from the robot that heard it, in m, along the axes of the compass
+    y: FloatArray
+
+    def of(self, which: BoolArray) -> "Bests":
+        """Those of the mask (k,)."""
+        return Bests(self.row[which], self.sender[which], self.brightness[which], self.x[which], self.y[which])
+
+
+def shift(state: Particle, by_m: Vectors) -> None:
+    """The robots moved by so much (n,), along the axes of the compass: places they remember are elsewhere from them."""
+    state.own_x -= by_m.x
+    state.own_y -= by_m.y
+    state.best_x -= by_m.x
+    state.best_y -= by_m.y
+    state.target_x -= by_m.x
+    state.target_y -= by_m.y
+
+
+def look(state: Particle, brightness: FloatArray, again_m: float) -> None:
+    """Where it is brighter (n,) than at the own best, here is the own best.
+
+    Nearer than `again_m` to the own best it is one more reading of it: their mean counts, and the place stays.
+    """
+    again = (state.own_readings > 0) & (np.hypot(state.own_x, state.own_y) < again_m)
+    state.own_readings[again] += 1
+    surprise = brightness - state.own_brightness
+    state.own_brightness[again] += (surprise / np.maximum(state.own_readings, 1))[again]
+    brighter = ~again & (surprise > 0.0)
+    state.own_brightness[brighter] = brightness[brighter]
+    state.own_readings[brighter] = 1
+    state.own_x[brighter] = 0.0
+    state.own_y[brighter] = 0.0
+
+
+def listen(state: Particle, bests: Bests) -> None:
+    """Of all that was heard, keep the brightest of each row; as bright as the one known, it is fresher."""
+    order = np.lexsort((bests.brightness, bests.row))
+    last = order[np.flatnonzero(np.diff(bests.row[order], append=-1))]  # of each row
+    last = last[bests.brightness[last] >= state.best_brightness[bests.row[last]]]
+    row = bests.row[last]
+    state.best_brightness[row] = bests.brightness[last]
+    state.best_x[row] = bests.x[last]
+    state.best_y[row] = bests.y[last]
+
+
+# --- Particle swarm search for a light: the robots are the particles, and the radio is their neighbourhood.
+
+
+P = TypeVar("P", bound=Particle)
+
+
+class ParticleSwarm(VectorAgent[P], Generic[P]):
+    """The rule of Kennedy and Eberhart (1995), as Pugh and Martinoli (2007) put it on robots.
+
+        v <- w v + a U (own best - x) + b U (neighbours' best - x),    |v| <= speed x time between updates
+
+    with U uniform in [0, 1), drawn anew for each term and axis. Own best is where the robot itself saw the brightest
+    light; neighbours' best is the brightest place that it has heard of or seen. Between two updates it heads for x + v.
+
+    Neighbours are those who are heard: all with a radio that reaches all, else those in its range; with
+    `ring_count` only those next to it on a ring of indices, if they are heard. What a neighbour told counts for good,
+    also when it is gone; with `keeps_heard = false` up to the next update, which is how a particle swarm in a computer
+    asks its neighbourhood.
+
+    By itself the own best is the brightest reading, so a lucky one is believed for ever. With `again_m`
+    the own best is measured again, and the mean of all its readings counts, as in Pugh's code for noisy fitness (new
+    mean = ((k - 1) mean + reading) / k at the k-th). A robot can measure only where it stands: so a reading counts as
+    one of the own best whenever the robot is that near to it, on its way out, when it comes back and while it rests
+    there. What was told is corrected by telling anew, for those who do not keep what they heard.
+
+    How a robot knows its motion, speaks of places and moves is its subclasses' part.
+    """
+
+    update_every_ticks: int = 100  # steps between two updates of the velocity
+    tell_before_ticks: int = 10  # the own best is broadcast so many steps before an update
+    inertia: float = 0.7298  # w; w, a and b are Clerc and Kennedy's constriction for phi = 4.1
+    own_weight: float = 1.4962  # a: pull of the own best
+    neighbour_weight: float = 1.4962  # b: pull of the neighbours' best
+    speed_mps: float = 0.1  # straight ahead
+    keeps_heard: bool = True  # whether what neighbours told counts for longer than until the next update
+    again_m: float = 0.0  # a reading so near to the own best is one more of it; 0: the brightest reading counts
+    ring_count: int = 0  # robots on the ring; 0: no ring, all who are heard are neighbours
+    ring_index: PerRobot[int] = per_robot(0)  # of the robot in the arena: its place on the ring
+    ring_width: int = 1  # neighbours on each side
+
+    @classmethod
+    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
+        """Updates are some steps apart, and a ring needs the place of each robot."""
+        check_above_zero(params, "update_every_ticks")
+        check_ring(cls, params, robots)
+
+    @abstractmethod
+    def moved(self, robots: Robots, state: P) -> Vectors:
+        """How far each robot moved since its last step, in m, (n,) each, along the axes of the compass."""
+
+    @abstractmethod
+    def tell(self, robots: Robots, state: P, rows: BoolArray) -> None:
+        """Broadcast the own best."""
+
+    @abstractmethod
+    def told(self, robots: Robots) -> Bests:
+        """Every best that was heard."""
+
+    @abstractmethod
+    def head_for_target(self, robots: Robots, state: P) -> None:
+        """Drive on."""
+
+    def step(self, robots: Robots, state: P) -> None:
+        """Look, listen, update or tell if it is time, and drive on."""
+        shift(state, self.moved(robots, state))
+        look(state, np.add.reduce(robots.light.value, 1), self.again_m)
+        listen(state, self._of_neighbours(self.told(robots)))
+        self._update(robots, state, state.steps % self.update_every_ticks == 0)
+        self.tell(robots, state, (state.steps + self.tell_before_ticks) % self.update_every_ticks == 0)
+        self.head_for_target(robots, state)
+        state.steps += 1
+
+    def _of_neighbours(self, bests: Bests) -> Bests:
+        if self.ring_count == 0:
+            return bests
+        return bests.of(ring_neighbours(bests.sender, self.ring_index[bests.row], self.ring_count, self.ring_width))
+
+    def _update(self, robots: Robots, state: P, now: BoolArray) -> None:
+        """A new velocity, and with it a new target."""
+        if not now.any():
+            return
+        furthest = self.speed_mps * self.update_every_ticks * robots.period_s
+        brighter = state.best_brightness > state.own_brightness
+        best_x = np.where(brighter, state.best_x, state.own_x)
+        best_y = np.where(brighter, state.best_y, state.own_y)
+        x = self._velocity(robots, "x", furthest, state.steps, state.velocity_x, state.own_x, best_x)
+        y = self._velocity(robots, "y", furthest, state.steps, state.velocity_y, state.own_y, best_y)
+        bounded = np.minimum(1.0, furthest / np.maximum(np.hypot(x, y), 1e-9))
+        state.velocity_x[now] = state.target_x[now] = (x * bounded)[now]
+        state.velocity_y[now] = state.target_y[now] = (y * bounded)[now]
+        robots.note("to its own best", now & ~brighter)
+        robots.note("to the neighbours' best", now & brighter)
+        if not self.keeps_heard:
+            state.best_brightness[now] = DARK
+
+    def _velocity(
+        self,
+        robots: Robots,
+        axis: str,
+        furthest: float,
+        steps: IntArray,
+        velocity: FloatArray,
+        own: FloatArray,
+        best: FloatArray,
+    ) -> FloatArray:
+        """The rule along one axis; a velocity at random for the first time."""
+        pull = self.own_weight * robots.draw.uniform(f"own {axis}") * own
+        pull += self.neighbour_weight * robots.draw.uniform(f"neighbours {axis}") * best
+        first = robots.draw.uniform(f"first {axis}", -furthest, furthest)
+        return np.where(steps == 0, first, self.inertia * velocity + pull)

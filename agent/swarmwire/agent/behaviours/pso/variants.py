@@ -1,0 +1,156 @@
+"""Particles that are told where they are, and tell one another places."""
+
+from typing import ClassVar, Generic, TypeVar
+
+import numpy as np
+
+from swarmwire.agent.behaviours.pso.core import Bests, Particle, ParticleSwarm
+from swarmwire.agent.fields import Vectors, along, repulsion_of_rays
+from swarmwire.agent.robots import Robots
+from swarmwire.agent.vector_agent import FloatColumn, column
+from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.messages import Message, f4
+
+
+class BestPlace(Message):
+    """The brightest place that a robot has seen, in the arena's frame."""
+
+    brightness: f4
+    x_m: f4
+    y_m: f4
+
+
+class PositionedParticle(Particle):
+    """A particle that is told where it is, in m, arena frame."""
+
+    x_m: FloatColumn = column(np.nan)  # as in its last step
+    y_m: FloatColumn = column(np.nan)
+
+
+class ParticlesByPlaces(ParticleSwarm[PositionedParticle]):
+    """A particle swarm of bodies with positioning."""
+
+    def moved(self, robots: Robots, state: PositionedParticle) -> Vectors:
+        """By the positions of now and then; their noise does not add up."""
+        here = robots.positioning
+        x, y = np.nan_to_num(here.x_m - state.x_m), np.nan_to_num(here.y_m - state.y_m)
+        state.x_m[:] = here.x_m
+        state.y_m[:] = here.y_m
+        return Vectors(x, y)
+
+    def tell(self, robots: Robots, state: PositionedParticle, rows: BoolArray) -> None:
+        """The own best, as a place."""
+        here = robots.positioning
+        x, y = here.x_m + state.own_x, here.y_m + state.own_y
+        robots.radio.send(BestPlace, rows=rows, brightness=state.own_brightness, x_m=x, y_m=y)
+
+    def told(self, robots: Robots) -> Bests:
+        """Places of those that were heard, seen from here."""
+        heard = robots.radio.heard(BestPlace)
+        here = robots.positioning
+        x, y = heard.message.x_m - here.x_m[heard.row], heard.message.y_m - here.y_m[heard.row]
+        return Bests(heard.row, heard.sender, heard.message.brightness, x, y)
+
+
+# --- Particles on wheels: to the target, and away from what is near.
+
+
+P = TypeVar("P", bound=Particle)
+
+
+class ParticlesOnWheels(ParticleSwarm[P], Generic[P]):
+    """A particle swarm of robots with proximity and compass, which turn to where they drive."""
+
+    arrived_m: float = 0.05  # nearer than this to the target the robot waits
+    avoidance: float = 2.0  # weight of the rays against the way to the target
+    turn_gain_per_s: float = 3.0  # turn rate per angle to the wanted direction
+
+    def head_for_target(self, robots: Robots, state: P) -> None:
+        """To the target, and away from what is near."""
+        bearing = np.arctan2(state.target_y, state.target_x) - robots.compass.heading_rad
+        pull = np.where(np.hypot(state.target_x, state.target_y) < self.arrived_m, 0.0, 1.0)
+        wanted = pull * along(bearing) + self.avoidance * repulsion_of_rays(robots.proximity)
+        angle, push = wanted.angle_rad, np.minimum(wanted.length, 1.0)
+        linear = self.speed_mps * push * np.maximum(np.cos(angle), 0.0)
+        robots.drive(linear_mps=linear, angular_radps=self.turn_gain_per_s * push * angle)
+
+
+# --- The point-particle model of the search: particle swarm optimisation at the robots' speed and with their radio.
+
+
+class PsoModel(ParticlesByPlaces):
+    """The point-particle model of a particle swarm search: no body, nothing in the way, exact positions.
+
+    The rule of PsoSearch, made continuous as the second half of Pugh and Martinoli's (2007) paper has it: a particle
+    flies straight to x + v with at most `speed_mps`, looks on its way, and waits there for the next update. For the
+    body `point` with a light sense; it is the same model only under the robots' light and radio. Where the
+    paper is silent, this is our reading.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("light", "compass", "positioning")
+
+    def head_for_target(self, robots: Robots, state: PositionedParticle) -> None:
+        """Straight to the target in whatever direction, and no further."""
+        away = np.hypot(state.target_x, state.target_y)
+        bearing = np.arctan2(state.target_y, state.target_x) - robots.compass.heading_rad
+        speed = np.minimum(self.speed_mps, away / robots.period_s)
+        robots.drive(linear_mps=speed * np.cos(bearing), angular_radps=0.0, lateral_mps=speed * np.sin(bearing))
+
+
+# --- Particle swarm search by what a robot itself can sense: wheels, compass, and a radio that tells range and bearing.
+
+
+class BestVector(Message):
+    """The brightest place that a robot has seen, as a vector from where it is now."""
+
+    brightness: f4
+    x_m: f4  # along the axes of the compass
+    y_m: f4
+
+
+class WheeledParticle(Particle):
+    """A particle that counts the turns of its wheels."""
+
+    left_m: FloatColumn = column(np.nan)  # as in its last step
+    right_m: FloatColumn = column(np.nan)
+
+
+class PsoSearch(ParticlesOnWheels[WheeledParticle]):
+    """Particle swarm search by what a robot itself senses: wheels, compass, and a radio that tells range and bearing.
+
+    Neighbours are those whose broadcast is heard; a best comes as a vector from its sender, and the receiver adds where
+    it hears the sender. Places are kept by dead reckoning: the mean way of both wheels, along the compass' heading.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("light", "proximity", "compass", "odometry", "radio.range", "radio.bearing")
+
+    def moved(self, robots: Robots, state: WheeledParticle) -> Vectors:
+        """By the wheels, along the heading of now."""
+        wheels = robots.odometry
+        forward = np.nan_to_num(0.5 * ((wheels.left_m - state.left_m) + (wheels.right_m - state.right_m)))
+        state.left_m[:] = wheels.left_m
+        state.right_m[:] = wheels.right_m
+        return forward * along(robots.compass.heading_rad)
+
+    def tell(self, robots: Robots, state: WheeledParticle, rows: BoolArray) -> None:
+        """The own best, as a vector from here."""
+        robots.radio.send(BestVector, rows=rows, brightness=state.own_brightness, x_m=state.own_x, y_m=state.own_y)
+
+    def told(self, robots: Robots) -> Bests:
+        """Bests of those that were heard, seen from here."""
+        heard = robots.radio.heard(BestVector)
+        place = heard.range_m * along(heard.bearing_rad + robots.compass.heading_rad[heard.row])
+        place += Vectors(heard.message.x_m, heard.message.y_m)
+        return Bests(heard.row, heard.sender, heard.message.brightness, place.x, place.y)
+
+
+# --- Particle swarm search by global positions, for a body with `positioning`.
+
+
+class PsoSearchPositioned(ParticlesByPlaces, ParticlesOnWheels[PositionedParticle]):
+    """Particle swarm search by global positions.
+
+    The rule of PsoSearch. A best comes as a place; with a radio that reaches all, the neighbourhood is global.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("light", "proximity", "compass", "positioning")

@@ -1,0 +1,120 @@
+"""A nursery: one process that imports what runners need, then forks a runner for each name it is given.
+
+Forking after the import makes a thousand runners cheap: they start in milliseconds and share the code's memory. The
+nursery itself never opens a zenoh session (one opened in a child of a process that has had one hangs). It is a program
+of its own rather than multiprocessing's fork server, which would run the user's script again in every runner.
+
+Only some runners are on their way to their robots at a time; the next is forked as soon as one has got its own. If a
+thousand connected and asked at once, each would wait for all others, and some longer than a query is kept.
+
+Standard input is the life line: when it ends, the world is gone, and so are all runners. A runner that ends badly is
+reported as one line on standard output: its name and its exit code.
+"""
+
+import gc
+import os
+import select
+import shutil
+import signal
+import struct
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import zenoh
+
+from swarmwire.agent import host, runner
+from swarmwire.agent.agent import NoAgent, load_agent
+from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.wire.sessions import PRIVATE
+
+__all__ = ["host", "main"]  # the host is imported here so that its code is shared
+
+POLL_MS = 50
+AT_ONCE = 32  # runners that have no robots yet
+PID = struct.Struct("i")  # as a runner that got its robots writes it
+
+
+def main(arguments: list[str]) -> int:
+    """`endpoint run_id agent,agent,… runner runner …`: fork the runners and wait for them all."""
+    endpoint, run_id, agents, *names = arguments
+    reports = os.dup(1)
+    os.dup2(2, 1)  # what agents print is for people, not for the world that reads the reports
+    for agent in agents.split(","):
+        with suppress(NoAgent):  # the runner finds it again and reports it
+            load_agent(agent)
+    gc.freeze()  # the collector would write to, and so copy, every shared page
+    joined, tell_joined = os.pipe()
+
+    def forked(name: str) -> int:
+        child = os.fork()
+        if child == 0:
+            os.close(reports)
+            os.close(joined)
+            os._exit(_runner(endpoint, run_id, name, tell_joined))
+        return child
+
+    if not _tend(names, forked, joined, reports):
+        _remove_socket(endpoint)
+    return 0
+
+
+def _runner(endpoint: str, run_id: str, name: str, tell_joined: int) -> int:
+    os.close(0)
+
+    def joined(_: Assignment) -> None:
+        os.write(tell_joined, PID.pack(os.getpid()))
+        os.close(tell_joined)
+
+    try:
+        runner.run(endpoint, run_id, name, joined)
+    except (SwarmwireError, zenoh.ZError) as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    except BaseException:  # noqa: BLE001 - the last frame of this process: whatever it is, show it and end
+        traceback.print_exc()
+        return 1
+    return 0
+
+
+def _tend(names: Sequence[str], forked: Callable[[str], int], joined: int, reports: int) -> bool:
+    """Fork a runner of each name, and whether all ended; False: the world did, and they were ended with it."""
+    news = select.poll()
+    news.register(0, select.POLLIN | select.POLLHUP)  # the life line
+    news.register(joined, select.POLLIN)
+    to_fork, joining, children = list(reversed(names)), set[int](), dict[int, str]()
+    while to_fork or children:
+        while to_fork and len(joining) < AT_ONCE:
+            name = to_fork.pop()
+            child = forked(name)
+            children[child] = name
+            joining.add(child)
+        heard = {of for of, _ in news.poll(POLL_MS)}
+        if 0 in heard:
+            for child in children:
+                os.kill(child, signal.SIGKILL)
+            return False
+        if joined in heard:
+            joining.difference_update(pid for (pid,) in PID.iter_unpack(os.read(joined, AT_ONCE * PID.size)))
+        child, status = os.waitpid(-1, os.WNOHANG)
+        while child:
+            name, code = children.pop(child), os.waitstatus_to_exitcode(status)
+            joining.discard(child)
+            if code != 0:
+                os.write(reports, f"{name} {code}\n".encode())
+            child, status = os.waitpid(-1, os.WNOHANG) if children else (0, 0)
+    return True
+
+
+def _remove_socket(endpoint: str) -> None:
+    """A world that was killed cannot take away the private directory of its socket."""
+    directory = Path(endpoint.partition("/")[2]).parent
+    if directory.name.startswith(PRIVATE):
+        shutil.rmtree(directory, ignore_errors=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,105 @@
+"""Parameters of an agent class: its annotated attributes, typed, with defaults; values are checked when it is made."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, TypeVar, cast, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from swarmwire.agent.vector_agent import PerRobot, PerRobotDefault, VectorAgent
+from swarmwire.comms.config import one_of
+
+T = TypeVar("T")
+TYPES: dict[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}  # in words
+OF_THE_CLASS = "needs", "api"  # what a class says of itself, never to be given
+REQUIRED = object()  # in place of a default
+
+
+class BadParameter(ValueError):
+    """A parameter that the agent does not have, lacks or cannot take; `key` is its name."""
+
+    def __init__(self, key: str, expected: str) -> None:
+        self.key, self.expected = key, expected
+        super().__init__(f"{key}: {expected}")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an agent class."""
+
+    name: str
+    type: type
+    default: Any  # REQUIRED where there is none
+    per_robot: bool = False
+
+
+def parameters_of(kind: type) -> dict[str, Parameter]:
+    """The parameters that an agent class declares, bases first; TypeError if a type is one that no scenario gives."""
+    found: dict[str, Parameter] = {}
+    for name, hint in get_type_hints(kind).items():
+        if name.startswith("_") or name in OF_THE_CLASS or ClassVar in (hint, get_origin(hint)):
+            continue
+        per_robot = get_origin(hint) is PerRobot
+        if per_robot and VectorAgent not in kind.__mro__:
+            raise TypeError(f"{kind.__name__}.{name}: only a VectorAgent has parameters per robot")
+        of = get_args(hint)[0] if per_robot else hint
+        if of not in TYPES:
+            raise TypeError(f"{kind.__name__}.{name}: a parameter is a float, int, bool or str")
+        default = getattr(kind, name, REQUIRED)
+        if isinstance(default, PerRobotDefault):
+            default = default.value
+        found[name] = Parameter(name, of, default, per_robot)
+    return found
+
+
+def checked(kind: type, params: dict[str, Any], robots: int = 1) -> dict[str, Any]:
+    """The given parameters of so many robots, each as its type; BadParameter names the first that is wrong."""
+    declared = parameters_of(kind)
+    for name in params:
+        if name not in declared:
+            raise BadParameter(name, f"unknown parameter of {kind.__name__}; expected {one_of(declared, name)}")
+    for name, parameter in declared.items():
+        if name not in params and parameter.default is REQUIRED:
+            raise BadParameter(name, f"is missing: expected {TYPES[parameter.type]}")
+    values = {name: _value(declared[name], value, robots) for name, value in params.items()}
+    if issubclass(kind, VectorAgent):
+        kind.check_parameters(values, robots)
+    return values
+
+
+def make(kind: type[T], params: dict[str, Any], robots: int = 1) -> T:
+    """An instance with these parameters, set before its `__init__` runs; those per robot are arrays (robots,)."""
+    agent, given = kind.__new__(kind), checked(kind, params, robots)
+    for name, parameter in parameters_of(kind).items():
+        if parameter.per_robot:
+            value = given.get(name, parameter.default)
+            setattr(agent, name, np.array(np.broadcast_to(value, robots), parameter.type))
+        elif name in given:
+            setattr(agent, name, given[name])
+    kind.__init__(agent)
+    return agent
+
+
+def _value(parameter: Parameter, value: Any, robots: int) -> Any:
+    if not parameter.per_robot:
+        return _one(parameter, value, TYPES[parameter.type])
+    expected = f"{TYPES[parameter.type]}, or a list with one for each of the {robots} robots"
+    if not isinstance(value, list):
+        return _one(parameter, value, expected)
+    items = cast("list[Any]", value)
+    if len(items) != robots:
+        raise BadParameter(parameter.name, f"expected {expected}, got a list of {len(items)}")
+    return [_one(parameter, item, expected) for item in items]
+
+
+def _one(parameter: Parameter, value: Any, expected: str) -> Any:
+    whole_number = isinstance(value, int) and not isinstance(value, bool)
+    if whole_number and not -(2**63) <= value < 2**63:
+        raise BadParameter(parameter.name, f"expected a number of at most 64 bits, got {value}")
+    if parameter.type is float and (whole_number or isinstance(value, float)):
+        if not math.isfinite(value):
+            raise BadParameter(parameter.name, f"expected a finite number, got {value}")
+        return float(value)
+    if (parameter.type is int and whole_number) or (parameter.type in (bool, str) and type(value) is parameter.type):
+        return value
+    raise BadParameter(parameter.name, f"expected {expected}, got {value!r}")

@@ -1,0 +1,193 @@
+"""The air of a world nearby as a radio: what this robot sends is on air there, and it hears what it would there.
+
+It joins by asking for its terms, which say what the world's radio gives; then `actions` frames go there, of which only
+the packets count, and `tick` frames come back, which hold no senses.
+"""
+
+# pyright: reportUnknownMemberType=false
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import zenoh
+from zenoh.handlers import Callback
+
+from swarmwire.agent.radios.radio import SENT, TOO_LARGE, HeardPacket, NoRadioLog, RadioLog, SentPacket
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.clock import Clock, DatedClock, WallClock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, AirTerms, BoundedInbox, decode_air
+from swarmwire.comms.wire.robot_network import SwarmKeys
+from swarmwire.comms.wire.tick_frames import encode_actions
+
+# zenoh's stubs leave out the return types of put and undeclare.
+
+
+JOIN_S = 10.0  # how long a world may take to answer
+ONE_TRY_S = 1.0
+AGAIN_NS = to_ns(0.1)
+MOST_WAITING = 1024  # frames that may wait for the agent's next step
+NO_COMMAND = np.zeros(1)
+
+
+class _Arrival(NamedTuple):
+    frame: bytes
+    at_ns: int
+    utc_ns: int
+
+
+class AirRadio:
+    """The radio of the robot `own`, one of `robots`, in the air of the world that answers in this network.
+
+    Attributes:
+        terms: what the world's radio is to this robot; None before `open`. So are `needs` and `gives` empty.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: SwarmKeys,
+        robots: Sequence[str],
+        own: str,
+        clock: DatedClock,
+        log: RadioLog | None = None,
+        wall: Clock | None = None,
+    ) -> None:
+        """`clock` runs at the agent's pace; the network is waited for by the `wall` clock, whatever that pace is."""
+        self._session, self._keys, self._robots, self._own = session, keys, tuple(robots), own
+        self._row, self._clock = self._robots.index(own), clock
+        self._wall: Clock = wall or WallClock()
+        self._log: RadioLog = log or NoRadioLog()
+        self._inbox = BoundedInbox[_Arrival](MOST_WAITING)
+        self._subscriber: zenoh.Subscriber[None] | None = None
+        self._sequence = self._frames = self._far_too_large = 0
+        self._counted = Counter[str]()
+        self.terms: AirTerms | None = None
+        self.gives: tuple[str, ...] = ()
+        self.needs: frozenset[str] = frozenset()
+
+    def open(self) -> None:
+        """Join the air; BadInput if there is no world in the network, or this robot or its swarm is not in it."""
+        terms = self._join()
+        if terms.robots != self._robots:
+            given = ", ".join(terms.robots)
+            raise BadInput("robots", "", f"expected the robots of the world, in its order: {given}")
+        self.terms, self.gives, self.needs = terms, terms.gives, frozenset(terms.needs)
+        self._subscriber = self._session.declare_subscriber(
+            self._keys.air_heard(self._own), Callback(self._arrive, indirect=False)
+        )
+
+    def heard(self, now_ns: int) -> tuple[Heard, Outcomes]:
+        """What the world's air brought since the last call."""
+        terms, heard, outcomes = self._joined(), Heard.none(self.gives), NO_OUTCOMES
+        started_ns = self._clock.now_ns() - now_ns
+        for arrival in self._inbox.take():
+            try:
+                tick, its, told = decode_air(arrival.frame, terms)
+            except BadFrame as error:
+                self._counted[f"frames_{error.fault}"] += 1
+                continue
+            # The frame left the world as its tick began.
+            ahead_ns = arrival.at_ns - started_ns - tick_start_ns(tick, terms.rate_hz)
+            mine = self._own_rows(its, ahead_ns)
+            self._note(mine, arrival.utc_ns - arrival.at_ns + started_ns)
+            heard = heard.merged(mine)
+            outcomes = Outcomes.joined([outcomes, Outcomes(self._rows(told.row), told.id, told.result)])
+        return heard, outcomes
+
+    def send(self, sent: Sent) -> None:
+        """Hand the packets to the world's air, also those that are too large for it: it counts them."""
+        if not len(sent):
+            return
+        terms, utc_ns = self._joined(), self._clock.utc_ns()
+        for to, tag, size_bytes in zip(
+            sent.to.tolist(), sent.payloads.tags().tolist(), sent.payloads.sizes.tolist(), strict=True
+        ):
+            fits = size_bytes <= terms.max_payload_bytes
+            self._counted["packets_sent" if fits else "packets_too_large"] += 1
+            self._log.sent(SentPacket(utc_ns, self._sequence, to, size_bytes, tag, SENT if fits else TOO_LARGE))
+            self._sequence += 1
+        row = np.array([terms.row])
+        packets = Sent(np.full(len(sent), terms.row), sent.to, sent.payloads, sent.outcome_id)
+        still = Actions(row, NO_COMMAND != 0.0, NO_COMMAND, NO_COMMAND, NO_COMMAND, packets)
+        self._frames += 1
+        try:
+            self._session.put(
+                self._keys.air_sent(self._own),
+                encode_actions(self._frames, still),
+                congestion_control=zenoh.CongestionControl.DROP,
+            )
+        except zenoh.ZError:  # the session was closed
+            self._counted["packets_refused"] += len(sent)
+
+    def counts(self) -> dict[str, int]:
+        """What was sent, heard and lost on the way to the world, by name, where there is any."""
+        counted = Counter(self._counted)
+        counted["frames_oversized"] += self._far_too_large
+        counted["frames_dropped"] += self._inbox.dropped
+        return {name: count for name, count in sorted(counted.items()) if count}
+
+    def close(self) -> None:
+        """Hear no more; the session is its owner's."""
+        subscriber, self._subscriber = self._subscriber, None
+        if subscriber is not None and not self._session.is_closed():
+            subscriber.undeclare()
+
+    def _join(self) -> AirTerms:
+        """The world's answer; the network may still be on its way up."""
+        end_ns = self._wall.now_ns() + to_ns(JOIN_S)
+        while (left_ns := end_ns - self._wall.now_ns()) > 0:
+            for reply in self._session.get(self._keys.air_join(self._own), timeout=min(ONE_TRY_S, to_s(left_ns))):
+                if reply.ok is not None:
+                    try:
+                        return AirTerms.decode(reply.ok.payload.to_bytes())
+                    except BadFrame as error:
+                        raise BadInput("radio", "air", f"expected a world of this version: {error}") from error
+                if reply.err is not None and (error := reply.err.payload.to_string()) != "Timeout":
+                    raise BadInput("radio", "air", error)
+            self._wall.sleep_until(min(self._wall.now_ns() + AGAIN_NS, end_ns))
+        expected = f"expected a world that lends its air to {self._own}; none in the network answers"
+        raise BadInput("radio", "air", expected)
+
+    def _joined(self) -> AirTerms:
+        if self.terms is None:
+            raise RuntimeError("the radio is to be opened first")
+        return self.terms
+
+    def _arrive(self, sample: zenoh.Sample) -> None:
+        """Called by the network's thread: it must take no time, and keep nothing that is large."""
+        if len(sample.payload) > MAX_RADIO_FRAME_BYTES:
+            self._far_too_large += 1
+            return
+        self._inbox.put(_Arrival(sample.payload.to_bytes(), self._clock.now_ns(), self._clock.utc_ns()))
+
+    def _own_rows(self, heard: Heard, ahead_ns: int) -> Heard:
+        """The same as this robot counts: itself by its place in the swarm, times from its agent's start."""
+        at_ns = heard.heard_at_ns + ahead_ns
+        rows = self._rows(heard.receiver)
+        return Heard(rows, heard.sender, heard.sequence, at_ns, heard.given, heard.payload, heard.payloads)
+
+    def _rows(self, rows: IntArray) -> IntArray:
+        return np.full(len(rows), self._row)
+
+    def _note(self, heard: Heard, dated_ns: int) -> None:
+        """Tell the log; `dated_ns` is the date at the agent's start."""
+        sizes, tags = heard.payloads.sizes, heard.payloads.tags()
+        for at, payload in enumerate(heard.payload.tolist()):
+            packet = HeardPacket(
+                utc_ns=int(heard.heard_at_ns[at]) + dated_ns,
+                sender=int(heard.sender[at]),
+                sequence=int(heard.sequence[at]),
+                to=BROADCAST,  # whom it was addressed to the air does not tell
+                size_bytes=int(sizes[payload]),
+                tag=int(tags[payload]),
+                latency_ns=None,
+                distance_m=float(heard.given["range_m"][at]) if "range_m" in heard.given else None,
+                given=True,
+            )
+            self._log.heard(packet)
+        self._counted["packets_heard"] += len(heard)

@@ -1,0 +1,216 @@
+"""What a reading has of a robot where it has a single number."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Generic, TypeVar, cast
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.bodies.sensors import Infrared, Light, Proximity, Rim, Ring, Scan
+
+N = TypeVar("N", bound=float | FloatArray)  # a float for an Agent; (n,) for a VectorAgent, one for each robot
+
+
+# --- Readings of sensors around a body.
+
+
+S = TypeVar("S", bound=Ring)
+R = TypeVar("R", bound=Rim)
+
+
+@dataclass(frozen=True)
+class Around(Generic[N, S]):
+    """Sensors around a body, in the data sheet's order (use the angles, never the indices)."""
+
+    value: FloatArray  # (…, sensors) the response, 0 to 1
+    sheet: S
+
+    @property
+    def angle_rad(self) -> FloatArray:
+        """Where the sensors look in the body's frame, (sensors,)."""
+        return self.sheet.angle_rad
+
+    def vector_sum(self) -> tuple[N, N]:
+        """X and y of the sum of the sensors as vectors, `value` long towards `angle_rad`: where most of it is."""
+        value, (cosine, sine) = self.value, self.sheet.direction
+        if value.ndim == 1:  # once a robot and tick: a faster call than that for any axis
+            return cast("tuple[N, N]", (float(np.add.reduce(value * cosine)), float(np.add.reduce(value * sine))))
+        return cast("tuple[N, N]", (np.add.reduce(value * cosine, 1), np.add.reduce(value * sine, 1)))
+
+
+class _AtRim(Around[N, R]):
+    @cached_property
+    def distance_m(self) -> FloatArray:
+        """Distance from the rim at which an ideal sensor answers `value`; the reach if it sees nothing, (…, rays)."""
+        return self.sheet.response.distance_m(self.value)
+
+
+class ProximityReading(_AtRim[N, Proximity]):
+    """The rays of proximity, (…, rays): value is 0 for nothing, 1 for touching."""
+
+
+class InfraredReading(_AtRim[N, Infrared]):
+    """The rays of passive infrared, (…, rays): value is 0 for no robot, 1 for touching one."""
+
+
+class LightReading(Around[N, Light]):
+    """Photocells, (…, cells): value is 0 for dark."""
+
+
+# --- The reading of the battery.
+
+
+@dataclass(frozen=True)
+class BatteryReading(Generic[N]):
+    """The battery's gauge."""
+
+    charge: N  # 1 full, 0 empty: the motors stop
+    voltage_v: N
+
+
+# --- Readings of the bumper.
+
+
+@dataclass(frozen=True)
+class BumperReading:
+    """One robot's bumper."""
+
+    pressed: bool  # touched a robot, an obstacle or a wall in the tick before
+
+
+@dataclass(frozen=True)
+class BumperReadings:
+    """The bumpers of n robots."""
+
+    pressed: FloatArray  # (n,) 1 for a robot that touched anything in the tick before, else 0
+
+
+# --- Readings of the omnidirectional camera.
+
+
+@dataclass(frozen=True)
+class Blob:
+    """A LED of another robot."""
+
+    distance_m: float  # over the floor, from the body's centre
+    bearing_rad: float  # in the body's frame, (-pi, pi], 0 ahead, positive to the left
+    colour: int  # 0xRRGGBB
+
+
+@dataclass(frozen=True)
+class CameraReading:
+    """What one robot's camera sees."""
+
+    blobs: list[Blob]  # by true distance, the nearest first
+
+    @classmethod
+    def of(cls, distance_m: FloatArray, bearing_rad: FloatArray, colour: FloatArray) -> "CameraReading":
+        """The reading of these columns (most_blobs,), nan where there is no blob."""
+        seen = np.isfinite(distance_m)
+        columns = (column[seen].tolist() for column in (distance_m, bearing_rad, colour))
+        return cls([Blob(d, bearing, int(rgb)) for d, bearing, rgb in zip(*columns, strict=True)])
+
+
+@dataclass(frozen=True)
+class CameraReadings:
+    """What the cameras of n robots see, a column per blob, by true distance; nan where there is none."""
+
+    distance_m: FloatArray  # (n, most_blobs) over the floor, from the body's centre
+    bearing_rad: FloatArray  # (n, most_blobs) in the body's frame, (-pi, pi], 0 ahead, positive to the left
+    colour: FloatArray  # (n, most_blobs) 0xRRGGBB
+
+    @property
+    def count(self) -> IntArray:
+        """How many blobs each robot sees, (n,)."""
+        return np.count_nonzero(np.isfinite(self.distance_m), axis=1)
+
+
+# --- The reading of the compass.
+
+
+@dataclass(frozen=True)
+class CompassReading(Generic[N]):
+    """The heading."""
+
+    heading_rad: N  # 0 along the arena's +x, counter-clockwise, in (-pi, pi]
+
+
+# --- The reading of the ground sensors.
+
+
+@dataclass(frozen=True)
+class GroundReading:
+    """The floor under the sensors, in the data sheet's order."""
+
+    shade: FloatArray  # (…, points) 0 black to 1 white
+
+
+# --- The reading of the IMU.
+
+
+@dataclass(frozen=True)
+class ImuReading(Generic[N]):
+    """What the IMU feels, in the body's frame: the mean over the tick before."""
+
+    forward_mps2: N  # acceleration towards ahead
+    left_mps2: N  # acceleration to the left: in a left turn it is positive
+    turn_radps: N  # turn rate, positive to the left
+
+
+# --- The reading of the wheel encoders.
+
+
+@dataclass(frozen=True)
+class OdometryReading(Generic[N]):
+    """The wheel encoders."""
+
+    left_m: N  # travelled by the left wheel since the start
+    right_m: N
+
+
+# --- Readings of senses of the user's own.
+
+
+class OwnReading:
+    """What a sense of the user's own reads: each of its fields is an attribute.
+
+    For one robot a float, or (width,); for n robots (n,), or (n, width).
+    """
+
+    def __init__(self, sense: str, fields: Mapping[str, Any]) -> None:
+        self._sense, self._fields = sense, fields
+
+    def __getattr__(self, name: str) -> Any:
+        """A field by its name."""
+        if name.startswith("_") or name not in self._fields:
+            raise AttributeError(f"the sense {self._sense} has the fields {', '.join(self._fields)}, not {name}")
+        return self._fields[name]
+
+
+# --- The reading of positioning.
+
+
+@dataclass(frozen=True)
+class PositioningReading(Generic[N]):
+    """Where the robot is told to be, arena frame."""
+
+    x_m: N
+    y_m: N
+
+
+# --- The reading of the laser scanner.
+
+
+@dataclass(frozen=True)
+class ScanReading:
+    """The rays of the scanner."""
+
+    range_m: FloatArray  # (…, rays) from the scanner; inf where nothing is within its range
+    sheet: Scan
+
+    @property
+    def angle_rad(self) -> FloatArray:
+        """Where the rays look in the body's frame, (rays,)."""
+        return self.sheet.angle_rad

@@ -1,0 +1,124 @@
+"""What both kinds of handle tell of the tick and the body."""
+
+from abc import abstractmethod
+from typing import Generic, TypeVar
+
+from swarmwire.agent.readings import (
+    BatteryReading,
+    CompassReading,
+    GroundReading,
+    ImuReading,
+    InfraredReading,
+    LightReading,
+    N,
+    OdometryReading,
+    PositioningReading,
+    ProximityReading,
+    ScanReading,
+)
+from swarmwire.agent.step_context import Turn
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.sensors import Sheet
+from swarmwire.comms.clock import to_s
+
+
+class Handle:
+    """A view of one tick of one group."""
+
+    __slots__ = ("_turn",)
+
+    def __init__(self, turn: Turn) -> None:
+        self._turn = turn
+
+    @property
+    def time_s(self) -> float:
+        """Time since the start of the run, at this tick."""
+        return to_s(self._turn.time_ns)
+
+    @property
+    def period_s(self) -> float:
+        """Time between two steps."""
+        return to_s(self._turn.period_ns)
+
+    @property
+    def body(self) -> Body:
+        """Geometry and limits of the body."""
+        return self._turn.group.body
+
+
+# --- What robots sense, the same for one and for n of them: a property per sense of a body.
+
+
+S = TypeVar("S", bound=Sheet)
+
+
+class Sensing(Handle, Generic[N]):
+    """The senses of one robot, or of n with a leading axis n, here written …; but for those that differ in form."""
+
+    __slots__ = ()  # what is set on a handle by mistake is refused
+
+    @abstractmethod
+    def _number(self, sense: str, field: str) -> N:
+        """A field that has one number for a robot."""
+
+    @abstractmethod
+    def _numbers(self, sense: str, field: str) -> FloatArray:
+        """A field that has several, (…, width)."""
+
+    @property
+    def proximity(self) -> ProximityReading[N]:
+        """Rays around the body: value and distance_m (…, rays), angle_rad (rays,)."""
+        return ProximityReading(self._numbers("proximity", "value"), _had(self.body.proximity))
+
+    @property
+    def compass(self) -> CompassReading[N]:
+        """Heading in the arena's frame: heading_rad."""
+        return CompassReading(self._number("compass", "heading_rad"))
+
+    @property
+    def odometry(self) -> OdometryReading[N]:
+        """Wheel encoders: left_m and right_m."""
+        return OdometryReading(self._number("odometry", "left_m"), self._number("odometry", "right_m"))
+
+    @property
+    def light(self) -> LightReading[N]:
+        """Photocells around the body: value (…, cells), angle_rad (cells,)."""
+        return LightReading(self._numbers("light", "value"), _had(self.body.light))
+
+    @property
+    def positioning(self) -> PositioningReading[N]:
+        """Position in the arena's frame: x_m and y_m."""
+        return PositioningReading(self._number("positioning", "x_m"), self._number("positioning", "y_m"))
+
+    @property
+    def imu(self) -> ImuReading[N]:
+        """Acceleration and turn rate in the body's frame: forward_mps2, left_mps2 and turn_radps."""
+        return ImuReading(*(self._number("imu", name) for name in ("forward_mps2", "left_mps2", "turn_radps")))
+
+    @property
+    def battery(self) -> BatteryReading[N]:
+        """Battery: charge, 1 full and 0 empty, and voltage_v."""
+        return BatteryReading(self._number("battery", "charge"), self._number("battery", "voltage_v"))
+
+    @property
+    def infrared(self) -> InfraredReading[N]:
+        """Light of other robots, by rays around the body: value and distance_m (…, rays), angle_rad (rays,)."""
+        return InfraredReading(self._numbers("infrared", "value"), _had(self.body.infrared))
+
+    @property
+    def scan(self) -> ScanReading:
+        """Laser scan: range_m (…, rays), angle_rad (rays,)."""
+        return ScanReading(self._numbers("scan", "range_m"), _had(self.body.scan))
+
+    @property
+    def ground(self) -> GroundReading:
+        """Shade of the floor under the sensors: shade (…, points)."""
+        return GroundReading(self._numbers("ground", "shade"))
+
+
+def _had(sheet: S | None) -> S:
+    """The data sheet of a sense that the body has (needs are checked before a run)."""
+    if sheet is None:
+        raise AttributeError("the body does not have this sense")
+    return sheet

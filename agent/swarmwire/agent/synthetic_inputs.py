@@ -1,0 +1,162 @@
+"""Trial: which robots, for how long, with what parameters."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from swarmwire.comms import draws
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.bodies.body import Body, load_body
+from swarmwire.comms.bodies.drives import BRIGHTEST
+from swarmwire.comms.bodies.sensors import Camera, GroundColour, OwnSheet
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.packets import NO_OUTCOMES, UNTOLD, Heard, Outcomes, Payloads, SendResult, Sent
+from swarmwire.comms.tick_io import GroupSenses
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What to try an agent with: robots whose senses and packets are made up.
+
+    All that the body senses is drawn anew in each tick. What robots send is heard a tick later, by each of the others
+    with probability 0.4, and outcomes of all kinds are told to an agent that needs them. A tenth of the robots is
+    missing in each tick and starts afresh when it is back.
+    """
+
+    robots: int = 7  # of one group
+    ticks: int = 12  # of a tenth of a second
+    seed: int = 1  # of what they sense, hear and draw
+    body: str | Body = "epuck"  # one that comes with swarmwire, or any other
+    params: dict[str, Any] | None = None  # as in a scenario: a list has a value for each robot
+
+    @cached_property
+    def sheet(self) -> Body:
+        """The body's data sheet."""
+        return load_body(self.body) if isinstance(self.body, str) else self.body
+
+
+# --- What robots of a trial sense and hear, made up and keyed by its seed.
+#
+# Ragged packets (what robots sent a tick ago, heard by some), outcomes of addressed ones, robots that drop out and come
+# back.
+
+
+RATE_HZ = 10
+GIVEN = ("range_m", "bearing_rad", "rssi_dbm")
+DROP_OUT = 0.1  # share of the robots missing in a tick
+HEARING = 0.4  # share of the senders that a robot hears
+LEARNING = 0.6  # share of the outcomes still to come that come in a tick
+
+
+class _Ether:
+    """What was sent a tick ago, heard at random, and what became of it, told at random."""
+
+    def __init__(self, key: int) -> None:
+        self._key, self._sent = key, Sent.none()
+        self._untold = NO_OUTCOMES
+
+    def show(self, sent: Sent) -> None:
+        self._sent = sent.select(np.argsort(sent.sender, kind="stable"))
+        asked = np.flatnonzero(self._sent.outcome_ids != UNTOLD)
+        row, id_ = self._sent.sender[asked], self._sent.outcome_ids[asked]
+        chance = draws.uniform(self._key, row, id_, 0, draws.purpose("outcome"))
+        new = Outcomes(row, id_, (chance * len(SendResult)).astype(np.int64))
+        self._untold = Outcomes.joined([self._untold, new])
+
+    def outcomes(self, tick: int) -> Outcomes:
+        """As the air would tell them: also to robots that have dropped out, and to those that have forgotten."""
+        comes = _uniform(self._key, tick, "learning", (len(self._untold),)) < LEARNING
+        told, self._untold = (self._untold.select(np.flatnonzero(now)) for now in (comes, ~comes))
+        return told
+
+    def heard(self, tick: int, rows: IntArray) -> Heard:
+        chance = _uniform(self._key, tick, "hearing", (len(rows), len(self._sent)))
+        receiver, payload = np.nonzero((chance < HEARING) & (self._sent.sender != rows[:, None]))
+        given = {name: _uniform(self._key, tick, name, (len(receiver),)) * 3.0 - 1.0 for name in GIVEN}
+        at_ns = np.full(len(receiver), tick_start_ns(tick, RATE_HZ) - 1, np.int64)
+        sender = self._sent.sender[payload]
+        payloads: Payloads = self._sent.payloads
+        return Heard(rows[receiver], sender, np.full(len(receiver), tick), at_ns, given, payload, payloads)
+
+
+class Given(NamedTuple):
+    """What a group is given in a tick: time (its number, start and length in ns), senses, packets and outcomes."""
+
+    time: tuple[int, int, int]
+    senses: GroupSenses
+    heard: Heard
+    outcomes: Outcomes
+
+
+def inputs(trial: Trial) -> Iterator[tuple[Given, Callable[[Sent], None]]]:
+    """What the robots are given, tick by tick, and whom to show what they sent."""
+    key, body = draws.derive_key("inputs", trial.seed), trial.sheet
+    ether = _Ether(key)
+    for tick in range(trial.ticks):
+        rows = np.flatnonzero(_uniform(key, tick, "drop-out", (trial.robots,)) >= DROP_OUT)
+        time_ns = tick_start_ns(tick, RATE_HZ)
+        time = (tick, time_ns, tick_start_ns(tick + 1, RATE_HZ) - time_ns)
+        senses = GroupSenses(rows, _senses(body, key, tick, rows))
+        yield Given(time, senses, ether.heard(tick, rows), ether.outcomes(tick)), ether.show
+
+
+def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatArray]:
+    n, fields = len(rows), dict[str, FloatArray]()
+    if body.proximity is not None:
+        value = _uniform(key, tick, "proximity", (n, len(body.proximity.angles_deg)))
+        fields["proximity.value"] = np.maximum(value * 2.0 - 1.0, 0.0)
+    if body.compass is not None:
+        fields["compass.heading_rad"] = (_uniform(key, tick, "compass", (n,)) * 2.0 - 1.0) * np.pi
+    if body.odometry is not None:
+        for side in ("left_m", "right_m"):
+            fields[f"odometry.{side}"] = tick * 0.01 + _uniform(key, tick, side, (n,)) * 0.01
+    if body.light is not None:
+        fields["light.value"] = _uniform(key, tick, "light", (n, len(body.light.angles_deg)))
+    if "bumper" in body.senses:
+        fields["bumper.pressed"] = np.round(_uniform(key, tick, "bumper", (n,)))
+    if "positioning" in body.senses:
+        for axis in ("x_m", "y_m"):
+            fields[f"positioning.{axis}"] = _uniform(key, tick, axis, (n,)) * 4.0 - 2.0
+    if "imu" in body.senses:
+        for name in ("forward_mps2", "left_mps2", "turn_radps"):
+            fields[f"imu.{name}"] = _uniform(key, tick, name, (n,)) * 2.0 - 1.0
+    if "battery" in body.senses:
+        charge = _uniform(key, tick, "battery", (n,))
+        fields["battery.charge"], fields["battery.voltage_v"] = charge, 3.4 + 0.8 * charge
+    for name, sheet in body.senses.items():
+        if isinstance(sheet, OwnSheet):
+            for field, width in sheet.fields.items():
+                fields[f"{name}.{field}"] = _uniform(key, tick, f"{name}.{field}", (n, width) if width else (n,))
+    fields.update(_seen(body, key, tick, n))
+    return fields
+
+
+def _seen(body: Body, key: int, tick: int, n: int) -> dict[str, FloatArray]:
+    """What senses show that look around or down."""
+    fields = dict[str, FloatArray]()
+    if body.infrared is not None:
+        value = _uniform(key, tick, "infrared", (n, len(body.infrared.angles_deg)))
+        fields["infrared.value"] = np.maximum(value * 2.0 - 1.0, 0.0)
+    if body.scan is not None:
+        share = _uniform(key, tick, "scan", (n, body.scan.rays))
+        fields["scan.range_m"] = np.where(share < 0.8, share * body.scan.range_m, np.inf)
+    ground, camera = body.senses.get("ground"), body.senses.get("camera")
+    if isinstance(ground, GroundColour):
+        fields["ground.shade"] = _uniform(key, tick, "ground", (n, len(ground.points_m)))
+    if isinstance(camera, Camera):
+        shape = n, camera.most_blobs
+        none = np.arange(camera.most_blobs) >= _uniform(key, tick, "blobs", (n, 1)) * camera.most_blobs
+        nearest_first = np.sort(_uniform(key, tick, "distance", shape), axis=1)
+        bearing = (_uniform(key, tick, "bearing", shape) * 2.0 - 1.0) * np.pi
+        colour = np.floor(_uniform(key, tick, "colour", shape) * BRIGHTEST)
+        for name, column in (("distance_m", nearest_first), ("bearing_rad", bearing), ("colour", colour)):
+            fields[f"camera.{name}"] = np.where(none, np.nan, column)
+    return fields
+
+
+def _uniform(key: int, tick: int, purpose: str, shape: tuple[int, ...]) -> FloatArray:
+    count = np.arange(int(np.prod(shape))).reshape(shape)
+    return draws.uniform(key, tick, count, 0, draws.purpose(purpose))

@@ -1,0 +1,160 @@
+"""What robots did in a tick, as names and values that can be compared and shown."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from swarmwire.agent.agent import Agent, AgentClass
+from swarmwire.agent.host import Hosted, hosted
+from swarmwire.agent.synthetic_inputs import Given, Trial, inputs
+from swarmwire.agent.vector_agent import VectorAgent
+from swarmwire.comms import draws
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.assignment import GroupAssignment, params_of
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.messages import DICT_TAG, decode_dict, message_classes
+from swarmwire.comms.packets import BROADCAST, TAG_BYTES, UNTOLD, Sent
+from swarmwire.comms.tick_io import Actions, GroupSenses
+
+Deed = tuple[int, str, str]  # robot, what it did, and the value, exactly
+SPEEDS = ("linear_mps", "angular_radps", "lateral_mps")
+
+
+def deeds(actions: Actions, body: Body) -> dict[int, dict[str, str]]:
+    """What each robot did, by its row: the exact value of each deed, by its name."""
+    found: dict[int, dict[str, str]] = {robot: {} for robot in actions.rows.tolist()}
+    for robot, what, value in chain(_driven(actions), _shown(actions), _actuated(actions, body), _sent(actions.sent)):
+        found[robot][what] = value
+    return found
+
+
+def _driven(actions: Actions) -> Iterator[Deed]:
+    for name in SPEEDS:
+        speeds: list[float] = getattr(actions, name).tolist()
+        for robot, drives, speed in zip(actions.rows.tolist(), actions.drive.tolist(), speeds, strict=True):
+            if drives:
+                yield robot, f"drive: {name}", repr(speed)
+
+
+def _shown(actions: Actions) -> Iterator[Deed]:
+    notes, leds = actions.notes, actions.leds
+    codes: list[int] = notes.code.tolist()
+    for robot, code in zip(notes.rows.tolist(), codes, strict=True):
+        yield robot, "note", repr(notes.names[code])
+    for robot, value in zip(actions.values.rows.tolist(), actions.values.value.tolist(), strict=True):
+        yield robot, "note: value", repr(value)
+    for robot, which, rgb in zip(leds.rows.tolist(), leds.which.tolist(), leds.rgb.tolist(), strict=True):
+        yield robot, f"led {which}", f"0x{rgb:06x}"
+
+
+def _actuated(actions: Actions, body: Body) -> Iterator[Deed]:
+    places = [f"{name}[{at}]" for name, sheet in body.actuators.items() for at in range(sheet.width)]
+    rows, place, value = actions.own.rows.tolist(), actions.own.place.tolist(), actions.own.value.tolist()
+    for robot, at, number in zip(rows, place, value, strict=True):
+        yield robot, f"actuate: {places[at]}", repr(number)
+
+
+def _sent(sent: Sent) -> Iterator[Deed]:
+    packets: dict[int, int] = {}  # of each robot, up to now
+    columns = sent.sender.tolist(), sent.to.tolist(), sent.outcome_ids.tolist()
+    for at, (robot, to, outcome_id) in enumerate(zip(*columns, strict=True)):
+        number = packets[robot] = packets.get(robot, 0) + 1
+        yield robot, f"packet {number}: to", "all" if to == BROADCAST else f"robot {to}"
+        if outcome_id != UNTOLD:
+            yield robot, f"packet {number}: id", str(outcome_id)
+        for name, value in _fields(sent.payloads.row(at)):
+            yield robot, f"packet {number}: {name}", value
+
+
+def _fields(payload: bytes) -> list[tuple[str, str]]:
+    tag = int.from_bytes(payload[:TAG_BYTES], "little")
+    if tag == DICT_TAG:
+        return [("dict", repr(decode_dict(payload)))]
+    for kind in message_classes():
+        if (kind.tag, kind.size_bytes) == (tag, len(payload)):
+            message = kind.decode(payload)
+            values = [(f"{kind.__name__}.{name}", repr(getattr(message, name))) for name in kind.ranges]
+            return values or [(kind.__name__, "sent")]
+    return [("bytes", payload.hex(" "))]
+
+
+# --- Comparison: two agents that are given the same, and where what they do comes apart.
+
+
+MOST_SHOWN = 8  # deeds of a robot
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Who is compared, and what is said if they differ."""
+
+    text: str
+    names: tuple[str, str]
+    body: Body
+
+    def check(self, tick: int, first: Actions, second: Actions) -> None:
+        """AssertionError with the first robot that does not do the same in both, and what it does in each."""
+        one, other = deeds(first, self.body), deeds(second, self.body)
+        different = [robot for robot in one if one[robot] != other[robot]]
+        if different:
+            robot, *others = different
+            lines = [f"{self.text} in tick {tick}, robot {robot}:", *self._lines(one[robot], other[robot])]
+            if others:
+                lines.append(f"and so do robots {', '.join(map(str, others))}")
+            raise AssertionError("\n".join(lines))
+
+    def _lines(self, one: dict[str, str], other: dict[str, str]) -> list[str]:
+        first, second = self.names
+        apart = [what for what in one | other if one.get(what) != other.get(what)]
+        lines = [
+            f"  {what}: {one.get(what, 'nothing')} ({first}), {other.get(what, 'nothing')} ({second})"
+            for what in apart[:MOST_SHOWN]
+        ]
+        return lines + [f"  and {len(apart) - MOST_SHOWN} more"] * (len(apart) > MOST_SHOWN)
+
+
+# --- The checks themselves: the same robots twice, in two ways, and what they do compared.
+
+
+def assert_equivalent(single: type[Agent], vector: type[VectorAgent[Any]], trial: Trial | None = None) -> None:
+    """AssertionError unless both do exactly the same, bit for bit, for robots that sense and hear the same.
+
+    It names the tick, a robot, and each number, LED, note and field of a message in which the two differ.
+    """
+    trial = trial or Trial()
+    one, other = (_host(kind, trial, np.arange(trial.robots)) for kind in (single, vector))
+    names = single.__name__, vector.__name__
+    comparison = Comparison(f"{single.__name__} and {vector.__name__} differ", names, trial.sheet)
+    for tick, (given, show) in enumerate(inputs(trial)):
+        first = one.act(*given)
+        comparison.check(tick, first, other.act(*given))
+        show(first.sent)
+
+
+def assert_rows_independent(vector: type[VectorAgent[Any]], trial: Trial | None = None) -> None:
+    """AssertionError unless n rows at once do exactly what each row does alone, bit for bit: so no row peeks."""
+    trial = trial or Trial()
+    together = _host(vector, trial, np.arange(trial.robots))
+    alone = [_host(vector, trial, np.array([row])) for row in range(trial.robots)]
+    comparison = Comparison(f"rows of {vector.__name__} are not independent", ("together", "alone"), trial.sheet)
+    for tick, (given, show) in enumerate(inputs(trial)):
+        first = together.act(*given)
+        comparison.check(tick, first, Actions.joined([host.act(*_only(row, given)) for row, host in enumerate(alone)]))
+        show(first.sent)
+
+
+def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> Hosted:
+    keys = np.array([draws.derive_key("trial", trial.seed, int(row)) for row in rows], np.uint64)
+    names = tuple(f"robot-{row}" for row in rows)
+    params = params_of(trial.params or {}, rows)
+    return hosted(GroupAssignment("trial", "", params, trial.sheet, rows, names, keys), kind)
+
+
+def _only(row: int, given: Given) -> Given:
+    at = np.flatnonzero(given.senses.rows == row)
+    own = GroupSenses(given.senses.rows[at], {name: column[at] for name, column in given.senses.fields.items()})
+    heard = given.heard.select(np.flatnonzero(given.heard.receiver == row))
+    return Given(given.time, own, heard, given.outcomes.select(np.flatnonzero(given.outcomes.row == row)))
