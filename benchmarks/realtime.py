@@ -6,8 +6,8 @@ import statistics
 from benchmarks import scenes
 from benchmarks.lines import report, spread
 from swarmwire.deploy import run
-from swarmwire.world.crews.lateness import Delays
-from swarmwire.world.scenario.scenario_file import scenario_from
+from swarmwire.world.backends.pacing import Delays
+from swarmwire.world.scenario.file import scenario_from
 
 AGENT = "benchmarks.agents:Relay"
 MS_PER_S = 1000.0

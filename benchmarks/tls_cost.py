@@ -28,13 +28,11 @@ from swarmwire.deploy.certificates.certificate_folder import begin_authority, is
 from swarmwire.deploy.certificates.folder_access import network_in
 from swarmwire.deploy.certificates.wanted import wanted
 from swarmwire.deploy.new_air import new_air
-from swarmwire.world.crews import split_robots
-from swarmwire.world.crews.door import Door
-from swarmwire.world.crews.remote_crew import RemoteCrew
-from swarmwire.world.crews.runner_crew import Surroundings
-from swarmwire.world.crews.terms import Terms
+from swarmwire.world.backends import allocation
+from swarmwire.world.backends.join_policy import Door, Terms
+from swarmwire.world.backends.zenoh_backend import RemoteCrew, Surroundings
 from swarmwire.world.loop import Loop
-from swarmwire.world.scenario.scenario_file import scenario_from
+from swarmwire.world.scenario.file import scenario_from
 
 KINDS = ("unix", "tcp", "tls")
 WARM_UP = 20
@@ -104,7 +102,7 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
     """Of each tick, in ms: what world and radio took, and what each set of runners did."""
     scenario = scenario_from(scenes.flocking(robots, ticks / 10), "tls-cost")
     simulation = Simulation(scenario)
-    parts = split_robots.split(split_robots.whole(scenario, simulation.static, dict(simulation.agents)), robots)
+    parts = allocation.split(allocation.whole(scenario, simulation.static, dict(simulation.agents)), robots)
     agent, clock = next(iter(simulation.agents.values())), WallClock()
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sw-", dir="/tmp")))

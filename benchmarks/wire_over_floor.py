@@ -30,7 +30,7 @@ from swarmwire.comms.wire import frames, tick_frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import close_session, open_world, unix_endpoint
 from swarmwire.deploy import run
-from swarmwire.world.scenario.scenario_file import scenario_from
+from swarmwire.world.scenario.file import scenario_from
 
 AGENT = "benchmarks.agents:TimedBoid"
 EVERY, WARM = 10, 20  # ticks
@@ -123,7 +123,7 @@ def _sizes(run_some: Callable[[], object]) -> tuple[int, int]:
         answers.append(len(data))
         return decode(data)
 
-    with patch("swarmwire.world.crews.lockstep.encode_tick", encoded), patch.object(frames, "decode", decoded):
+    with patch("swarmwire.world.backends.lockstep.encode_tick", encoded), patch.object(frames, "decode", decoded):
         run_some()
     return int(statistics.median(sent)), int(statistics.median(answers))
 

@@ -20,12 +20,12 @@ from swarmwire.comms.wire import frames, join, tick_frames
 from swarmwire.comms.wire.join import LIMITS, JoinRequest, Offer, OfferedGroup
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.tick_frames import encode_actions, encode_tick
-from swarmwire.world.crews import admission, lockstep, realtime, roster, runner_crew, runner_inbox
+from swarmwire.world.backends import inbox, join_policy, lockstep, realtime, registry, zenoh_backend
 
 PAGE = Path(__file__).parent / "protocol.md"
 ROWS = np.array([4, 6])
-ENCODERS = (runner, tick_frames, runner_crew)
-COUNTERS = (frames, frames, tick_frames, admission, roster, lockstep, realtime, runner_inbox)
+ENCODERS = (runner, tick_frames, zenoh_backend)
+COUNTERS = (frames, frames, tick_frames, join_policy, registry, lockstep, realtime, inbox)
 
 
 def protocol_page() -> Iterator[str]:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from docs.pictures.svg import arc, arrow, box, page, text
-from swarmwire.world.crews.slot import MOVES, Move, State
+from swarmwire.world.backends.allocation import MOVES, Move, State
 
 TO = Path(__file__).parents[1] / "runner-states.svg"
 PLACES: dict[State, tuple[float, float]] = {

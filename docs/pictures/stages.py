@@ -14,8 +14,8 @@ from swarmwire.comms.draws import derive_key
 from swarmwire.comms.truth import Group
 from swarmwire.metrics.drawing.canvas import save
 from swarmwire.metrics.drawing.looks import FAINT
+from swarmwire.world.sensors.pipeline import Staged
 from swarmwire.world.sensors.sensor import Field, Noise
-from swarmwire.world.sensors.staged import Staged
 
 TO = Path(__file__).parents[1] / "stages.svg"
 TICK_S, TICKS = 0.1, 60

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.world.own import Field, Noise, OwnActuator, OwnSensor, Scene, parameter
+from swarmwire.world.custom import Field, Noise, OwnActuator, OwnSensor, Scene, parameter
 
 
 class Leak:

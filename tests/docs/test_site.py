@@ -26,8 +26,8 @@ from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.deploy import run
 from swarmwire.deploy.cli import app
 from swarmwire.metrics.registry import METRICS
-from swarmwire.world.crews.realtime_crew import RealTimeReport
-from swarmwire.world.scenario.scenario_file import scenario_schema
+from swarmwire.world.backends.realtime_backend import RealTimeReport
+from swarmwire.world.scenario.file import scenario_schema
 from tests.docs.pages import ROOT
 
 

@@ -15,8 +15,8 @@ from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire.join import JoinRequest
-from swarmwire.world.crews.lockstep import Lockstep
-from swarmwire.world.crews.split_robots import split
+from swarmwire.world.backends.allocation import split
+from swarmwire.world.backends.lockstep import Lockstep
 
 
 class EncodedCrew:

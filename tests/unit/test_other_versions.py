@@ -30,7 +30,7 @@ from swarmwire.deploy.tuning.tuning import read_tuning
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.real_log.about import read_about_robot
 from swarmwire.metrics.verify.verify import verify
-from swarmwire.world.scenario.scenario_file import load_scenario
+from swarmwire.world.scenario.file import load_scenario
 
 FILES: dict[str, tuple[str, Callable[[Path], Any]]] = {
     "scenario": ("scenario.toml", load_scenario),

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.crews.pace import Pace
+from swarmwire.world.backends.pacing import Pace
 
 SPEEDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # simulated s per s of wall time
 SLOWEST, FASTEST = 0.001, 1e6  # that may be asked for

@@ -15,17 +15,15 @@ from swarmwire.deploy.gateways.served import Served
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.new_terms import new_terms
 from swarmwire.deploy.runner_processes import RunnerProcesses
-from swarmwire.world.crews import split_robots as assignments
-from swarmwire.world.crews.change import Change
-from swarmwire.world.crews.door import Door
-from swarmwire.world.crews.pace import Pace
-from swarmwire.world.crews.quanta import Quanta
-from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
-from swarmwire.world.crews.remote_crew import RemoteCrew
-from swarmwire.world.crews.roster import Loss
-from swarmwire.world.crews.runner_crew import Surroundings
-from swarmwire.world.gateways.gateway_crew import GatewayCrew
+from swarmwire.world.backends import allocation as assignments
+from swarmwire.world.backends.join_policy import Door
+from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.backends.realtime_backend import PacedCrew, RealTimeCrew
+from swarmwire.world.backends.registry import Change, Loss
+from swarmwire.world.backends.zenoh_backend import RemoteCrew, Surroundings
+from swarmwire.world.gateways.backend import GatewayCrew
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.subtick import Quanta
 
 
 @dataclass(frozen=True)

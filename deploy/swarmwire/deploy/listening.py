@@ -8,9 +8,8 @@ from swarmwire.comms.wire.access_control import RunAccess, agents_access, observ
 from swarmwire.comms.wire.join import LIMITS, Limits
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.network import Network
-from swarmwire.world.crews.change import Change
-from swarmwire.world.crews.door import Door
-from swarmwire.world.crews.roster import GOES_ON
+from swarmwire.world.backends.join_policy import Door
+from swarmwire.world.backends.registry import GOES_ON, Change
 from swarmwire.world.scenario.scenario import Scenario
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from swarmwire.comms.plugins import resolve
 from swarmwire.metrics.judge import Condition
 from swarmwire.metrics.listed import Item, Listed, listed
-from swarmwire.world.scenario.metric_tables import MetricTable
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario.tables import MetricTable
 
 
 def measuring(scenario: Scenario) -> Listed:

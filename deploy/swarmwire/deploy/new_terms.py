@@ -10,7 +10,7 @@ from swarmwire.agent.host import layout_of
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.join import Offer, OfferedGroup
 from swarmwire.deploy.listening import Listening
-from swarmwire.world.crews.terms import Terms
+from swarmwire.world.backends.join_policy import Terms
 from swarmwire.world.scenario.scenario import Scenario
 
 KEPT = ("wait", "stand", "coast")  # where another runner may take over

@@ -11,9 +11,8 @@ from swarmwire.deploy.record.interventions import InterventionsRecord
 from swarmwire.deploy.record.origin import Origin
 from swarmwire.deploy.result import EventResult, Result, arena_result
 from swarmwire.metrics.record.recorders import record_summary
-from swarmwire.world.crews.change import Change
-from swarmwire.world.crews.realtime_crew import RealTimeReport
-from swarmwire.world.crews.roster import Loss
+from swarmwire.world.backends.realtime_backend import RealTimeReport
+from swarmwire.world.backends.registry import Change, Loss
 
 NO_STOP = {"stop_time_s": None, "stopped_by": None}
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from swarmwire.deploy.record.inputs import RecordedInputs
-from swarmwire.world.interventions import Intervention
+from swarmwire.world.live_events import Intervention
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from swarmwire.deploy.record.interventions import InterventionsRecord
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.record.formats import SUMMARY_FORMAT
 from swarmwire.metrics.whole_file import write_whole
-from swarmwire.world.crews.change import Change
-from swarmwire.world.crews.realtime_crew import RealTimeReport
+from swarmwire.world.backends.realtime_backend import RealTimeReport
+from swarmwire.world.backends.registry import Change
 
 
 @dataclass(frozen=True)

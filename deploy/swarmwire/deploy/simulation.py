@@ -52,18 +52,16 @@ from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.judge import Judge as StopJudge
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
-from swarmwire.world.crews.change import Change
-from swarmwire.world.crews.pace import Pace
-from swarmwire.world.crews.quanta import Quanta
-from swarmwire.world.crews.realtime_crew import PacedCrew, RealTimeCrew
-from swarmwire.world.crews.remote_crew import RemoteCrew
-from swarmwire.world.crews.roster import Loss
-from swarmwire.world.crews.runner_health import RunnerHealth
-from swarmwire.world.gateways.gateway_crew import GatewayCrew
-from swarmwire.world.interventions import Interventions
+from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.backends.realtime_backend import PacedCrew, RealTimeCrew
+from swarmwire.world.backends.registry import Change, Loss, RunnerHealth
+from swarmwire.world.backends.zenoh_backend import RemoteCrew
+from swarmwire.world.gateways.backend import GatewayCrew
+from swarmwire.world.live_events import Interventions
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of, own_code
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.subtick import Quanta
 from swarmwire.world.world import World
 
 

@@ -12,8 +12,8 @@ from swarmwire.deploy.endpoint import local_endpoint, new_run_id
 from swarmwire.deploy.new_air import new_air
 from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.world.crews import split_robots as assignments
-from swarmwire.world.crews.remote_crew import RemoteCrew
+from swarmwire.world.backends import allocation as assignments
+from swarmwire.world.backends.zenoh_backend import RemoteCrew
 from swarmwire.world.loop import Loop
 from tests.support.deploy.commands import LOSSY, ROOT
 

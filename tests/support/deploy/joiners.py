@@ -26,10 +26,9 @@ from swarmwire.deploy.new_terms import KEPT
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.world.crews.change import Change
-from swarmwire.world.crews.lockstep import Lockstep
-from swarmwire.world.crews.roster import OnLoss
-from swarmwire.world.crews.terms import Terms
+from swarmwire.world.backends.join_policy import Terms
+from swarmwire.world.backends.lockstep import Lockstep
+from swarmwire.world.backends.registry import Change, OnLoss
 from tests.support.deploy.commands import LOSSY, ROOT
 
 HERE = ("tcp/127.0.0.1:0",)

@@ -10,7 +10,7 @@ from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.world.crews.change import Change
+from swarmwire.world.backends.registry import Change
 from tests.integration.examples.test_examples import EXAMPLES
 from tests.support.runners.raw_runner import RawRunner, Says, honestly
 

@@ -10,8 +10,8 @@ from swarmwire.comms.packets import BROADCAST, Payloads, Sent
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
-from swarmwire.world.crews.lockstep import Lockstep
-from swarmwire.world.crews.realtime import RealTime
+from swarmwire.world.backends.lockstep import Lockstep
+from swarmwire.world.backends.realtime import RealTime
 from tests.support.agent.hosts import GIVES, assignment, group, senses
 
 R = TypeVar("R", Lockstep, RealTime)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.world.own import Field, Noise, OwnActuator, OwnSensor, parameter
+from swarmwire.world.custom import Field, Noise, OwnActuator, OwnSensor, parameter
 
 
 @dataclass

@@ -11,8 +11,8 @@ from swarmwire.comms.geometry.ground import ground_of
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.sensors import SENSORS, Scene
-from swarmwire.world.sensors.scene import led_places_m
-from swarmwire.world.sensors.staged import Staged
+from swarmwire.world.sensors.pipeline import Staged
+from swarmwire.world.sensors.sensor import led_places_m
 
 
 def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: float = 10.0, **more: Any) -> Scene:

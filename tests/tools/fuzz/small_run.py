@@ -18,11 +18,11 @@ from swarmwire.comms.wire.agent_memory import Layout
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.deploy.new_air import new_air
-from swarmwire.world.crews.lockstep import Lockstep
-from swarmwire.world.crews.split_robots import split, whole
-from swarmwire.world.crews.terms import Terms
+from swarmwire.world.backends.allocation import split, whole
+from swarmwire.world.backends.join_policy import Terms
+from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.loop import Loop
-from swarmwire.world.scenario.scenario_file import scenario_from
+from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.world import World
 from tests.support.agent.hosts import spec
 

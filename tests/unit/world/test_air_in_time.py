@@ -14,9 +14,9 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy.new_air import new_air
-from swarmwire.world.air_in_time import AirInTime
 from swarmwire.world.loop import Loop
-from swarmwire.world.scenario.scenario_file import scenario_from
+from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.subtick import AirInTime
 from swarmwire.world.world import World
 from tests.support.comms.air.runs import RATE_HZ, TICK_NS, make_air, scattered
 from tests.support.comms.air.traffic import RADIOS

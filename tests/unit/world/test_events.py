@@ -12,7 +12,7 @@ from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.world.crews import split_robots as assignments
+from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.loop import Loop
 from swarmwire.world.world import World
 from tests.support.world.samples import commanded, posed

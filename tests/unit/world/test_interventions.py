@@ -6,10 +6,10 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.robot_events import Kill
-from swarmwire.world.interventions import MOST_WAITING, Intervention, Interventions
+from swarmwire.world.live_events import MOST_WAITING, Intervention, Interventions
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of
-from swarmwire.world.scenario.scenario_file import scenario_from
+from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import changed, posed
 from tests.unit.world.test_events import Ahead, Watch

@@ -3,8 +3,8 @@
 import numpy as np
 
 from swarmwire.comms.packets import Heard, Outcomes, Payloads
-from swarmwire.world.mailbox import Mailbox
-from swarmwire.world.scenario.scenario_file import scenario_from
+from swarmwire.world.loop import Mailbox
+from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import changed
 

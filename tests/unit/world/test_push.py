@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.interventions import Interventions
+from swarmwire.world.live_events import Interventions
 from swarmwire.world.loop import Loop
-from swarmwire.world.scenario.scenario_file import scenario_from
+from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import changed, posed
 from tests.unit.world.test_events import Ahead, Watch

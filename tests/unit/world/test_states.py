@@ -1,7 +1,7 @@
 import numpy as np
 
 from swarmwire.comms.tick_io import MOST_STATES, Notes
-from swarmwire.world.states import States
+from swarmwire.world.annotations import States
 
 ALIVE = np.ones(6, np.bool_)
 

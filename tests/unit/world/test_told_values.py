@@ -1,7 +1,7 @@
 import numpy as np
 
 from swarmwire.comms.tick_io import NO_VALUES, Values
-from swarmwire.world.told_values import ToldValues
+from swarmwire.world.annotations import ToldValues
 
 ALIVE = np.ones(4, np.bool_)
 

@@ -1,11 +1,11 @@
-"""The world: every arena's bodies and senses, tick by tick. It knows neither agents nor the radio.
+"""What the world shows of its bodies once they have moved. Compiled."""
 
-It does no I/O but that it reads the pictures that a scenario names, when it is made.
-"""
+# pyright: basic, reportUnknownMemberType=false
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.body import Body
@@ -19,22 +19,41 @@ from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.actuation.batteries import Batteries
-from swarmwire.world.actuation.own_actuators import OwnActuators
-from swarmwire.world.engines.choice import engines_of
-from swarmwire.world.engines.physics import Physics
-from swarmwire.world.own.fitting import made_sensor
-from swarmwire.world.own.sensor import AskedSensor
-from swarmwire.world.placement.layout import Layout, read_layout
+from swarmwire.world.annotations import States, ToldValues
+from swarmwire.world.custom.loading import OwnActuators, made_sensor
+from swarmwire.world.custom.sensors import AskedSensor
+from swarmwire.world.engines.physics import Physics, engines_of
+from swarmwire.world.placement.maps import Layout, read_layout
 from swarmwire.world.placement.placement import Placed, place
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.sensors import SENSORS, Scene
-from swarmwire.world.sensors.scene import led_places_m
-from swarmwire.world.sensors.sensor import TrueSense
-from swarmwire.world.sensors.staged import Staged
-from swarmwire.world.snapshot import snapshot
-from swarmwire.world.states import States
-from swarmwire.world.told_values import ToldValues
+from swarmwire.world.sensors.pipeline import Staged
+from swarmwire.world.sensors.sensor import TrueSense, led_places_m
+
+LOWEST = np.nextafter(-np.pi, 0.0)
+
+
+@njit(cache=True)
+def snapshot(state: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Poses and velocities, (rows, 3) each, of a state (arenas, robots, 6); headings as `angles.wrapped` has them."""
+    arenas, robots = state.shape[:2]
+    pose, velocity = np.empty((arenas * robots, 3)), np.empty((arenas * robots, 3))
+    for arena in range(arenas):
+        for i in range(robots):
+            row, heading = arena * robots + i, state[arena, i, 2]
+            if not -np.pi < heading <= np.pi:
+                heading -= 2.0 * np.pi * np.ceil((heading - np.pi) / (2.0 * np.pi))
+                heading = min(max(heading, LOWEST), np.pi)
+            pose[row, 0], pose[row, 1], pose[row, 2] = state[arena, i, 0], state[arena, i, 1], heading
+            for column in range(3):
+                velocity[row, column] = state[arena, i, 3 + column]
+    return pose, velocity
+
+
+# --- The world: every arena's bodies and senses, tick by tick. It knows neither agents nor the radio.
+#
+# It does no I/O but that it reads the pictures that a scenario names, when it is made.
 
 
 class World:

@@ -16,10 +16,9 @@ from swarmwire.deploy.campaign.whole_numbers import whole_numbers
 from swarmwire.deploy.measuring import measuring
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.metrics.campaign.outcome import Outcome
-from swarmwire.world.scenario.as_mapping import mapping_of
 from swarmwire.world.scenario.bodies import bodies_of, own_code_of
-from swarmwire.world.scenario.scenario import Scenario
-from swarmwire.world.scenario.scenario_file import load_scenario, scenario_from
+from swarmwire.world.scenario.file import load_scenario, scenario_from
+from swarmwire.world.scenario.scenario import Scenario, mapping_of
 
 MOST_RUNS = 10_000_000
 

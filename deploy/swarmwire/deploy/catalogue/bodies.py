@@ -12,7 +12,7 @@ from swarmwire.comms.config import limits_of
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 from swarmwire.deploy.catalogue.units import unit_of
-from swarmwire.world.own.fitting import made_actuator, made_sensor
+from swarmwire.world.custom.loading import made_actuator, made_sensor
 from swarmwire.world.scenario.bodies import read_body
 
 GEOMETRY = ("radius_m", "height_m", "mass_kg", "altitude_m", "contacts")

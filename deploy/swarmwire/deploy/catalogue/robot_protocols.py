@@ -9,9 +9,8 @@ from swarmwire.comms.plugins import installed_points
 from swarmwire.deploy.catalogue.docs import first_line, texts_of
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
-from swarmwire.world.gateways.gateway import Gateway
-from swarmwire.world.gateways.registry import GROUP as GATEWAYS
-from swarmwire.world.gateways.registry import gateway_kind, gateway_names
+from swarmwire.world.gateways.gateway import GROUP as GATEWAYS
+from swarmwire.world.gateways.gateway import Gateway, gateway_kind, gateway_names
 
 
 def drivers() -> list[Entry]:

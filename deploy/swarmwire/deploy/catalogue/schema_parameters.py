@@ -8,8 +8,7 @@ from typing import Any
 from swarmwire.deploy.catalogue.docs import first_line
 from swarmwire.deploy.catalogue.entry import Parameter
 from swarmwire.deploy.catalogue.units import unit_of
-from swarmwire.world.scenario.schema import table_of
-from swarmwire.world.scenario.schema_words import Node, forms, plain, words
+from swarmwire.world.scenario.schema import Node, forms, plain, table_of, words
 
 
 @cache  # the schema of a class takes milliseconds, and a list of bodies asks for the same dozen hundreds of times

@@ -11,7 +11,7 @@ from swarmwire.comms.radio.config.ramps import numbers_of
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy.controls import Controls
 from swarmwire.metrics.viewer.plotted import Measured
-from swarmwire.world.crews.runner_health import RunnerHealth
+from swarmwire.world.backends.registry import RunnerHealth
 
 NAMED = 1000  # robots: up to so many, their names are told; those of more follow from the groups
 WAITS_S = 1.0  # for runners: a run that has waited so long is said to wait

@@ -16,8 +16,8 @@ from swarmwire.deploy.gateways.gateways import Gateways
 from swarmwire.deploy.gateways.listening import listening_places
 from swarmwire.deploy.gateways.robot_settings import RobotSettings, write_settings
 from swarmwire.deploy.gateways.served import Served, ServedRobot
-from swarmwire.world.gateways.air_bridge import AirBridge, LentAir
-from swarmwire.world.gateways.gateway_group import GatewayGroup
+from swarmwire.world.gateways.backend import GatewayGroup
+from swarmwire.world.gateways.radio_bridge import AirBridge, LentAir
 from swarmwire.world.gateways.tracker import Tracker
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.world import World

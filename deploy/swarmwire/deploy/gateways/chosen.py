@@ -10,8 +10,7 @@ from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.deploy.gateways.gateways import OTHERS, Gateways
-from swarmwire.world.gateways.gateway import Gateway
-from swarmwire.world.gateways.registry import gateway_kind
+from swarmwire.world.gateways.gateway import Gateway, gateway_kind
 from swarmwire.world.scenario.scenario import Scenario
 
 WHERE, OPTION, SWARM = "--gateway", "--gateway-set", "--swarm"

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from swarmwire.world.gateways.air_bridge import AirBridge
-from swarmwire.world.gateways.gateway_group import GatewayGroup
+from swarmwire.world.gateways.backend import GatewayGroup
+from swarmwire.world.gateways.radio_bridge import AirBridge
 
 
 @dataclass(frozen=True)

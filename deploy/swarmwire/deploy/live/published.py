@@ -27,7 +27,7 @@ from swarmwire.deploy.live.live_file import Live, forget_live
 from swarmwire.deploy.live.sampling import FRAMES_PER_S, Rate, Sampling, Since
 from swarmwire.metrics.viewer.plotted import Measured
 from swarmwire.metrics.viewer.selected import selected_robot
-from swarmwire.world.crews.door import Door
+from swarmwire.world.backends.join_policy import Door
 
 LEAVE_S = 2.0  # how long the last frame may take
 

@@ -17,7 +17,7 @@ from typing import Any, cast
 from swarmwire.comms.config import from_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.record.names import INTERVENTIONS
-from swarmwire.world.interventions import Intervention
+from swarmwire.world.live_events import Intervention
 
 
 @dataclass(frozen=True)

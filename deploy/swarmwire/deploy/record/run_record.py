@@ -26,8 +26,8 @@ from swarmwire.metrics.record.names import RECORDING, SUMMARY
 from swarmwire.metrics.record.recorders import recorders
 from swarmwire.metrics.record.run_log import RunLog
 from swarmwire.metrics.viewer.recording import RerunRecording
-from swarmwire.world.crews.door import Door
-from swarmwire.world.interventions import Intervention
+from swarmwire.world.backends.join_policy import Door
+from swarmwire.world.live_events import Intervention
 from swarmwire.world.scenario.scenario import Scenario
 
 

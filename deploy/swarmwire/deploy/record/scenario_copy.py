@@ -21,10 +21,9 @@ from swarmwire.comms.config import from_toml
 from swarmwire.comms.plugins import resolve
 from swarmwire.deploy.radio.link_trace_file import trace_path
 from swarmwire.metrics.record.names import SCENARIO
-from swarmwire.world.placement.grey_image import beside
-from swarmwire.world.scenario.as_mapping import mapping_of
+from swarmwire.world.placement.maps import beside
 from swarmwire.world.scenario.bodies import sheet_path
-from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario.scenario import Scenario, mapping_of
 
 FILES = "files"
 

@@ -10,7 +10,7 @@ from rich.status import Status
 from swarmwire.comms.assignment import robots_text
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.comms.wire.network import Network, is_local
-from swarmwire.world.crews.change import Change
+from swarmwire.world.backends.registry import Change
 
 
 class Gathering:

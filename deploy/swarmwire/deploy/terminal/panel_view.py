@@ -11,7 +11,7 @@ from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.bindings import BINDINGS
 from swarmwire.deploy.terminal.figures import EVENTS, HISTORY_S, Figures
 from swarmwire.deploy.terminal.sparkline import sparkline
-from swarmwire.world.crews.runner_health import RunnerHealth
+from swarmwire.world.backends.registry import RunnerHealth
 
 MARGIN = 4  # columns of the frame and the blanks beside it
 LABEL, VALUE = 19, 7  # columns

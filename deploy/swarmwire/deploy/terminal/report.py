@@ -12,7 +12,7 @@ from swarmwire.deploy.result import ArenaResult, Percentiles, Result, Statistics
 
 if TYPE_CHECKING:
     from swarmwire.metrics.metric import Metric
-    from swarmwire.world.crews.lateness import Delays
+    from swarmwire.world.backends.pacing import Delays
 
 BLOCKED = Fate.BLOCKED.name.lower()
 SHOWN = 6  # arenas that are named, at most

@@ -13,7 +13,7 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.packets import BROADCAST, Payloads, Sent
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import open_swarm
-from swarmwire.world.gateways.air_bridge import AirBridge, LentAir
+from swarmwire.world.gateways.radio_bridge import AirBridge, LentAir
 from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, peers, radio, words
 
 

@@ -9,7 +9,7 @@ from swarmwire.deploy.certificates.folder_access import access_in, network_in
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.world.crews.change import Change
+from swarmwire.world.backends.registry import Change
 from tests.integration.deploy.machines.test_three_machines import lab
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.joiners import Joiners, Watcher

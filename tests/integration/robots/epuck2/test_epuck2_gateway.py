@@ -17,7 +17,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.robots.epuck2.commands import RobotCommand
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
 from swarmwire.world.gateways.epuck2.emulated_robot import Connection, EmulatedRobot
-from swarmwire.world.gateways.epuck2.options import Epuck2GatewayOptions
+from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
 from tests.support.robots.epuck2.fact_sheet import SENSORS, command, read
 from tests.support.waiting import until
 

@@ -10,10 +10,9 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.wire.join import JoinRequest, Limits, Offer, OfferedGroup
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import closed_after, open_runner, unix_endpoint
-from swarmwire.world.crews.change import Change
-from swarmwire.world.crews.remote_crew import RemoteCrew
-from swarmwire.world.crews.runner_crew import Surroundings
-from swarmwire.world.crews.terms import Terms
+from swarmwire.world.backends.join_policy import Terms
+from swarmwire.world.backends.registry import Change
+from swarmwire.world.backends.zenoh_backend import RemoteCrew, Surroundings
 from tests.integration.world.crews.test_remote_crew import RUN
 from tests.support.agent.hosts import assignment, group, spec
 from tests.support.waiting import until

@@ -26,10 +26,9 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
-from swarmwire.world.crews import runner_crew
-from swarmwire.world.crews.remote_crew import RemoteCrew
-from swarmwire.world.crews.runner_crew import Surroundings
-from swarmwire.world.crews.runner_health import RunnerHealth
+from swarmwire.world.backends import zenoh_backend
+from swarmwire.world.backends.registry import RunnerHealth
+from swarmwire.world.backends.zenoh_backend import RemoteCrew, Surroundings
 from tests.support.agent.hosts import GIVES, assignment, group, heard_from, one_group, plain, spec
 from tests.support.waiting import PATIENCE_S
 
@@ -232,7 +231,7 @@ def test_a_runner_whose_world_does_not_come_says_so(endpoint: str, monkeypatch: 
 def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many_more(
     endpoint: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(runner_crew, "POLL_S", PATIENCE_S)  # it would answer nobody while it waits for more to come
+    monkeypatch.setattr(zenoh_backend, "POLL_S", PATIENCE_S)  # it would answer nobody while it waits for more to come
     keys, slots = Keys(RUN), parts("Counter", *([row] for row in ROWS))
     with opened(endpoint, slots) as crew, ThreadPoolExecutor() as others, open_runner(endpoint) as asking:
         started = others.submit(crew.start)
@@ -299,7 +298,7 @@ def test_runners_leave_when_the_world_is_killed(endpoint: str) -> None:
     """A world in a process of its own, killed without a word."""
     program = f"""
 from swarmwire.comms.clock import WallClock, to_ns
-from swarmwire.world.crews.remote_crew import RemoteCrew
+from swarmwire.world.backends.zenoh_backend import RemoteCrew
 from tests.integration.world.crews.test_remote_crew import RUN, parts
 
 crew = RemoteCrew({endpoint!r}, RUN, parts("Counter", [0]), 60.0, WallClock())

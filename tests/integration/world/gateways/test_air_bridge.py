@@ -15,7 +15,7 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import encode_air
 from swarmwire.comms.wire.robot_network import open_swarm
 from swarmwire.comms.wire.sessions import close_session
-from swarmwire.world.gateways.air_bridge import AirBridge, LentAir
+from swarmwire.world.gateways.radio_bridge import AirBridge, LentAir
 from tests.support.clocks import FakeClock
 from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, KeptLog, Wide, Word, heard_by, words
 from tests.support.waiting import until
@@ -153,7 +153,7 @@ def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packe
 def test_nothing_heard_is_no_frame(monkeypatch):
     with bridged() as (bridge, _):
         published: list[int] = []
-        monkeypatch.setattr("swarmwire.world.gateways.air_bridge.encode_air", lambda *_: published.append(1) or b"")
+        monkeypatch.setattr("swarmwire.world.gateways.radio_bridge.encode_air", lambda *_: published.append(1) or b"")
         bridge.publish(1, Heard.none(GIVES), NO_OUTCOMES)
         bridge.publish(2, heard((0, 1, 1, 1)), NO_OUTCOMES)  # nobody behind the bridge heard it
         assert not published

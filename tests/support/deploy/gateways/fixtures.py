@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from swarmwire.comms import plugins
-from swarmwire.world.gateways import registry
+from swarmwire.world.gateways import gateway
 from tests.support.world.gateways.scripted import ScriptedGateway
 
 TWO_GROUPS = """
@@ -44,7 +44,7 @@ def scenario(tmp_path: Path) -> Path:
 @pytest.fixture
 def scripted(monkeypatch: pytest.MonkeyPatch) -> list[ScriptedGateway]:
     """The gateways of kind "scripted" that runs of this test make, in order."""
-    point = EntryPoint("scripted", "tests.support.world.gateways.scripted:ScriptedGateway", registry.GROUP)
+    point = EntryPoint("scripted", "tests.support.world.gateways.scripted:ScriptedGateway", gateway.GROUP)
     monkeypatch.setattr(plugins, "entry_points_of", lambda _: [point])
     made: list[ScriptedGateway] = []
     monkeypatch.setattr(ScriptedGateway, "made", made)

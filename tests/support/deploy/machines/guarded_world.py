@@ -21,7 +21,7 @@ from swarmwire.deploy.certificates.folder_access import access_in, network_in
 from swarmwire.deploy.certificates.wanted import wanted
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.running import finished
-from swarmwire.world.crews.change import Change
+from swarmwire.world.backends.registry import Change
 from tests.support.deploy.commands import LOSSY
 
 SHORT = ["duration_s=2"]

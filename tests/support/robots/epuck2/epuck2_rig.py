@@ -8,7 +8,7 @@ from swarmwire.agent.drivers.epuck2 import Epuck2Driver
 from swarmwire.agent.drivers.epuck2.driver import Epuck2Options
 from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
-from swarmwire.world.gateways.epuck2.options import Epuck2GatewayOptions
+from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
 from swarmwire.world.gateways.gateway import Gateway
 from tests.support.robots.rig import OwnWireRig
 

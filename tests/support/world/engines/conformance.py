@@ -9,10 +9,9 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Boundary, Obstacle
-from swarmwire.world.engines.discs.discs import DiscsEngine
-from swarmwire.world.engines.engine import Engine, Setting
+from swarmwire.world.engines.discs.engine import DiscsEngine
+from swarmwire.world.engines.engine import Engine, Motors, Setting
 from swarmwire.world.engines.kinematic import KinematicEngine
-from swarmwire.world.engines.motors import Motors
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
 
 Make = Callable[[Setting, FloatArray], Engine]

@@ -19,11 +19,10 @@ from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.page.app import MOST_BYTES
 from swarmwire.deploy.page.orders import Order
-from swarmwire.world.crews.admission import Refused
-from swarmwire.world.crews.lockstep import Lockstep
-from swarmwire.world.crews.terms import Terms
-from swarmwire.world.interventions import Interventions
-from swarmwire.world.scenario.scenario_file import scenario_from
+from swarmwire.world.backends.join_policy import Refused, Terms
+from swarmwire.world.backends.lockstep import Lockstep
+from swarmwire.world.live_events import Interventions
+from swarmwire.world.scenario.file import scenario_from
 from tests.tools.fuzz.mutations import JSON, TEXTS, one_in, pick
 from tests.tools.fuzz.small_run import SCENARIO, small_run
 from tests.tools.fuzz.target import DocumentTarget, check_line

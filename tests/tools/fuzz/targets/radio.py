@@ -17,7 +17,7 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import AirTerms, Pose, encode_air, encode_pose
 from swarmwire.comms.wire.robot_network import SwarmKeys
 from swarmwire.comms.wire.tick_frames import encode_actions
-from swarmwire.world.gateways.air_bridge import AirBridge, LentAir
+from swarmwire.world.gateways.radio_bridge import AirBridge, LentAir
 from tests.support.agent.players import Other, Word
 from tests.tools.fuzz.mutations import TEXTS, mutated_bytes, one_in, pick
 from tests.tools.fuzz.small_run import small_run

@@ -19,10 +19,10 @@ from swarmwire.comms.robots.ros2.links import Inlet
 from swarmwire.comms.robots.ros2.messages import Messages, Velocities, decode_either, encode_twist, encode_twist_stamped
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
 from swarmwire.world.gateways.epuck2.emulated_robot import Connection
-from swarmwire.world.gateways.epuck2.options import Epuck2GatewayOptions
+from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
 from swarmwire.world.gateways.ros2 import Ros2GatewayOptions
-from swarmwire.world.gateways.ros2.command_inbox import CommandInbox
-from swarmwire.world.gateways.ros2.tellers import tellers_of
+from swarmwire.world.gateways.ros2.base import CommandInbox
+from swarmwire.world.gateways.ros2.publishers import tellers_of
 from tests.support.robots.ros2.ros2_rig import AT_START
 from tests.tools.fuzz.mutations import mutated_bytes, pick
 from tests.tools.fuzz.target import ByteTarget

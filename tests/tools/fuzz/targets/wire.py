@@ -13,10 +13,10 @@ from swarmwire.comms.tick_io import Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.observer_frames import decode_scene, decode_truth, encode_scene, encode_truth
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_packets, encode_sent
-from swarmwire.world.crews.lockstep import Lockstep
-from swarmwire.world.crews.realtime import RealTime
-from swarmwire.world.crews.roster import Roster
-from swarmwire.world.crews.terms import Terms
+from swarmwire.world.backends.join_policy import Terms
+from swarmwire.world.backends.lockstep import Lockstep
+from swarmwire.world.backends.realtime import RealTime
+from swarmwire.world.backends.registry import Roster
 from tests.support.agent.hosts import PLAYERS
 from tests.tools.fuzz.mutations import one_in, pick
 from tests.tools.fuzz.small_run import RUNNERS, joined, senses_of, small_run

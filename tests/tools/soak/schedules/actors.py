@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.world.crews.change import Change
+from swarmwire.world.backends.registry import Change
 from tests.support.deploy.watching import WATCHER
 from tests.tools.soak.agenda import Agenda, Steps
 from tests.tools.soak.invariants import Broken

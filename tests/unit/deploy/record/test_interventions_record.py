@@ -10,7 +10,7 @@ from swarmwire.deploy import Simulation, repeat
 from swarmwire.deploy.record.interventions import InterventionsLog, read_interventions
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.metrics.record.names import INTERVENTIONS
-from swarmwire.world.interventions import Intervention
+from swarmwire.world.live_events import Intervention
 from tests.support.deploy.commands import LOSSY
 
 KILL: dict[str, Any] = {"do": "kill", "robots": {"names": ["flock-1"]}}

@@ -16,8 +16,8 @@ from swarmwire.deploy.terminal.panel import Panel
 from swarmwire.deploy.terminal.panel_view import panel_view
 from swarmwire.deploy.terminal.sparkline import sparkline
 from swarmwire.metrics.metrics import Metrics
-from swarmwire.world.crews.pace import Pace
-from swarmwire.world.crews.runner_health import RunnerHealth
+from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.backends.registry import RunnerHealth
 from tests.support.clocks import MS, FakeClock
 from tests.support.metrics.truths import edges, poses, static, tally, truth
 

@@ -11,7 +11,7 @@ from swarmwire.deploy import Result, run
 from swarmwire.deploy.result import Statistics
 from swarmwire.deploy.terminal.report import print_result
 from swarmwire.metrics.registry import METRICS
-from swarmwire.world.crews.realtime_crew import RealTimeReport
+from swarmwire.world.backends.realtime_backend import RealTimeReport
 from tests.support.deploy.commands import LOSSY
 
 

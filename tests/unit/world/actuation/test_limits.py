@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.truth import Group
-from swarmwire.world.actuation.limits import limits_of, take_commands
+from swarmwire.world.actuation.actuators import limits_of, take_commands
 
 FORCES = {"max_force_n": 1.0, "max_torque_nm": 2.0}
 DRIVES: dict[str, dict[str, Any]] = {

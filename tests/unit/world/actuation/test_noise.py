@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.truth import Group
-from swarmwire.world.actuation.noise import NoisyWheels
+from swarmwire.world.actuation.actuators import NoisyWheels
 from swarmwire.world.world import World
 from tests.support.world.samples import commanded, posed
 

@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.tick_io import Actions, LedChanges
 from swarmwire.comms.truth import Group
-from swarmwire.world.actuation.shown_leds import ShownLeds
+from swarmwire.world.actuation.actuators import ShownLeds
 from swarmwire.world.world import World
 from tests.support.world.samples import posed
 

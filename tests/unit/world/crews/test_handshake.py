@@ -7,9 +7,9 @@ import pytest
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import MAX_JOIN_BYTES
-from swarmwire.world.crews.admission import Refused
-from swarmwire.world.crews.lockstep import Lockstep
-from swarmwire.world.crews.realtime import RealTime
+from swarmwire.world.backends.join_policy import Refused
+from swarmwire.world.backends.lockstep import Lockstep
+from swarmwire.world.backends.realtime import RealTime
 from tests.support.agent.hosts import GIVES, assignment, group
 from tests.support.world.locksteps import FLOCK, joined, ready, request, state, two, two_in_real_time
 

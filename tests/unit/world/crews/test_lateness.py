@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.world.crews.lateness import Delays, Lateness
+from swarmwire.world.backends.pacing import Delays, Lateness
 
 NS_PER_S = 1e9
 

@@ -8,8 +8,8 @@ from swarmwire.comms.errors import AgentFailed, RunnerLost
 from swarmwire.comms.packets import Heard
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import encode_actions
-from swarmwire.world.crews.admission import Refused
-from swarmwire.world.crews.lockstep import Lockstep
+from swarmwire.world.backends.join_policy import Refused
+from swarmwire.world.backends.lockstep import Lockstep
 from tests.support.agent.hosts import GIVES, plain
 from tests.support.world.locksteps import actions, all_senses, joined, ready, request, state, two, two_parts
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.packets import Heard, Outcomes, Payloads, Sent
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
-from swarmwire.world.crews.lockstep import Lockstep
+from swarmwire.world.backends.lockstep import Lockstep
 from tests.support.agent.hosts import GIVES, heard_from, plain, senses
 from tests.support.world.locksteps import (
     FLOCK,

@@ -3,8 +3,8 @@
 from swarmwire.agent.local_backend import LocalCrew
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import Heard
-from swarmwire.world.crews.pace import Pace
-from swarmwire.world.crews.realtime_crew import PacedCrew
+from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.backends.realtime_backend import PacedCrew
 from tests.support.agent.hosts import GIVES, assignment, group, one_group, spec
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock
 

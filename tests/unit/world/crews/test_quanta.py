@@ -9,9 +9,9 @@ import pytest
 from swarmwire.agent.local_backend import LocalCrew
 from swarmwire.comms.interfaces import Put
 from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
-from swarmwire.world.crews.pace import Pace
-from swarmwire.world.crews.quanta import Quanta
-from swarmwire.world.crews.realtime_crew import PacedCrew
+from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.backends.realtime_backend import PacedCrew
+from swarmwire.world.subtick import Quanta
 from tests.support.agent.hosts import GIVES, assignment, group, one_group, spec
 from tests.support.agent.players import Word
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock

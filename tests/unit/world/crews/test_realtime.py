@@ -12,10 +12,9 @@ from swarmwire.comms.tick_io import Actions, LedChanges, Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_packets, encode_actions, encode_sent
-from swarmwire.world.crews.pace import Pace
-from swarmwire.world.crews.realtime import RealTime
-from swarmwire.world.crews.roster import OnLoss
-from swarmwire.world.crews.runner_health import RunnerHealth
+from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.backends.realtime import RealTime
+from swarmwire.world.backends.registry import OnLoss, RunnerHealth
 from tests.support.agent.hosts import GIVES, assignment, group, heard_from, one_group
 from tests.support.clocks import FakeClock
 

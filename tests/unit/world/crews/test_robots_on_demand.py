@@ -11,12 +11,10 @@ from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, Interrupted, RunnerLost
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import Limits, Offer, OfferedGroup
-from swarmwire.world.crews.admission import Refused
-from swarmwire.world.crews.change import Change
-from swarmwire.world.crews.lockstep import Lockstep
-from swarmwire.world.crews.realtime import RealTime
-from swarmwire.world.crews.roster import OnLoss
-from swarmwire.world.crews.terms import Terms
+from swarmwire.world.backends.join_policy import Refused, Terms
+from swarmwire.world.backends.lockstep import Lockstep
+from swarmwire.world.backends.realtime import RealTime
+from swarmwire.world.backends.registry import Change, OnLoss
 from tests.support.agent.hosts import assignment, group
 from tests.support.world.locksteps import FLOCK, SCOUTS, parts, ready, request, state
 

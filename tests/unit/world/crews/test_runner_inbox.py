@@ -8,7 +8,7 @@ import zenoh
 
 from swarmwire.comms.wire.join import Limits
 from swarmwire.comms.wire.sessions import closed_after, open_world, unix_endpoint
-from swarmwire.world.crews.runner_inbox import RunnerInbox
+from swarmwire.world.backends.inbox import RunnerInbox
 from tests.support.waiting import until
 
 FLOOD = 5000

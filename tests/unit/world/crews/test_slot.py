@@ -4,7 +4,7 @@ from typing import get_args
 
 import pytest
 
-from swarmwire.world.crews.slot import MOVES, Move, Slot, State
+from swarmwire.world.backends.allocation import MOVES, Move, Slot, State
 from tests.support.agent.hosts import assignment, group
 
 STATES, EVERY_MOVE = get_args(State), get_args(Move)

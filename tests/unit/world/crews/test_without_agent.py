@@ -11,10 +11,10 @@ from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, decode_memory
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
-from swarmwire.world.crews.lockstep import Lockstep
-from swarmwire.world.crews.realtime import RealTime
-from swarmwire.world.crews.roster import OnLoss
-from swarmwire.world.crews.terms import Terms
+from swarmwire.world.backends.join_policy import Terms
+from swarmwire.world.backends.lockstep import Lockstep
+from swarmwire.world.backends.realtime import RealTime
+from swarmwire.world.backends.registry import OnLoss
 from tests.support.agent.hosts import GIVES, heard_from
 from tests.support.world.locksteps import (
     FLOCK,

@@ -5,7 +5,7 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.truth import Obstacle
-from swarmwire.world.engines.discs.discs import DiscsEngine
+from swarmwire.world.engines.discs.engine import DiscsEngine
 from swarmwire.world.engines.engine import Engine
 from tests.support.world.engines.conformance import EVERY, FLOOR, Make, R, asked, made, packed
 

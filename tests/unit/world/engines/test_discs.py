@@ -6,12 +6,10 @@ import pytest
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Obstacle
-from swarmwire.world.engines.discs import discs
-from swarmwire.world.engines.discs.discs import DiscsEngine
-from swarmwire.world.engines.discs.fixed import CIRCLE, POLYGON, gap_to_polygon
-from swarmwire.world.engines.discs.near import fixed_near, pairs_near
-from swarmwire.world.engines.discs.obstacle_cells import obstacle_cells
-from swarmwire.world.engines.discs.robots import ROBOT
+from swarmwire.world.engines.discs import engine as discs_engine
+from swarmwire.world.engines.discs.contacts import CIRCLE, POLYGON, gap_to_polygon
+from swarmwire.world.engines.discs.engine import ROBOT, DiscsEngine
+from swarmwire.world.engines.discs.neighbours import fixed_near, obstacle_cells, pairs_near
 from tests.support.world.engines.conformance import R, asked, made, packed
 
 
@@ -107,7 +105,7 @@ def test_how_often_near_things_are_listed_changes_no_bit(monkeypatch: pytest.Mon
     side_m = 2.2
     ends: list[FloatArray] = []
     for margin in (0.06, 0.3, 3.0):
-        monkeypatch.setattr(discs, "MARGIN", margin)
+        monkeypatch.setattr(discs_engine, "MARGIN", margin)
         engine = made(DiscsEngine, packed(50, side_m, R, 8), (side_m, side_m))
         rng = np.random.default_rng(9)
         onsets = np.zeros((1, 2), np.int64)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.world.engines.discs.discs import DiscsEngine
+from swarmwire.world.engines.discs.engine import DiscsEngine
 from swarmwire.world.engines.engine import Engine
 from tests.support.world.engines.conformance import FLOOR, Make, R, asked, made, packed
 

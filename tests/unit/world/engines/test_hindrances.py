@@ -8,9 +8,8 @@ import pytest
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.obstacles import Obstacles, obstacle_arrays
 from swarmwire.comms.truth import Obstacle
-from swarmwire.world.engines.engine import Setting
+from swarmwire.world.engines.engine import Motors, Setting
 from swarmwire.world.engines.kinematic import KinematicEngine
-from swarmwire.world.engines.motors import Motors
 
 SIZE_M, TICK_S, ROBOTS = (4.0, 3.0), 0.1, 30
 

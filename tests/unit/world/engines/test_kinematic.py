@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Obstacle
-from swarmwire.world.engines.engine import Setting
+from swarmwire.world.engines.engine import Motors, Setting
 from swarmwire.world.engines.kinematic import KinematicEngine
-from swarmwire.world.engines.motors import Motors
 
 RADIUS_M, TICK_S = 0.05, 0.1
 BOX = Obstacle("box", 1.0, 0.0, 0.3, size_m=(0.02, 1.0), height_m=0.5)

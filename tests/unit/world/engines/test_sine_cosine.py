@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarmwire.world.engines.sine_cosine import sine_cosine
+from swarmwire.world.engines.discs.step import sine_cosine
 
 
 def test_sine_and_cosine_are_numpy_s_within_rounding() -> None:

@@ -10,10 +10,9 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
 from swarmwire.comms.tick_io import Actions, GroupSenses, LedChanges
 from swarmwire.comms.truth import Group
-from swarmwire.world.crews.pace import Pace
-from swarmwire.world.crews.quanta import Quanta
-from swarmwire.world.gateways.gateway_crew import GatewayCrew
-from swarmwire.world.gateways.gateway_group import GatewayGroup
+from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.gateways.backend import GatewayCrew, GatewayGroup
+from swarmwire.world.subtick import Quanta
 from tests.support.agent.hosts import GIVES, heard_from
 from tests.support.clocks import FakeClock
 from tests.support.world.gateways.scripted import ScriptedGateway, ScriptedOptions

@@ -6,20 +6,20 @@ import pytest
 
 from swarmwire.comms import plugins as installed_classes
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.gateways import registry
+from swarmwire.world.gateways import gateway
 from tests.support.world.gateways.scripted import ScriptedGateway
 
 HERE = "tests.support.world.gateways.scripted:ScriptedGateway"
 
 
 def installed(monkeypatch: pytest.MonkeyPatch, *points: tuple[str, str]) -> None:
-    found = [EntryPoint(name, value, registry.GROUP) for name, value in points]
-    monkeypatch.setattr(installed_classes, "entry_points_of", lambda group: found if group == registry.GROUP else [])
+    found = [EntryPoint(name, value, gateway.GROUP) for name, value in points]
+    monkeypatch.setattr(installed_classes, "entry_points_of", lambda group: found if group == gateway.GROUP else [])
 
 
 def refused(name: str) -> str:
     with pytest.raises(BadInput) as caught:
-        registry.gateway_kind(name, "--gateway", name)
+        gateway.gateway_kind(name, "--gateway", name)
     text = str(caught.value)
     assert text.startswith(f"--gateway: {name}: ")
     assert "\n" not in text
@@ -27,12 +27,12 @@ def refused(name: str) -> str:
 
 
 def test_those_that_come_with_swarmwire_are_known_without_being_imported() -> None:
-    assert set(registry.gateway_names()) >= {"epuck2", "ros2"}
+    assert set(gateway.gateway_names()) >= {"epuck2", "ros2"}
 
 
 def test_a_gateway_is_found_by_its_name(monkeypatch) -> None:
     installed(monkeypatch, ("scripted", HERE))
-    assert registry.gateway_kind("scripted", "--gateway") is ScriptedGateway
+    assert gateway.gateway_kind("scripted", "--gateway") is ScriptedGateway
 
 
 def test_an_unknown_name_is_refused_with_those_there_are(monkeypatch) -> None:
@@ -51,7 +51,7 @@ def test_a_package_that_is_missing_is_named(monkeypatch) -> None:
 
 
 @pytest.mark.parametrize(
-    "value", ["swarmwire.world.gateways.gateway:Nothing", "swarmwire.world.gateways.registry:GROUP"]
+    "value", ["swarmwire.world.gateways.gateway:Nothing", "swarmwire.world.gateways.gateway:GROUP"]
 )
 def test_what_is_no_gateway_is_refused(monkeypatch, value) -> None:
     installed(monkeypatch, ("odd", value))

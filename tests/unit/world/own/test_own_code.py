@@ -12,10 +12,10 @@ from swarmwire.comms.bodies.custom import MOST_WIDE
 from swarmwire.comms.bodies.sensors import OwnSheet
 from swarmwire.comms.errors import BadInput, OwnCodeFailed
 from swarmwire.comms.tick_io import Actions, Actuations
-from swarmwire.world.own.fitting import made_actuator, made_sensor
+from swarmwire.world.custom.loading import made_actuator, made_sensor
 from swarmwire.world.scenario.bodies import read_body
+from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.scenario.scenario import Scenario
-from swarmwire.world.scenario.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import commanded
 

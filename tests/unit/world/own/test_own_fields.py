@@ -9,8 +9,8 @@ import pytest
 
 from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.own import Field, Noise
-from swarmwire.world.own.fitting import fitted
+from swarmwire.world.custom import Field, Noise
+from swarmwire.world.custom.loading import fitted
 from tests.support.world import own_code
 
 UNKNOWN: Any = "gaussian"

@@ -12,9 +12,9 @@ from PIL import Image
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Patch
-from swarmwire.world.placement import grey_image, layout
-from swarmwire.world.placement.merged_boxes import merged_boxes
-from swarmwire.world.scenario.scenario_file import load_scenario, scenario_from
+from swarmwire.world.placement import maps
+from swarmwire.world.placement.maps import merged_boxes
+from swarmwire.world.scenario.file import load_scenario, scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import SAMPLE, changed
 
@@ -124,10 +124,10 @@ def test_greys_are_those_of_the_picture_whatever_its_form(tmp_path: Path) -> Non
     (tmp_path / "16.pgm").write_bytes(b"P5 16 16 65535\n" + (ramp.astype(">u2") * 257).tobytes())
     (tmp_path / "ascii.pgm").write_text("P2\n# a comment\n16 16 255\n" + " ".join(map(str, ramp.ravel())))
     for name in ("8.png", "rgb.png", "16.png", "16.pgm", "ascii.pgm"):
-        assert grey_image.read_grey(tmp_path / name, "f", "k") == pytest.approx(ramp / 255.0, abs=1e-6), name
+        assert maps.read_grey(tmp_path / name, "f", "k") == pytest.approx(ramp / 255.0, abs=1e-6), name
     clear = np.dstack([np.zeros_like(ramp)] * 3 + [ramp])  # black, more and more of it
     saved(tmp_path, "clear.png", clear)
-    assert grey_image.read_grey(tmp_path / "clear.png", "f", "k") == pytest.approx(1.0 - ramp / 255.0, abs=0.003)
+    assert maps.read_grey(tmp_path / "clear.png", "f", "k") == pytest.approx(1.0 - ramp / 255.0, abs=0.003)
 
 
 def test_a_floor_has_its_picture_and_patches(tmp_path: Path) -> None:
@@ -172,10 +172,10 @@ def test_what_is_no_map_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert map_of(good, size_m=[4.0, 2.1]) == size
     too_large = "maze.toml: arena.map.resolution_m: expected an arena of at most 10000 m a side"
     assert map_of(good, map={"resolution_m": 300.0}) == too_large
-    monkeypatch.setattr(layout, "MOST_BOXES", 2)
+    monkeypatch.setattr(maps, "MOST_BOXES", 2)
     few = "a picture that makes at most 2 boxes: make it coarser, or free of specks"
     assert map_of(good) == f"{said} {few}: good.png"
-    monkeypatch.setattr(grey_image, "MOST_PIXELS", 799)
+    monkeypatch.setattr(maps, "MOST_PIXELS", 799)
     assert map_of(good) == f"{said} a picture of at most 799 pixels: good.png"
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
     assert map_of(good) == f"{said} a picture of at most 799 pixels: good.png"

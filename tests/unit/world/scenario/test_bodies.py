@@ -8,10 +8,10 @@ import pytest
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.own import fitting
-from swarmwire.world.placement.grey_image import beside
+from swarmwire.world.custom import loading
+from swarmwire.world.placement.maps import beside
 from swarmwire.world.scenario.bodies import bodies_of, own_code_of, read_body, sheet_path
-from swarmwire.world.scenario.scenario_file import scenario_from
+from swarmwire.world.scenario.file import scenario_from
 
 
 def test_a_name_has_no_file_and_a_sheet_lies_beside_the_scenario(tmp_path):
@@ -83,7 +83,7 @@ def test_what_a_scenario_may_not_change_is_named(tmp_path, sheet, key):
 
 def test_a_scenario_changes_parameters_of_a_users_own_sense_that_an_entry_point_names(tmp_path, monkeypatch):
     point = EntryPoint("painted", "tests.support.world.own_code:Paint", "swarmwire.sensors")
-    monkeypatch.setattr(fitting, "entry_points_of", lambda _: [point])
+    monkeypatch.setattr(loading, "entry_points_of", lambda _: [point])
     (tmp_path / "mine.toml").write_text('like = "epuck"\nsenses.paint.kind = "painted"\n')
     worn = bodies(tmp_path, "mine.toml", {"senses": {"paint": {"cells": 2}}})["worn"]
     assert own_code_of([worn]) == ("tests.support.world.own_code:Paint",)

@@ -10,7 +10,7 @@ from swarmwire.comms.bodies.sensors import Battery
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.batteries import Batteries
-from swarmwire.world.events import Events
+from swarmwire.world.event_scheduler import Events
 from swarmwire.world.world import World
 from tests.support.world.samples import commanded, posed
 from tests.support.world.scenes import read, scene

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.sensors import SHEETS, RangedSheet
-from swarmwire.world.scenario.scenario_file import scenario_from
+from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.sensors import SENSORS
 from swarmwire.world.world import World
 from tests.support.world.samples import commanded

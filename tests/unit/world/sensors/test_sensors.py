@@ -14,7 +14,7 @@ from swarmwire.comms.bodies.sensors import Compass, Odometry, Proximity
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.sensors import Scene
-from swarmwire.world.sensors.proximity import ProximitySensor
+from swarmwire.world.sensors.rays import ProximitySensor
 from swarmwire.world.world import World
 from tests.support.world.samples import SENSES, commanded, posed
 from tests.support.world.scenes import read, scene, staged

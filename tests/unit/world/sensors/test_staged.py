@@ -8,8 +8,8 @@ import pytest
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.sensors import Sheet
 from swarmwire.comms.truth import Group
+from swarmwire.world.sensors.pipeline import Staged
 from swarmwire.world.sensors.sensor import Field, Noise
-from swarmwire.world.sensors.staged import Staged
 
 KEYS = np.array([7, 8], np.uint64)
 GROUP = Group("a", load_body("epuck"), 2, 5)

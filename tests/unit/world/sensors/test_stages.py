@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.draws import normal, purpose, uniform
-from swarmwire.world.placement.angles import wrapped
+from swarmwire.world.placement.placement import wrapped
+from swarmwire.world.sensors.pipeline import Stages
 from swarmwire.world.sensors.sensor import Field, Noise
-from swarmwire.world.sensors.stages import Stages
 
 KEYS = np.array([7, 8], np.uint64)
 ROBOTS = np.arange(3, 8)

@@ -11,7 +11,7 @@ from numba import njit
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.bodies.sensors import Battery
 from swarmwire.comms.truth import Group
-from swarmwire.world.actuation.limits import HOLONOMIC, limits_of
+from swarmwire.world.actuation.actuators import HOLONOMIC, limits_of
 
 PER_HOUR = 3600.0
 MAINS = Battery(capacity_wh=inf)  # of a body without a battery: its charge never falls

@@ -17,9 +17,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.kernels import borrowing
 from swarmwire.world.engines.contacts import count_began, mark
 from swarmwire.world.engines.engine import Setting
-from swarmwire.world.engines.held_back import any_near, held_back, shortest
-from swarmwire.world.engines.hindrances import Hindrances
-from swarmwire.world.engines.overlaps import overlaps
+from swarmwire.world.engines.position_correction import Hindrances, any_near, held_back, overlaps, shortest
 
 PIECE_OF_RADIUS = 0.25  # near obstacles a tick's way is gone in pieces of so much of the radius, so none is jumped over
 

@@ -9,6 +9,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import NoParameters
+from swarmwire.comms.plugins import installed_class, installed_points
 from swarmwire.comms.tick_io import LedChanges
 
 
@@ -82,3 +83,19 @@ class Gateway(ABC):
     @abstractmethod
     def close(self) -> None:
         """Hang up and free the addresses; safe to call more than once."""
+
+
+# --- Gateways by kind: entry points of the group `swarmwire.gateways`, of which one is imported where somebody asks.
+
+
+GROUP = "swarmwire.gateways"  # of entry points
+
+
+def gateway_names() -> list[str]:
+    """The kinds of gateways that are installed."""
+    return list(installed_points(GROUP))
+
+
+def gateway_kind(name: str, where: str, key: str = "") -> type[Gateway]:
+    """The gateway of this kind; BadInput at `where` and `key` as `installed_class`."""
+    return installed_class(GROUP, name, Gateway, "gateway", where, key)

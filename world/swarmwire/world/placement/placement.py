@@ -1,10 +1,4 @@
-"""Where things stand at the start of an arena: its map, obstacles at a point, then random ones, lights and robots.
-
-Candidate j of a thing is a draw keyed by the arena, the thing and j; it takes the first candidate that is free. So a
-robot's place depends on its arena's seed and on what was put before it, never on what comes after. Lights have no body:
-they keep clear of obstacles, and nothing keeps clear of them but lights that are to stand apart. Robots keep clear of
-what their own height lets them touch.
-"""
+"""Angles as the contract has them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,17 +10,37 @@ from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Group, Light, Obstacle
-from swarmwire.world.placement.angles import wrapped
-from swarmwire.world.placement.free_places import MOST_CANDIDATES, free_circle, free_polygon, put_robots
-from swarmwire.world.placement.layout import Layout
-from swarmwire.world.placement.obstacles import heading_of, obstacle_at
-from swarmwire.world.placement.region import BOX, DISC, RING, Region
-from swarmwire.world.placement.standing import Standing
-from swarmwire.world.placement.taken import GAP_M, Disc, Taken
-from swarmwire.world.scenario import place_tables
-from swarmwire.world.scenario.arena_tables import CylinderTable, ObstacleTable
-from swarmwire.world.scenario.place_tables import AtPoses, OnGrid, PlaceTable, RegionTable
+from swarmwire.world.placement.maps import Layout
+from swarmwire.world.placement.occupancy import GAP_M, Disc, Standing, Taken, heading_of, obstacle_at
+from swarmwire.world.placement.sampling import (
+    BOX,
+    DISC,
+    MOST_CANDIDATES,
+    RING,
+    Region,
+    free_circle,
+    free_polygon,
+    put_robots,
+)
+from swarmwire.world.scenario import tables
 from swarmwire.world.scenario.scenario import RobotsTable, Scenario
+from swarmwire.world.scenario.tables import AtPoses, CylinderTable, ObstacleTable, OnGrid, PlaceTable, RegionTable
+
+
+def wrapped(angle_rad: FloatArray) -> FloatArray:
+    """Angles of any shape in (-pi, pi]; those already there keep their bits."""
+    turned = angle_rad - 2.0 * np.pi * np.ceil((angle_rad - np.pi) / (2.0 * np.pi))
+    turned = np.clip(turned, np.nextafter(-np.pi, 0.0), np.pi)  # the last bit of the product may step over an end
+    return np.where((angle_rad > -np.pi) & (angle_rad <= np.pi), angle_rad, turned)
+
+
+# --- Where things stand at the start of an arena: its map, obstacles at a point, then random ones, lights and robots.
+#
+# Candidate j of a thing is a draw keyed by the arena, the thing and j; it takes the first candidate that is free. So a
+# robot's place depends on its arena's seed and on what was put before it, never on what comes after. Lights have no
+# body: they keep clear of obstacles, and nothing keeps clear of them but lights that are to stand apart. Robots keep
+# clear of what their own height lets them touch.
+
 
 ROBOT, HEADING = purpose("place of a robot"), purpose("heading of a robot")
 TRIED = f"none of {MOST_CANDIDATES} places tried is free"
@@ -114,11 +128,11 @@ def _place_lights(scenario: Scenario, standing: Standing, seed: int, key: np.uin
 
 def _region(of: RegionTable | PlaceTable | None, taken: Taken) -> Region:
     """The region of a table; the whole arena where it names none."""
-    if isinstance(of, place_tables.Disc):
+    if isinstance(of, tables.Disc):
         return Region(DISC, *of.at, of.radius_m, of.radius_m, 0.0)
-    if isinstance(of, place_tables.Ring):
+    if isinstance(of, tables.Ring):
         return Region(RING, *of.at, of.radius_m, of.radius_m, of.inner_radius_m)
-    if isinstance(of, place_tables.Box):
+    if isinstance(of, tables.Box):
         return Region(BOX, *of.at, 0.5 * of.size_m[0], 0.5 * of.size_m[1], 0.0)
     return Region(BOX, 0.0, 0.0, taken.half_x_m, taken.half_y_m, 0.0)
 

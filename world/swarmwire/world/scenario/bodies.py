@@ -10,7 +10,7 @@ from swarmwire.comms.bodies.sensors import OwnSheet
 from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
-from swarmwire.world.own.fitting import fitted
+from swarmwire.world.custom.loading import fitted
 from swarmwire.world.scenario.scenario import RobotsTable, Scenario
 
 

@@ -1,9 +1,11 @@
 """The scenario: everything that a run's file may say, as frozen tables. Unknown keys are refused."""
 
+from copy import deepcopy
+from dataclasses import fields, is_dataclass
 from itertools import accumulate
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import Field, PrivateAttr, StringConstraints, field_validator, model_validator
+from pydantic import BaseModel, Field, PrivateAttr, StringConstraints, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from swarmwire.comms.events.event import Event
@@ -12,11 +14,17 @@ from swarmwire.comms.events.selection import Groups
 from swarmwire.comms.radio.config.phy import OwnAntenna
 from swarmwire.comms.radio.config.presets import with_preset
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.world.scenario.arena_tables import ArenaTable
-from swarmwire.world.scenario.metric_tables import MetricItem, StopTable, StopTables
-from swarmwire.world.scenario.place_tables import AtPoses, InArena, PlaceTable
 from swarmwire.world.scenario.schema import AsTable, OneOf
-from swarmwire.world.scenario.tables import Table
+from swarmwire.world.scenario.tables import (
+    ArenaTable,
+    AtPoses,
+    InArena,
+    MetricItem,
+    PlaceTable,
+    StopTable,
+    StopTables,
+    Table,
+)
 
 GroupName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=40)]
 
@@ -153,3 +161,42 @@ class Scenario(Table):
     def robot_names(self) -> tuple[str, ...]:
         """`group-i` for each robot index of an arena."""
         return tuple(f"{group}-{i}" for group, table in self.robots.items() for i in range(table.count))
+
+
+# --- A scenario as the mapping that describes it: the way back from `scenario_from`, for whoever writes it to a file.
+
+
+def mapping_of(scenario: Scenario) -> dict[str, Any]:
+    """The mapping that gives an equal scenario: texts, numbers, lists and tables only.
+
+    It is the mapping that the scenario was read from, as long as it still describes it; a scenario that was made or
+    changed in Python is taken apart instead, and then says defaults of radio and events, too. The mapping is the
+    caller's own.
+    """
+    given = scenario.given
+    if given is not None and same_content(Scenario.model_validate(given), scenario):
+        return deepcopy(given)
+    return cast("dict[str, Any]", _plain(scenario))
+
+
+def same_content(one: Scenario, other: Scenario) -> bool:
+    """Whether two scenarios say the same, wherever they come from."""
+    return all(getattr(one, name) == getattr(other, name) for name in Scenario.model_fields)
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, BaseModel):
+        names = [name for name in type(value).model_fields if name in value.model_fields_set]
+        return _table({**{name: getattr(value, name) for name in names}, **(value.model_extra or {})})
+    if is_dataclass(value) and not isinstance(value, type):
+        return _table({of.name: getattr(value, of.name) for of in fields(value)})
+    if isinstance(value, dict):
+        return _table(cast("dict[str, object]", value))
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in cast("list[object]", value)]
+    return value
+
+
+def _table(items: dict[str, object]) -> dict[str, object]:
+    """TOML has no word for None: what is None is left out."""
+    return {name: _plain(item) for name, item in items.items() if item is not None}

@@ -16,8 +16,7 @@ from swarmwire.comms.draws import normal as normals
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 from swarmwire.comms.truth import Group
-from swarmwire.world.sensors.scene import Scene
-from swarmwire.world.sensors.sensor import Field, Noise
+from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
 BIAS, DRIFT = purpose("imu bias"), purpose("imu drift")
 

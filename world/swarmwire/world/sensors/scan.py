@@ -13,10 +13,8 @@ from swarmwire.comms.geometry.obstacles import ray_to_circle, ray_to_polygon
 from swarmwire.comms.geometry.robot_index import sort
 from swarmwire.comms.kernels import borrowing
 from swarmwire.comms.truth import Group
-from swarmwire.world.sensors.crowd import crowd_of, near_robots, nearest
-from swarmwire.world.sensors.scene import Scene
-from swarmwire.world.sensors.sensor import Field, Noise
-from swarmwire.world.sensors.standing import Standing
+from swarmwire.world.sensors.rays import Standing, crowd_of, near_robots, nearest
+from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
 TURN_RAD = 2.0 * np.pi
 SLACK = 1e-6  # of the angle between two rays: a ray that grazes a thing is tested, however numbers are rounded

@@ -7,7 +7,6 @@ from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, IntArray
 from swarmwire.comms.kernels import borrowing
-from swarmwire.world.engines.discs.fixed import ROBOT, gap_to_circle, gap_to_fixed
 
 # Robots look ahead for what their speed may reach in a step and this share of their radius, since others may push them.
 LOOK_AHEAD = 0.05
@@ -125,3 +124,119 @@ def find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, 
 @borrowing()
 def _speed_mps(now):
     return np.sqrt(now[3] * now[3] + now[4] * now[4])
+
+
+# --- Gaps between a disc and what is fixed: walls, circles, sides and corners of convex polygons. Compiled.
+
+
+ROBOT, LEFT, RIGHT, BOTTOM, TOP, CIRCLE, POLYGON = range(7)  # kinds of things that a disc may meet
+
+
+@borrowing()
+def gap_to_wall(wall, x, y, radius_m, half_size_m):
+    """Gap in m from a disc to a wall of the arena, negative if they overlap, and the unit vector towards the wall."""
+    if wall == LEFT:
+        return half_size_m[0] + x - radius_m, -1.0, 0.0
+    if wall == RIGHT:
+        return half_size_m[0] - x - radius_m, 1.0, 0.0
+    if wall == BOTTOM:
+        return half_size_m[1] + y - radius_m, 0.0, -1.0
+    return half_size_m[1] - y - radius_m, 0.0, 1.0
+
+
+@borrowing()
+def gap_to_circle(x, y, radius_m, circle_x, circle_y, circle_radius_m):
+    """As `gap_to_wall`, to a circle. Two with one centre part along x."""
+    dx, dy = circle_x - x, circle_y - y
+    apart = np.sqrt(dx * dx + dy * dy)
+    if apart == 0.0:
+        return -radius_m - circle_radius_m, 1.0, 0.0
+    return apart - radius_m - circle_radius_m, dx / apart, dy / apart
+
+
+@borrowing(from_python=True)
+def gap_to_polygon(x, y, radius_m, polygon, side_start, side):
+    """As `gap_to_wall`, to the side or corner of a convex polygon that is nearest to the disc's centre.
+
+    That is on the side whose line has the centre farthest outside, or, where its foot lies beyond that side, one of
+    the side's two corners.
+    """
+    first, end = side_start[polygon], side_start[polygon + 1]
+    outside, nearest = -np.inf, first
+    for k in range(first, end):
+        here = side[k, 2] * x + side[k, 3] * y - side[k, 4]
+        if here > outside:
+            outside, nearest = here, k
+    nx, ny = side[nearest, 2], side[nearest, 3]
+    if outside > 0.0:
+        after = nearest + 1 if nearest + 1 < end else first
+        # The side runs along (-ny, nx), its normal turned left.
+        if (y - side[nearest, 1]) * nx - (x - side[nearest, 0]) * ny < 0.0:
+            return gap_to_circle(x, y, radius_m, side[nearest, 0], side[nearest, 1], 0.0)
+        if (y - side[after, 1]) * nx - (x - side[after, 0]) * ny > 0.0:
+            return gap_to_circle(x, y, radius_m, side[after, 0], side[after, 1], 0.0)
+    return outside - radius_m, -nx, -ny
+
+
+@borrowing()
+def gap_to_fixed(kind, which, x, y, radius_m, half_size_m, circle, side_start, side):
+    """As `gap_to_wall`, to any thing: circle or polygon number `which`, or a wall."""
+    if kind == CIRCLE:
+        return gap_to_circle(x, y, radius_m, circle[which, 0], circle[which, 1], circle[which, 2])
+    if kind == POLYGON:
+        return gap_to_polygon(x, y, radius_m, which, side_start, side)
+    return gap_to_wall(kind, x, y, radius_m, half_size_m)
+
+
+# --- Who touches what, and which contacts began: a pair that touches in this tick and did not in the one before.
+# Compiled.
+#
+# All that is fixed counts as one thing.
+
+
+@borrowing()
+def begin_tick(contacts, robots, touched):
+    """What touched in the tick that ends did so before, and nothing has touched yet."""
+    for k in range(len(contacts)):
+        contacts[k].touch = BEFORE if contacts[k].touch & NOW else 0
+    for row in range(len(robots)):
+        robots[row].against_fixed = BEFORE if robots[row].against_fixed & NOW else 0
+        touched[row] = 0.0
+
+
+@borrowing()
+def note_touches(contacts, met, robots, state, dt_s, touched, per_arena, onsets):
+    """Note what touches at the end of a step: it was pushed, or its gap is next to nothing.
+
+    Args:
+        contacts: listed, whose bits of touch are set.
+        met: places of those that may have met in the step, after their impulses.
+        robots: (rows,) whose bits of touching anything fixed are set.
+        state: (rows, 6) after the impulses, before the move.
+        dt_s: length of the step.
+        touched: (rows,) set to 1 for who touched.
+        per_arena: robots of an arena.
+        onsets: (arenas, 2) added to: robot with robot, robot with something fixed.
+    """
+    for k in met:
+        contact = contacts[k]
+        if contact.push_ns <= 0.0 and contact.gap_m + dt_s * _parting_mps(contact, state) > TOUCH_M:
+            continue
+        arena = contact.row // per_arena
+        touched[contact.row] = 1.0
+        if contact.kind == ROBOT:
+            touched[contact.which] = 1.0
+            onsets[arena, 0] += contact.touch == 0
+            contact.touch |= NOW
+        else:
+            onsets[arena, 1] += robots[contact.row].against_fixed == 0
+            robots[contact.row].against_fixed |= NOW
+
+
+@borrowing()
+def _parting_mps(contact, state):
+    """How fast the gap grows."""
+    parting = -(state[contact.row, 3] * contact.nx + state[contact.row, 4] * contact.ny)
+    if contact.kind == ROBOT:
+        parting += state[contact.which, 3] * contact.nx + state[contact.which, 4] * contact.ny
+    return parting

@@ -1,14 +1,43 @@
-"""One emulated e-puck2 as its connections see it; everything here runs in the gateway's thread."""
+"""Where emulated e-puck2s answer: an address for each."""
 
 import asyncio
 import socket
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from threading import Event, Thread
 from typing import cast
 
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.robots.epuck2.commands import Commands, RobotCommand
-from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, Header, Request
+from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, PORT, Header, Request
+
+MOST_HOSTS = 254  # of a network of the last byte
+WHERE = "gateway epuck2"
+EXPECTED = 'expected "host:port" (ports count up), "127.0.1.*:port" (hosts count up from 1) or "host:0" (any ports)'
+
+
+def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
+    """Host and port of each robot; BadInput if the address is of no such form, or does not reach for all.
+
+    >>> addresses_of("127.0.0.1:11000", 2), addresses_of("127.0.1.*", 2)
+    ([('127.0.0.1', 11000), ('127.0.0.1', 11001)], [('127.0.1.1', 1000), ('127.0.1.2', 1000)])
+    """
+    host, colon, port = (address or "127.0.0.1:0").partition(":")
+    if not host or (colon and not (port.isascii() and port.isdigit())) or host.count("*") > host.endswith(".*"):
+        raise BadInput(WHERE, "address", f"{EXPECTED}; got {address!r}")
+    first = int(port) if colon else PORT
+    if host.endswith("*"):
+        if robots > MOST_HOSTS:
+            raise BadInput(WHERE, "address", f"expected at most {MOST_HOSTS} robots for {address!r}, got {robots}")
+        return [(f"{host[:-1]}{1 + i}", first) for i in range(robots)]
+    last = first + robots - 1 if first else 0
+    if last > 65535:
+        raise BadInput(WHERE, "address", f"expected ports up to 65535, got {first} to {last}")
+    return [(host, first + i if first else 0) for i in range(robots)]
+
+
+# --- One emulated e-puck2 as its connections see it; everything here runs in the gateway's thread.
+
 
 MOST_WAITING = 4  # connections; the one that has waited longest has given up
 MOST_UNREAD_BYTES = 1 << 20  # of answers; whoever reads none of them will not begin to
@@ -135,3 +164,80 @@ class EmulatedRobot:
             image = _BLACK_IMAGE
         told = self._answer() if request & Request.SENSORS else b"" if request else _EMPTY
         connection.transport.write(image + told)  # at once: it could be gone after the first half
+
+
+# --- A thread that serves the connections of all emulated e-puck2s of a group.
+
+
+BACKLOG = 16
+
+
+class Server:
+    """Sockets that answer from the moment that this is made until `close`."""
+
+    def __init__(self, robots: Sequence[EmulatedRobot], addresses: Sequence[tuple[str, int]]) -> None:
+        """BadInput if an address is taken, or not ours to take."""
+        self._robots = robots
+        self._sockets = _listening(addresses)
+        self.addresses: list[tuple[str, int]] = [listening.getsockname()[:2] for listening in self._sockets]
+        self._loop = asyncio.new_event_loop()
+        self._end = asyncio.Event()
+        self._serving = Event()
+        self._thread = Thread(target=self._run, name="epuck2 gateway", daemon=True)
+        self._thread.start()
+        self._serving.wait()
+
+    def live(self, alive: Sequence[bool]) -> None:
+        """Which robots are alive from now on."""
+        self._loop.call_soon_threadsafe(self._live, alive)
+
+    def tell_unasked(self) -> None:
+        """Have the newest readings sent to whoever is connected."""
+        self._loop.call_soon_threadsafe(self._tell_unasked)
+
+    def close(self) -> None:
+        """Hang up, and free the addresses."""
+        self._loop.call_soon_threadsafe(self._end.set)
+        self._thread.join()
+
+    def _live(self, alive: Sequence[bool]) -> None:
+        for robot, lives in zip(self._robots, alive, strict=True):
+            robot.live(lives)
+
+    def _tell_unasked(self) -> None:
+        for robot in self._robots:
+            robot.tell_unasked()
+
+    def _run(self) -> None:
+        try:
+            with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+                runner.run(self._serve())
+        finally:
+            self._serving.set()  # whatever ends the thread, nobody waits for it
+
+    async def _serve(self) -> None:
+        servers = [
+            await self._loop.create_server(lambda robot=robot: Connection(robot), sock=listening)
+            for robot, listening in zip(self._robots, self._sockets, strict=True)
+        ]
+        self._serving.set()
+        await self._end.wait()
+        for server in servers:
+            server.close()
+        for robot in self._robots:
+            robot.hang_up()
+
+
+def _listening(addresses: Sequence[tuple[str, int]]) -> list[socket.socket]:
+    """A socket for each address; none stays open if one cannot be had."""
+    sockets: list[socket.socket] = []
+    for host, port in addresses:
+        try:
+            sockets.append(socket.create_server((host, port), backlog=BACKLOG))
+        except OSError as error:
+            for listening in sockets:
+                listening.close()
+            reason = str(error.strerror or error).partition(" (while")[0]  # the address is said already
+            expected = f"expected {host}:{port} to be free, and ours to take: {reason}"
+            raise BadInput(WHERE, "address", expected) from error
+    return sockets

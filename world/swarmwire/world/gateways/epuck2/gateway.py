@@ -1,24 +1,90 @@
-"""The gateway of emulated e-puck2s: a TCP server for each, all in one thread."""
+"""What a user may tell the gateway of emulated e-puck2s."""
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
+from math import radians
 from typing import Any, ClassVar
 
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.body import Body, load_body
+from swarmwire.comms.bodies.sensors import Light, Proximity
 from swarmwire.comms.clock import DatedClock
+from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.epuck2.commands import SENSES, check_fits
-from swarmwire.world.gateways.epuck2.addresses import addresses_of
-from swarmwire.world.gateways.epuck2.differences import differences_of
-from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot
-from swarmwire.world.gateways.epuck2.options import Epuck2GatewayOptions
-from swarmwire.world.gateways.epuck2.received import Received
-from swarmwire.world.gateways.epuck2.sensor_packets import SensorPackets
-from swarmwire.world.gateways.epuck2.server import Server
+from swarmwire.comms.robots.epuck2.readings import CHIPS, Compass
+from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot, Server, addresses_of
+from swarmwire.world.gateways.epuck2.packets import Received, SensorPackets
 from swarmwire.world.gateways.gateway import Commands, Gateway
+
+
+@dataclass(frozen=True)
+class Epuck2GatewayOptions:
+    """How the robots differ from the firmware's defaults."""
+
+    stream: bool = parameter(
+        False, help="answer the last command once more with each new reading, as the WiFi firmware does unasked"
+    )
+    north_deg: float = parameter(
+        0.0, help="heading of magnetic north in the arena", unit="deg", at_least=-360, at_most=360
+    )
+    magnetometer: str = parameter(CHIPS[0], help="the robots' chip, which says where its axes lie", choices=CHIPS)
+
+    @property
+    def compass(self) -> Compass:
+        """The magnetometer that these robots have."""
+        return Compass(self.magnetometer, radians(self.north_deg))
+
+
+# --- In what a body that an e-puck2 could be is another one, as a program sees that takes it for an e-puck2.
+
+
+SHOWN = 3  # angles
+
+
+def differences_of(body: Body) -> tuple[str, ...]:
+    """In words, each for itself; none for an e-puck2.
+
+    >>> differences_of(load_body("epuck2"))
+    ()
+    """
+    model = load_body("epuck2")
+    return (*_looking(body, model), *_driving(body, model), *_at_rest(body, model))
+
+
+def _looking(body: Body, model: Body) -> list[str]:
+    pairs = [(name, body.senses.get(name), model.senses.get(name)) for name in ("proximity", "light")]
+    return [
+        f"its {name} looks to {_angles(its)}, not {_angles(usual)}"
+        for name, its, usual in pairs
+        if isinstance(its, Proximity | Light)
+        and isinstance(usual, Proximity | Light)
+        and its.angles_deg != usual.angles_deg
+    ]
+
+
+def _angles(sheet: Proximity | Light) -> str:
+    return f"{', '.join(f'{angle:g}' for angle in sheet.angles_deg[:SHOWN])}, ... deg"
+
+
+def _driving(body: Body, model: Body) -> list[str]:
+    base_m, usual_m = body.wheels.wheel_base_m, model.wheels.wheel_base_m
+    fastest, usual = body.drive.max_linear_mps, model.drive.max_linear_mps
+    return [
+        *([f"its wheels are {base_m:g} m apart, not {usual_m:g}"] if base_m != usual_m else []),
+        *([f"it goes up to {fastest:g} m/s, not {usual:g}"] if fastest != usual else []),
+    ]
+
+
+def _at_rest(body: Body, model: Body) -> list[str]:
+    absent = [name for name in model.senses if name in SENSES and name not in body.senses]
+    return [f"it has no {', '.join(absent)}, which are told as of a robot at rest"] if absent else []
+
+
+# --- The gateway of emulated e-puck2s: a TCP server for each, all in one thread.
 
 
 class Epuck2Gateway(Gateway):

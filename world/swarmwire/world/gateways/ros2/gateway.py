@@ -17,11 +17,8 @@ from swarmwire.comms.robots.ros2.links import Outlet, check_endpoint, close, ope
 from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.comms.tick_io import NO_LED_CHANGES
 from swarmwire.world.gateways.gateway import Commands, Gateway
-from swarmwire.world.gateways.ros2.base import NODE, Base
-from swarmwire.world.gateways.ros2.command_inbox import CommandInbox
-from swarmwire.world.gateways.ros2.options import Ros2GatewayOptions
-from swarmwire.world.gateways.ros2.rate import Rate
-from swarmwire.world.gateways.ros2.tellers import tellers_of
+from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox
+from swarmwire.world.gateways.ros2.publishers import Rate, Ros2GatewayOptions, tellers_of
 
 CHOICE = "tcp/127.0.0.1:0"  # a port that the system chooses
 CLOCK_TOPIC = "/clock"

@@ -1,1 +1,0 @@
-"""Crews behind the network: who plays which robots, in lockstep or in real time."""

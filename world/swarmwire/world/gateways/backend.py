@@ -1,0 +1,197 @@
+"""One group of robots and its gateway: rows of the loop on one side, places in the group on the other."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.interfaces import AirTime, HearingCrew, Put
+from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.tick_io import Actions, LedChanges, Senses
+from swarmwire.comms.truth import Group
+from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.backends.realtime_backend import RealTimeReport, report_of
+from swarmwire.world.gateways.gateway import Gateway
+from swarmwire.world.subtick import Quanta
+
+
+class GatewayGroup:
+    """The robots of a group of a run's only arena, behind a gateway.
+
+    Attributes:
+        name: of the group.
+        kind: of the gateway.
+        rows: (n,) robot rows.
+        gateway: where they answer.
+        driven: (n,) bool, which of them some program has told how to move.
+    """
+
+    def __init__(self, group: Group, kind: str, gateway: Gateway) -> None:
+        self.name, self.kind, self.gateway = group.name, kind, gateway
+        self.rows = np.arange(group.start, group.stop)
+        self.driven = np.zeros(len(self.rows), np.bool_)
+        self._alive = self._minds = np.ones(len(self.rows), np.bool_)
+        self._told: dict[str, FloatArray] = {}  # the newest readings, of the dead those before their death
+
+    def publish(self, time_ns: int, senses: Senses) -> None:
+        """Hand the newest readings to the gateway; who senses nothing in a tick in which its group acts is dead."""
+        if self.name not in senses:  # it does not act in this tick
+            return
+        own = senses[self.name]
+        place = own.rows - self.rows[0]
+        alive = np.zeros(len(self.rows), np.bool_)
+        alive[place] = True
+        # One that dies or is revived comes to rest by itself, which no program told it.
+        self._minds, self._alive = alive & self._alive, alive
+        self._told = {field: self._whole(field, place, column) for field, column in own.fields.items()}
+        self.gateway.publish(time_ns, self._told, alive)
+
+    def take(self) -> Actions:
+        """What foreign programs told the robots since it was asked last."""
+        told = self.gateway.take()
+        self.driven |= told.drive & self._minds
+        leds = LedChanges(told.leds.rows + self.rows[0], told.leds.which, told.leds.rgb)
+        return Actions(self.rows, told.drive, told.linear_mps, told.angular_radps, told.lateral_mps, leds=leds)
+
+    def _whole(self, field: str, place: IntArray, column: FloatArray) -> FloatArray:
+        """A row for each robot, also the dead: a new array, since the gateway may still read the last one."""
+        if len(place) == len(self.rows):
+            return column
+        whole = self._told[field].copy() if field in self._told else np.zeros((len(self.rows), *column.shape[1:]))
+        whole[place] = column
+        return whole
+
+
+# --- The crew of a run some of whose robots answer as real ones: foreign programs drive them, and nobody waits for
+# those.
+#
+#     a tick begins     poses, readings and packets heard go out
+#     it is over        by the wall clock: commands and packets that have come by then are taken
+#
+# So what is commanded while a tick goes on is done from its start, like the answers of runners in real time.
+#
+# A loop that lags by more than a tick does not make up for it: robots that moved for seconds in an instant, by commands
+# of before, would be none that a program could drive.
+
+
+CARRIED = ("packets_to_robots", "packets_from_robots")  # which is no fault
+
+
+class RobotsAir(Protocol):
+    """The world's air as robots behind gateways have it; `AirBridge` is one."""
+
+    def publish(self, tick: int, heard: Heard, outcomes: Outcomes) -> None:
+        """Hand out what these robots heard, and learn of packets that they sent."""
+        ...
+
+    def take(self) -> Sent:
+        """The packets that they sent since it was asked last."""
+        ...
+
+    def counts(self) -> dict[str, int]:
+        """What went wrong on the way, by name."""
+        ...
+
+
+class GatewayCrew:
+    """The robots of some groups behind gateways, all others played by another crew, in one arena and in real time."""
+
+    def __init__(
+        self,
+        inner: HearingCrew,
+        groups: Sequence[GatewayGroup],
+        air: RobotsAir | None,
+        pace: Pace,
+        rate_hz: int,
+        show: Callable[[], None] = lambda: None,
+        show_counts: Callable[[], dict[str, int]] = dict,
+        quanta: Quanta | None = None,
+    ) -> None:
+        """`inner` plays all other groups; `show` is called at the start of each tick, before anything goes out.
+
+        `show_counts` tells what went wrong there, by name. Gateways and air are open already, and are closed by
+        whoever opened them.
+        """
+        self._inner, self._groups, self._air, self._pace, self._show = inner, groups, air, pace, show
+        self._rate_hz, self._show_counts, self._quanta = rate_hz, show_counts, quanta
+        self._puts: list[Put] = []
+        self._names = frozenset(group.name for group in groups)
+        self._rows = np.sort(np.concatenate([group.rows for group in groups]))
+        self.start, self.close = inner.start, inner.close
+
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+        """What agents here decided, and what foreign programs told the other robots in this tick."""
+        others = self._begin(tick, senses, heard, outcomes)
+        actions = self._inner.act(tick, others, heard, outcomes)
+        self._pace.hold(tick)
+        self._catch_up(tick)
+        told = Actions.joined([actions, *(group.take() for group in self._groups)])
+        return replace(told, sent=Sent.joined([told.sent, self._air.take()])) if self._air else told
+
+    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+        """The same, with packets taken when they come and handed over when they are due."""
+        assert self._quanta
+        others = self._begin(tick, senses, heard, outcomes)
+        self._inner.receive(heard, outcomes)
+        actions = self._inner.act(tick, others, Heard.none(tuple(heard.given)), NO_OUTCOMES)
+        self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
+        self._quanta.pass_tick(tick, air, self)
+        self._catch_up(tick)
+        still = replace(actions, sent=Sent.none())
+        return Actions.joined([still, *(group.take() for group in self._groups)])
+
+    def take_in(self) -> list[Put]:
+        """What agents here sent since the last call, and what came from foreign ones."""
+        puts, self._puts = self._puts, []
+        return [*puts, Put(self._pace.now_ns(), None, self._air.take())] if self._air else puts
+
+    def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> None:
+        """Tell robots behind gateways, and let agents here that read between ticks read."""
+        self._publish(tick, heard, outcomes)
+        self._inner.receive(heard, outcomes)
+        sent = self._inner.hear(tick, at_ns)
+        if len(sent):
+            self._puts.append(Put(self._pace.now_ns(), None, sent))
+
+    def counts(self) -> dict[str, int]:
+        """Faults of the inner crew, of gateways by their kind, of what is shown, and of the air between."""
+        found = Counter(self._inner.counts())
+        found.update(self._show_counts())
+        for group in self._groups:
+            found.update({f"{group.kind}_{name}": count for name, count in group.gateway.counts().items()})
+        if self._air:
+            found.update({f"air_{name}": count for name, count in self._air.counts().items() if name not in CARRIED})
+        return {name: count for name, count in found.items() if count}
+
+    def report(self) -> RealTimeReport:
+        """How far the loop kept up."""
+        return report_of(self._pace, self._quanta)
+
+    def _begin(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> Senses:
+        """A tick begins: all goes out; what the others sense."""
+        self._pace.begin()
+        self._show()
+        for group in self._groups:
+            group.publish(tick_start_ns(tick, self._rate_hz), senses)
+        self._publish(tick, heard, outcomes)
+        self._pace.handed_over(heard.heard_at_ns)
+        return {name: of for name, of in senses.items() if name not in self._names}
+
+    def _publish(self, tick: int, heard: Heard, outcomes: Outcomes) -> None:
+        if self._air:
+            self._air.publish(tick, heard.select(self._own(heard.receiver)), outcomes.select(self._own(outcomes.row)))
+
+    def _catch_up(self, tick: int) -> None:
+        """Where the loop lags by more than a tick, the schedule begins anew."""
+        pace = self._pace
+        if pace.lag_ns > tick_start_ns(1, self._rate_hz) / pace.factor:
+            pace.begin_anew(tick + 1, pace.factor)
+
+    def _own(self, rows: IntArray) -> IntArray:
+        """Which of these rows (k,) are of robots behind gateways."""
+        mine: BoolArray = np.isin(rows, self._rows)
+        return np.flatnonzero(mine)

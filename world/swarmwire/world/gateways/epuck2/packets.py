@@ -1,0 +1,163 @@
+"""What programs told a group of emulated e-puck2s, kept until the loop asks."""
+
+from collections import Counter
+from collections.abc import Callable
+from threading import Lock
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.robots.epuck2 import readings
+from swarmwire.comms.robots.epuck2.commands import FASTEST, M_PER_STEP, RobotCommand, body_speeds
+from swarmwire.comms.robots.epuck2.packets import SENSORS, Header, Settings
+from swarmwire.comms.robots.epuck2.readings import Compass
+from swarmwire.comms.tick_io import LedChanges
+from swarmwire.world.gateways.gateway import Commands
+
+
+class Received:
+    """The newest speeds of each robot, its LEDs, and its step counters; any thread may add to them."""
+
+    def __init__(self, robots: int, body: Body, counts: Counter[str]) -> None:
+        self._robots, self._wheel_base_m, self._counts = robots, body.wheels.wheel_base_m, counts
+        self._lock = Lock()
+        self._speeds: dict[int, tuple[float, float]] = {}
+        self._leds: dict[tuple[int, int], int] = {}  # robot and place -> 0xRRGGBB
+        self._counters: dict[int, tuple[int, int]] = {}
+        self._shown = [dict.fromkeys(range(body.led_count), 0) for _ in range(robots)]
+
+    def add(self, robot: int, command: RobotCommand) -> None:
+        """Keep what a robot is told."""
+        with self._lock:
+            if command.settings & Settings.AVOID:
+                self._counts["avoidance_refused"] += 1  # it goes as it is told
+            if command.settings & Settings.SET_STEPS:
+                self._counters[robot] = command.left, command.right
+            else:
+                if max(abs(command.left), abs(command.right)) > FASTEST:
+                    self._counts["speeds_clipped"] += 1
+                self._speeds[robot] = body_speeds(command.left, command.right, self._wheel_base_m)
+            before = self._shown[robot]
+            if before:
+                shown = command.lights.shown(before)
+                self._leds.update({(robot, which): rgb for which, rgb in shown.items() if rgb != before[which]})
+                self._shown[robot] = shown
+
+    def halt(self, robot: int) -> None:
+        """Keep that a robot was switched on: at rest, and dark."""
+        self.add(robot, RobotCommand())
+
+    def counters(self) -> dict[int, tuple[int, int]]:
+        """What step counters were to show, by robot, since the last call."""
+        with self._lock:
+            counters, self._counters = self._counters, {}
+        return counters
+
+    def taken(self) -> Commands:
+        """What came since the last call."""
+        with self._lock:
+            speeds, self._speeds = self._speeds, {}
+            leds, self._leds = self._leds, {}
+        drive, linear_mps, angular_radps = np.zeros(self._robots, bool), *np.zeros((2, self._robots))
+        for robot, (linear, angular) in speeds.items():
+            drive[robot], linear_mps[robot], angular_radps[robot] = True, linear, angular
+        changes = np.array([(*at, rgb) for at, rgb in leds.items()], np.int64).reshape(-1, 3).T
+        lateral_mps = np.zeros(self._robots)
+        return Commands(drive, linear_mps, angular_radps, lateral_mps, LedChanges(*changes.copy()))
+
+
+# --- The readings of a group as the packets that its robots answer with.
+
+
+Fields = dict[str, FloatArray]  # "sense.field" -> (n,) or (n, width)
+
+WIFI_SELECTOR = 15  # where the selector of a robot stands that answers over WiFi
+ROOM_C = 25
+LEVEL_UT, DOWN_UT = 22.0, 42.0  # the earth's field in central Europe
+UPRIGHT_DEG, OVER_DEG = 5.0, 160.0  # the firmware tells no orientation of a robot that leans less, or more
+_ANSWER = np.dtype([("header", "u1"), ("sensors", SENSORS)])
+
+
+class SensorPackets:
+    """What each robot of a group would answer now. A reading that is lost (nan) leaves the number as it was."""
+
+    def __init__(self, body: Body, robots: int, compass: Compass) -> None:
+        self._body, self._compass = body, compass
+        self._answers = np.zeros(robots, _ANSWER)
+        self._answers["header"] = Header.SENSORS
+        self._rows = self._answers["sensors"]
+        self._travelled = np.zeros((robots, 2), np.int64)  # steps, without wrap
+        self._counted_from = np.zeros((robots, 2), np.int64)  # what a counter that shows 0 has travelled
+        self._to_wire: dict[str, tuple[str, Callable[[FloatArray], AnyArray]]] = {
+            "proximity.value": ("proximity", readings.to_proximity),
+            "light.value": ("ambient", readings.to_light),
+            "ground.shade": ("ground", readings.to_shade),
+            "scan.range_m": ("distance_mm", self._distance),
+            "battery.voltage_v": ("battery", readings.to_voltage),
+            "compass.heading_rad": ("magnetic_field", self._field_ut),
+        }
+        self._at_rest()
+
+    def fill(self, fields: Fields) -> None:
+        """Take over these readings, of which a body need not have all."""
+        for name, values in fields.items():
+            if name in self._to_wire:
+                place, to_wire = self._to_wire[name]
+                self._set(place, to_wire(values))
+        if "imu.turn_radps" in fields:
+            self._set_imu(fields)
+        if "odometry.left_m" in fields:
+            self._set_steps(fields)
+
+    def count_from(self, robot: int, left: int, right: int) -> None:
+        """Let a robot's step counters show these numbers now."""
+        self._counted_from[robot] = self._travelled[robot] - (left, right)
+
+    def answers(self) -> list[bytes]:
+        """Header and sensors' packet of each robot."""
+        data, size = self._answers.tobytes(), _ANSWER.itemsize
+        return [data[start : start + size] for start in range(0, len(data), size)]
+
+    def _at_rest(self) -> None:
+        """What a robot tells that has none of the senses, or was just switched on."""
+        rows = self._rows
+        rows["acceleration"][:, 2] = rows["acceleration_size"] = readings.PER_G
+        rows["ambient"], rows["distance_mm"] = readings.AMBIENT_DARK, readings.SEES_NOTHING_MM
+        rows["temperature_c"], rows["selector"], rows["battery"] = ROOM_C, WIFI_SELECTOR, round(4.2 * readings.PER_V)
+
+    def _set(self, name: str, value: AnyArray) -> None:
+        self._rows[name] = np.where(np.isnan(value), self._rows[name], value)
+
+    def _distance(self, range_m: FloatArray) -> AnyArray:
+        sheet = self._body.scan
+        assert sheet is not None
+        return readings.to_distance(range_m[:, 0], sheet)
+
+    def _field_ut(self, heading_rad: FloatArray) -> FloatArray:
+        return self._compass.field_ut(heading_rad, LEVEL_UT, DOWN_UT)
+
+    def _set_steps(self, fields: Fields) -> None:
+        told = np.stack([fields["odometry.left_m"], fields["odometry.right_m"]], axis=1)
+        steps = np.where(np.isnan(told), self._travelled, np.rint(told / M_PER_STEP))
+        self._travelled = steps.astype(np.int64)
+        self._rows["steps"] = _wrapped(self._travelled - self._counted_from)
+
+    def _set_imu(self, fields: Fields) -> None:
+        """Accelerometer, with what the firmware works out of it, and gyro."""
+        forward, left = fields["imu.forward_mps2"], fields["imu.left_mps2"]
+        level = readings.to_acceleration(np.stack([left, forward], axis=1))
+        acceleration = np.concatenate([level, self._rows["acceleration"][:, 2:]], axis=1)
+        self._set("acceleration", acceleration)
+        x, y, z = self._rows["acceleration"].astype(np.float64).T
+        inclination = 90.0 - np.degrees(np.arctan2(z, np.hypot(x, y)))
+        leans = (inclination >= UPRIGHT_DEG) & (inclination <= OVER_DEG)
+        self._rows["acceleration_size"] = np.sqrt(x * x + y * y + z * z)
+        self._rows["inclination_deg"] = inclination
+        self._rows["orientation_deg"] = np.where(leans, np.degrees(np.arctan2(x, y)) + 180.0, 0.0)
+        turn = readings.to_turn(fields["imu.turn_radps"])
+        self._set("gyro", np.stack([np.zeros_like(turn), np.zeros_like(turn), turn], axis=1))
+
+
+def _wrapped(steps: IntArray) -> IntArray:
+    return (steps + 0x8000) % 0x10000 - 0x8000

@@ -1,0 +1,195 @@
+"""Options of the ROS 2 gateway."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from math import floor, isnan, nan
+from typing import Any, ClassVar
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.drives import wheel_base_of
+from swarmwire.comms.bodies.sensors import Scan
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.config import parameter
+from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
+from swarmwire.comms.robots.ros2.laser import laser_scan
+from swarmwire.comms.robots.ros2.messages import DISTROS, Messages
+from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu
+from swarmwire.comms.robots.ros2.other_sensors import FULL_LUX, battery_state, illuminance, topics_of_light
+
+
+@dataclass(frozen=True)
+class Ros2GatewayOptions:
+    """How the emulated bases answer, and when they stop by themselves."""
+
+    domain: int = parameter(0, help="ROS_DOMAIN_ID of rmw_zenoh", at_least=0, at_most=232)
+    distro: str = parameter("jazzy", help="distribution of ROS 2 whose nodes drive the robots", choices=DISTROS)
+    stamped: bool = parameter(
+        False, help="whether cmd_vel is announced as TwistStamped, not Twist; both are taken either way"
+    )
+    cmd_timeout_s: float = parameter(0.5, help="a base stops after so long without a command", unit="s", above=0)
+    full_lux: float = parameter(
+        FULL_LUX, help="illuminance that a photocell tells where it reads 1", unit="lx", above=0
+    )
+    north_deg: float = parameter(0.0, help="heading in the arena at which the IMU's yaw is 0", unit="deg")
+
+
+# --- When a sensor has a new reading.
+
+
+NEAR = 1e-6  # a reading that is due but for rounding is due
+
+
+class Rate:
+    """Says of each tick whether a reading is due in it, as the sensors of the world themselves do."""
+
+    def __init__(self, rate_hz: float) -> None:
+        """0: in each tick."""
+        self._rate_hz = rate_hz
+        self._last = -1
+
+    def is_due(self, time_ns: int) -> bool:
+        """Whether a reading is due at this time since the start of the run, which may not go back."""
+        if not self._rate_hz:
+            return True
+        now = floor(time_ns * self._rate_hz / NS_PER_S + NEAR)
+        due, self._last = now > self._last, max(now, self._last)
+        return due
+
+
+# --- What the bases of a gateway tell on each topic, from the readings of their group.
+
+
+Fields = dict[str, FloatArray]  # "sense.field" -> (n,) or (n, width)
+
+
+class Teller(ABC):
+    """One topic of every base.
+
+    Attributes:
+        kind: of its messages.
+        topic: its name within the namespace of a base.
+        reads: the fields that it needs, or one of them.
+        rate_hz: how often there is something new; 0: in each tick.
+    """
+
+    kind: ClassVar[str]
+    reads: ClassVar[tuple[str, ...]]
+    topic: str
+    rate_hz: float
+
+    def is_told(self, fields: Fields) -> bool:
+        """Whether there is anything to tell of."""
+        return any(name in fields for name in self.reads)
+
+    def follow(self, time_ns: int, fields: Fields) -> None:
+        """Take note of new readings, whether or not anybody subscribes."""
+        return
+
+    @abstractmethod
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
+        """The message of one base; None: its reading was lost."""
+
+
+class ScanTeller(Teller):
+    """`scan` as LaserScan."""
+
+    kind = LASER_SCAN
+    reads = ("scan.range_m",)
+    topic = "scan"
+
+    def __init__(self, sheet: Scan) -> None:
+        self._sheet, self.rate_hz = sheet, sheet.rate_hz
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
+        """As `Teller.message`."""
+        return laser_scan(messages, self._sheet, fields["scan.range_m"][base], stamp_ns)
+
+
+class OdometryTeller(Teller):
+    """`odometry` as Odometry: where the wheels say that the base is."""
+
+    kind = ODOMETRY
+    reads = ("odometry.left_m", "odometry.right_m")
+    topic = "odom"
+
+    def __init__(self, rate_hz: float, bases: int, wheel_base_m: float) -> None:
+        self.rate_hz = rate_hz
+        self._poses = WheelPoses(bases, wheel_base_m)
+
+    def follow(self, time_ns: int, fields: Fields) -> None:
+        """As `Teller.follow`."""
+        self._poses.follow(time_ns, fields["odometry.left_m"], fields["odometry.right_m"])
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
+        """As `Teller.message`."""
+        lost = isnan(fields["odometry.left_m"][base] + fields["odometry.right_m"][base])
+        return None if lost else self._poses.message(messages, base, stamp_ns)
+
+
+class ImuTeller(Teller):
+    """`imu` and `compass`, or whichever there is, as Imu."""
+
+    kind = IMU
+    reads = ("imu.forward_mps2", "imu.left_mps2", "imu.turn_radps", "compass.heading_rad")
+    topic = "imu"
+
+    def __init__(self, rates_hz: tuple[float, ...], north_deg: float) -> None:
+        self.rate_hz = max(rates_hz) if all(rates_hz) else 0.0
+        self._north_deg = north_deg
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
+        """As `Teller.message`."""
+        motion = Motion(*(float(fields[name][base]) if name in fields else nan for name in self.reads))
+        return None if all(map(isnan, motion)) else imu(messages, motion, self._north_deg, stamp_ns)
+
+
+class BatteryTeller(Teller):
+    """`battery` as BatteryState."""
+
+    kind = BATTERY_STATE
+    reads = ("battery.charge", "battery.voltage_v")
+    topic = "battery_state"
+
+    def __init__(self, rate_hz: float) -> None:
+        self.rate_hz = rate_hz
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
+        """As `Teller.message`."""
+        charge, voltage_v = float(fields["battery.charge"][base]), float(fields["battery.voltage_v"][base])
+        return None if isnan(charge + voltage_v) else battery_state(messages, charge, voltage_v, stamp_ns)
+
+
+class LightTeller(Teller):
+    """One cell of `light` as Illuminance."""
+
+    kind = ILLUMINANCE
+    reads = ("light.value",)
+
+    def __init__(self, topic: str, rate_hz: float, cell: int, full_lux: float) -> None:
+        self.topic, self.rate_hz = topic, rate_hz
+        self._cell, self._full_lux = cell, full_lux
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
+        """As `Teller.message`."""
+        brightness = float(fields["light.value"][base, self._cell])
+        return illuminance(messages, brightness, self._full_lux, self.topic, stamp_ns)
+
+
+def tellers_of(body: Body, bases: int, options: Ros2GatewayOptions) -> tuple[Teller, ...]:
+    """The topics of bases of this body."""
+    tellers: list[Teller] = []
+    wheel_base_m = wheel_base_of(body.drive)
+    if body.scan:
+        tellers.append(ScanTeller(body.scan))
+    if body.odometry and wheel_base_m:
+        tellers.append(OdometryTeller(body.odometry.rate_hz, bases, wheel_base_m))
+    rates_hz = tuple(body.senses[name].rate_hz for name in ("imu", "compass") if name in body.senses)
+    if rates_hz:
+        tellers.append(ImuTeller(rates_hz, options.north_deg))
+    if "battery" in body.senses:
+        tellers.append(BatteryTeller(body.senses["battery"].rate_hz))
+    if body.light:
+        topics = topics_of_light("illuminance", len(body.light.angle_rad))
+        tellers.extend(LightTeller(t, body.light.rate_hz, cell, options.full_lux) for cell, t in enumerate(topics))
+    return tuple(tellers)

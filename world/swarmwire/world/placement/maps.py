@@ -1,0 +1,190 @@
+"""Pictures as greys: maps of obstacles and floors are given so."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING
+from warnings import catch_warnings, simplefilter
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.geometry.floor import Floor, Patch, packed_image
+from swarmwire.comms.truth import Obstacle
+from swarmwire.world.scenario.tables import ArenaTable, DiscPatchTable, GroundTable, MapTable
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF")  # PGM is one of PPM's family
+MOST_PIXELS = 2**24
+
+GreyArray = NDArray[np.float32]
+
+
+def beside(where: str, name: str) -> Path:
+    """The path of a file that a scenario names, which lies beside the scenario."""
+    return Path(where).parent / name
+
+
+def read_grey(path: Path, where: str, key: str) -> GreyArray:
+    """The greys of a picture, (rows, columns), 0 black … 1 white, top row first; on white where it is transparent.
+
+    BadInput names `where` and `key` for a file that is no picture, or one of more than `MOST_PIXELS`.
+    """
+    from PIL import Image
+
+    too_large = BadInput(where, key, f"expected a picture of at most {MOST_PIXELS} pixels: {path}")
+    try:
+        with catch_warnings():
+            simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(path, formats=FORMATS) as image:
+                if image.width * image.height > MOST_PIXELS:
+                    raise too_large
+                return _greys(image)
+    except FileNotFoundError:
+        raise BadInput(where, key, f"expected a file beside the scenario: there is no {path}") from None
+    except (Image.DecompressionBombWarning, Image.DecompressionBombError):
+        raise too_large from None
+    except (OSError, ValueError, SyntaxError, EOFError, IndexError):  # Pillow's, by where a file is broken
+        raise BadInput(where, key, f"expected a picture, PNG, PGM, BMP, JPEG or GIF: {path}") from None
+
+
+def _greys(image: "Image.Image") -> GreyArray:
+    from PIL import Image
+
+    if image.mode.startswith("I"):  # 16 bits a pixel
+        return np.asarray(image, np.float32) / np.float32(65535)
+    if image.has_transparency_data:
+        white = Image.new("RGBA", image.size, "white")
+        image = Image.alpha_composite(white, image.convert("RGBA"))
+    return np.asarray(image.convert("L"), np.float32) / np.float32(255)
+
+
+# --- Occupied pixels merged into rectangles: few obstacles for engines, rays and signals to look at. Compiled.
+
+
+def merged_boxes(occupied: BoolArray, most: int) -> IntArray:
+    """Rectangles that cover the occupied pixels (rows, columns) and nothing else, none of them twice, (boxes, 4).
+
+    Each is its first row, first column, rows and columns. Of every first pixel in reading order that is not covered yet
+    it is the larger of two rectangles: as wide as can be and then as tall, or the other way round. If there would be
+    more than `most`, there are `most + 1`.
+    """
+    return _merged(occupied.copy(), most)
+
+
+@njit(cache=True)
+def _merged(left, most):
+    boxes = np.empty((most + 1, 4), np.int64)
+    found = 0
+    for row in range(left.shape[0]):
+        for column in range(left.shape[1]):
+            if not left[row, column]:
+                continue
+            if found > most:
+                return boxes
+            wide = _columns(left, row, column, 1)
+            below = _rows(left, row, column, wide)
+            tall = _rows(left, row, column, 1)
+            beside = _columns(left, row, column, tall)
+            rows, columns = (below, wide) if below * wide >= tall * beside else (tall, beside)
+            left[row : row + rows, column : column + columns] = False
+            boxes[found] = row, column, rows, columns
+            found += 1
+    return boxes[:found]
+
+
+@njit(cache=True)
+def _columns(left, row, column, rows):
+    """How many columns from `column` on are occupied in all of these rows."""
+    columns = 0
+    while column + columns < left.shape[1] and left[row : row + rows, column + columns].all():
+        columns += 1
+    return columns
+
+
+@njit(cache=True)
+def _rows(left, row, column, columns):
+    """How many rows from `row` on are occupied in all of these columns."""
+    rows = 0
+    while row + rows < left.shape[0] and left[row + rows, column : column + columns].all():
+        rows += 1
+    return rows
+
+
+# --- What is the same in every arena of a scenario: its size, the obstacles of its map, its floor.
+
+
+MOST_BOXES = 10_000
+LONGEST_M = 10_000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Size, obstacles and floor of every arena; obstacles at random are each arena's own."""
+
+    size_m: tuple[float, float]
+    boxes: tuple[Obstacle, ...] = ()  # of the map
+    floor: Floor | None = None
+
+
+def read_layout(arena: ArenaTable, where: str) -> Layout:
+    """The layout that an arena's table describes; BadInput for pictures that cannot be read, or do not fit."""
+    size_m, boxes = arena.size_m, ()
+    if arena.map is not None:
+        size_m, boxes = _read_map(arena.map, size_m, where)
+    assert size_m is not None  # the table sees to it
+    return Layout(size_m, boxes, _read_floor(arena.ground, where) if arena.ground else None)
+
+
+def _read_map(
+    table: MapTable, wanted_m: tuple[float, float] | None, where: str
+) -> tuple[tuple[float, float], tuple[Obstacle, ...]]:
+    """Size of the arena in m, and boxes."""
+    key, path = "arena.map.image", beside(where, table.image)
+    occupied = read_grey(path, where, key) < table.occupied_below
+    rows, columns = occupied.shape
+    size_m = columns * table.resolution_m, rows * table.resolution_m
+    if wanted_m is not None and not np.allclose(wanted_m, size_m, rtol=1e-6, atol=0.0):
+        size, got = (" x ".join(f"{side:g}" for side in sides) for sides in (size_m, wanted_m))
+        raise BadInput(where, "arena.size_m", f"expected {size} m, the size of the map, or none; got {got} m")
+    if max(size_m) > LONGEST_M:
+        raise BadInput(where, "arena.map.resolution_m", f"expected an arena of at most {LONGEST_M:g} m a side")
+    if occupied.all():
+        expected = f"expected free space: no pixel is as bright as occupied_below = {table.occupied_below:g}"
+        raise BadInput(where, key, f"{expected}: {path}")
+    merged = merged_boxes(occupied, MOST_BOXES)
+    if len(merged) > MOST_BOXES:
+        expected = f"expected a picture that makes at most {MOST_BOXES} boxes: make it coarser, or free of specks"
+        raise BadInput(where, key, f"{expected}: {path}")
+    height_m, side_m = inf if table.height_m is None else table.height_m, table.resolution_m
+    return size_m, tuple(
+        Obstacle(
+            "box",
+            (column + 0.5 * wide - 0.5 * columns) * side_m,
+            (0.5 * rows - row - 0.5 * tall) * side_m,
+            size_m=(wide * side_m, tall * side_m),
+            height_m=height_m,
+        )
+        for row, column, tall, wide in merged.tolist()
+    )
+
+
+def _read_floor(table: GroundTable, where: str) -> Floor:
+    image = None
+    if table.image is not None:
+        grey = read_grey(beside(where, table.image), where, "arena.ground.image")
+        image = packed_image(np.round(255.0 * grey).astype(np.uint8))
+    patches = (
+        Patch("disc", *patch.at, patch.shade, radius_m=patch.radius_m)
+        if isinstance(patch, DiscPatchTable)
+        else Patch("polygon", *patch.at, patch.shade, points_m=patch.points)
+        for patch in table.patches
+    )
+    return Floor(table.shade, tuple(patches), image)

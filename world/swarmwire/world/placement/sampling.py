@@ -1,0 +1,135 @@
+"""Where candidates for a place lie, and the keyed draws that give them. Compiled."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.draws_compiled import uniform
+from swarmwire.comms.geometry.robot_index import cell_of
+from swarmwire.world.placement.occupancy import (
+    Disc,
+    Taken,
+    disc_clear_of_obstacles,
+    disc_clear_of_robots,
+    on_torus,
+    polygon_clear_of_obstacles,
+    within_arena,
+)
+
+BOX, DISC, RING = range(3)
+TURN_RAD = 2.0 * np.pi
+
+
+class Region(NamedTuple):
+    """Where candidates lie."""
+
+    kind: int  # BOX, DISC or RING
+    x_m: float
+    y_m: float
+    half_x_m: float  # the radius of a disc, the outer one of a ring
+    half_y_m: float
+    inner_m: float  # inner radius of a ring
+
+
+@njit(cache=True)
+def candidate(region, key, entity, attempt, purpose):
+    """Candidate `attempt` of an entity: x, y, whether it lies in the region."""
+    u = uniform(key, entity, attempt, 0, purpose)
+    v = uniform(key, entity, attempt, 1, purpose)
+    if region.kind == RING:
+        inner2 = region.inner_m * region.inner_m
+        r = np.sqrt(inner2 + u * (region.half_x_m * region.half_x_m - inner2))
+        return region.x_m + r * np.cos(TURN_RAD * v), region.y_m + r * np.sin(TURN_RAD * v), True
+    u, v = 2.0 * u - 1.0, 2.0 * v - 1.0
+    inside = region.kind == BOX or u * u + v * v <= 1.0
+    return region.x_m + u * region.half_x_m, region.y_m + v * region.half_y_m, inside
+
+
+# --- The first of the keyed candidates for a place that is free. Compiled.
+
+
+MOST_CANDIDATES = 1000
+
+
+@njit(cache=True)
+def free_circle(
+    taken: Taken, region: Region, key: np.uint64, entity: int, purpose: int, disc: Disc
+) -> tuple[float, float]:
+    """x, y of the first candidate where a disc is clear of all obstacles; nan if there is none."""
+    for attempt in range(MOST_CANDIDATES):
+        x, y, inside = candidate(region, key, entity, attempt, purpose)
+        inside = inside and within_arena(taken, x, y, disc.radius_m)  # obstacles lie within even a torus
+        if inside and disc_clear_of_obstacles(taken, x, y, disc):
+            return x, y
+    return np.nan, np.nan
+
+
+@njit(cache=True)
+def free_polygon(
+    taken: Taken,
+    region: Region,
+    key: np.uint64,
+    entity: int,
+    purpose: int,
+    corners: FloatArray,
+    heading_rad: float,
+    gap_m: float,
+) -> tuple[float, float, float]:
+    """x, y, heading of the first candidate where a polygon is clear of all obstacles; nan if there is none.
+
+    `corners` (k, 2) are those at the origin and heading 0. A heading that is not finite is drawn with each candidate.
+    """
+    placed = np.empty_like(corners)
+    for attempt in range(MOST_CANDIDATES):
+        turn = heading_rad
+        if not np.isfinite(heading_rad):
+            turn = (uniform(key, entity, attempt, 2, purpose) - 0.5) * TURN_RAD
+        x, y, inside = candidate(region, key, entity, attempt, purpose)
+        c, s = np.cos(turn), np.sin(turn)
+        placed[:, 0] = x + c * corners[:, 0] - s * corners[:, 1]
+        placed[:, 1] = y + s * corners[:, 0] + c * corners[:, 1]
+        if inside and polygon_clear_of_obstacles(taken, placed, gap_m):
+            return x, y, turn
+    return np.nan, np.nan, np.nan
+
+
+@njit(cache=True)
+def put_robots(
+    taken: Taken,
+    region: Region,
+    fixed: FloatArray,
+    key: np.uint64,
+    purpose: int,
+    start: int,
+    stop: int,
+    disc: Disc,
+) -> int:
+    """Put robots start to stop - 1, each at its first free candidate; the first that found no place, else -1.
+
+    `fixed` (robots put, 2) gives each its only candidate; with no rows candidates are drawn from the region.
+    """
+    ny, nx = taken.head.shape
+    for robot in range(start, stop):
+        found = False
+        for attempt in range(1 if len(fixed) else MOST_CANDIDATES):
+            if len(fixed):
+                x, y, inside = fixed[robot - start, 0], fixed[robot - start, 1], True
+            else:
+                x, y, inside = candidate(region, key, robot, attempt, purpose)
+            if taken.wraps:
+                x, y = on_torus(x, taken.half_x_m), on_torus(y, taken.half_y_m)
+            found = inside and disc_clear_of_obstacles(taken, x, y, disc)
+            found = found and disc_clear_of_robots(taken, x, y, disc)
+            if found:
+                break
+        if not found:
+            return robot
+        taken.robot[robot] = x, y, disc.radius_m, disc.bottom_m, disc.top_m
+        cell = cell_of(y, -taken.half_y_m, taken.cell_m, ny), cell_of(x, -taken.half_x_m, taken.cell_m, nx)
+        taken.follow[robot] = taken.head[cell]
+        taken.head[cell] = robot
+    return -1

@@ -1,0 +1,113 @@
+"""`--set path=value`: a value of a scenario given from outside, put at its place before the scenario is checked."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from functools import cache
+from pathlib import Path
+from typing import Any, cast
+
+from pydantic import ValidationError
+
+from swarmwire.comms.config import check_format, from_toml
+from swarmwire.comms.errors import BadInput
+from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario.validation import check, fault
+
+
+def put(mapping: dict[str, Any], text: str) -> str:
+    """Set the value that an override names by its path, in which a number is a place in a list.
+
+    The path of what is new with it. BadInput if there is no such place.
+    """
+    keys, value = _parsed(text)
+    at: Any = mapping
+    new = len(keys)  # keys that lead to what is new
+    for depth, key in enumerate(keys):
+        if isinstance(at, list):
+            items = cast("list[Any]", at)
+            if not key.isdecimal() or int(key) >= len(items):
+                expected = f"expected a place in a list of {len(items)}, counted from 0"
+                raise BadInput(f"--set {text}", ".".join(keys[: depth + 1]), expected)
+            holder, index = cast(Any, items), int(key)
+        elif isinstance(at, dict):
+            holder, index = cast(Any, at), key
+        else:
+            raise BadInput(f"--set {text}", ".".join(keys[: depth + 1]), f"{'.'.join(keys[:depth])} holds no keys")
+        if isinstance(at, dict) and key not in at:
+            new = min(new, depth + 1)
+        if depth == len(keys) - 1:
+            holder[index] = value
+        else:
+            at = holder[index] if isinstance(at, list) else holder.setdefault(index, {})
+    return ".".join(keys[:new])
+
+
+def _parsed(text: str) -> tuple[list[str], Any]:
+    path, equals, value = text.partition("=")
+    keys = [key.strip() for key in path.split(".")]
+    if not equals or not all(keys):
+        raise BadInput(f"--set {text}", "", "expected path=value, such as robots.flock.count=30")
+    try:
+        found = from_toml(f"value = {value}")
+    except tomllib.TOMLDecodeError:
+        return keys, value.strip()
+    return keys, found["value"] if len(found) == 1 else value
+
+
+# --- From a file, a mapping and `--set` overrides to a checked scenario; every fault is one BadInput.
+
+
+FORMAT = 1  # that a scenario's file names
+
+
+def scenario_schema() -> dict[str, Any]:
+    """The JSON schema of a scenario's file, with bounds, units and a description of every key."""
+    return deepcopy(_schema())
+
+
+@cache
+def _schema() -> dict[str, Any]:
+    return Scenario.model_json_schema()  # takes longer than all else about a scenario
+
+
+def scenario_from(mapping: Mapping[str, Any], where: str, overrides: Sequence[str] = ()) -> Scenario:
+    """The scenario of a mapping, after `overrides` such as "robots.flock.count=30" (a TOML value, else a text).
+
+    BadInput names `where`, or the override, the key and what was expected.
+    """
+    given = deepcopy(dict(mapping))
+    settings = [(put(given, text), text) for text in overrides]
+    try:
+        return _checked(given, where)
+    except BadInput as error:
+        for key, text in reversed(settings):
+            if f"{error.key}.".startswith(f"{key}."):  # the fault is the override's, not the scenario's
+                raise BadInput(f"--set {text}", error.key, error.expected) from None
+        raise
+
+
+def load_scenario(path: Path | str, overrides: Sequence[str] = ()) -> Scenario:
+    """The scenario in a TOML file, after `overrides` as for `scenario_from`."""
+    return scenario_from(_read(path, str(path)), str(path), overrides)
+
+
+def _checked(given: dict[str, Any], where: str) -> Scenario:
+    check_format(given, FORMAT, where)
+    try:
+        scenario = Scenario.model_validate(given)
+    except ValidationError as error:
+        raise fault(error, _schema(), where) from None
+    check(scenario, where)
+    return scenario.with_source(where, deepcopy(given))
+
+
+def _read(path: Path | str, where: str) -> dict[str, Any]:
+    try:
+        return from_toml(Path(path).read_text(encoding="utf-8-sig"))
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput(where, "", f"expected TOML: {error}") from None
+    except UnicodeDecodeError:
+        raise BadInput(where, "", "expected TOML, which is UTF-8 text") from None
+    except OSError as error:
+        raise BadInput(where, "", f"expected a readable file: {error.strerror}") from None

@@ -1,0 +1,186 @@
+"""Validation errors as one plain line: which key, what was expected. The words come from the JSON schema."""
+
+import math
+from collections.abc import Mapping
+from typing import cast
+
+import numpy as np
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.config import one_of
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.events.event import Event
+from swarmwire.comms.events.robot_events import Push
+from swarmwire.comms.radio.config.radio import Radio, check_radio, unfit_for_torus
+from swarmwire.world.actuation.actuators import noise_of
+from swarmwire.world.engines.physics import check_engines, engines_of
+from swarmwire.world.placement.maps import read_layout
+from swarmwire.world.placement.occupancy import extent, heading_of, obstacle_at
+from swarmwire.world.scenario.bodies import bodies_of
+from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario.schema import UNFIT, Node, forms, plain, words
+from swarmwire.world.scenario.tables import ObstacleTable
+
+MOST_KEYS = 6  # that are named after the first fault
+
+
+def fault(error: ValidationError, schema: Node, where: str) -> BadInput:
+    """The first fault of a validation error, with the keys of those that follow."""
+    first, *others = (_explained(of, schema) for of in error.errors(include_url=False))
+    keys = list(dict.fromkeys(key for key, _ in others))
+    more = f" (also wrong: {', '.join(keys[:MOST_KEYS])}{', …' if len(keys) > MOST_KEYS else ''})" if keys else ""
+    return BadInput(where, first[0], first[1] + more)
+
+
+def _explained(error: ErrorDetails, schema: Node) -> tuple[str, str]:
+    names, node, holder = _followed(error["loc"], schema)
+    kind, key, got = error["type"], ".".join(names), _shown(error["input"])
+    if kind == "extra_forbidden":
+        return key, f"unknown key; expected {one_of(holder.get('properties', {}), names[-1])}"
+    if kind == "missing":
+        return key, f"is missing; expected {words(node, schema)}"
+    if "discriminator" in node:  # one of several tables, by their tag
+        tag = node["discriminator"]["propertyName"]
+        kinds = node["discriminator"]["mapping"]
+        if not isinstance(error["input"], dict):
+            return key, f"expected a table with {tag} = {one_of(kinds)}; got {got}"
+        given = cast("Node", error["input"])
+        choices = f"expected {one_of(kinds, given.get(tag))}"
+        return f"{key}.{tag}", f"{choices}; got {_shown(given[tag])}" if tag in given else f"is missing; {choices}"
+    if error["loc"][-1] == "[key]":
+        return key, f"expected a name of at most 40 letters, digits and _ that starts with a letter, got {got}"
+    if kind == UNFIT:
+        return f"{key}.{error.get('ctx', {})['key']}", error["msg"]
+    if kind in ("place", "poses", "points", "stop"):  # worded by the scenario's own validators
+        return key, error["msg"]
+    if "patternProperties" in holder and node.get("type") == "object":
+        return key, f"expected a table for each group, [{'.'.join(names[:-1])}.GROUP], got {got}"
+    expected = one_of(map(str, node["enum"]), error["input"]) if "enum" in node else words(node, schema)
+    return key, f"expected {expected}, got {got}"
+
+
+def _followed(loc: tuple[int | str, ...], schema: Node) -> tuple[list[str], Node, Node]:
+    """The keys that a location names, the schema's node there, and the node that holds it."""
+    names: list[str] = []
+    node = holder = schema
+    for part in loc:
+        node = plain(node, schema)
+        if "discriminator" in node:  # the part is the tag that chose the table, no key of the file
+            node = {"$ref": node["discriminator"]["mapping"][part]}
+        elif forms(node):  # the part tells the form, no key of the file either
+            node = next(form for form in forms(node) if plain(form, schema).get("type") == part)
+        elif node.get("type") == "object":
+            holder, names = node, [*names, str(part)]
+            named, patterned = _table(node, "properties"), _table(node, "patternProperties")
+            node = _table(named, str(part)) or next(iter(patterned.values()), Node())
+        elif node.get("type") == "array":
+            holder, names = node, [*names, str(part)]
+            places = node.get("prefixItems", [])
+            node = places[part] if isinstance(part, int) and part < len(places) else _table(node, "items")
+    return [name for name in names if name != "[key]"], plain(node, schema), holder
+
+
+def _table(node: Node, name: str) -> Node:
+    return node.get(name) or Node()
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+# --- Checks that need more than one key of a scenario: bodies, physics steps, obstacles, the radio's offset, events.
+
+
+MOST_OF_RADIUS = 0.25  # how far a robot at full speed may move in one physics step
+
+
+def check(scenario: Scenario, where: str) -> None:
+    """Raise BadInput for the first contradiction in a scenario."""
+    bodies = bodies_of(scenario, where)
+    check_engines(scenario, bodies, where)
+    _check_steps(scenario, bodies, where)
+    size_m = read_layout(scenario.arena, where).size_m
+    for i, obstacle in enumerate(scenario.arena.obstacles):
+        _check_obstacle(size_m, obstacle, f"arena.obstacles.{i}", where)
+    _check_send_offset(scenario, where)
+    if scenario.radio is not None:
+        check_radio(scenario.radio, where)
+        _check_torus(scenario, scenario.radio, where)
+    _check_antennas(scenario, where)
+    for i, event in enumerate(scenario.events):
+        check_event(scenario, bodies, event, f"events.{i}", where)
+
+
+def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> None:
+    for group, engine in engines_of(scenario, bodies).items():
+        body = bodies[group]
+        tick_m = body.max_linear_mps * max(1.0, noise_of(body.drive).factor) / scenario.time.rate_hz
+        needed = math.ceil(tick_m / (MOST_OF_RADIUS * body.radius_m) - 1e-9)
+        if engine != "kinematic" and scenario.physics.steps < needed:
+            text = f"so that a robot of {group} at full speed moves at most a quarter of its radius in one step"
+            raise BadInput(where, "physics.steps", f"expected at least {needed}, {text}; got {scenario.physics.steps}")
+
+
+def _check_obstacle(extents_m: tuple[float, float], table: ObstacleTable, key: str, where: str) -> None:
+    """A fixed obstacle lies within the arena; a random one would fit into it somewhere at heading 0."""
+    size_m = np.array(extents_m)
+    least, greatest = extent(obstacle_at(table, *(table.at or (0.0, 0.0)), heading_of(table) or 0.0))
+    fits = np.all(greatest - least <= size_m + 2e-9)
+    if not fits or (table.at and (np.any(greatest > 0.5 * size_m + 1e-9) or np.any(least < -0.5 * size_m - 1e-9))):
+        size = " x ".join(f"{side:g}" for side in size_m)
+        raise BadInput(where, key, f"expected the {table.shape} to lie within the arena of {size} m")
+
+
+def _check_send_offset(scenario: Scenario, where: str) -> None:
+    offset, tick_s = scenario.radio.send_offset if scenario.radio else "uniform", 1.0 / scenario.time.rate_hz
+    known = offset in ("uniform", "tick") if isinstance(offset, str) else 0.0 <= offset < tick_s
+    if not known:
+        expected = "expected uniform, tick, or an offset in s from 0 to below the period of a tick"
+        raise BadInput(where, "radio.send_offset", f"{expected}; got {offset!r}")
+
+
+def _check_torus(scenario: Scenario, radio: Radio, where: str) -> None:
+    unfit = unfit_for_torus(radio) if scenario.arena.boundary == "torus" else None
+    if unfit is not None:
+        expected = "expected a disk without bodies_block: what is between two robots across a torus's seam is not known"
+        raise BadInput(where, f"radio.{unfit}", expected)
+
+
+def _check_antennas(scenario: Scenario, where: str) -> None:
+    for group, table in scenario.robots.items():
+        if table.radio is not None and (scenario.radio is None or not scenario.radio.is_signal):
+            why = "a disk knows no strength" if scenario.radio else "there is no [radio]"
+            raise BadInput(where, f"robots.{group}.radio", f"expected a radio with signals: {why}")
+
+
+def _check_push(scenario: Scenario, bodies: Mapping[str, Body], event: Push) -> None:
+    """Only engines with forces can push; and who is pushed must not get through what stands in the way in one step."""
+    engines = engines_of(scenario, bodies)
+    for group in event.robots.groups(scenario.groups()):
+        if engines[group] == "kinematic":
+            expected = (
+                f"expected robots whose bodies have contacts: those of {group} go where they are told (kinematic)"
+            )
+            raise BadInput("", "robots", expected)
+        most_mps = bodies[group].radius_m * scenario.time.rate_hz * scenario.physics.steps
+        if event.speed_mps > most_mps:
+            why = f"with which a robot of {group} moves by its radius in one of {scenario.physics.steps} physics.steps"
+            raise BadInput("", "speed_mps", f"expected at most {most_mps:g} m/s, {why}; got {event.speed_mps!r}")
+
+
+def check_event(scenario: Scenario, bodies: Mapping[str, Body], event: Event, key: str, where: str) -> None:
+    """Raise BadInput unless an event names robots that there are, and fits the radio and the engines that it needs."""
+    if event.needs_radio and scenario.radio is None:
+        raise BadInput(where, f"{key}.do", f"expected a scenario with a [radio] for {event.do!r}")
+    try:
+        event.check(scenario.groups())
+        event.check_bodies(scenario.groups(), bodies)
+        if isinstance(event, Push):
+            _check_push(scenario, bodies, event)
+        if event.needs_radio and scenario.radio is not None:
+            event.check_radio(scenario.radio)
+    except BadInput as error:
+        raise BadInput(where, ".".join(part for part in (key, error.key) if part), error.expected) from None

@@ -1,0 +1,167 @@
+"""The air of a loop whose crew takes its time: packets are put on it, and heard, also in the middle of a tick.
+
+    a tick begins    `begin`      what became final since the last tick, for observers; what of it nobody was handed yet
+    it goes on       `send`       packets come: those of a step wait for their robot's turn, others go out at once
+                     `advance`    what is heard is handed over when it is due
+
+When which part of a packet's way is asked for changes nothing of it; so a run is repeated from what came in, and when.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.clock import Clock, tick_start_ns, to_ns
+from swarmwire.comms.interfaces import AirTime, Put
+from swarmwire.comms.packets import Heard, Outcomes, Sent
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.results import News
+from swarmwire.comms.truth import Static
+from swarmwire.world.backends.pacing import Pace
+
+NEVER_NS = 2**63 - 1
+
+
+class AirInTime:
+    """An air between `begin` of one tick and that of the next."""
+
+    def __init__(self, air: Air, static: Static, addressable: Callable[[Sent], Sent]) -> None:
+        """`addressable` makes packets fit for the air, and counts what was wrong with them."""
+        self._air, self._static, self._addressable = air, static, addressable
+        self._rows = static.arenas * static.robots
+        self._waiting = Sent.none()  # (k,) that were put on the air, each until its robot's turn comes
+        self._turn_ns = np.empty(0, np.int64)  # (k,) NEVER_NS: it came
+        self._next_ns = NEVER_NS  # the first turn to come
+        self._now_ns = 0
+
+    def begin(self, start_ns: int) -> tuple[News, Heard, Outcomes]:
+        """Let the tick end that is under way; what became final in it, and what of that was not handed over."""
+        self._release(start_ns)
+        self._now_ns = start_ns
+        # What has been heard by now was heard, also by who dies now: as if it had been handed over in the tick.
+        heard, outcomes = self._air.advance_within(start_ns)
+        return self._air.advance(start_ns), heard, outcomes
+
+    def send(self, put: Put) -> None:
+        """Take packets that came no sooner than those before them, and within the tick."""
+        if not len(put.sent):
+            return
+        at_ns = max(put.at_ns, self._now_ns)
+        self._release(at_ns)
+        sent = self._addressable(put.sent)
+        if put.tick is None:
+            self._air.send_at(np.full(self._rows, at_ns), sent)
+            return
+        start_ns = tick_start_ns(put.tick, self._static.rate_hz)
+        turn_ns = np.maximum(at_ns, self._air.turns(start_ns, put.tick)[sent.sender])
+        waits = np.flatnonzero(self._turn_ns < NEVER_NS)
+        self._waiting = Sent.joined([self._waiting.select(waits), sent]) if len(waits) else sent
+        self._turn_ns = np.concatenate((self._turn_ns[waits], turn_ns))
+        self._next_ns = int(self._turn_ns.min())
+        self._release(at_ns)
+
+    def advance(self, until_ns: int) -> tuple[Heard, Outcomes]:
+        """Let time pass; what robots heard, and learned of their packets, that nobody was handed before."""
+        self._release(until_ns)
+        self._now_ns = until_ns
+        return self._air.advance_within(until_ns)
+
+    def leave(self, over: BoolArray) -> None:
+        """The arenas (arenas,) are over: what waits there for a turn is the air's to end."""
+        self._release(NEVER_NS, over)
+
+    def end(self) -> None:
+        """The run is over: what waits for a turn is the air's to end."""
+        self._release(NEVER_NS)
+
+    def _release(self, until_ns: int, arenas: BoolArray | None = None) -> None:
+        """Hand to the radios what robots, of these arenas (arenas,), send until then, in the order of their turns."""
+        while self._next_ns <= until_ns and self._next_ns < NEVER_NS:
+            due = self._turn_ns <= min(until_ns, NEVER_NS - 1)
+            if arenas is not None:
+                due &= arenas[self._waiting.sender // self._static.robots]
+            place = np.flatnonzero(due)
+            if not len(place):
+                return
+            sender, turn_ns = self._waiting.sender[place], self._turn_ns[place]
+            # A robot's packets stand in the order in which it sent them, which is that of their turns.
+            first_ns = np.full(self._rows, NEVER_NS)
+            first_ns[sender[::-1]] = turn_ns[::-1]
+            going = place[turn_ns == first_ns[sender]]
+            self._air.send_at(first_ns, self._waiting.select(going))
+            self._turn_ns[going] = NEVER_NS
+            self._next_ns = int(self._turn_ns.min())
+
+
+# --- A tick in quanta: the loop wakes many times in it, to take in what came and hand over what is due.
+#
+# In every quantum `take_in` gives what agents sent since, with the time at which it came; these packets go on the air,
+# it advances to now, and `hand_over` takes what was heard. So once more at the tick's end, where commands are taken as
+# ever.
+
+
+MEAN_OF = 16  # sleeps, about: that were late
+SHARE_EARLY = 5  # of a quantum, at most, that a sleep is shorter: a machine that wakes later than that is busy
+
+
+class Exchange(Protocol):
+    """Whoever carries packets between agents and air."""
+
+    def take_in(self) -> Sequence[Put]:
+        """Packets that agents sent since the last call, `at_ns` in wall time."""
+        ...
+
+    def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> None:
+        """Hand this to those that it is for, now, at `at_ns` of simulated time."""
+        ...
+
+
+class Quanta:
+    """The quanta of ticks, by the wall clock.
+
+    Attributes:
+        quantum_s: wall time.
+    """
+
+    def __init__(self, clock: Clock, pace: Pace, rate_hz: int, quantum_s: float) -> None:
+        self.quantum_s = quantum_s
+        self._clock, self._pace, self._rate_hz, self._quantum_ns = clock, pace, rate_hz, to_ns(quantum_s)
+        self._last_ns = 0  # up to which the air has advanced
+        self._wakes_late_ns = 0  # by how much sleeps ended late, of late
+
+    def pass_tick(self, tick: int, air: AirTime, exchange: Exchange) -> None:
+        """Return once the tick is over by the wall clock, and all that is due by then was handed over."""
+        last_ns = self._pace.over_ns(tick) - self._quantum_ns  # later, there may not be the time before the tick's end
+        wake_ns = self._clock.now_ns()
+        while wake_ns <= last_ns:
+            self._sleep_until(wake_ns)
+            self.exchange(tick, air, exchange)
+            # Whoever woke late goes on from there: quanta that were missed are not made up for.
+            wake_ns = max(wake_ns + self._quantum_ns, self._clock.now_ns())
+        self._pace.hold(tick)
+        self.exchange(tick, air, exchange)
+
+    def _sleep_until(self, at_ns: int) -> None:
+        """Sleep, for less by what the machine takes to wake; a little early or late does not matter here."""
+        early_ns = at_ns - min(self._wakes_late_ns, self._quantum_ns // SHARE_EARLY)
+        if self._clock.now_ns() < early_ns:
+            self._clock.sleep_until(early_ns)
+            self._wakes_late_ns += (self._clock.now_ns() - early_ns - self._wakes_late_ns) // MEAN_OF
+
+    def exchange(self, tick: int, air: AirTime, exchange: Exchange) -> None:
+        """Take in what came, and hand over what is due."""
+        pace, came = self._pace, exchange.take_in()
+        start_ns, end_ns = (tick_start_ns(of, self._rate_hz) for of in (tick, tick + 1))
+        now_ns = min(max(start_ns, pace.simulated_ns(self._clock.now_ns()), self._last_ns), end_ns)
+        from_ns = max(start_ns, self._last_ns)
+        for put in came:
+            # The network's threads put in what came in nearly the order in which it did.
+            from_ns = min(max(from_ns, pace.simulated_ns(put.at_ns)), now_ns)
+            air.send(put._replace(at_ns=from_ns))
+        self._last_ns = now_ns
+        heard, outcomes = air.advance(now_ns)
+        if len(heard) or len(outcomes):
+            exchange.hand_over(tick, now_ns, heard, outcomes)
+            pace.handed_over(heard.heard_at_ns)
