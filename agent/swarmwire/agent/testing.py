@@ -1,4 +1,7 @@
-"""What robots did in a tick, as names and values that can be compared and shown."""
+"""Checks for agents: two classes that are the same rule, and rows that do not see one another.
+
+Both feed made-up senses and packets through the same host that runs agents anywhere.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,6 +21,8 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.messages import DICT_TAG, decode_dict, message_classes
 from swarmwire.comms.packets import BROADCAST, TAG_BYTES, UNTOLD, Sent
 from swarmwire.comms.tick_io import Actions, GroupSenses
+
+__all__ = ["Trial", "assert_equivalent", "assert_rows_independent"]
 
 Deed = tuple[int, str, str]  # robot, what it did, and the value, exactly
 SPEEDS = ("linear_mps", "angular_radps", "lateral_mps")

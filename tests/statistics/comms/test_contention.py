@@ -9,8 +9,8 @@ from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.analysis.contention import contention
 from swarmwire.comms.radio.config.phy import Antenna, Noise, Reception
 from swarmwire.comms.radio.config.radio import Radio
-from tests.support.comms.air.runs import at, make_air, packets, run
-from tests.support.comms.air.signal.radios import with_access
+from tests.support.comms.radio.phy.radios import with_access
+from tests.support.comms.radio.runs import at, make_air, packets, run
 
 CSMA = replace(with_access("csma-802154"), send_offset="uniform", queue_limit=10**6)
 DCF_B = replace(

@@ -11,10 +11,10 @@ from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.truth import Static, Truth
-from tests.support.comms.air.runs import make_air, scattered
-from tests.support.comms.air.signal.radios import with_access
+from tests.support.comms.radio.phy.radios import with_access
+from tests.support.comms.radio.runs import make_air, scattered
 from tests.support.metrics.truths import static, truth
-from tests.unit.comms.air.test_accounts import OBSTACLES, random_traffic
+from tests.unit.comms.radio.test_accounts import OBSTACLES, random_traffic
 
 DISK = Radio(range_m=2.0, loss=0.2, latency_s=0.15, jitter_s=0.1, bit_rate_bps=20_000, queue_limit=2)
 RADIOS = (

@@ -18,7 +18,7 @@ PYTEST = ["-m", "pytest", "-q", "-m", "not slow", "-n", "2", "--dist", "workstea
 AGAIN = ["--reruns", "1", "--only-rerun", "ZError", "--only-rerun", "it did not come to hold"]  # as `make test`
 PLAIN = ["-p", "tests.tools.coverage.plain_kernels", "tests/unit/comms", "tests/unit/world"]
 THREADS = ["-p", "tests.tools.coverage.network_threads"]
-UNITS = [f"tests/unit/{folder}" for folder in ("agent", "comms/wire", "world/crews", "world/gateways")]
+UNITS = [f"tests/unit/{folder}" for folder in ("agent", "comms/wire", "world/backends", "world/gateways")]
 PROCESSES = [f"tests/integration/{part}" for part in ("agent", "robots", "comms", "world")]
 AS_USED = [*THREADS, *UNITS, *PROCESSES]
 

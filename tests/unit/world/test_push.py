@@ -11,7 +11,7 @@ from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import changed, posed
-from tests.unit.world.test_events import Ahead, Watch
+from tests.unit.world.test_event_scheduler import Ahead, Watch
 
 ENGINES = ["discs", "pymunk"]
 

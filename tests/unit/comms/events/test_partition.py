@@ -11,7 +11,7 @@ from swarmwire.comms.events.effects import Conditions
 from swarmwire.comms.events.partition import Partition, Region
 from swarmwire.comms.events.selection import Swarm
 from swarmwire.comms.radio.config.radio import Radio
-from tests.support.comms.air.runs import RATE_HZ, Run, at, everybody, make_air
+from tests.support.comms.radio.runs import RATE_HZ, Run, at, everybody, make_air
 
 # Robots a-0 to a-3 and b-0 to b-1, all in reach of one another.
 POSE = at((-1, 0.5), (-0.5, -0.5), (-0.2, 0.3), (0.3, -0.2), (0.6, 0.7), (1, -0.7))

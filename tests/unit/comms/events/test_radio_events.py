@@ -16,7 +16,7 @@ from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import number_of
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, NO_ROBOT, Jammers
-from tests.support.comms.air.signal.radios import WIFI_B
+from tests.support.comms.radio.phy.radios import WIFI_B
 
 SWARM = Swarm({"a": range(3)}, 3, np.array([7], np.uint64), np.zeros((3, 3)))
 

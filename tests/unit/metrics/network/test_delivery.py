@@ -16,7 +16,7 @@ from swarmwire.metrics.network import link_counts
 from swarmwire.metrics.network.link_counts import LinkCounts
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.network.robot_counts import RobotCounts
-from tests.support.comms.air.runs import make_air, packets
+from tests.support.comms.radio.runs import make_air, packets
 from tests.support.metrics.radio_runs import radio_runs, rows_of
 from tests.support.metrics.recorded import links
 from tests.support.metrics.truths import departed, finished, in_each_tick, measured, static, tally, truth, watch

@@ -14,7 +14,7 @@ from swarmwire.metrics.network import age_of_information
 from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
 from swarmwire.metrics.network.pdr import PacketDeliveryRatio
 from swarmwire.metrics.network.windowed import Window
-from tests.support.comms.air.runs import make_air, packets
+from tests.support.comms.radio.runs import make_air, packets
 from tests.support.metrics.radio_runs import radio_runs, rows_of
 from tests.support.metrics.recorded import links
 from tests.support.metrics.truths import finished, in_each_tick, static, tally, truth

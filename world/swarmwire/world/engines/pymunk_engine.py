@@ -85,8 +85,8 @@ def push(
 #
 # A space has its own coordinates, so an arena moves bit for bit alike alone and beside others. What is chosen here:
 #
-# - `SLOP_M`: bodies at rest overlap by this much, so that contacts persist. Pymunk's default of 0.1 length units is more
-#   than an e-puck's radius.
+# - `SLOP_M`: bodies at rest overlap by this much, so that contacts persist. Pymunk's default of 0.1 length units is
+#   more than an e-puck's radius.
 # - `ITERATIONS` of the contact solver as in ARGoS, whose engine is the same library.
 # - `FRICTION` 0.7 on everything (the coefficient of a contact is the product of both sides'), no bounce.
 # - Walls are as thick as two of the widest robots, so that no crowd is pushed through them.

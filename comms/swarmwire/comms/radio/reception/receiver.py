@@ -14,14 +14,15 @@ from numba import njit
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.radio.config.phy import Reception, SuccessTable
 from swarmwire.comms.radio.propagation.decibels import from_db
-from swarmwire.comms.radio.reception import error_rates
 from swarmwire.comms.radio.reception.error_rates import (
+    OFDM_RATES_BPS,
     dsss_success,
     ofdm_success,
     oqpsk_success,
     table_success,
     threshold_success,
 )
+from swarmwire.comms.radio.timing import DSSS_RATES_BPS
 
 
 class Model(IntEnum):
@@ -66,13 +67,13 @@ def ieee802154() -> Receiver:
 
 
 def ieee80211b(rate_bps: int) -> Receiver:
-    """A receiver of IEEE 802.11b at one of `dsss.RATES_BPS`; ValueError at any other."""
-    return Receiver(_DSSS, error_rates.DSSS_RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
+    """A receiver of IEEE 802.11b at one of DSSS_RATES_BPS; ValueError at any other."""
+    return Receiver(_DSSS, DSSS_RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
 
 
 def ieee80211ag(rate_bps: int) -> Receiver:
-    """A receiver of IEEE 802.11a or g at one of `ofdm.RATES_BPS`; ValueError at any other."""
-    return Receiver(int(Model.OFDM), error_rates.OFDM_RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
+    """A receiver of IEEE 802.11a or g at one of OFDM_RATES_BPS; ValueError at any other."""
+    return Receiver(int(Model.OFDM), OFDM_RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
 
 
 def receiver_of(reception: Reception, bit_rate_bps: int) -> Receiver:

@@ -1,0 +1,408 @@
+"""The remote crew over a real unix socket, with real runners: what it does, and what nobody can do to it."""
+
+import os
+import queue
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Generator, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+
+from swarmwire.agent import runner
+from swarmwire.agent.local_backend import LocalCrew
+from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.clock import WallClock, to_ns
+from swarmwire.comms.errors import AgentFailed, BadInput, Interrupted, RunnerLost
+from swarmwire.comms.packets import Heard
+from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.join import JoinRequest
+from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
+from swarmwire.world.backends import zenoh_backend
+from swarmwire.world.backends.registry import RunnerHealth
+from swarmwire.world.backends.zenoh_backend import RemoteCrew, Surroundings
+from tests.support.agent.hosts import GIVES, assignment, group, heard_from, one_group, plain, spec
+from tests.support.waiting import PATIENCE_S
+
+RUN = "r1"
+ROWS = [0, 1, 2, 3, 4]
+TIMEOUT_S = 20.0
+
+
+@pytest.fixture
+def endpoint() -> Iterator[str]:
+    with tempfile.TemporaryDirectory(prefix="sw-", dir="/tmp") as directory:  # a socket's path must be short
+        yield unix_endpoint(f"{directory}/world")
+
+
+def parts(agent: str, *rows: list[int]) -> list[Assignment]:
+    return [assignment(group(spec(agent), own)) for own in rows]
+
+
+@contextmanager
+def opened(endpoint: str, slots: list[Assignment], timeout_s: float = TIMEOUT_S) -> Generator[RemoteCrew]:
+    crew = RemoteCrew(endpoint, RUN, slots, timeout_s, WallClock(), start_s=timeout_s)
+    try:
+        crew.open()
+        yield crew
+    finally:
+        crew.close()
+
+
+@contextmanager
+def processes(endpoint: str, names: list[str], agent: str = "Chatter") -> Generator["subprocess.Popen[bytes]"]:
+    """A nursery and its runners; none is left afterwards, whatever happened."""
+    command = [sys.executable, "-m", "swarmwire.agent.fork_server", endpoint, RUN, spec(agent), *names]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True, env=environment
+    ) as nursery:
+        try:
+            yield nursery
+        finally:
+            if nursery.stdin is not None:
+                nursery.stdin.close()  # the life line: it ends all that are left
+            nursery.wait(10.0)
+
+
+@contextmanager
+def thread(endpoint: str, name: str) -> Generator["queue.SimpleQueue[BaseException | None]"]:
+    """A runner in this process; its end is put into the queue."""
+    ends: queue.SimpleQueue[BaseException | None] = queue.SimpleQueue()
+
+    def play() -> None:
+        try:
+            runner.run(endpoint, RUN, name)
+        except BaseException as error:  # noqa: BLE001 - the test asks how it ended
+            ends.put(error)
+        else:
+            ends.put(None)
+
+    playing = threading.Thread(target=play)
+    playing.start()
+    try:
+        yield ends
+    finally:
+        playing.join(20.0)
+        assert not playing.is_alive()
+
+
+def three_ticks(crew: RemoteCrew, rows: list[int]) -> None:
+    for tick in range(3):
+        crew.act(tick, one_group(tick, rows), Heard.none(GIVES))
+
+
+def hear(before: Actions | None) -> Heard:
+    return Heard.none(GIVES) if before is None else heard_from(before.sent, ROWS)
+
+
+@pytest.mark.parametrize("rows", [[ROWS], [[0, 2, 4], [1, 3]], [[row] for row in ROWS]], ids=["one", "two", "each"])
+def test_runners_do_exactly_what_the_local_crew_does(endpoint: str, rows: list[list[int]]) -> None:
+    local = LocalCrew(assignment(group(spec("Chatter"), ROWS)))
+    local.start()
+    before: Actions | None = None
+    names = [f"r{i}" for i in range(len(rows))]
+    with processes(endpoint, names) as nursery:
+        with opened(endpoint, parts("Chatter", *rows)) as crew:
+            crew.start()
+            for tick in range(6):
+                acting = [row for row in ROWS if (row + tick) % 4]  # robots drop out and come back
+                expected = local.act(tick, one_group(tick, acting), hear(before))
+                got = crew.act(tick, one_group(tick, acting), hear(before))
+                assert plain(got) == plain(expected)
+                assert len(expected.sent) == 3 * len(acting)
+                before = expected
+            assert not crew.counts()
+        assert nursery.wait(10.0) == 0  # told that the run is over, they leave by themselves
+    assert nursery.stdout is not None
+
+
+def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
+    keys = Keys(RUN)
+    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as crew:
+        crew.start()
+        with open_runner(endpoint) as foreign:
+            for key in (keys.answer("r0"), keys.answer("stranger"), keys.alive("stranger")):
+                foreign.put(key, b"\xc1 no frame")
+            foreign.put(keys.answer("r0"), frames.encode("actions", 10**9, {}))
+            foreign.put(keys.answer("r0"), frames.encode("ready", 0, {}))
+            foreign.delete(keys.answer("r0"))
+            asked = [
+                foreign.get(key, payload=payload)
+                for key, payload in (
+                    (keys.join("x"), b"\xc1"),
+                    (keys.any_join, JoinRequest().encode()),
+                    (keys.join("x"), JoinRequest().encode()),
+                )
+            ]
+            names = {"malformed_frames", "unknown_runner_frames", "wrong_tick_frames", "unexpected_kind_frames"}
+            tick = 0
+            while not names | {"bad_join", "refused_join"} <= set(crew.counts()) or crew.counts()["bad_join"] < 2:
+                got = crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
+                tick += 1
+                assert got.linear_mps.tolist() == [float(tick)] * len(ROWS)
+            errors = [reply.err for replies in asked for reply in replies]
+        texts = [error.payload.to_string() if error else "granted" for error in errors]
+        assert [text.split()[0] for text in texts] == ["malformed:", "expected", "all"]
+        got = crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
+        assert got.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
+        assert set(crew.counts()) == names | {"bad_join", "refused_join"}
+
+
+def test_a_runner_that_vanishes_is_lost_and_its_robots_are_named(endpoint: str) -> None:
+    slots = parts("Vanishing", [0, 3, 4], [1, 2])  # in tick 2 it is robots 0 and 4 whose compass shows more than 0
+    with processes(endpoint, ["a", "b"], "Vanishing") as nursery:
+        with opened(endpoint, slots) as crew:
+            crew.start()
+            with pytest.raises(RunnerLost) as caught:
+                three_ticks(crew, ROWS)
+            assert caught.value.robots == "flock-0, flock-3, flock-4"
+            assert caught.value.runner in {"a", "b"}
+            assert "gone" in caught.value.reason
+        assert nursery.stdout is not None
+        assert nursery.stdout.readline().split()[1] == b"3"  # the nursery tells the exit code
+
+
+def test_a_failing_agent_ends_the_run_with_its_own_traceback(endpoint: str) -> None:
+    with processes(endpoint, ["a", "b"], "Failing") as nursery:
+        with opened(endpoint, parts("Failing", [0, 1], [2, 3])) as crew:
+            crew.start()
+            with pytest.raises(AgentFailed) as caught:
+                three_ticks(crew, [0, 1, 2, 3])
+        assert nursery.wait(10.0) == 0
+    assert caught.value.robots == "flock-0"
+    assert "NotDeclared" in caught.value.traceback
+    assert "print(robot.proximity)" in caught.value.traceback
+
+
+def test_an_agent_that_cannot_be_made_ends_the_run_before_its_first_tick(endpoint: str) -> None:
+    with thread(endpoint, "r0") as ends, opened(endpoint, parts("Unmade", [0, 1])) as crew:
+        with pytest.raises(AgentFailed) as caught:
+            crew.start()
+        crew.close()
+        assert ends.get(timeout=20.0) is None
+    assert caught.value.robots == "flock-0, flock-1"
+    assert "no memory left" in caught.value.traceback
+
+
+def test_an_agent_that_is_not_there_ends_the_run_with_the_reason(endpoint: str) -> None:
+    fails = pytest.raises(AgentFailed, match="no such name: 'Nowhere'")
+    with thread(endpoint, "r0"), opened(endpoint, parts("Nowhere", [0])) as crew, fails:
+        crew.start()
+
+
+def test_a_runner_too_many_is_told_so(endpoint: str) -> None:
+    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as crew:
+        crew.start()
+        with thread(endpoint, "r1") as ends:
+            tick = 0
+            while "refused_join" not in crew.counts():
+                crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
+                tick += 1
+            end = ends.get(timeout=20.0)
+        crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))  # that it left does not matter
+        crew.close()
+    assert isinstance(end, RunnerLost)
+    assert end.reason == "all robots are taken"
+
+
+def test_a_runner_may_come_before_its_world(endpoint: str) -> None:
+    for _ in range(8):  # a world that listens but cannot answer yet is but a moment: one try would rarely meet it
+        with thread(endpoint, "r0") as ends:
+            with opened(endpoint, parts("Counter", [0])) as crew:
+                crew.start()
+            assert ends.get(timeout=20.0) is None
+
+
+def test_a_runner_whose_world_does_not_come_says_so(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "JOIN_S", 0.1)
+    with pytest.raises(RunnerLost, match="r0 got no robots: no connection to its world within 0.1 s"):
+        runner.run(endpoint, RUN, "r0")
+
+
+def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many_more(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(zenoh_backend, "POLL_S", PATIENCE_S)  # it would answer nobody while it waits for more to come
+    keys, slots = Keys(RUN), parts("Counter", *([row] for row in ROWS))
+    with opened(endpoint, slots) as crew, ThreadPoolExecutor() as others, open_runner(endpoint) as asking:
+        started = others.submit(crew.start)
+        for row in ROWS:
+            (reply,) = asking.get(keys.join(f"r{row}"), payload=JoinRequest().encode(), timeout=TIMEOUT_S)
+            assert reply.ok is not None
+            asking.put(keys.answer(f"r{row}"), frames.encode("ready", -1, {}))
+        started.result(PATIENCE_S)
+
+
+def test_when_nobody_joins_the_wait_ends_at_the_time_out(endpoint: str) -> None:
+    with opened(endpoint, parts("Counter", [0, 1]), timeout_s=0.05) as crew, pytest.raises(RunnerLost) as caught:
+        crew.start()
+    assert caught.value.robots == "flock-0, flock-1"
+    assert caught.value.reason == "no answer for 0.05 s"
+
+
+def test_trouble_ends_the_wait_at_once(endpoint: str) -> None:
+    crew = RemoteCrew(
+        endpoint, RUN, parts("Counter", [0]), 600.0, WallClock(), Surroundings(lambda: "its process ended")
+    )
+    try:
+        with pytest.raises(RunnerLost, match="its process ended"):
+            crew.start()
+    finally:
+        crew.close()
+
+
+def test_a_socket_in_use_is_bad_input_and_the_run_on_it_goes_on(endpoint: str) -> None:
+    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", [0])) as crew:
+        crew.start()
+        second = RemoteCrew(endpoint, "other", parts("Counter", [0]), TIMEOUT_S, WallClock())
+        with pytest.raises(BadInput, match="expected an endpoint that is free"):
+            second.open()
+        second.close()
+        got = crew.act(0, one_group(0, [0]), Heard.none(GIVES))
+        assert got.linear_mps.tolist() == [1.0]
+
+
+def test_a_socket_in_a_directory_that_is_not_there_is_bad_input(endpoint: str) -> None:
+    with pytest.raises(BadInput), opened(endpoint.replace("world", "nowhere/world"), parts("Counter", [0])):
+        pass
+
+
+def test_the_socket_that_a_dead_world_left_is_used_again(endpoint: str) -> None:
+    path = endpoint.split("/", 1)[1]
+    with socket.socket(socket.AF_UNIX) as dead:
+        dead.bind(path)
+    assert Path(path).is_socket()
+    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", [0])) as crew:
+        crew.start()
+        assert crew.act(0, one_group(0, [0]), Heard.none(GIVES)).linear_mps.tolist() == [1.0]
+
+
+def test_a_crew_may_be_closed_twice_and_before_it_opened(endpoint: str) -> None:
+    crew = RemoteCrew(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, WallClock())
+    crew.close()
+    crew.open()
+    crew.close()
+    crew.close()
+
+
+def test_runners_leave_when_the_world_is_killed(endpoint: str) -> None:
+    """A world in a process of its own, killed without a word."""
+    program = f"""
+from swarmwire.comms.clock import WallClock, to_ns
+from swarmwire.world.backends.zenoh_backend import RemoteCrew
+from tests.integration.world.backends.test_remote_crew import RUN, parts
+
+crew = RemoteCrew({endpoint!r}, RUN, parts("Counter", [0]), 60.0, WallClock())
+crew.start()
+print("started", flush=True)
+input()
+"""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment
+    ) as world:
+        try:
+            with thread(endpoint, "r0") as ends:
+                assert world.stdout is not None
+                assert world.stdout.readline() == b"started\n"
+                world.kill()
+                assert ends.get(timeout=20.0) is None
+        finally:
+            world.kill()
+
+
+def kill_one(nursery: "subprocess.Popen[bytes]") -> None:
+    child = psutil.Process(nursery.pid).children()[0]
+    child.kill()
+    child.wait(20.0)
+
+
+def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
+    with ExitStack() as later, processes(endpoint, ["a", "b"]) as nursery:
+        around = Surroundings(lost=lambda _: (later.enter_context(thread(endpoint, "c")), None)[1])
+        crew = RemoteCrew(endpoint, RUN, parts("Counter", [0, 1], [2]), TIMEOUT_S, WallClock(), around, "wait")
+        later.callback(crew.close)
+        crew.start()
+        for tick in range(2):
+            crew.act(tick, one_group(tick, [0, 1, 2]), Heard.none(GIVES))
+        kill_one(nursery)
+        got = crew.act(2, one_group(2, [0, 1, 2]), Heard.none(GIVES))
+        steps = dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True))
+        assert steps in ({0: 1.0, 1: 1.0, 2: 3.0}, {0: 3.0, 1: 3.0, 2: 1.0})
+        assert crew.counts() == {"runners_lost": 1, "runners_joined_late": 1}
+        crew.close()
+
+
+def test_a_run_that_waits_for_a_runner_can_be_ended(endpoint: str) -> None:
+    with processes(endpoint, ["a", "b"]) as nursery:
+        asked: list[bool] = []
+        around = Surroundings(stopped=lambda: bool(asked))
+        crew = RemoteCrew(endpoint, RUN, parts("Counter", [0], [1]), TIMEOUT_S, WallClock(), around, "wait")
+        try:
+            crew.start()
+            kill_one(nursery)
+            asked.append(True)
+            with pytest.raises(Interrupted):
+                crew.act(0, one_group(0, [0, 1]), Heard.none(GIVES))
+        finally:
+            crew.close()
+
+
+class LeapingClock(WallClock):
+    """The wall clock, which a test may set forward."""
+
+    def __init__(self) -> None:
+        self.ahead_ns = 0
+
+    def now_ns(self) -> int:
+        return super().now_ns() + self.ahead_ns
+
+
+def test_a_pause_between_ticks_that_is_longer_than_the_time_out_loses_no_runner(endpoint: str) -> None:
+    clock = LeapingClock()
+    with thread(endpoint, "r0") as ends:
+        crew = RemoteCrew(endpoint, RUN, parts("Counter", ROWS), TIMEOUT_S, clock)
+        with closing(crew):
+            crew.start()
+            for tick in range(3):
+                actions = crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
+                assert actions.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
+                clock.ahead_ns += to_ns(10 * TIMEOUT_S)
+            assert not crew.counts()
+            assert crew.health() == RunnerHealth(ready=1, lost=0)
+        assert ends.get(timeout=20.0) is None
+
+
+def test_time_for_which_the_world_itself_was_frozen_is_no_runners_fault(endpoint: str) -> None:
+    """A runner is slow, and meanwhile the world is frozen for longer than its time-out; both go on together."""
+    clock, waits = LeapingClock(), list[RunnerHealth]()
+    with processes(endpoint, ["a"]) as nursery:
+
+        def frozen() -> bool:
+            if crew.health().ready and not waits:
+                waits.append(crew.health())
+                clock.ahead_ns += to_ns(10 * TIMEOUT_S)
+                child.resume()
+            return False
+
+        crew = RemoteCrew(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, clock, Surroundings(stopped=frozen))
+        with closing(crew):
+            crew.start()
+            child = psutil.Process(nursery.pid).children()[0]
+            waits.clear()
+            child.suspend()
+            actions = crew.act(0, one_group(0, [0]), Heard.none(GIVES))
+            assert actions.linear_mps.tolist() == [1.0]
+            assert waits[0].waits_s > 0
+            assert waits[0].waits_for == "a, which plays flock-0"
+            assert crew.health() == RunnerHealth(ready=1, lost=0)
+            crew.close()

@@ -1,0 +1,180 @@
+"""Presets do what their sources say; defaults of parameters are within their limits, and each has help."""
+
+import math
+from dataclasses import MISSING, fields, is_dataclass, replace
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.config import fault_of, limits_of
+from swarmwire.comms.radio.analysis.contention import Contention, contention
+from swarmwire.comms.radio.config.phy import Access
+from swarmwire.comms.radio.config.presets import PRESETS
+from swarmwire.comms.radio.config.radio import Radio, acknowledgement_bytes, airtime_ns
+from swarmwire.comms.radio.phy.propagation import range_of, receiver_for, sensitivity_of
+from swarmwire.comms.radio.propagation.path_loss import loss_db
+from swarmwire.comms.radio.reception.receiver import chunk_success
+from tests.support.comms.radio.parameter_modules import MODULES
+from tests.support.comms.radio.runs import at, make_air, packets, run
+from tests.unit.world.scenario.test_radio_tables import radio_of
+
+NEW = ("ble-1M", "kilobot", "gz-rfcomms", "subt", "acoustic")
+GAZEBO = ("gz-rfcomms", "subt")
+
+
+def preset(name: str, **others: Any) -> Radio:
+    return radio_of({"preset": name, **others})
+
+
+def airtime_us(radio: Radio, payload_bytes: int) -> float:
+    return float(airtime_ns(radio, np.array([payload_bytes + radio.overhead_bytes]))[0]) / 1e3
+
+
+@pytest.mark.parametrize(("name", "us"), [("ieee802154", 352), ("wifi-b-1M", 304), ("wifi-a-6M", 44)])
+def test_an_acknowledgement_takes_as_long_as_the_standard_says(name: str, us: int):
+    radio = preset(name)
+    assert airtime_ns(radio, np.array([acknowledgement_bytes(radio)])).tolist() == [us * 1000]
+
+
+def in_one_spot(radio: Radio, nodes: int, payload_bytes: int, interval_s: float, runs: int) -> Contention:
+    return contention(radio, nodes, payload_bytes, interval_s, range(1, runs + 1), measured_s=4.0 * interval_s)
+
+
+@pytest.mark.parametrize(
+    ("name", "payload_bytes", "us"),
+    [
+        ("ble-1M", 27, 376.0),  # 31 bytes of data and 6 of address: the longest legacy advertisement
+        ("kilobot", 11, 3200.0),  # 12 bytes at 30 kbit/s
+        ("acoustic", 64, 1_100_000.0),  # 512 bits at 463 bit/s take 1.106 s
+        ("gz-rfcomms", 1500, 222.223),
+        ("subt", 1500, 12_000.0),
+    ],
+)
+def test_the_longest_frame_takes_as_long_as_the_source_says(name: str, payload_bytes: int, us: float):
+    assert preset(name).max_payload_bytes == payload_bytes
+    assert airtime_us(preset(name), payload_bytes) == pytest.approx(us, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", NEW)
+def test_a_pair_hears_within_the_reach_and_not_beyond(name: str):
+    """Without shadowing, which would make it a question of place; frames of 4 bytes."""
+    radio = replace(preset(name), shadowing=None, send_offset="tick")
+    range_m = range_of(radio)
+    assert range_m is not None
+    for share, heard in ((0.5, True), (1.3, False)):
+        # One sends: two modems that call at once would not hear each other.
+        told = run(make_air(radio, 2), at((0, 0), (share * range_m, 0)), lambda _: packets([0], size=4), 1, 60)
+        assert told.fates() == ({"HEARD": 1} if heard else {"OUT_OF_RANGE": 1})
+
+
+def test_bluetooth_has_one_bit_in_a_thousand_wrong_at_its_sensitivity():
+    radio = preset("ble-1M")
+    sinr = 10.0 ** (0.1 * (sensitivity_of(radio) - radio.noise_or_default.power_dbm))
+    assert 1.0 - chunk_success(receiver_for(radio), sinr, 1) == pytest.approx(1e-3, rel=0.05)
+
+
+@pytest.mark.parametrize("name", GAZEBO)
+@pytest.mark.parametrize("sinr_db", [3.25, 5.0, 6.25, 8.0, 9.75])
+def test_losses_are_those_of_gazebos_formula(name: str, sinr_db: float):
+    sinr = 10.0 ** (0.1 * sinr_db)
+    found = chunk_success(receiver_for(preset(name)), sinr, 8 * 100)
+    assert found == pytest.approx((1.0 - math.erfc(math.sqrt(sinr))) ** 100, abs=0.01)
+
+
+def test_the_simulators_have_their_noise_path_loss_and_reach():
+    assert [preset(name).noise_or_default.power_dbm for name in GAZEBO] == pytest.approx([-90.0, -90.0], abs=1e-3)
+    assert [range_of(preset(name)) for name in GAZEBO] == [50.0, 500.0]
+    gazebo, subt = (preset(name).loss_model.curve(2.4e9) for name in GAZEBO)
+    for distance_m in (2.0, 30.0, 400.0):
+        assert loss_db(gazebo, distance_m) == pytest.approx(40.0 + 25.0 * math.log10(distance_m))
+        assert loss_db(subt, distance_m) == pytest.approx(40.0 + 15.0 * math.log10(0.55 * distance_m), abs=1e-3)
+
+
+def test_sound_spreads_is_absorbed_and_reaches_as_far_as_in_trials():
+    radio = preset("acoustic")
+    curve, range_m = radio.loss_model.curve(radio.frequency_hz), range_of(radio)
+    # Thorp at 28 kHz: 0.11 f2/(1 + f2) + 44 f2/(4100 + f2) + 0.000275 f2 + 0.003 dB/km, f2 = 784.
+    assert loss_db(curve, 1000.0) == pytest.approx(60.0 + 7.39, abs=0.05)
+    assert range_m is not None
+    assert 3000.0 < range_m < 4000.0
+    assert loss_db(curve, range_m) == pytest.approx(27.2 - sensitivity_of(radio), abs=1e-6)
+
+
+@pytest.mark.parametrize("model", ["disk", "log-distance"])
+def test_what_is_slow_is_heard_later_with_distance(model: str):
+    """150 m at 1500 m/s take 100 ms, 75 m half of it; of the disk and of signals."""
+    place = at((0, 0), (75, 0), (150, 0))
+    radio = Radio(200.0, model=model, send_offset="tick", latency_s=0.01, bit_rate_bps=10**6)
+    for speed_mps, later_ns in ((None, [0, 0]), (1500.0, [50_000_000, 100_000_000])):
+        slow = replace(radio, propagation_mps=speed_mps)
+        told = run(make_air(slow, 3), place, lambda _: packets([0]), 1, 3)
+        assert (told.heard("heard_at_ns") - 10_000_000 - 80_000).tolist() == later_ns
+
+
+def test_fading_of_sound_goes_by_its_own_wavelength():
+    """28 kHz at 1500 m/s have 5.36 cm, as 5.6 GHz have in air: the same strengths, to the last bit."""
+    fading = {"distribution": "rayleigh"}
+    sound = preset("acoustic", fading=fading, gives={"rssi": {}}, frequency_hz=30e3, propagation_mps=3e3)
+    like = preset("acoustic", fading=fading, gives={"rssi": {}}, frequency_hz=3e9, propagation_mps=3e8)
+    place = at((0, 0), (10, 0), (0, 14))
+    strengths = [
+        run(make_air(radio, 3), place, lambda _: packets([0], size=4), 1, 20).given("rssi_dbm").tolist()
+        for radio in (sound, like)
+    ]
+    assert len(strengths[0]) == 2
+    assert strengths[0] == strengths[1]
+
+
+def test_advertisements_collide_as_in_pure_aloha():
+    """9 others, each on air 376 us in 10 ms: heard if none starts 376 us before or after; 800 packets x 9."""
+    found = in_one_spot(preset("ble-1M"), 10, 27, 0.01, runs=20)
+    assert found.packets == 800
+    assert found.delivery_ratio == pytest.approx((1.0 - 2.0 * 0.0376) ** 9, abs=0.05)
+
+
+def test_kilobots_listen_before_they_send():
+    """20 in one spot, twice a second, as Kilobots do: without carrier sense a fifth would be lost."""
+    found = in_one_spot(preset("kilobot"), 20, 11, 0.5, runs=20)
+    blind = in_one_spot(replace(preset("kilobot"), access=Access("aloha")), 20, 11, 0.5, runs=20)
+    assert blind.delivery_ratio == pytest.approx((1.0 - 2.0 * 3.2 / 500.0) ** 19, abs=0.05)
+    assert found.delivery_ratio > 0.95
+    assert found.access_failure_share == 0.0
+
+
+@pytest.mark.parametrize("name", GAZEBO)
+def test_simulated_radios_never_disturb_one_another(name: str):
+    assert in_one_spot(replace(preset(name), send_offset="tick"), 10, 100, 0.1, runs=1).delivery_ratio == 1.0
+
+
+def test_modems_that_call_at_once_hear_nothing_of_each_other():
+    together = in_one_spot(replace(preset("acoustic"), send_offset="tick"), 2, 4, 1.0, runs=2)
+    assert together.delivery_ratio == 0.0
+    assert 0.2 < in_one_spot(preset("acoustic"), 2, 4, 1.0, runs=20).delivery_ratio < 0.6
+
+
+@pytest.mark.parametrize("name", NEW)
+def test_what_a_preset_leaves_out_is_told(name: str):
+    assert PRESETS[name].otherwise
+
+
+PARAMETERS = {
+    thing
+    for module in MODULES
+    for thing in vars(import_module(module)).values()
+    if isinstance(thing, type) and is_dataclass(thing) and thing.__module__ == module
+}
+
+
+@pytest.mark.parametrize("kind", sorted(PARAMETERS, key=lambda one: one.__name__))
+def test_defaults_are_within_limits_and_every_parameter_has_help(kind: type):
+    for field in fields(kind):
+        limits = limits_of(field)
+        if "limits" not in field.metadata:
+            continue
+        assert limits.help, field.name
+        if isinstance(field.default, int | float):
+            assert fault_of(field.default, limits) is None, field.name
+        if limits.choices and field.default not in (MISSING, None):
+            assert field.default in limits.choices, field.name

@@ -1,0 +1,246 @@
+"""Over signals, how time, world or crew are divided changes nothing; each fate is computed once more from its draws."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.draws import derive_key, purpose, uniform
+from swarmwire.comms.packets import BROADCAST, Fate, SendResult, Sent
+from swarmwire.comms.radio.config.impairments import Bursts
+from swarmwire.comms.radio.phy.losses import passing_share
+from swarmwire.comms.radio.phy.params import rules_of
+from swarmwire.comms.radio.phy.reception import lone_deliveries
+from tests.support.comms.radio.phy.radios import METHODS, drawing, with_access
+from tests.support.comms.radio.runs import Run, at, everybody, make_air, packets, run, scattered
+
+ROBOTS = 8
+
+
+def story(told: Run, arena: int = 0) -> list[tuple[object, ...]]:
+    """Everything heard and every other fate in one arena."""
+    rows: list[tuple[object, ...]] = []
+    for one in told.news:
+        h, f = one.heard, one.finished
+        for i in np.flatnonzero(h.receiver // ROBOTS == arena):
+            given = tuple(column[i] for column in h.given.values())
+            rows.append((h.receiver[i] % ROBOTS, h.sender[i], h.sequence[i], h.heard_at_ns[i], *given))
+        columns = f.receiver, f.sender, f.sequence, f.fate, f.on_air_at_ns, f.final_at_ns
+        rows += [tuple(column[i] for column in columns) for i in np.flatnonzero(f.arena == arena)]
+    return sorted(rows)
+
+
+def traffic(arenas: int) -> Sent:
+    """Each robot sends two broadcasts and one packet to its neighbour."""
+    sender = np.repeat(np.arange(arenas * ROBOTS), 3)
+    to = np.where(np.arange(len(sender)) % 3 == 2, (sender + 1) % ROBOTS, BROADCAST)
+    return packets(sender, to)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_time_may_pass_in_any_pieces(method: str):
+    pose = scattered(ROBOTS) * [10.0, 10.0, 1.0]
+    stories = []
+    for pieces in (1, 2, 97):
+        air = make_air(drawing(method), ROBOTS)
+        told = Run(air)
+        for tick in range(4):
+            air.hold(pose + 0.01 * tick, np.ones(ROBOTS, bool))
+            air.send(tick * 10**8, tick, traffic(1))
+            for piece in range(1, pieces + 1):
+                told.news.append(air.advance(tick * 10**8 + 10**8 * piece // pieces))
+        stories.append(story(told))
+    assert len(stories[0]) > 200
+    assert stories[0] == stories[1] == stories[2]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_arena_alone_gives_the_same_as_beside_others(method: str):
+    seeds = (11, 12, 13)
+    pose = scattered(3 * ROBOTS) * [20.0, 20.0, 1.0]
+    beside = run(make_air(drawing(method), ROBOTS, seeds), pose, lambda _: traffic(3), 4, 2)
+    for arena, seed in enumerate(seeds):
+        own = pose[arena * ROBOTS : (arena + 1) * ROBOTS]
+        alone = run(make_air(drawing(method), ROBOTS, [seed]), own, lambda _: traffic(1), 4, 2)
+        assert story(alone) == story(beside, arena)
+
+
+def test_the_order_among_senders_is_indifferent():
+    pose, sent = scattered(ROBOTS) * [20.0, 20.0, 1.0], traffic(1)
+    index = np.arange(len(sent)).reshape(ROBOTS, 3)[::-1].ravel()
+    mixed = Sent(sent.sender[index], sent.to[index], sent.payloads.rows(index))
+    radio = drawing("csma-802154")
+    runs = [run(make_air(radio, ROBOTS), pose, lambda _, of=of: of, 3, 2) for of in (sent, mixed)]
+    assert story(runs[0]) == story(runs[1])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_robot_beyond_the_cut_off_changes_nothing(method: str):
+    """It stands far away and sends all the time."""
+    radio = replace(drawing(method), range_m=40.0)
+    pose = scattered(ROBOTS)
+    pose[-1, :2] = 60.0, 60.0
+    with_it, without = (
+        run(make_air(radio, ROBOTS), pose, lambda _, k=k: packets([*range(ROBOTS - 1)] + [ROBOTS - 1] * k), 4, 2)
+        for k in (5, 0)
+    )
+    assert story(without)
+    assert [row for row in story(with_it) if row[1] != ROBOTS - 1 and row[0] != ROBOTS - 1] == story(without)
+
+
+def test_the_cut_off_decides_from_where_on_a_robot_disturbs():
+    """A link at 1 dB over noise, and 20 robots that send at the same time, each at the receiver's noise less 9 dB."""
+    radio = with_access("aloha")
+    near_m, far_m = (10.0 ** ((-radio.noise_or_default.power_dbm - 46.6777 - db) / 30.0) for db in (1.0, -9.0))
+    pose = np.zeros((22, 3))
+    pose[1:, 0] = -far_m
+    pose[1, 0] = near_m
+    heard = {
+        (senders, cut_off_db): heard_from_1_at_0(
+            run(
+                make_air(replace(radio, cut_off_db=cut_off_db), 22),
+                pose,
+                lambda _, n=senders: packets([*range(1, n)]),
+                30,
+            )
+        )
+        for senders, cut_off_db in ((2, 10.0), (22, 8.0), (22, 10.0))
+    }
+    assert heard[2, 10.0] == heard[22, 8.0] > 20
+    assert heard[22, 10.0] < 10
+
+
+def heard_from_1_at_0(told: Run) -> int:
+    """How many packets robot 0 heard from robot 1."""
+    return sum(int(np.sum((one.heard.receiver == 0) & (one.heard.sender == 1))) for one in told.news)
+
+
+SEEDS = (3, 8)
+THREE = 3
+KEYS = np.array([derive_key(seed, "air") for seed in SEEDS], np.uint64)
+
+
+def on_air(told: Run, name: str) -> np.ndarray:
+    """A column of the links of packets that went on air, out of range or not."""
+    return told.on_air(name)
+
+
+def draws_of(told: Run, what: str) -> np.ndarray:
+    arena = on_air(told, "arena")
+    columns = (on_air(told, name) for name in ("sender", "receiver", "sequence"))
+    return uniform(KEYS[arena], *columns, purpose(what))
+
+
+def test_a_weak_frame_is_right_if_its_draw_is_below_the_probability():
+    """Two robots in each arena, too far apart for every frame to be right; what is not counts as out of range."""
+    radio = replace(with_access("none"), send_offset="tick")
+    pose, ticks = np.concatenate([at((0, 0), (112, 0)), at((0, 0), (116, 0))]), 40
+    told = run(make_air(radio, 2, SEEDS), pose, everybody(4), ticks, 1)
+    arena, sender, sequence = (of.ravel() for of in np.meshgrid(range(2), range(2), range(ticks), indexing="ij"))
+    rssi_dbm = [on_air(told, "rssi_dbm")[on_air(told, "arena") == of][0] for of in range(2)]
+    likely = lone_deliveries(rules_of(radio, 2), np.array(rssi_dbm), 8.0 * (10 + radio.overhead_bytes))
+    is_right = uniform(KEYS[arena], sender, 1 - sender, sequence, purpose("reception")) < likely[arena]
+    assert 0 < np.count_nonzero(is_right) < len(is_right)
+    heard = zip(*(on_air(told, name).tolist() for name in ("arena", "sender", "sequence")), strict=True)
+    expected = zip(arena[is_right].tolist(), sender[is_right].tolist(), sequence[is_right].tolist(), strict=True)
+    assert sorted(heard) == sorted(expected)
+
+
+def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
+    """A packet is sent up to three times, until an answer to it is right; it is heard if one of its frames is."""
+    radio = with_access("csma-802154")
+    radio = replace(radio, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
+    rules, ticks, frame_bits = rules_of(radio, 2), 80, 8.0 * (10 + radio.overhead_bytes)
+    told = run(make_air(radio, 2, SEEDS), np.tile(at((0, 0), (122, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    rssi_dbm = on_air(told, "rssi_dbm")[:1]
+    frame, answer = (lone_deliveries(rules, rssi_dbm, bits)[0] for bits in (frame_bits, rules.acknowledgement_bits))
+    keys, sequence, tries = KEYS[:, None, None], np.arange(ticks)[:, None], np.arange(3)
+    right = uniform(keys, 0, 1, sequence, purpose("reception") + tries) < frame
+    is_answered = right & (uniform(keys, 1, 0, sequence, purpose("reception of an acknowledgement") + tries) < answer)
+    heard = sorted(zip(on_air(told, "arena").tolist(), on_air(told, "sequence").tolist(), strict=True))
+    assert heard == [tuple(of) for of in np.argwhere(right.any(axis=2)).tolist()]
+    acknowledged = sorted((row // 2, i) for i, row, result in learned(told) if result == int(SendResult.ACKNOWLEDGED))
+    assert acknowledged == [tuple(of) for of in np.argwhere(is_answered.any(axis=2)).tolist()]
+    assert 20 < len(acknowledged) < len(heard) < 2 * ticks - 20
+
+
+@pytest.mark.parametrize("loss", [0.3, 1.0])
+def test_a_frame_is_lost_if_its_draw_is_below_the_loss(loss: float):
+    radio = replace(with_access("none"), send_offset="tick", loss=loss)
+    pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
+    told = run(make_air(radio, THREE, SEEDS), pose, everybody(2 * THREE), 10, 1)
+    fate = np.where(draws_of(told, "fixed loss") < loss, Fate.LOST, Fate.HEARD)
+    assert on_air(told, "fate").tolist() == fate.tolist()
+
+
+def asking(senders: list[int]) -> Callable[[int], Sent]:
+    """A packet in each tick from each of these to robot 1 of its arena, whose outcome it asks for, by the tick."""
+    sent = packets(senders, 1)
+    return lambda tick: Sent(sent.sender, sent.to, sent.payloads, np.full(len(senders), tick))
+
+
+def learned(told: Run) -> list[tuple[int, int, int]]:
+    """Outcomes that senders were told, sorted: (id, row, result)."""
+    found = (
+        zip(one.outcomes.id.tolist(), one.outcomes.row.tolist(), one.outcomes.result.tolist(), strict=True)
+        for one in told.news
+    )
+    return sorted(chain.from_iterable(found))
+
+
+def told_beforehand(key: np.uint64, sequence: int, loss: float, attempts: int) -> tuple[Fate, SendResult]:
+    """The fate of a packet from robot 0 to 1, and what its sender learns: frames and answers are lost by draws."""
+    fate = Fate.LOST
+    for attempt in range(attempts):
+        if uniform(key, 0, 1, sequence, purpose("fixed loss") + attempt) < loss:
+            continue
+        fate = Fate.HEARD
+        if uniform(key, 1, 0, sequence, purpose("fixed loss of an acknowledgement") + attempt) >= loss:
+            return fate, SendResult.ACKNOWLEDGED
+    return fate, SendResult.NO_ACKNOWLEDGEMENT
+
+
+@pytest.mark.parametrize("method", ["csma-802154", "dcf"])
+def test_attempts_and_their_answers_have_draws_of_their_own(method: str):
+    radio = with_access(method)
+    radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
+    ticks = 60
+    told = run(make_air(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    expected = [told_beforehand(key, tick, 0.6, 3) for tick in range(ticks) for key in KEYS]
+    assert [result for _, _, result in learned(told)] == [result for _, result in expected]
+    order = np.lexsort((on_air(told, "arena"), on_air(told, "sequence")))
+    assert on_air(told, "fate")[order].tolist() == [fate for fate, _ in expected]
+    assert len(set(expected)) == 3
+
+
+@pytest.mark.parametrize("method", ["none", "aloha"])
+def test_bursts_alone_take_frames_that_nothing_else_could(method: str):
+    radio = replace(with_access(method), send_offset="tick", bursts=Bursts(0.3, 0.3))
+    pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
+    fates = run(make_air(radio, THREE, SEEDS), pose, lambda _: packets([0, THREE]), 60, 1).fates()
+    assert set(fates) == {"HEARD", "BURST"}
+    assert min(fates.values()) > 50
+
+
+def test_losses_of_all_kinds_leave_a_share():
+    radio = replace(with_access("none"), loss=0.25)
+    assert passing_share(radio) == 0.75
+    assert passing_share(replace(radio, bursts=Bursts(0.1, 0.2))) == 0.75 * (1.0 - Bursts(0.1, 0.2).loss) < 0.75
+
+
+def test_each_attempt_of_csma_waits_by_a_backoff_draw_of_its_own():
+    """Of packets whose first frame is lost and whose second is right, all that differs in time are two backoffs."""
+    radio = with_access("csma-802154")
+    radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
+    rules, ticks = rules_of(radio, 2), 60
+    told = run(make_air(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    arena, sequence = on_air(told, "arena"), on_air(told, "sequence")
+    lost = [uniform(KEYS[arena], 0, 1, sequence, purpose("fixed loss") + attempt) < 0.6 for attempt in range(2)]
+    second = lost[0] & ~lost[1]
+    draws = [uniform(KEYS[arena], 0, sequence, 16 * attempt, purpose("csma backoff")) for attempt in range(2)]
+    backoffs = sum(np.floor(u * 2**rules.least_exponent).astype(np.int64) for u in draws)
+    waited_ns = on_air(told, "final_at_ns") - on_air(told, "sent_at_ns")
+    assert np.count_nonzero(second) > 20
+    assert len(set((waited_ns - backoffs * rules.backoff_ns)[second].tolist())) == 1

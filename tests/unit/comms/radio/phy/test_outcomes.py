@@ -1,0 +1,244 @@
+"""Senders who ask learn once what became of each addressed packet, and no more than a radio can know."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.packets import BROADCAST, NOWHERE, UNTOLD, Fate, Outcomes, SendResult, Sent
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import Disruption
+from swarmwire.comms.radio.unit_disk.tx_queue import QUEUE_FULL
+from tests.support.comms.radio.phy.radios import METHODS, drawing, with_access
+from tests.support.comms.radio.runs import Run, at, make_air, packets, run, scattered
+
+ROBOTS = 8
+ACKNOWLEDGING = ("csma-802154", "dcf")
+NEAR, FAR = at((0, 0), (1, 0)), at((0, 0), (5000, 0))
+
+
+class Asking:
+    """Numbers packets as agents do: each robot its own, and asks for the outcomes of those to one robot."""
+
+    def __init__(self, rows: int) -> None:
+        self._sent = np.zeros(rows, np.int64)
+        self.asked: list[tuple[int, int]] = []
+
+    def __call__(self, sent: Sent) -> Sent:
+        ids = np.full(len(sent), UNTOLD)
+        for k, (sender, to) in enumerate(zip(sent.sender.tolist(), sent.to.tolist(), strict=True)):
+            if to != BROADCAST:
+                ids[k] = self._sent[sender]
+                self.asked.append((sender, int(ids[k])))
+            self._sent[sender] += 1
+        return replace(sent, outcome_id=ids)
+
+
+def told(of: Run) -> list[Outcomes]:
+    return [one.outcomes for one in of.news]
+
+
+def listed(outcomes: Outcomes) -> list[tuple[int, int, str]]:
+    """Robot row, id and result."""
+    names = [SendResult(result).name for result in outcomes.result.tolist()]
+    return list(zip(outcomes.row.tolist(), outcomes.id.tolist(), names, strict=True))
+
+
+def results(radio: Radio, pose: FloatArray, sent: Sent, ticks: int = 1, quiet_ticks: int = 3) -> list[str]:
+    ask = Asking(len(pose))
+    of = run(make_air(radio, len(pose)), pose, lambda _: ask(sent), ticks, quiet_ticks)
+    return [result for one in told(of) for _, _, result in listed(one)]
+
+
+@st.composite
+def radios(draw: st.DrawFn) -> Radio:
+    radio = with_access(draw(st.sampled_from(ACKNOWLEDGING)))
+    slow = radio.frame == "plain" and draw(st.booleans())
+    access = replace(radio.access_or_default, most_retries=draw(st.integers(0, 3)))
+    return replace(
+        radio,
+        access=access,
+        bit_rate_bps=draw(st.sampled_from([900, 30_000])) if slow else radio.bit_rate_bps,
+        max_payload_bytes=draw(st.integers(10, 60)),
+        queue_limit=draw(st.integers(0, 4)),
+        send_offset=draw(st.sampled_from(["uniform", "tick"])),
+        loss=draw(st.sampled_from([0.0, 0.3, 0.7])),
+    )
+
+
+def mixed(rng: np.random.Generator, rows: int, robots: int) -> Sent:
+    """Some robots send some packets: to one, to all, or to nobody."""
+    k = int(rng.integers(0, 3 * rows))
+    sender, kind = rng.integers(0, rows, k), rng.random(k)
+    to = (sender + rng.integers(1, robots, k)) % robots
+    to = np.where(kind < 0.6, to, np.where(kind < 0.9, BROADCAST, NOWHERE))
+    return packets(sender, to, rng.integers(1, 70, k))
+
+
+@given(radios(), st.integers(1, 2), st.integers(2, 8), st.integers(0, 1000), st.sampled_from([0, 1, 40]))
+def test_each_addressed_packet_has_one_outcome_unless_it_is_in_flight(
+    radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int
+):
+    rng, rows = np.random.default_rng(seed), arenas * robots
+    air, ask = make_air(radio, robots, range(arenas)), Asking(rows)
+    pose = scattered(rows, seed) * [rng.choice([1.0, 30.0]), 20.0, 1.0]
+    of = run(air, pose, lambda _: ask(mixed(rng, rows, robots)), 4, quiet_ticks)
+    learned = [(row, id_) for one in told(of) for row, id_, _ in listed(one)]
+    assert len(set(learned)) == len(learned)
+    assert set(learned) <= set(ask.asked)
+    if quiet_ticks == 40 and radio.bit_rate_bps != 900:
+        assert sorted(learned) == sorted(ask.asked)
+    # As the ids count all packets, they are the air's sequence numbers too.
+    arena_of = {(row % robots, row // robots): row for row in range(rows)}
+    fate: dict[tuple[int, int], set[int]] = {}
+    for one in of.news:
+        f = one.finished
+        for arena, sender, sequence, what in zip(f.arena, f.sender, f.sequence, f.fate, strict=True):
+            fate.setdefault((arena_of[int(sender), int(arena)], int(sequence)), set()).add(int(what))
+    for one in told(of):
+        assert listed(one) == sorted(listed(one), key=lambda row: row[:2])
+        for row, id_, result in listed(one):
+            if result == "ACKNOWLEDGED":
+                assert fate[row, id_] == {Fate.HEARD}
+            if result == "QUEUE_FULL":
+                assert fate[row, id_] == {QUEUE_FULL}
+            if result == "TOO_LARGE":
+                assert fate.get((row, id_), {Fate.TOO_LARGE}) == {Fate.TOO_LARGE}
+
+
+@pytest.mark.parametrize("method", ACKNOWLEDGING)
+@pytest.mark.parametrize(
+    ("change", "pose", "size", "expected"),
+    [
+        (lambda radio: radio, NEAR, 10, ["ACKNOWLEDGED"]),
+        (lambda radio: radio, FAR, 10, ["NO_ACKNOWLEDGEMENT"]),
+        (lambda radio: replace(radio, loss=1.0), NEAR, 10, ["NO_ACKNOWLEDGEMENT"]),
+        (lambda radio: replace(radio, max_payload_bytes=9), NEAR, 10, ["TOO_LARGE"]),
+        (lambda radio: replace(radio, send_offset=0.25), NEAR, 10, ["ACKNOWLEDGED"]),
+    ],
+)
+def test_a_lone_packet_has_the_outcome_that_its_sender_sees(
+    method: str, change: Callable[[Radio], Radio], pose: FloatArray, size: int, expected: list[str]
+):
+    assert results(change(with_access(method)), pose, packets([0], 1, size)) == expected
+
+
+@pytest.mark.parametrize("method", ACKNOWLEDGING)
+def test_packets_beyond_the_queue_are_told_to_be(method: str):
+    radio = replace(with_access(method), queue_limit=2)
+    assert results(radio, NEAR, packets([0] * 5, 1)) == ["ACKNOWLEDGED"] * 3 + ["QUEUE_FULL"] * 2
+
+
+def test_a_sender_that_finds_the_air_busy_each_time_says_so_also_after_an_attempt_that_was_not_answered():
+    """Every third tick two robots want to send: one a frame of 160 ms, the other one that is always lost, and again."""
+    radio = replace(with_access("csma-802154"), send_offset="tick", max_payload_bytes=5000, loss=1.0)
+    pose, both = at((0, 0), (1, 0), (0.5, 1)), packets([0, 2], [1, BROADCAST], [10, 5000])
+    ask = Asking(3)
+    of = run(make_air(radio, 3), pose, lambda tick: ask(both) if tick % 3 == 0 else Sent.none(), 120, 3)
+    busy = {id_ for one in told(of) for _, id_, result in listed(one) if result == "CHANNEL_BUSY"}
+    own = of.finished("sender") == 0
+    fates = dict(zip(of.finished("sequence")[own].tolist(), of.finished("fate")[own].tolist(), strict=True))
+    assert {fates[id_] for id_ in busy} >= {Fate.CHANNEL_BUSY, Fate.LOST}
+    assert {id_ for id_, fate in fates.items() if fate == Fate.CHANNEL_BUSY} <= busy
+
+
+@pytest.mark.parametrize("method", ACKNOWLEDGING)
+def test_a_packet_that_was_heard_but_whose_acknowledgement_was_lost_is_not_acknowledged(method: str):
+    radio = with_access(method)
+    radio = replace(radio, loss=0.5, access=replace(radio.access_or_default, most_retries=0))
+    ask = Asking(2)
+    of = run(make_air(radio, 2), NEAR, lambda _: ask(packets([0], 1)), 300, 1)
+    heard, acknowledged = len(of.heard("sender")), sum(int(one.acknowledged.sum()) for one in told(of))
+    assert sum(len(one) for one in told(of)) == 300
+    # 150 and 75 of 300, within four standard deviations (one false alarm in ten thousand seeds); the seed is fixed.
+    assert abs(heard - 150) < 35
+    assert abs(acknowledged - 75) < 30
+
+
+def test_the_outcome_comes_in_the_tick_after_it_happened():
+    for method in ACKNOWLEDGING:
+        ask = Asking(2)
+        of = run(make_air(with_access(method), 2), NEAR, lambda _, ask=ask: ask(packets([0], 1)), 3, 2)
+        assert [listed(one) for one in told(of)] == [
+            [],
+            *([(0, tick, "ACKNOWLEDGED")] for tick in range(3)),
+            [],
+            [],
+        ]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_who_does_not_ask_or_sends_to_all_or_has_no_acknowledgements_is_not_told(method: str):
+    assert all(len(one) == 0 for one in told(run(make_air(with_access(method), 2), NEAR, lambda _: packets([0], 1), 3)))
+    assert results(with_access(method), NEAR, packets([0, 1])) == []
+    if method not in ACKNOWLEDGING:
+        assert results(with_access(method), NEAR, packets([0, 1], [1, 0])) == []
+    radio = with_access(method)
+    silent = replace(radio, access=replace(radio.access_or_default, acknowledged=False))
+    assert results(silent, NEAR, packets([0, 0], [1, NOWHERE])) == []
+    assert results(Radio(range_m=2.0), NEAR, packets([0, 0], [1, NOWHERE])) == []
+
+
+@pytest.mark.parametrize("method", ["disk", *METHODS])
+def test_a_packet_to_nobody_takes_a_number_and_is_not_acknowledged(method: str):
+    radio = Radio(range_m=2.0) if method == "disk" else with_access(method)
+    ask = Asking(2)
+    of = run(make_air(radio, 2), NEAR, lambda _: ask(packets([0, 0, 0], [NOWHERE, 1, NOWHERE])), 2, 3)
+    assert of.heard("sequence").tolist() == [1, 4]
+    assert (of.tally.sent.tolist(), of.tally.intended.tolist()) == ([2], [2])
+    lost = [(0, id_, "NO_ACKNOWLEDGEMENT") for id_ in (0, 2, 3, 5)]
+    learned = sorted([*lost, (0, 1, "ACKNOWLEDGED"), (0, 4, "ACKNOWLEDGED")]) if method in ACKNOWLEDGING else []
+    assert sorted(row for one in told(of) for row in listed(one)) == learned
+
+
+def test_only_packets_to_nobody_are_no_trouble():
+    assert results(with_access("csma-802154"), NEAR, packets([0, 1], NOWHERE)) == ["NO_ACKNOWLEDGEMENT"] * 2
+    too_large = packets([0], NOWHERE, 111)
+    assert results(with_access("csma-802154"), NEAR, too_large) == ["TOO_LARGE"]
+
+
+def test_the_dead_learn_nothing_and_a_radio_that_is_off_is_not_answered():
+    radio = replace(with_access("csma-802154"), bit_rate_bps=2000, send_offset="tick")
+    for alive, radio_on, expected in (
+        ([False, True], [True, True], []),
+        ([True, True], [False, True], ["NO_ACKNOWLEDGEMENT"] * 3),
+    ):
+        ask, of = Asking(2), Run(make_air(radio, 2))
+        for tick in range(30):
+            if tick == 1:
+                of.air.disrupt(disrupted(np.array(alive), np.array(radio_on)))
+            of.news.append(of.air.advance(tick * 10**8))
+            of.air.hold(NEAR, np.array(alive) if tick else np.ones(2, bool))
+            of.air.send(tick * 10**8, tick, ask(packets([0] * 3, 1) if tick == 0 else Sent.none()))
+        assert [result for one in told(of) for _, _, result in listed(one)] == expected
+
+
+def disrupted(alive: np.ndarray, radio_on: np.ndarray) -> Disruption:
+    coming = Disruption.none(2)
+    coming.alive, coming.radio_on = alive, radio_on
+    return coming
+
+
+@pytest.mark.parametrize("method", ACKNOWLEDGING)
+def test_outcomes_are_the_same_in_any_order_of_senders_and_beside_other_arenas(method: str):
+    def of(seeds: list[int], order: IntArray | slice) -> list[list[tuple[int, int, str]]]:
+        rows = len(seeds) * ROBOTS
+        sender = np.repeat(np.arange(rows), 3)
+        sent = packets(sender, (sender + 1) % ROBOTS)
+        numbered = replace(sent, outcome_id=np.tile(np.arange(3), rows)).select(np.arange(3 * rows)[order])
+        pose = np.tile(scattered(ROBOTS) * [20.0, 20.0, 1.0], (len(seeds), 1))
+        return [
+            listed(one) for one in told(run(make_air(drawing(method), ROBOTS, seeds), pose, lambda _: numbered, 1, 9))
+        ]
+
+    plain = of([7], slice(None))
+    assert len({result for one in plain for _, _, result in one}) > 1
+    by_sender_backwards = np.arange(3 * ROBOTS).reshape(ROBOTS, 3)[::-1].ravel()
+    assert of([7], by_sender_backwards) == plain
+    beside = of([5, 7, 6], slice(None))
+    own = [[(row - ROBOTS, id_, what) for row, id_, what in one if row // ROBOTS == 1] for one in beside]
+    assert own == plain

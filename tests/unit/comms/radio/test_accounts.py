@@ -1,0 +1,221 @@
+"""Accounting: one fate for each packet and intended receiver; a packet leaves its radio once; links are told whole."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SendResult, Sent
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.counters import Accounts, Lives
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.transmissions import Intake, Transmissions
+from tests.support.comms.radio.phy.radios import METHODS, with_access
+from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_air, packets, run, scattered
+from tests.support.comms.radio.traffic import OBSTACLES, RADIOS, random_traffic
+
+
+def random_run(radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int) -> Run:
+    """Four ticks of random traffic among robots at random places."""
+    rng = np.random.default_rng(seed)
+    air = make_air(radio, robots, range(arenas), [OBSTACLES] * arenas)
+    return run(air, scattered(arenas * robots, seed), lambda _: random_traffic(rng, arenas, robots), 4, quiet_ticks)
+
+
+@given(RADIOS, st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000), st.sampled_from([0, 1, 8]))
+def test_fates_add_up_to_intended_receivers(radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int):
+    told = random_run(radio, arenas, robots, seed, quiet_ticks)
+    np.testing.assert_array_equal(told.tally.fates.sum(axis=1), told.tally.intended)
+    assert (told.tally.fates >= 0).all()
+
+
+@given(RADIOS, st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000))
+def test_tally_agrees_with_what_is_listed(radio: Radio, arenas: int, robots: int, seed: int):
+    """Heard packets, listed links and the tally tell the same story, in every tick."""
+    for one in random_run(radio, arenas, robots, seed, 2).news:
+        listed = np.zeros_like(one.tally.fates)
+        np.add.at(listed, (one.finished.arena, one.finished.fate), one.finished.receivers)
+        but_far = [fate for fate in Fate if fate != Fate.OUT_OF_RANGE]
+        np.testing.assert_array_equal(listed[:, but_far], one.tally.fates[:, but_far])
+        assert not listed[:, Fate.OUT_OF_RANGE].any()
+        assert len(one.heard) == listed[:, Fate.HEARD].sum()
+        in_range = listed[:, Fate.HEARD] + listed[:, Fate.LOST]
+        assert (one.tally.in_range >= in_range).all()
+        if not one.tally.fates[:, Fate.QUEUE_FULL].any():
+            np.testing.assert_array_equal(one.tally.in_range, in_range)
+
+
+def test_sent_and_intended_are_counted_when_the_air_takes_a_packet_up():
+    """Even if it goes on air ticks later."""
+    told = run(make_air(Radio(2.0, send_offset=0.25), 4), at((0, 0), (1, 0), (2, 0), (5, 0)), everybody(4), 1, 4)
+    assert [int(one.tally.intended[0]) for one in told.news] == [0, 12, 0, 0, 0, 0]
+    assert [int(one.tally.sent[0]) for one in told.news] == [0, 4, 0, 0, 0, 0]
+    assert [int(one.tally.fates.sum()) for one in told.news] == [0, 0, 0, 12, 0, 0]
+
+
+def test_a_broadcast_intends_only_robots_alive():
+    air = make_air(Radio(9.0, send_offset="tick"), 4)
+    air.hold(scattered(4), np.array([True, True, False, True]))
+    air.send(0, 0, packets([0]))
+    tally = air.advance(10**8).tally
+    assert tally.intended.tolist() == [2]
+    assert tally.fates[0, Fate.HEARD] == 2
+
+
+def test_what_the_run_ends_under_way_or_queued_is_in_flight():
+    """Three packets of 40 ms each: one delivered late, one on air, one waiting; none of them final, none in range."""
+    radio = Radio(9.0, latency_s=1.0, bit_rate_bps=2000, send_offset="tick")
+    told = run(make_air(radio, 3), at((0, 0), (1, 0), (2, 0)), lambda _: packets([0, 0, 0, 0]), 1)
+    assert told.fates() == {"IN_FLIGHT": 8}
+    assert told.tally.in_range.tolist() == [0]
+    assert told.air.end().fates.sum() == 0
+
+
+def test_the_books_of_some_arenas_may_be_closed_and_the_others_count_on():
+    def handed_over(rows: list[int]) -> Transmissions:
+        return Intake(6).take(np.zeros(6, np.int64), packets(rows), np.full(6, 1), 0)
+
+    accounts = Accounts(arenas=3, robots=2)
+    accounts.take_up(handed_over([0, 2, 3, 4, 5, 5]))
+    closed = accounts.close(np.array([True, False, True]))
+    assert (closed.sent.tolist(), closed.intended.tolist()) == ([1, 0, 3], [1, 0, 3])
+    accounts.take_up(handed_over([0]))
+    rest = accounts.close()
+    assert (rest.sent.tolist(), rest.intended.tolist(), rest.fates.sum()) == ([1, 2, 0], [1, 2, 0], 0)
+    assert accounts.close().sent.tolist() == [0, 0, 0]
+
+
+def told(run: Run, name: str):
+    return np.concatenate([getattr(one.departed, name) for one in run.news])
+
+
+def check_packets(ended: Run) -> None:
+    """Of packets that all have left: once each, intended and out of range as the tally has them."""
+    packet = Counter(zip(*(told(ended, name).tolist() for name in ("arena", "sender", "sequence")), strict=True))
+    assert set(packet.values()) <= {1}
+    tally = ended.tally
+    assert len(packet) == tally.sent.sum()
+    assert told(ended, "intended").sum() == tally.intended.sum()
+    assert told(ended, "out_of_range").sum() == tally.fates[:, Fate.OUT_OF_RANGE].sum()
+    never, on, off = told(ended, "fate") != Fate.HEARD, told(ended, "on_air_at_ns"), told(ended, "off_air_at_ns")
+    assert (off >= on).all()
+    assert (off == on)[never].all()
+
+
+@given(RADIOS, st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000))
+def test_each_packet_departs_once_over_a_disk(radio: Radio, arenas: int, robots: int, seed: int):
+    rng = np.random.default_rng(seed)
+    air = make_air(replace(radio, bit_rate_bps=250_000), robots, range(arenas), [OBSTACLES] * arenas)
+    pose = scattered(arenas * robots, seed)
+    check_packets(run(air, pose, lambda _: random_traffic(rng, arenas, robots), 4, 8))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("seed", range(5))
+def test_each_packet_departs_once_over_signals_acknowledged_or_not(method: str, seed: int):
+    rng = np.random.default_rng(seed)
+    ended = run(
+        make_air(with_access(method), 6, range(2)), scattered(12, seed), lambda _: random_traffic(rng, 2, 6), 4, 8
+    )
+    check_packets(ended)
+
+
+def test_a_packet_tells_whom_it_was_for_and_how_long_it_was_on_air():
+    radio = Radio(range_m=1.0, bit_rate_bps=8_000, send_offset="tick", queue_limit=0)
+    sent = packets([0, 2, 2], [BROADCAST, 1, BROADCAST], 20)
+    ended = run(make_air(radio, 3), at((0, 0), (0.5, 0), (2, 0)), lambda tick: sent if tick == 0 else packets([]), 1, 1)
+    columns = ("sender", "to", "intended", "out_of_range", "fate", "on_air_at_ns", "off_air_at_ns")
+    rows = sorted(zip(*(told(ended, name).tolist() for name in columns), strict=True))
+    airtime_ns = 20_000_000
+    assert rows == [
+        (0, BROADCAST, 2, 1, Fate.HEARD, 0, airtime_ns),
+        (2, BROADCAST, 2, 0, Fate.QUEUE_FULL, 0, 0),
+        (2, 1, 1, 1, Fate.HEARD, 0, airtime_ns),
+    ]
+
+
+BOTH, FIRST, NONE = np.array([True, True]), np.array([True, False]), np.zeros(0, np.int64)
+
+
+def test_the_dead_are_intended_by_what_was_sent_before_they_died() -> None:
+    lives = Lives(2)
+    lives.now(BOTH)
+    assert (lives.epoch, lives.any_dead) == (0, False)
+    lives.now(FIRST)
+    assert (lives.epoch, lives.any_dead) == (1, True)
+    assert lives.intended(np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])).tolist() == [True, True, True, False]
+
+
+def test_a_death_is_forgotten_when_all_live_again_and_nothing_of_that_time_waits() -> None:
+    lives = Lives(2)
+    for alive in (FIRST, BOTH):
+        lives.now(alive)
+    lives.forget(queued=np.array([1, 2]))
+    assert lives.any_dead
+    lives.forget(queued=np.array([2]))
+    assert not lives.any_dead
+    assert lives.intended(np.array([2, 2]), np.array([0, 1])).all()
+    lives.forget(queued=NONE)
+    assert not lives.any_dead
+
+
+ROBOTS = 3
+ALIVE = np.ones(2 * ROBOTS, np.bool_)
+POSE = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
+PAYLOADS = [b"\x01\x02 of arena 0", b"\x03\x04 of arena 1, longer"]
+NEWS_RADIOS = {"disk": Radio(9.0, send_offset="tick"), "signals": with_access("aloha")}
+ASKED: IntArray = np.array([41, 42])
+
+
+def sent(radio: str) -> Air:
+    """Robot 1 of arena 0 has sent to all, robot 2 of arena 1 to robot 0."""
+    air = make_air(NEWS_RADIOS[radio], ROBOTS, [1, 2])
+    air.advance(0)
+    air.hold(POSE, ALIVE)
+    air.send(0, 0, Sent(np.array([1, 5]), np.array([BROADCAST, 0]), Payloads.of(PAYLOADS), ASKED))
+    return air
+
+
+@pytest.mark.parametrize("radio", NEWS_RADIOS)
+def test_a_link_is_told_with_all_that_its_packet_was(radio: str):
+    told = sent(radio).advance(TICK_NS).finished
+    of_links = told.arena, told.sender, told.receiver, told.to, told.sequence, told.fate
+    rows = list(zip(*(column.tolist() for column in of_links), strict=True))
+    assert sorted(rows) == [(0, 1, 0, -1, 0, 0), (0, 1, 2, -1, 0, 0), (1, 2, 0, 0, 0, 0)]
+    assert told.payload is not None
+    assert told.payloads is not None
+    for arena, size, tag, payload in zip(told.arena, told.size_bytes, told.tag, told.payload, strict=True):
+        assert told.payloads.row(int(payload)) == PAYLOADS[arena]
+        assert (size, tag) == (len(PAYLOADS[arena]), int.from_bytes(PAYLOADS[arena][:2], "little"))
+    assert (told.rssi_dbm is None) == (radio == "disk")
+
+
+@pytest.mark.parametrize("over", [0, 1])
+@pytest.mark.parametrize("radio", NEWS_RADIOS)
+def test_of_an_arena_that_left_nothing_is_told_any_more(radio: str, over: int):
+    air = sent(radio)
+    heard, _ = air.advance_within(TICK_NS // 2)
+    assert heard.receiver.tolist() == [0, 2, 3]
+    air.leave(np.arange(2) == over)
+    news, left = air.advance(TICK_NS), 1 - over
+    assert news.heard.receiver.tolist() == [[0, 2], [3]][left]
+    assert {news.heard.payloads.row(int(row)) for row in news.heard.payload} == {PAYLOADS[left]}
+    assert set(news.finished.arena.tolist()) == set(news.departed.arena.tolist()) == {left}
+
+
+@pytest.mark.parametrize("over", [0, 1])
+def test_nor_what_its_senders_learned(over: int):
+    air = make_air(with_access("csma-802154"), ROBOTS, [1, 2])
+    air.advance(0)
+    air.hold(POSE, ALIVE)
+    air.send(0, 0, Sent(np.array([1, 5]), np.array([0, 0]), Payloads.of(PAYLOADS), ASKED))
+    _, learned = air.advance_within(TICK_NS // 2)
+    assert learned.row.tolist() == [1, 5]
+    air.leave(np.arange(2) == over)
+    outcomes = air.advance(TICK_NS).outcomes
+    assert (outcomes.row.tolist(), outcomes.id.tolist()) == ([[1, 5][1 - over]], [[41, 42][1 - over]])
+    assert outcomes.result.tolist() == [int(SendResult.ACKNOWLEDGED)]

@@ -1,0 +1,290 @@
+"""Results do not depend on how the world, the crew or time is divided, and order is kept where it is asked for."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.packets import Heard, Sent
+from swarmwire.comms.radio.config.impairments import BearingGiven, Delays, Gives, RangeGiven
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import Disruption
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.results import News
+from swarmwire.comms.truth import Obstacle
+from tests.support.comms.radio.phy.radios import METHODS, with_access
+from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, Run, everybody, make_air, packets, run, scattered
+from tests.support.comms.radio.traffic import RADIOS, random_traffic
+
+ROBOTS = 7
+RADIO = Radio(
+    3.0,
+    loss=0.3,
+    latency_s=0.1,
+    jitter_s=0.05,
+    bit_rate_bps=3000,
+    queue_limit=2,
+    gives=Gives(RangeGiven(0.1), BearingGiven(0.2)),
+)
+OBSTACLES = [[Obstacle("cylinder", 0.1 * a, 0.0, radius_m=0.3 + 0.1 * a)] for a in range(3)]
+COLUMNS = ("receiver", "sender", "sequence", "heard_at_ns")
+
+
+def story(told: Run, arena: int = 0) -> list[tuple[object, ...]]:
+    """Everything heard in one arena, with what came with it, then its tally."""
+    rows: list[tuple[object, ...]] = []
+    for tick, one in enumerate(told.news):
+        h = one.heard
+        for i in np.flatnonzero(h.receiver // ROBOTS == arena):
+            given = tuple(column[i] for column in h.given.values())
+            rest = h.sender[i], h.sequence[i], h.heard_at_ns[i], *given, h.payloads.row(h.payload[i])
+            rows.append((tick, h.receiver[i] % ROBOTS, *rest))
+    return [*rows, (*told.tally.fates[arena], told.tally.in_range[arena])]
+
+
+def two_each(arenas: int) -> Sent:
+    """Each robot sends two different packets."""
+    sent = packets(range(2 * ROBOTS), size=20)
+    payloads = sent.payloads.rows(np.tile(np.arange(2 * ROBOTS), arenas))
+    return Sent(np.repeat(np.arange(arenas * ROBOTS), 2), np.tile(sent.to, arenas), payloads)
+
+
+def test_an_arena_alone_gives_the_same_as_beside_others():
+    seeds = (11, 12, 13)
+    pose = scattered(3 * ROBOTS)
+    beside = run(make_air(RADIO, ROBOTS, seeds, OBSTACLES), pose, lambda _: two_each(3), 5, 2)
+    for arena, seed in enumerate(seeds):
+        alone_air = make_air(RADIO, ROBOTS, [seed], [OBSTACLES[arena]])
+        alone = run(alone_air, pose[arena * ROBOTS : (arena + 1) * ROBOTS], lambda _: two_each(1), 5, 2)
+        assert len(story(alone)) > 50
+        assert story(alone) == story(beside, arena)
+
+
+@settings(max_examples=20)
+@given(st.randoms(use_true_random=False))
+def test_the_order_among_senders_is_indifferent(shuffle):
+    """Each sender's own packets keep theirs."""
+    sent = two_each(1)
+    place = shuffle.sample(range(len(sent)), len(sent))
+    order = np.array(place)[np.argsort(sent.sender[place], kind="stable")]
+    index = np.empty_like(order)
+    index[:] = np.array(place)
+    for s in range(ROBOTS):
+        index[np.isin(index, (2 * s, 2 * s + 1))] = 2 * s, 2 * s + 1
+    mixed = Sent(sent.sender[index], sent.to[index], sent.payloads.rows(index))
+    pose = scattered(ROBOTS)
+    assert story(run(make_air(RADIO, ROBOTS), pose, lambda _: mixed, 3, 2)) == story(
+        run(make_air(RADIO, ROBOTS), pose, lambda _: sent, 3, 2)
+    )
+
+
+def test_no_stage_shifts_the_draws_of_another():
+    """With and without noise in what is given, the same packets are lost, equally late."""
+    pose = scattered(ROBOTS)
+    full, bare = (
+        run(make_air(radio, ROBOTS), pose, lambda _: two_each(1), 5, 2)
+        for radio in (RADIO, replace(RADIO, gives=Gives()))
+    )
+    for name in COLUMNS:
+        np.testing.assert_array_equal(full.heard(name), bare.heard(name))
+
+
+def test_heard_is_sorted_by_receiver_time_sender_and_sequence():
+    """Also where times tie, and for robots that hear many."""
+    for radio in (RADIO, Radio(99.0, send_offset="tick", jitter_s=0.2), Radio(99.0, send_offset="tick", latency_s=0.1)):
+        told = run(make_air(radio, 30), scattered(30), lambda _: packets([*range(30), *range(30)]), 4, 4)
+        for one in told.news:
+            h = one.heard
+            order = np.lexsort((h.sequence, h.sender, h.heard_at_ns, h.receiver))
+            np.testing.assert_array_equal(order, np.arange(len(h)))
+        assert len(told.heard("receiver")) > 1000
+
+
+def test_the_order_of_ties_is_that_of_senders_also_over_ticks():
+    """Robot 2 takes 150 ms from tick 0, robot 1 takes 50 ms from tick 1: both are heard at 150 ms."""
+    air = make_air(Radio(99.0, bit_rate_bps=800, send_offset="tick"), 3)
+    told = run(air, scattered(3), lambda tick: [packets([2], size=15), packets([1], size=5)][tick], 2, 2)
+    heard_by_0 = told.heard("receiver") == 0
+    assert told.heard("heard_at_ns")[heard_by_0].tolist() == [150_000_000] * 2
+    assert told.heard("sender")[heard_by_0].tolist() == [1, 2]
+
+
+def test_payloads_hold_only_packets_that_somebody_heard():
+    told = run(make_air(RADIO, ROBOTS), scattered(ROBOTS), lambda _: two_each(1), 5, 2)
+    for one in told.news:
+        np.testing.assert_array_equal(np.unique(one.heard.payload), np.arange(len(one.heard.payloads)))
+
+
+SIX, TICKS = 6, 5
+SIGNALS = st.sampled_from(METHODS).map(with_access)
+
+
+def told(news: list[News]) -> list[Any]:
+    """All that was told, whenever that was: as plain values, sorted."""
+    out = []
+    for one in news:
+        h, f, d = one.heard, one.finished, one.departed
+        for i in range(len(h)):
+            given = tuple(float(column[i]) for column in h.given.values())
+            numbers = int(h.receiver[i]), int(h.sender[i]), int(h.sequence[i]), int(h.heard_at_ns[i])
+            out.append(("heard", *numbers, given, h.payloads.row(int(h.payload[i]))))
+        columns = f.sender, f.receiver, f.receivers, f.sequence, f.on_air_at_ns, f.final_at_ns, f.fate
+        out += [("finished", *row) for row in zip(*(column.tolist() for column in columns), strict=True)]
+        columns = d.sender, d.sequence, d.intended, d.fate, d.on_air_at_ns, d.off_air_at_ns
+        out += [("departed", *row) for row in zip(*(column.tolist() for column in columns), strict=True)]
+    return sorted(out)
+
+
+def played(air: Air, parts: list[float], seed: int, out: int | None) -> tuple[list[Any], list[int]]:
+    """What becomes of packets sent at several times within ticks, where time passes in these parts of a tick, too.
+
+    Where robots are out, one is dead and one's radio is off for two ticks. What is heard by a tick's start is told
+    before that: a robot that has been handed a packet has heard it, though it be dead a moment later.
+    """
+    rng = np.random.default_rng(seed)
+    pose, alive = scattered(SIX, seed), np.ones(SIX, np.bool_)
+    news, within = list[News](), list[Heard]()
+    for tick in range(TICKS):
+        start_ns = tick_start_ns(tick, RATE_HZ)
+        if out is not None and tick in (1, 3):
+            off = Disruption.none(SIX)
+            if tick == 1:
+                off.radio_on[out] = off.alive[(out + 1) % SIX] = False
+            air.disrupt(off)
+            alive = off.alive.copy()
+        within.append(air.advance_within(start_ns)[0])
+        news.append(air.advance(start_ns))
+        air.hold(pose, alive)
+        sends = [(start_ns + int(at), rng.integers(0, SIX, 3)) for at in sorted(rng.integers(0, TICK_NS, 3))]
+        looks = [(start_ns + round(part * TICK_NS), None) for part in parts]
+        for at_ns, sender in sorted(sends + looks, key=lambda one: (one[0], one[1] is None)):
+            if sender is None:
+                within.append(air.advance_within(at_ns)[0])
+            else:
+                air.send_at(np.full(SIX, at_ns), packets(sender, size=12))
+    within.append(air.advance_within(tick_start_ns(TICKS, RATE_HZ))[0])
+    news.append(air.advance(tick_start_ns(TICKS, RATE_HZ)))
+    last = air.end()
+    tallies = sum((one.tally for one in news[1:]), news[0].tally) + last
+    assert tallies.fates.sum() == tallies.intended.sum()
+    assert sum(map(len, within)) == sum(len(one.heard) for one in news)  # each is handed over once
+    return told(news), [int(count.sum()) for count in (tallies.sent, tallies.intended, tallies.in_range)]
+
+
+@given(
+    RADIOS | SIGNALS,
+    st.lists(st.floats(0.0, 1.0), max_size=12).map(sorted),
+    st.integers(0, 1000),
+    st.none() | st.integers(0, SIX - 1),
+)
+def test_time_may_pass_in_any_parts(radio: Radio, parts: list[float], seed: int, out: int | None):
+    assert played(make_air(radio, SIX), parts, seed, out) == played(make_air(radio, SIX), [], seed, out)
+
+
+LATE = Delays("lognormal", 0.15, 0.2)
+DISK = Radio(4.0, loss=0.1, jitter_s=0.1, delays=LATE)
+LATE_RADIOS = (DISK, *(replace(with_access(method), delays=LATE) for method in ("none", "csma-802154")))
+FIVE, ARENAS, LATE_TICKS = 5, 2, 6
+
+
+def kept(radio: Radio) -> Radio:
+    """The radio, with the order kept."""
+    assert radio.delays is not None
+    return replace(radio, delays=replace(radio.delays, keep_order=True))
+
+
+def heard(radio: Radio, seed: int, between: Sequence[float] = ()) -> IntArray:
+    """Receiver, sender, sequence and time of all that is heard, as it is told, (k, 4).
+
+    `between` are moments, as shares of a tick, at which the air is asked, too.
+    """
+    rng = np.random.default_rng(seed)
+    air = make_air(radio, FIVE, range(ARENAS))
+    pose, alive = scattered(ARENAS * FIVE, seed), np.ones(ARENAS * FIVE, np.bool_)
+    told = []
+    for tick in range(LATE_TICKS + 40):
+        at_ns = tick_start_ns(tick, RATE_HZ)
+        told.append(air.advance(at_ns).heard)
+        air.hold(pose, alive)
+        if tick < LATE_TICKS:
+            air.send(at_ns, tick, random_traffic(rng, ARENAS, FIVE))
+        told += [air.advance(at_ns + int(share * TICK_NS)).heard for share in between]
+    return np.concatenate([np.stack([h.receiver, h.sender, h.sequence, h.heard_at_ns], axis=1) for h in told])
+
+
+def sorted_rows(found: IntArray) -> Any:
+    return found[np.lexsort(found.T)].tolist()
+
+
+def overtaken(found: IntArray) -> int:
+    """How many packets are heard before one of their link with a smaller number."""
+    count = 0
+    for link in np.unique(found[:, :2], axis=0):
+        count += int(np.count_nonzero(np.diff(found[(found[:, :2] == link).all(axis=1), 2]) < 0))
+    return count
+
+
+@pytest.mark.parametrize("radio", LATE_RADIOS)
+def test_packets_overtake_unless_order_is_kept(radio: Radio):
+    free, ordered = heard(radio, 3), heard(kept(radio), 3)
+    assert overtaken(free) > 10
+    assert overtaken(ordered) == 0
+    # The same packets, each as late as the latest up to it on its link.
+    expected = free[np.lexsort((free[:, 2], free[:, 1], free[:, 0]))]
+    for i in range(1, len(expected)):
+        if (expected[i, :2] == expected[i - 1, :2]).all():
+            expected[i, 3] = max(expected[i, 3], expected[i - 1, 3])
+    assert sorted_rows(ordered) == sorted_rows(expected)
+
+
+@settings(max_examples=12)
+@given(
+    st.sampled_from(LATE_RADIOS),
+    st.integers(0, 1000),
+    st.lists(st.floats(0.0, 0.999), min_size=1, max_size=3).map(sorted),
+)
+def test_when_the_air_is_asked_changes_nothing(radio: Radio, seed: int, between: list[float]):
+    at_ticks, often = heard(kept(radio), seed), heard(kept(radio), seed, between)
+    assert overtaken(often) == 0
+    assert sorted_rows(at_ticks) == sorted_rows(often)
+
+
+def test_a_reception_that_an_event_ended_holds_up_nothing():
+    """The radio of robot 0 is off while first packets are on their way to it; second ones come in their own time."""
+    radio = Radio(9.0, send_offset="tick", delays=Delays("uniform", 0.5, 0.28))
+    times: list[dict[tuple[int, int], int]] = []
+    for one in (radio, kept(radio)):
+        air, pose = make_air(one, 12), scattered(12)
+        times.append({})
+        for tick in range(14):
+            now = Disruption.none(12)
+            now.radio_on[0] = tick != 1
+            air.disrupt(now)
+            at_ns = tick_start_ns(tick, RATE_HZ)
+            told = air.advance(at_ns).heard
+            times[-1] |= {
+                (s, q): t
+                for r, s, q, t in zip(told.receiver, told.sender, told.sequence, told.heard_at_ns, strict=True)
+                if r == 0
+            }
+            air.hold(pose, np.ones(12, np.bool_))
+            if tick in (0, 2):
+                air.send(at_ns, tick, packets(range(1, 12)))
+    free, ordered = times
+    ended = [sender for sender in range(1, 12) if (sender, 0) not in free]
+    assert len(ended) > 5
+    assert [ordered[sender, 1] for sender in ended] == [free[sender, 1] for sender in ended]
+    assert ordered.keys() == free.keys()
+
+
+def test_nobody_waits_where_delays_are_even():
+    radio = Radio(9.0, latency_s=0.2, delays=Delays("uniform", 0.01, 1e-9))
+    pose = scattered(4)
+    free, ordered = (run(make_air(one, 4), pose, everybody(4), 4, 4) for one in (radio, kept(radio)))
+    np.testing.assert_array_equal(free.heard("heard_at_ns"), ordered.heard("heard_at_ns"))

@@ -1,0 +1,312 @@
+"""A sender's radio sends one packet after the other, keeps what waits while it is off, and refuses the rest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.packets import NOWHERE, Fate, Sent
+from swarmwire.comms.radio.config.phy import Access
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
+from swarmwire.comms.radio.transmissions import Intake
+from swarmwire.comms.radio.unit_disk.tx_queue import ACCEPTED, enter
+from swarmwire.comms.truth import Obstacle
+from tests.support.comms.radio.phy.radios import with_access
+from tests.support.comms.radio.runs import TICK_NS, Run, at, make_air, packets, run
+from tests.support.comms.radio.traffic import run_disrupted
+
+TRIO = at((0, 0), (1, 0), (9, 0))
+SLOW = Radio(2.0, bit_rate_bps=4000, send_offset="tick")  # 10 bytes take 20 ms
+
+
+def test_packets_of_one_sender_follow_each_other_without_gap():
+    """First in, first out; another sender does not wait for them."""
+    told = run(make_air(SLOW, 3), TRIO, lambda _: packets([0, 0, 1, 0], size=[10, 5, 10, 10]), 1)
+    times = {
+        (int(s), int(n)): int(t)
+        for s, n, t in zip(told.on_air("sender"), told.on_air("sequence"), told.on_air("on_air_at_ns"), strict=True)
+    }
+    assert times == {(0, 0): 0, (0, 1): 20_000_000, (0, 2): 30_000_000, (1, 0): 0}
+    assert (told.on_air("sent_at_ns") == 0).all()
+
+
+@pytest.mark.parametrize("limit", [0, 1, 3])
+def test_a_full_queue_refuses_for_every_intended_receiver(limit: int):
+    """One packet is on air and `limit` wait; the refused count as in range where they would have been heard."""
+    radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=limit)
+    told = run(make_air(radio, 3), TRIO, lambda _: packets([0] * 5), 1, 3)
+    assert told.on_air("sequence").tolist() == list(range(limit + 1))
+    assert told.fates() == {"HEARD": limit + 1, "OUT_OF_RANGE": limit + 1, "QUEUE_FULL": 2 * (4 - limit)}
+    assert told.tally.in_range.tolist() == [5]
+
+
+def test_who_stands_behind_an_obstacle_was_not_in_range_of_what_was_refused():
+    radio = Radio(2.0, line_of_sight=True, bit_rate_bps=4000, send_offset="tick", queue_limit=0)
+    air = make_air(radio, 3, obstacles=[[Obstacle("cylinder", 0.5, 0.0, radius_m=0.1)]])
+    told = run(air, at((0, 0), (1, 0), (0, 1)), lambda _: packets([0, 0]), 1, 3)
+    assert told.fates() == {"HEARD": 1, "BLOCKED": 1, "QUEUE_FULL": 2}
+    assert told.tally.in_range.tolist() == [2]
+
+
+def test_the_queue_empties_as_time_passes():
+    """Packets of 60 ms, two per tick of 100 ms, and room for one: with every other tick one more is refused."""
+    radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=1)
+    told = run(make_air(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=30), 6, 3)
+    on_air_ms = (told.on_air("on_air_at_ns") // 10**6).tolist()
+    assert on_air_ms == [0, 60, 120, 200, 260, 320, 400, 460, 520]
+    assert told.fates() == {"HEARD": 9, "QUEUE_FULL": 3}
+    assert (np.diff(told.on_air("sequence")) > 0).all()
+
+
+def test_what_earlier_ticks_left_waiting_counts_against_the_limit():
+    """Packets of 60 ms and room for three: 120 and 180 ms still wait at 100 ms, 240 ms at 200 ms."""
+    radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=3)
+    told = run(make_air(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0] * 5, size=30), 3, 6)
+    assert told.on_air("sequence").tolist() == [0, 1, 2, 3, 5, 10, 11]
+    assert told.on_air("on_air_at_ns")[-3:].tolist() == [240_000_000, 300_000_000, 360_000_000]
+
+
+def test_refused_packets_are_numbered_too():
+    """And a packet too large takes no time on air: the next goes out at once."""
+    told = run(make_air(SLOW, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=[101, 100]), 1, 3)
+    assert told.heard("sequence").tolist() == [1]
+    assert told.on_air("on_air_at_ns").tolist() == [0]
+
+
+def test_a_payload_above_the_maximum_is_too_large_for_every_intended_receiver():
+    """Overhead does not count, and nobody was in range of it."""
+    radio = Radio(2.0, max_payload_bytes=10, overhead_bytes=50, send_offset="tick")
+    told = run(make_air(radio, 3), TRIO, lambda _: packets([0, 0, 1], [-1, -1, 2], [11, 10, 11]), 1)
+    assert told.fates() == {"TOO_LARGE": 3, "HEARD": 1, "OUT_OF_RANGE": 1}
+    assert told.tally.in_range.tolist() == [1]
+
+
+def test_a_refusal_is_final_when_it_was_sent():
+    """Offset 150 ms: in the second tick, whose poses tell who would have been in range."""
+    radio = Radio(2.0, bit_rate_bps=1000, send_offset=0.15, queue_limit=0)  # on air for 80 ms
+    air = make_air(radio, 2)
+    air.hold(at((0, 0), (3, 0)), np.ones(2, bool))
+    air.send(0, 0, packets([0, 0]))
+    assert air.advance(TICK_NS).tally.fates.sum() == 0
+    air.hold(at((0, 0), (1, 0)), np.ones(2, bool))
+    tally = air.advance(2 * TICK_NS).tally
+    assert tally.fates[0].sum() == tally.fates[0, Fate.QUEUE_FULL] == 1
+    assert tally.in_range.tolist() == [1]
+
+
+PAIR = at((0, 0), (1, 0))
+# Ten bytes take 80 ms.
+SLOWEST = Radio(2.0, bit_rate_bps=1000, send_offset="tick", queue_limit=4)
+
+
+def off(backlog: int, *rows: int) -> Disruption:
+    now = Disruption.none(2)
+    now.radio_on[list(rows)] = False
+    now.backlog[:] = backlog
+    return now
+
+
+def one_each(first: int, stop: int, count: int = 1) -> dict[int, Sent]:
+    return {tick: packets([0] * count) for tick in range(first, stop)}
+
+
+def blacked_out(backlog: int, sent: dict[int, Sent], radio: Radio = SLOWEST, ticks: int = 15) -> Run:
+    """The sender's radio is off from 0.2 to 0.8 s."""
+    return run_disrupted(make_air(radio, 2), PAIR, sent, {2: off(backlog, 0), 8: Disruption.none(2)}, ticks)
+
+
+def on_air_ms(told: Run) -> list[int]:
+    return (told.on_air("on_air_at_ns") // 1_000_000).tolist()
+
+
+def test_nothing_waits_by_default():
+    told = blacked_out(DROP, one_each(0, 9))
+    assert told.fates() == {"HEARD": 3, "BLACKOUT": 6}
+    assert on_air_ms(told) == [0, 100, 800]
+
+
+def test_all_wait_up_to_the_limit_and_go_out_one_after_the_other():
+    """Handed over at 0.2 to 0.8 s: four wait, two find the queue full, and the one at 0.8 s goes last."""
+    told = blacked_out(ALL, one_each(0, 9))
+    assert told.fates() == {"HEARD": 7, "QUEUE_FULL": 2}
+    assert on_air_ms(told) == [0, 100, 800, 880, 960, 1040, 1120]
+    assert told.heard("sequence").tolist() == [0, 1, 2, 3, 4, 5, 8]
+    refused = told.finished("receiver") < 0
+    assert (told.finished("sent_at_ns")[refused] // 10**8).tolist() == [6, 7]
+
+
+@pytest.mark.parametrize("limit", [0, 1, 4])
+def test_the_newest_waits_whatever_the_limit(limit: int):
+    told = blacked_out(NEWEST, one_each(0, 8), replace(SLOWEST, queue_limit=limit))
+    assert told.fates() == {"HEARD": 3, "BLACKOUT": 5}
+    assert on_air_ms(told) == [0, 100, 800]
+    assert told.heard("sequence").tolist() == [0, 1, 7]
+    told = blacked_out(NEWEST, {2: packets([0] * 3)}, replace(SLOWEST, queue_limit=limit))
+    assert told.heard("sequence").tolist() == [2]
+    assert told.fates() == {"HEARD": 1, "BLACKOUT": 2}
+
+
+def test_what_waited_already_waits_on_and_what_is_on_air_ends_in_peace():
+    """Four packets at 0.1 s begin at 100, 180, 260 and 340 ms: that of 180 ms is on air when the radio goes off."""
+    told = blacked_out(ALL, {1: packets([0] * 4)})
+    assert on_air_ms(told) == [100, 180, 800, 880]
+    assert told.fates() == {"HEARD": 4}
+
+
+def test_a_frame_longer_than_the_blackout_is_not_interrupted_by_what_waited():
+    long_ = replace(SLOWEST, max_payload_bytes=200)
+    sent = {1: packets([0, 0], size=[100, 10])}
+    now = {2: off(ALL, 0), 3: Disruption.none(2)}
+    told = run_disrupted(make_air(long_, 2), PAIR, sent, now, 15)
+    assert on_air_ms(told) == [100, 900]
+
+
+def test_a_packet_too_large_does_not_wait():
+    told = blacked_out(ALL, {3: packets([0, 0], size=[101, 10])})
+    assert told.fates() == {"HEARD": 1, "TOO_LARGE": 1}
+    assert told.news[4].tally.fates.sum() == 1
+
+
+def test_the_backlog_of_a_robot_that_dies_dies_with_it_and_the_next_starts_afresh():
+    dead = off(ALL, 0)
+    dead.alive[0] = False
+    now = {2: off(ALL, 0), 4: dead, 6: off(ALL, 0), 8: Disruption.none(2)}
+    told = run_disrupted(make_air(SLOWEST, 2), PAIR, {2: packets([0] * 3), 7: packets([0])}, now, 12)
+    assert told.fates() == {"HEARD": 1, "SENDER_DEAD": 3}
+    assert on_air_ms(told) == [800]
+
+
+def test_what_still_waits_at_the_end_is_in_flight():
+    told = run_disrupted(make_air(SLOWEST, 2), PAIR, {3: packets([0] * 3)}, {2: off(ALL, 0)}, 6)
+    assert told.fates() == {"IN_FLIGHT": 3}
+
+
+def test_a_backlog_that_gets_stricter_is_cut_at_once():
+    sent = {3: packets([0] * 3)}
+    told = run_disrupted(
+        make_air(SLOWEST, 2), PAIR, sent, {2: off(ALL, 0), 5: off(NEWEST, 0), 8: Disruption.none(2)}, 12
+    )
+    assert told.fates() == {"HEARD": 1, "BLACKOUT": 2}
+    told = run_disrupted(make_air(SLOWEST, 2), PAIR, sent, {2: off(ALL, 0), 5: off(DROP, 0), 8: Disruption.none(2)}, 12)
+    assert told.fates() == {"BLACKOUT": 3}
+
+
+def test_a_backlog_keeps_to_its_own_radio():
+    """Robot 1 goes on as if nothing were, and its queue does not count for the other's."""
+    both = {tick: packets([0, 1, 1]) for tick in range(2, 6)}
+    told = blacked_out(ALL, both)
+    sender, on_air = told.on_air("sender"), np.array(on_air_ms(told))
+    assert on_air[sender == 0].tolist() == [800, 880, 960, 1040]
+    assert on_air[sender == 1].tolist() == [200, 280, 360, 440, 520, 600, 680, 760]
+    assert told.fates() == {"HEARD": 4, "BLACKOUT": 8}
+
+
+def test_a_radio_keeps_back_only_its_own_packets_and_only_those_that_it_took():
+    """Handed over at 0.35 s: the radio of robot 1 is off by then, and of its two packets the first is too large."""
+    later = replace(SLOWEST, send_offset=0.25)
+    sent, now = {1: packets([0, 0, 1, 1], size=[10, 10, 101, 10])}, {2: off(ALL, 1), 8: Disruption.none(2)}
+    told = run_disrupted(make_air(later, 2), PAIR, sent, now, 12)
+    assert told.fates() == {"HEARD": 1, "BLACKOUT": 2, "TOO_LARGE": 1}
+    assert on_air_ms(told) == [350, 430, 800]
+    assert [one.tally.fates[0, Fate.TOO_LARGE] for one in told.news].index(1) == 4
+
+
+def test_the_first_that_waited_goes_on_air_when_the_one_before_it_has_ended():
+    """As above, but the radio is on again at 300 ms: the second frame has ended at 260."""
+    told = run_disrupted(make_air(SLOWEST, 2), PAIR, {1: packets([0] * 4)}, {2: off(ALL, 0), 3: Disruption.none(2)}, 15)
+    assert on_air_ms(told) == [100, 180, 300, 380]
+
+
+def test_each_radio_lets_go_its_own_packets():
+    """Both are off from 0.2 s on, that of robot 1 until 0.5 s, that of robot 0 until 0.8 s."""
+    now = {2: off(ALL, 0, 1), 5: off(ALL, 0), 8: Disruption.none(2)}
+    told = run_disrupted(make_air(SLOWEST, 2), PAIR, {3: packets([0, 0, 1, 1])}, now, 15)
+    sender, on_air = told.on_air("sender"), np.array(on_air_ms(told))
+    assert on_air[sender == 1].tolist() == [500, 580]
+    assert on_air[sender == 0].tolist() == [800, 880]
+
+
+def test_a_packet_is_on_air_for_its_bytes_and_those_of_its_frame():
+    radio = Radio(2.0, bit_rate_bps=1000, overhead_bytes=6, max_payload_bytes=10, send_offset="tick")
+    told = run(make_air(radio, 2), PAIR, lambda _: packets([0, 0, 0], size=[10, 11, 10]), 1, 4)
+    assert (told.heard("heard_at_ns") // 10**6).tolist() == [128, 256]
+    departed = [one.departed for one in told.news]
+    lasts_ns = np.concatenate([of.off_air_at_ns - of.on_air_at_ns for of in departed])
+    fate = np.concatenate([of.fate for of in departed])
+    assert sorted(zip(fate.tolist(), (lasts_ns // 1000).tolist(), strict=True)) == [
+        (Fate.HEARD, 128_000),
+        (Fate.HEARD, 128_000),
+        (Fate.TOO_LARGE, 0),
+    ]
+    assert lasts_ns[fate == Fate.TOO_LARGE].tolist() == [0]
+
+
+def test_packets_are_taken_in_by_sender_in_whatever_order_the_crew_tells_them():
+    intake = Intake(4)
+    for before in (0, 2):
+        taken = intake.take(np.zeros(4, np.int64), packets([3, 1, 3, 1], to=[0, 1, 2, 3]), np.full(4, 3), 7)
+        assert taken.sender.tolist() == [1, 1, 3, 3]
+        assert taken.to.tolist() == [1, 3, 0, 2]
+        assert (taken.sequence - before).tolist() == [0, 1, 0, 1]
+        assert [taken.payloads.row(k)[0] for k in range(4)] == [1, 3, 0, 2]
+        assert (taken.intended.tolist(), taken.epoch.tolist()) == ([1] * 4, [7] * 4)
+
+
+def test_packets_to_nobody_take_a_number_and_go_nowhere():
+    taken = Intake(2).take(np.zeros(2, np.int64), packets([0, 0, 1], to=[NOWHERE, 1, NOWHERE]), np.ones(2, np.int64), 0)
+    assert (taken.sender.tolist(), taken.sequence.tolist()) == ([0], [1])
+
+
+AIRTIME_NS = 1_000_000
+SENDERS, WARM_UP, PACKETS = 1500, 150, 400
+STANDARD_ERRORS = 4.4
+NOBODY = np.empty(0, np.int64)
+
+
+@pytest.mark.parametrize(("load", "stated"), [(0.5, 0.5), (0.8, 2.0), (0.9, 4.5)])
+def test_packets_that_come_at_random_wait_as_theory_says(load: float, stated: float):
+    """Mean wait rho / (2 (1 - rho)) airtimes; 4.4 standard errors over independent senders (1 in 90,000).
+
+    At a load of 0.9 a queue forgets that it was empty in some 100 airtimes, which the warm-up leaves out.
+    """
+    gaps_ns = np.random.default_rng(7).exponential(AIRTIME_NS / load, (WARM_UP + PACKETS, SENDERS))
+    sent_at_ns = np.cumsum(gaps_ns, axis=0).astype(np.int64)
+    free_at_ns, wait = np.zeros(SENDERS, np.int64), np.zeros(SENDERS)
+    sender, airtime_ns, fits = np.arange(SENDERS), np.full(SENDERS, AIRTIME_NS), np.zeros(SENDERS, bool)
+    for k, at_ns in enumerate(sent_at_ns):
+        on_air_at_ns, fate, free_at_ns = enter(
+            at_ns, free_at_ns, NOBODY, NOBODY, sender, airtime_ns, fits, np.full(len(free_at_ns), 10**9)
+        )
+        assert (fate == ACCEPTED).all()
+        if k >= WARM_UP:
+            wait += (on_air_at_ns - at_ns) / AIRTIME_NS / PACKETS
+    assert load / (2.0 * (1.0 - load)) == pytest.approx(stated, rel=1e-12)
+    assert abs(wait.mean() - stated) < STANDARD_ERRORS * wait.std() / np.sqrt(SENDERS)
+
+
+def test_a_radio_with_signals_has_the_disks_queue():
+    """Without access there is nothing else to wait for: the same packets go on air at the same instants."""
+    signals = replace(with_access("none"), send_offset="uniform", bit_rate_bps=20_000, queue_limit=3)
+    assert signals.access == Access("none")
+    disk = Radio(
+        9.0,
+        bit_rate_bps=20_000,
+        overhead_bytes=signals.overhead_bytes,
+        max_payload_bytes=signals.max_payload_bytes,
+        queue_limit=3,
+    )
+    found = []
+    for radio in (signals, disk):
+        draws = np.random.default_rng(3)
+        told = run(
+            make_air(radio, 3),
+            at((0, 0), (1, 0), (0, 1)),
+            lambda _, draws=draws: packets(draws.integers(0, 3, 20), size=draws.integers(1, 100, 20)),
+            20,
+            30,
+        )
+        columns = [told.finished(name) for name in ("sender", "sequence", "receiver", "on_air_at_ns", "fate")]
+        found.append(sorted(zip(*(column.tolist() for column in columns), strict=True)))
+    assert len({row[3] for row in found[0]}) > 50
+    assert found[0] == found[1]

@@ -1,0 +1,267 @@
+"""Who is near enough and in sight, also on a torus, and what a receiver learns of a sender."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.draws import derive_key
+from swarmwire.comms.geometry.obstacles import is_blocked_on, obstacle_arrays, to_nearest
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.radio.config.impairments import BearingGiven, Gives, RangeGiven
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.truth import Obstacle
+from tests.support.comms.radio.runs import RATE_HZ, at, everybody, make_air, packets, run, scattered
+
+GIVES = Gives(RangeGiven(), BearingGiven())
+BETWEEN = {
+    "cylinder": Obstacle("cylinder", 0.0, 0.0, radius_m=0.2),
+    "box": Obstacle("box", 0.0, 0.0, np.pi / 4, size_m=(0.6, 0.1)),
+    "polygon": Obstacle("polygon", 0.0, -0.1, 0.3, points_m=((-0.1, 0.0), (0.2, 0.0), (0.0, 0.3))),
+}
+
+
+@given(st.integers(0, 1000), st.floats(0.05, 9.0), st.integers(1, 40))
+def test_heard_by_exactly_those_within_range(seed: int, range_m: float, robots: int):
+    pose = scattered(robots, seed) * [1.3, 1.3, 1.0]  # some outside the arena
+    told = run(make_air(Radio(range_m, send_offset="tick"), robots), pose, everybody(robots), 1)
+    apart_m = np.hypot(*(pose[:, None, :2] - pose[None, :, :2]).transpose(2, 0, 1))
+    near = np.argwhere((apart_m <= range_m) & ~np.eye(robots, dtype=bool))
+    pairs = np.column_stack([told.finished("sender"), told.finished("receiver")])
+    np.testing.assert_array_equal(pairs[np.lexsort(pairs.T[::-1])], near)
+    assert told.fates().get("OUT_OF_RANGE", 0) == robots * (robots - 1) - len(near)
+
+
+def test_range_is_inclusive():
+    told = run(make_air(Radio(2.0, send_offset="tick"), 3), at((-1, 0), (1, 0), (1, 2.0000001)), everybody(3), 1)
+    assert told.fates() == {"HEARD": 2, "OUT_OF_RANGE": 4}
+
+
+def test_robots_of_other_arenas_hear_nothing():
+    """Even if they stand at the same place."""
+    told = run(make_air(Radio(99.0, send_offset="tick"), 2, [1, 2]), np.zeros((4, 3)), lambda _: packets([0]), 1)
+    assert told.heard("receiver").tolist() == [1]
+
+
+def test_an_addressed_packet_reaches_only_its_receiver():
+    pose = at((0, 0), (1, 0), (0, 1), (3, 0))
+    told = run(make_air(Radio(2.0, send_offset="tick"), 4), pose, lambda _: packets([0, 0], [2, 3]), 1)
+    assert told.heard("receiver").tolist() == [2]
+    assert told.fates() == {"HEARD": 1, "OUT_OF_RANGE": 1}
+    assert told.tally.intended.tolist() == [2]
+
+
+@pytest.mark.parametrize("to", [-3, 0, 3])
+def test_a_receiver_outside_the_arena_or_oneself_is_refused_and_changes_nothing(to: int):
+    air = make_air(Radio(2.0, send_offset="tick"), 3)
+    air.hold(at((0, 0), (1, 0), (0, 1)), np.ones(3, bool))
+    with pytest.raises(ValueError, match="to: expected another robot"):
+        air.send(0, 0, packets([0, 0], [1, to]))
+    air.send(0, 0, packets([0], 1))
+    news = air.advance(10**8)
+    assert news.heard.sequence.tolist() == [0]
+    assert news.tally.sent.tolist() == [1]
+
+
+@pytest.mark.parametrize("shape", BETWEEN)
+def test_an_obstacle_in_the_line_of_sight_blocks(shape: str):
+    """Blocked receivers are not in range; without line of sight they hear."""
+    pose = at((-1, 0), (1, 0), (-1, 1))
+    for line_of_sight, fates, in_range in ((True, {"HEARD": 4, "BLOCKED": 2}, 4), (False, {"HEARD": 6}, 6)):
+        radio = Radio(9.0, line_of_sight=line_of_sight, send_offset="tick")
+        told = run(make_air(radio, 3, [1], [[BETWEEN[shape]]]), pose, everybody(3), 1)
+        assert told.fates() == fates
+        assert told.tally.in_range.tolist() == [in_range]
+
+
+def test_range_and_bearing_are_exact_without_noise():
+    """Robot 1 looks along +y: robot 0, at its west, is at its left; robot 2, at its south, behind it."""
+    radio = Radio(9.0, send_offset="tick", gives=GIVES)
+    told = run(make_air(radio, 3), at((-2, 0, 0), (0, 0, np.pi / 2), (0, -1, 0)), lambda _: packets([0, 2]), 1)
+    seen = {
+        (int(r), int(s)): (range_m, bearing_rad)
+        for r, s, range_m, bearing_rad in zip(
+            told.heard("receiver"), told.heard("sender"), told.given("range_m"), told.given("bearing_rad"), strict=True
+        )
+    }
+    assert seen[1, 0] == (2.0, np.pi / 2)
+    assert seen[1, 2] == (1.0, np.pi)
+    assert seen[0, 2] == pytest.approx((5**0.5, np.arctan2(-1, 2)))
+    assert seen[2, 0] == pytest.approx((5**0.5, np.arctan2(1, -2)))
+
+
+def test_only_what_the_radio_gives_comes_with_a_packet():
+    for gives in (Gives(), Gives(range=RangeGiven()), Gives(bearing=BearingGiven()), GIVES):
+        told = run(make_air(Radio(9.0, gives=gives), 3), scattered(3), everybody(3), 2, 2)
+        assert all(tuple(one.heard.given) == gives.columns for one in told.news)
+
+
+def test_noise_has_its_standard_deviation_and_stays_in_bounds():
+    """10,920 draws each: the mean and the deviation lie within five standard errors (false alarm 1e-6 each)."""
+    radio = Radio(99.0, gives=Gives(RangeGiven(0.1), BearingGiven(0.3)))
+    pose = at(*[(3.0 * np.cos(a), 2.5 * np.sin(a), a) for a in np.linspace(-3, 3, 40)])
+    told = run(make_air(radio, 40), pose, everybody(40), 7, 2)
+    way = pose[told.heard("sender"), :2] - pose[told.heard("receiver"), :2]
+    bearing_rad = np.arctan2(way[:, 1], way[:, 0]) - pose[told.heard("receiver"), 2]
+    wrong_rad = np.angle(np.exp(1j * (told.given("bearing_rad") - bearing_rad)))
+    far = np.hypot(*way.T) > 1.0  # no cut at zero
+    wrong_m = (told.given("range_m") - np.hypot(*way.T))[far]
+    for wrong, sigma in ((wrong_rad, 0.3), (wrong_m, 0.1)):
+        assert abs(wrong.mean()) < 5 * sigma / len(wrong) ** 0.5
+        assert abs(wrong.std() / sigma - 1.0) < 5 / (2 * len(wrong)) ** 0.5
+    assert (told.given("range_m") >= 0.0).all()
+    assert (told.given("bearing_rad") > -np.pi).all()
+    assert (told.given("bearing_rad") <= np.pi).all()
+
+
+@given(st.integers(0, 1000), st.floats(0.3, 4.0))
+def test_edges_are_the_links_that_are_heard_both_ways(seed: int, range_m: float):
+    obstacles = [*BETWEEN.values(), Obstacle("cylinder", 1.5, 1.0, radius_m=0.5)]
+    air = make_air(Radio(range_m, send_offset="tick"), 12, [1, 2], [obstacles, []])
+    pose = scattered(24, seed)
+    edges = air.edges(pose, np.ones(24, bool))
+    told = run(air, pose, everybody(24), 1)
+    sender = told.heard("receiver") // 12 * 12 + told.heard("sender")
+    links = np.column_stack([sender, told.heard("receiver")])
+    both = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0).reshape(-1, 2)
+    np.testing.assert_array_equal(links[np.lexsort(links.T[::-1])], both)
+    np.testing.assert_array_equal(edges, edges[np.lexsort(edges.T[::-1])])
+    assert (edges[:, 0] < edges[:, 1]).all()
+
+
+def test_edges_join_robots_alive_where_packets_get_through_often_enough():
+    pose, alive = at((0, 0), (1, 0), (2, 0)), np.array([True, True, False])
+    for loss, joined in ((0.0, 1), (0.9, 1), (0.91, 0)):
+        assert len(make_air(Radio(1.5, loss=loss), 3).edges(pose, alive)) == joined
+    assert make_air(Radio(1.5), 3).edges(pose, np.zeros(3, bool)).shape == (0, 2)
+
+
+def test_fate_of_a_link_is_listed_once():
+    told = run(make_air(Radio(9.0, loss=0.5, latency_s=0.2), 6), scattered(6), everybody(6), 4, 6)
+    links = np.column_stack([told.finished(name) for name in ("sender", "receiver", "sequence")])
+    assert len(np.unique(links, axis=0)) == len(links) == 6 * 5 * 4
+    assert set(told.finished("fate")) == {Fate.HEARD, Fate.LOST}
+
+
+SIZE_M = (6.0, 4.0)
+EXACT = Gives(RangeGiven(0.0), BearingGiven(0.0))
+
+
+def torus(radio: Radio, robots: int, arenas: int = 1, obstacles: tuple[Obstacle, ...] = ()) -> Air:
+    keys = np.array([derive_key(seed, "air") for seed in range(arenas)], np.uint64)
+    return Air(radio, keys, robots, SIZE_M, obstacle_arrays((obstacles,) * arenas), RATE_HZ, boundary="torus")
+
+
+def scattered_torus(rows: int) -> FloatArray:
+    rng, half = np.random.default_rng(8), np.array(SIZE_M) / 2
+    return np.column_stack([rng.uniform(-half, half, (rows, 2)), rng.uniform(-np.pi, np.pi, rows)])
+
+
+def away(pose: FloatArray) -> FloatArray:
+    """From each robot to each other, the shortest way, (rows, rows, 2)."""
+    straight = pose[None, :, :2] - pose[:, None, :2]
+    return straight - np.array(SIZE_M) * np.round(straight / SIZE_M)
+
+
+def expected_pairs(pose: FloatArray, robots: int, range_m: float) -> set[tuple[int, int]]:
+    near = np.hypot(*away(pose).transpose(2, 0, 1)) <= range_m
+    arena = np.arange(len(pose)) // robots
+    near &= (arena[:, None] == arena) & ~np.eye(len(pose), dtype=np.bool_)
+    return set(zip(*map(np.ndarray.tolist, np.nonzero(near)), strict=True))
+
+
+def pairs(receiver: IntArray, sender: IntArray) -> set[tuple[int, int]]:
+    return set(zip(receiver.tolist(), sender.tolist(), strict=True))
+
+
+@pytest.mark.parametrize("range_m", [0.35, 0.61, 0.9, 1.3, 2.1, 3.2, 5.0])
+def test_robots_hear_those_within_range_the_shortest_way_each_once(range_m: float) -> None:
+    """Ranges make grids of one, two, four and more cells a side."""
+    pose = scattered_torus(80)
+    out = run(torus(Radio(range_m=range_m, gives=EXACT), 40, arenas=2), pose, everybody(80), ticks=1, quiet_ticks=2)
+    receiver, sender = out.heard("receiver"), out.heard("sender")
+    sender = sender + receiver // 40 * 40
+    found = pairs(receiver, sender)
+    assert found == expected_pairs(pose, 40, range_m)
+    assert len(found) == len(receiver)
+    shortest = away(pose)[receiver, sender]
+    assert out.given("range_m") == pytest.approx(np.hypot(*shortest.T), abs=1e-12)
+    bearing = np.arctan2(shortest[:, 1], shortest[:, 0]) - pose[receiver, 2]
+    assert np.cos(out.given("bearing_rad") - bearing) == pytest.approx(1.0, abs=1e-12)
+    edges = torus(Radio(range_m=range_m), 40, arenas=2).edges(pose, np.ones(80, np.bool_))
+    assert pairs(*edges.T) == {pair for pair in found if pair[0] < pair[1]}
+
+
+def test_an_addressed_packet_crosses_the_seam() -> None:
+    pose = np.array([[2.9, 1.9, 0.0], [-2.9, -1.9, 0.0], [0.0, 0.0, 0.0]])
+    radio = Radio(range_m=1.0, gives=EXACT)
+    out = run(torus(radio, 3), pose, lambda _: packets([0, 0], [1, 2]), ticks=1, quiet_ticks=2)
+    assert (out.heard("receiver").tolist(), out.heard("sender").tolist()) == ([1], [0])
+    assert out.given("range_m") == pytest.approx([np.hypot(0.2, 0.2)])
+    assert out.given("bearing_rad") == pytest.approx([-0.75 * np.pi])
+    assert out.fates() == {"HEARD": 1, "OUT_OF_RANGE": 1}
+
+
+def test_slow_waves_take_the_shortest_way() -> None:
+    pose = np.array([[2.9, 0.0, 0.0], [-2.9, 0.0, 0.0]])
+    late_ns = []
+    for speed_mps in (None, 340.0):
+        radio = Radio(range_m=1.0, propagation_mps=speed_mps)
+        out = run(torus(radio, 2), pose, lambda _: packets([0]), ticks=1, quiet_ticks=2)
+        late_ns += out.heard("heard_at_ns").tolist()
+    assert late_ns[1] - late_ns[0] == pytest.approx(0.2 / 340.0 * 1e9, abs=2)
+
+
+def test_obstacles_block_across_the_seam() -> None:
+    """Against points along the shortest line, each put back into the arena."""
+    obstacles = (
+        Obstacle("box", 2.5, 0.3, 0.4, size_m=(0.4, 1.5)),
+        Obstacle("cylinder", -2.6, -1.6, radius_m=0.3),
+        Obstacle("box", 0.0, 1.8, size_m=(2.0, 0.2)),
+    )
+    arrays, pose, blocked = obstacle_arrays((obstacles,)), scattered_torus(60), 0
+    shortest, shares = away(pose), np.linspace(0.0, 1.0, 4001)[:, None]
+    for a in range(60):
+        for b in range(a):
+            line = pose[a, :2] + shares * shortest[a, b]
+            line -= np.array(SIZE_M) * np.round(line / SIZE_M)
+            nearest = min(depth(obstacle, line) for obstacle in obstacles)
+            if abs(nearest) > 0.002:  # within that of a rim the points might miss it
+                assert is_blocked_on(arrays, 0, *pose[a, :2], *pose[b, :2], *SIZE_M) == (nearest < 0.0)
+                crosses = bool(np.any(np.abs(pose[b, :2] - pose[a, :2] - shortest[a, b]) > 1.0))
+                blocked += crosses and nearest < 0.0
+    assert blocked > 100
+    radio = Radio(range_m=5.0, line_of_sight=True)
+    edges = torus(radio, 60, obstacles=obstacles).edges(pose, np.ones(60, np.bool_))
+    clear = {
+        (a, b)
+        for a, b in expected_pairs(pose, 60, 5.0)
+        if a < b and not is_blocked_on(arrays, 0, *pose[a, :2], *pose[b, :2], *SIZE_M)
+    }
+    assert pairs(*edges.T) == clear
+
+
+def depth(obstacle: Obstacle, points: FloatArray) -> float:
+    """How near to the obstacle, in m, the nearest of the points is; below 0 within it."""
+    apart = points - (obstacle.x_m, obstacle.y_m)
+    if obstacle.shape == "cylinder":
+        return float(np.hypot(*apart.T).min()) - obstacle.radius_m
+    c, s = np.cos(obstacle.heading_rad), np.sin(obstacle.heading_rad)
+    along, across = c * apart[:, 0] + s * apart[:, 1], c * apart[:, 1] - s * apart[:, 0]
+    beyond = np.maximum(np.abs(along) - obstacle.size_m[0] / 2, np.abs(across) - obstacle.size_m[1] / 2)
+    return float(beyond.min())
+
+
+def test_without_a_torus_nothing_is_added() -> None:
+    assert to_nearest(5.9, 0.0) == 0.0
+    assert [5.9 + to_nearest(5.9, 6.0), -3.5 + to_nearest(-3.5, 6.0), 2.0 + to_nearest(2.0, 6.0)] == pytest.approx(
+        [-0.1, 2.5, 2.0]
+    )
+
+
+@pytest.mark.parametrize("radio", [Radio(model="friis"), Radio(range_m=1.0, bodies_block=True)])
+def test_what_no_torus_can_have_is_refused(radio: Radio) -> None:
+    with pytest.raises(ValueError, match="expected a disk without bodies_block on a torus"):
+        torus(radio, 2)

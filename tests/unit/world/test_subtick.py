@@ -1,0 +1,221 @@
+"""The air of a crew that takes its time: no packet is lost between ticks, and nothing depends on when one looks."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.interfaces import AirTime, Put
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.deploy.new_air import new_air
+from swarmwire.world.loop import Loop
+from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.subtick import AirInTime
+from swarmwire.world.world import World
+from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, make_air, scattered
+from tests.support.comms.radio.traffic import RADIOS
+from tests.support.world.samples import SAMPLE
+
+MS = 1_000_000
+AIRTIME_NS = 96_000  # of a packet's three bytes
+
+
+def packet(sender: int, byte: int = 0) -> Sent:
+    return Sent(np.array([sender]), np.array([BROADCAST]), Payloads.of([bytes([0, 0, byte])]))
+
+
+def static(robots: int, arenas: int = 1) -> Static:
+    names = tuple(f"r{i}" for i in range(robots))
+    return Static("", tuple(range(arenas)), RATE_HZ, (6.0, 5.0), "walls", ((),) * arenas, (), names)
+
+
+def in_time(radio: Radio, robots: int = 4, arenas: int = 1) -> AirInTime:
+    air = make_air(radio, robots, range(arenas))
+    air.hold(scattered(robots * arenas), np.ones(robots * arenas, np.bool_))
+    return AirInTime(air, static(robots, arenas), lambda sent: sent)
+
+
+def heard_at(heard: Heard, receiver: int = 1) -> list[tuple[int, int]]:
+    """Sender and time, but for the airtime, of what one robot heard."""
+    mine = heard.receiver == receiver
+    return list(zip(heard.sender[mine].tolist(), (heard.heard_at_ns[mine] - AIRTIME_NS).tolist(), strict=True))
+
+
+def test_a_packet_put_on_the_air_within_a_tick_is_heard_within_it_once():
+    air = in_time(Radio(99.0, latency_s=0.002))
+    air.begin(0)
+    air.send(Put(10 * MS, None, packet(0)))
+    assert heard_at(air.advance(12 * MS)[0]) == []
+    assert heard_at(air.advance(12 * MS + AIRTIME_NS)[0]) == [(0, 12 * MS)]
+    assert heard_at(air.advance(13 * MS)[0]) == []
+    told, rest, _ = air.begin(TICK_NS)
+    assert (heard_at(told.heard), heard_at(rest)) == ([(0, 12 * MS)], [])  # observers learn of it, agents have it
+
+
+def test_what_a_step_sent_waits_for_its_robots_turn_and_holds_up_nothing_that_is_sent_at_once():
+    air = in_time(Radio(99.0, send_offset=0.05))
+    air.begin(0)
+    air.send(Put(1 * MS, 0, packet(0)))
+    air.send(Put(2 * MS, None, packet(0)))
+    air.send(Put(60 * MS, 0, packet(2)))  # too late for its turn: at once
+    assert heard_at(air.advance(100 * MS)[0]) == [(0, 2 * MS), (0, 50 * MS), (2, 60 * MS)]
+
+
+def test_a_turn_may_come_ticks_later_and_what_still_waits_at_the_end_is_in_flight():
+    air = in_time(Radio(99.0, send_offset=0.25))
+    air.begin(0)
+    air.send(Put(1 * MS, 0, packet(0)))
+    air.send(Put(2 * MS, 0, packet(1)))
+    for tick in (1, 2):
+        assert not len(air.begin(tick * TICK_NS)[0].heard)
+    assert heard_at(air.begin(3 * TICK_NS)[0].heard) == [(0, 250 * MS)]
+    air.send(Put(301 * MS, 3, packet(3)))
+    air.end()
+    assert air._air.end().intended.sum() == 3
+
+
+@settings(max_examples=60, deadline=None)
+@given(RADIOS, st.integers(0, 1000), st.lists(st.integers(0, 99), max_size=30), st.booleans())
+def test_fates_add_up_and_quanta_change_nothing(radio: Radio, seed: int, quanta_ms: list[int], one_leaves: bool):
+    """Packets of steps and at once, in two arenas, one of which may leave; looked at now and then, or only at ticks."""
+    looked, not_looked = (_played(radio, seed, looks, one_leaves) for looks in (sorted(quanta_ms), []))
+    assert looked == not_looked
+    assert looked[1] == looked[2]
+
+
+def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> tuple[Any, int, int]:
+    rng = np.random.default_rng(seed)
+    air, robots = in_time(radio, 5, 2), 5
+    heard, tallies = list[Any](), list[Tally]()
+
+    def keep(told: Heard) -> None:
+        columns = told.receiver, told.sender, told.sequence, told.heard_at_ns
+        heard.extend(zip(*(column.tolist() for column in columns), strict=True))
+
+    for tick in range(5):
+        start_ns = tick_start_ns(tick, RATE_HZ)
+        news, rest, _ = air.begin(start_ns)
+        tallies.append(news.tally)
+        keep(rest)
+        arenas = 1 if one_leaves and tick > 2 else 2
+        puts = [
+            (start_ns + int(at), int(rng.integers(0, arenas * robots)), bool(rng.integers(2)))
+            for at in sorted(rng.integers(0, TICK_NS, 4))
+        ]
+        for at_ns, sender, at_once in sorted([*puts, *((start_ns + look * MS, -1, True) for look in looks_ms)]):
+            if sender < 0:
+                keep(air.advance(at_ns)[0])
+            else:
+                air.send(Put(at_ns, None if at_once else tick, packet(sender)))
+        keep(air.advance(tick_start_ns(tick + 1, RATE_HZ))[0])  # as at the end of each tick
+        if one_leaves and tick == 2:
+            over = np.array([False, True])
+            air.leave(over)
+            tallies.append(air._air.leave(over))
+    air.end()
+    tallies.append(air._air.end())
+    total = sum(tallies[1:], tallies[0])
+    return (sorted(heard), total.fates.tolist(), total.in_range.tolist()), total.fates.sum(), total.intended.sum()
+
+
+@dataclass
+class Sender:
+    """A crew whose robot 0 sends in the middle of each tick, and which notes what it is handed."""
+
+    told: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+
+    def start(self) -> None:
+        """Ready."""
+
+    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+        raise AssertionError("a crew that takes its time is asked in time")
+
+    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+        start_ns = tick_start_ns(tick, 10)
+        self.told += heard_at(heard)
+        air.send(Put(start_ns + 5 * MS, None, packet(0)))
+        wrong = packet(0)
+        air.send(Put(start_ns + 6 * MS, None, Sent(wrong.sender, np.array([99]), wrong.payloads)))
+        self.told += heard_at(air.advance(start_ns + 50 * MS)[0])
+        return Actions.joined([])
+
+    def counts(self) -> dict[str, int]:
+        return {}
+
+    def close(self) -> None:
+        """Nothing."""
+
+
+class Tallies:
+    """An observer that adds up what it is told."""
+
+    def __init__(self) -> None:
+        self.tallies: list[Tally] = []
+
+    def begin(self, static: Static) -> None:
+        """Nothing yet."""
+
+    def see(self, truth: Truth) -> None:
+        assert truth.tally
+        assert truth.finished
+        self.tallies.append(truth.tally)
+        assert truth.tally.fates[:, truth.finished.fate].any() or not len(truth.finished.fate)
+
+    def end(self, last: Tally | None) -> dict[str, Any]:
+        return {}
+
+
+def test_the_loop_shows_observers_what_was_heard_within_a_tick_and_counts_what_was_sent_to_nobody():
+    scenario = scenario_from(SAMPLE, "sample")
+    world, crew, seen = World(scenario, [1], {}), Sender(), Tallies()
+    loop = Loop(world, new_air(scenario, world, None), crew, [seen], timed=crew)
+    loop.run(5)
+    last = loop.end()
+    assert last is not None
+    total = sum(seen.tallies, last)
+    assert int(total.sent.sum()) == 5
+    assert total.fates.sum() == total.intended.sum()
+    assert loop.counts()["packets_to_nobody"] == 5
+    assert [sender for sender, _ in crew.told] == [0] * len(crew.told)
+
+
+class OverAfter:
+    """A judge that finds the second arena over after so many ticks."""
+
+    def __init__(self, ticks: int) -> None:
+        self.ticks = ticks
+
+    def over(self) -> np.ndarray[Any, np.dtype[np.bool_]] | None:
+        self.ticks -= 1
+        return np.array([False, True]) if self.ticks == 0 else None
+
+
+class FromBoth(Sender):
+    """Robot 0 of each arena sends late in each tick, also where the arena is over."""
+
+    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+        start_ns = tick_start_ns(tick, 10)
+        for sender in (0, 15) if tick < 3 else (0,):
+            air.send(Put(start_ns + 5 * MS, None, packet(sender)))
+            air.send(Put(start_ns + 5 * MS, tick, packet(sender + 1)))
+        air.advance(start_ns + 99 * MS)
+        return Actions.joined([])
+
+
+def test_of_an_arena_that_leaves_what_was_heard_within_its_last_tick_counts_and_the_rest_is_in_flight():
+    scenario = scenario_from(SAMPLE, "sample")
+    world, crew, seen = World(scenario, [1, 2], {}), FromBoth(), Tallies()
+    loop = Loop(world, new_air(scenario, world, None), crew, [seen], judge=OverAfter(3), timed=crew)
+    loop.run(6)
+    last = loop.end()
+    assert last is not None
+    total = sum(seen.tallies, last)
+    assert total.sent.tolist() == [12, 6]
+    assert total.fates.sum(axis=1).tolist() == total.intended.tolist()
+    assert loop.arena_ticks.tolist() == [6, 3]
