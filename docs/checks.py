@@ -32,7 +32,7 @@ from swarmwire.deploy.fleet.fleet_keys import OF_FLEET, OF_ROBOT
 from tests.docs.pages import PAGES, blocks_of, commands_of, files_of
 
 ROOT = Path(__file__).parents[1]
-MOST_BYTES = 150_000  # of a picture
+MAX_BYTES = 150_000  # of a picture
 Problems = Iterator[str]
 
 
@@ -126,8 +126,8 @@ def pictures() -> Problems:
     if not sorted(shown) == sorted(FIGURES) == sorted(path.stem for path in (ROOT / "docs" / "radio").iterdir()):
         yield f"docs/radio.md: expected each figure once: {sorted(FIGURES)}"
     for path in (file for folder in ("radio", "behaviours") for file in (ROOT / "docs" / folder).iterdir()):
-        if path.suffix in {".svg", ".png"} and path.stat().st_size > MOST_BYTES:
-            yield f"{path.relative_to(ROOT)}: expected at most {MOST_BYTES} bytes"
+        if path.suffix in {".svg", ".png"} and path.stat().st_size > MAX_BYTES:
+            yield f"{path.relative_to(ROOT)}: expected at most {MAX_BYTES} bytes"
 
 
 def benchmark_rows() -> Problems:

@@ -102,7 +102,7 @@ def _numbers(page: _Page) -> Iterator[Comparison]:
     yield "results of sending", [int(number) for number in page.table("results")], [of.value for of in SendResult]
     yield "the tag of Heading", re.findall(r"<!-- tag: Heading -->(\d+)", page.text), [str(Heading.tag)]
     limits = {field.name: float(getattr(LIMITS, field.name)) for field in fields(LIMITS)}
-    limits |= {"frame": frames.MOST_BYTES, "items": frames.MOST_ITEMS, "request to join": join.MAX_JOIN_BYTES}
+    limits |= {"frame": frames.MAX_BYTES, "items": frames.MAX_ITEMS, "request to join": join.MAX_JOIN_BYTES}
     yield "limits", {name: float(value.split()[0]) for name, (value, _) in page.table("limits").items()}, limits
     source = _source(*COUNTERS)
     counted = {f"{fault}_frames" for fault in re.findall(r'BadFrame\("(\w+)"', source)}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 BEGIN = ("run", "point", "seed")
 ENDS = ("ended", "stop_time_s", "stopped_by", "sim_time_s")  # those that a campaign has
 LAST = ("timing_wall_s",)
-MOST_BYTES = 2_000_000  # of all digests of an experiment: they are kept with the code
+MAX_BYTES = 2_000_000  # of all digests of an experiment: they are kept with the code
 
 
 def digest(experiment: Experiment, places: Places, folders: Sequence[Path] = ()) -> list[Path]:
@@ -34,8 +34,8 @@ def digest(experiment: Experiment, places: Places, folders: Sequence[Path] = ())
         with chosen_file(written[-1]) as aside:
             frame.write_parquet(aside, compression="zstd", compression_level=9, statistics=False)
     size = sum(file.stat().st_size for file in _files(experiment, places) if file.exists())
-    if size > MOST_BYTES:
-        kept = f"expected at most {MOST_BYTES / 1e6:g} MB in all, got {size / 1e6:.1f}: keep fewer columns"
+    if size > MAX_BYTES:
+        kept = f"expected at most {MAX_BYTES / 1e6:g} MB in all, got {size / 1e6:.1f}: keep fewer columns"
         raise BadInput(str(places.data), experiment.name, kept)
     return written
 

@@ -12,7 +12,7 @@ from PIL import Image
 
 QUIET = ("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars", "--disable-sync",
          "--disable-background-networking")  # fmt: skip
-LEAST_PX = 500  # chromium's window is no narrower: what is shown on a phone stands in a frame of it
+MIN_PX = 500  # chromium's window is no narrower: what is shown on a phone stands in a frame of it
 
 
 def main(page: Path, heading: str, picture: Path, width_px: int, height_px: int) -> None:
@@ -25,7 +25,7 @@ def main(page: Path, heading: str, picture: Path, width_px: int, height_px: int)
             f'<!doctype html><iframe style="{style}" src="{page.resolve().as_uri()}#{heading}"></iframe>', "utf-8"
         )
         shot = Path(folder) / "shot.png"
-        window = f"--window-size={max(width_px, LEAST_PX)},{height_px}"
+        window = f"--window-size={max(width_px, MIN_PX)},{height_px}"
         command = ["chromium", *QUIET, f"--user-data-dir={folder}/profile", window, f"--screenshot={shot}"]
         subprocess.run([*command, frame.as_uri()], check=True, capture_output=True, timeout=100)
         Image.open(shot).convert("RGB").crop((0, 0, width_px, height_px)).quantize(64).save(picture, optimize=True)

@@ -19,7 +19,7 @@ from tests.support.waiting import until
 ANY_PORT = ("tcp/127.0.0.1:0",)
 ROBOTS = ("flock-0", "flock-1", "flock-2")
 KEYS = SwarmKeys("test")
-MOST_BYTES = 100
+MAX_BYTES = 100
 PROBE = KEYS.radio("probe", 0)  # no robot of the swarm
 
 
@@ -68,7 +68,7 @@ def peers(count: int) -> Generator[list[zenoh.Session]]:
 
 def radio(session: zenoh.Session, own: str, clock=None, robots: Sequence[str] = ROBOTS, **given) -> ZenohRadio:
     """An open radio of a robot."""
-    made = ZenohRadio(session, KEYS, robots, own, MOST_BYTES, clock or WallClock(), **given)
+    made = ZenohRadio(session, KEYS, robots, own, MAX_BYTES, clock or WallClock(), **given)
     made.open()
     return made
 
@@ -97,7 +97,7 @@ def meet(session: zenoh.Session, others: list[ZenohRadio]) -> None:
     unknown = [other.counts().get("packets_of_unknown", 0) for other in others]
     until(reached)
     large = [other.counts().get("packets_oversized", 0) for other in others]
-    session.put(PROBE, bytes(2 * MOST_BYTES))  # counted as soon as it arrives, and last
+    session.put(PROBE, bytes(2 * MAX_BYTES))  # counted as soon as it arrives, and last
     for other, its in zip(others, large, strict=True):
         until(lambda other=other, its=its: other.counts().get("packets_oversized", 0) > its)
         other.heard(0)

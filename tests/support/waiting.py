@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from swarmwire.comms.clock import WallClock, to_ns
 
-PATIENCE_S = 60.0  # of a machine that is busy: whatever holds does so in milliseconds
+TIMEOUT_S = 60.0  # of a machine that is busy: whatever holds does so in milliseconds
 EACH_S = 0.005
 
 T = TypeVar("T")
@@ -15,7 +15,7 @@ T = TypeVar("T")
 def until(look: Callable[[], T], holds: Callable[[T], object] = bool) -> T:
     """What `look` returns as soon as it `holds`; AssertionError if it does not in a minute."""
     clock, pause = WallClock(), Event()
-    end_ns = clock.now_ns() + to_ns(PATIENCE_S)
+    end_ns = clock.now_ns() + to_ns(TIMEOUT_S)
     while not holds(found := look()):
         assert clock.now_ns() < end_ns, f"it did not come to hold; last seen: {found!r}"
         pause.wait(EACH_S)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 # zenoh's stubs leave out the types of what a session answers.
 
 
-LOOK_S = 5.0  # for worlds at an endpoint: a router may have to find its own first
+POLL_S = 5.0  # for worlds at an endpoint: a router may have to find its own first
 OTHERS_S = 0.3  # for further worlds after the first
 OFFER_S = 10.0
 BY_ALL = ""  # in place of a group's name
@@ -130,7 +130,7 @@ def _or_else(joining: Joining) -> str:
 def _chosen_run(session: zenoh.Session, runner: str, joining: Joining) -> str:
     """The id of the run that is meant, or of the only one at the endpoint."""
     endpoint = joining.endpoint
-    replies = session.liveliness().get(EVERY_WORLD, timeout=LOOK_S)
+    replies = session.liveliness().get(EVERY_WORLD, timeout=POLL_S)
     found = {run_of(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None}
     runs = sorted(found or _runs_to_come(session))
     if joining.run in runs:
@@ -147,7 +147,7 @@ def _runs_to_come(session: zenoh.Session) -> set[str]:
     """The runs that appear soon. Beside a subscription to the same keys, zenoh answers a `get` only sometimes."""
     arrived: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
     looking = session.liveliness().declare_subscriber(EVERY_WORLD, Callback(arrived.put, indirect=False), history=True)
-    found, patience_s = set[str](), LOOK_S
+    found, patience_s = set[str](), POLL_S
     with suppress(queue.Empty):
         while True:
             found.add(run_of(str(arrived.get(timeout=patience_s).key_expr)))

@@ -36,7 +36,7 @@ from swarmwire.comms.wire.sessions import closed_after, open_runner
 from swarmwire.comms.wire.tick_frames import check_rows, decode_packets, decode_tick, encode_actions, encode_sent
 
 JOIN_S = 60.0  # for each step: as long as a world waits for the next runner to join
-LOOK_S = 5.0  # for the world, each time
+POLL_S = 5.0  # for the world, each time
 FAREWELL_S = 3.0
 NO_ROBOTS = ""
 TIMED_OUT = "Timeout"  # what zenoh says for a world that says nothing
@@ -213,11 +213,11 @@ def _watched_world(session: zenoh.Session, keys: Keys, inbox: Inbox) -> "zenoh.S
 
     Where very many come at once, zenoh now and then tells one of them nothing of a token that is there: it asks again.
     """
-    for _ in range(round(JOIN_S / LOOK_S)):
+    for _ in range(round(JOIN_S / POLL_S)):
         watched = session.liveliness().declare_subscriber(
             keys.world, Callback(inbox.put_token, indirect=False), history=True
         )
-        there = inbox.wait_for_world(LOOK_S)
+        there = inbox.wait_for_world(POLL_S)
         if there is not None:
             return watched if there else None
         watched.undeclare()
@@ -248,7 +248,7 @@ def given_robots(data: bytes, agents: Mapping[str, str] = PLAIN.agents) -> tuple
 
     `agents` are the runner's own, by group.
     """
-    given = versioned(data, frames.MOST_BYTES)
+    given = versioned(data, frames.MAX_BYTES)
     assignment, memory = Assignment.from_mapping(given).with_agents(agents), given.get("memory")
     if memory is not None and not isinstance(memory, bytes):
         raise BadFrame("malformed", "memory: expected a frame")

@@ -89,7 +89,7 @@ def _fields(payload: bytes) -> list[tuple[str, str]]:
 # --- Comparison: two agents that are given the same, and where what they do comes apart.
 
 
-MOST_SHOWN = 8  # deeds of a robot
+MAX_SHOWN = 8  # deeds of a robot
 
 
 @dataclass(frozen=True)
@@ -116,9 +116,9 @@ class Comparison:
         apart = [what for what in one | other if one.get(what) != other.get(what)]
         lines = [
             f"  {what}: {one.get(what, 'nothing')} ({first}), {other.get(what, 'nothing')} ({second})"
-            for what in apart[:MOST_SHOWN]
+            for what in apart[:MAX_SHOWN]
         ]
-        return lines + [f"  and {len(apart) - MOST_SHOWN} more"] * (len(apart) > MOST_SHOWN)
+        return lines + [f"  and {len(apart) - MAX_SHOWN} more"] * (len(apart) > MAX_SHOWN)
 
 
 # --- The checks themselves: the same robots twice, in two ways, and what they do compared.

@@ -6,7 +6,7 @@ from typing import Protocol
 
 NS_PER_S = 1_000_000_000  # all times are integers, in ns
 LATE_WAKE_NS = 100_000  # by how much a sleep ends late, before it is known
-MOST_AWAKE_NS = 500_000  # the longest that is waited awake: a machine that wakes later is busy, and others need it
+MAX_AWAKE_NS = 500_000  # the longest that is waited awake: a machine that wakes later is busy, and others need it
 FADES_IN = 16  # sleeps, about
 SCALED_FROM_NS = 1_767_225_600 * NS_PER_S  # the first of January 2026: when all scaled clocks show the same date
 SCALED_SPAN_NS = 10 * 365 * 86_400 * NS_PER_S  # after which they show it again: dates of ROS 2 end in 2038
@@ -91,7 +91,7 @@ class PreciseClock:
             self._clock.sleep_until(early_ns)
             late_ns = self.now_ns() - early_ns
             faded_ns = self._wakes_late_ns - self._wakes_late_ns // FADES_IN
-            self._wakes_late_ns = min(max(faded_ns, late_ns), MOST_AWAKE_NS)
+            self._wakes_late_ns = min(max(faded_ns, late_ns), MAX_AWAKE_NS)
         while self.now_ns() < at_ns:
             continue
 

@@ -23,7 +23,7 @@ SwarmwireError
 └── BadFrame            a message on the wire breaks the protocol: counted and dropped, never fatal
 """
 
-MOST_LETTERS = 1500  # of a line about bad input
+MAX_LETTERS = 1500  # of a line about bad input
 
 
 class SwarmwireError(Exception):
@@ -45,9 +45,9 @@ def _one_line(text: str) -> str:
     """The text as a terminal can show it: keys and values in it may be anything, and of any length."""
     if not text.isprintable():
         text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-    if len(text) <= MOST_LETTERS:
+    if len(text) <= MAX_LETTERS:
         return text
-    half = MOST_LETTERS // 2  # a line begins with the place, and often ends with what was meant
+    half = MAX_LETTERS // 2  # a line begins with the place, and often ends with what was meant
     return f"{text[:half]}…{text[-half:]}"
 
 

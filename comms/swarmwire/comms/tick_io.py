@@ -7,8 +7,8 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.packets import Sent
 
-LONGEST_STATE = 64  # characters
-MOST_STATES = 256  # different ones in a run; what a runner names in a tick is bounded by the same number
+MAX_STATE = 64  # characters
+MAX_STATES = 256  # different ones in a run; what a runner names in a tick is bounded by the same number
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +44,8 @@ _NO_NOTES = Notes(np.empty(0, np.int64), np.empty(0, np.int64))
 
 def checked_state(state: object) -> str:
     """The state; ValueError unless it is a text of 1 to 64 characters."""
-    if not isinstance(state, str) or not 0 < len(state) <= LONGEST_STATE:
-        raise ValueError(f"note(state=…): expected a text of 1 to {LONGEST_STATE} characters, got {state!r}")
+    if not isinstance(state, str) or not 0 < len(state) <= MAX_STATE:
+        raise ValueError(f"note(state=…): expected a text of 1 to {MAX_STATE} characters, got {state!r}")
     return state
 
 

@@ -9,10 +9,10 @@ from swarmwire.world.scenario.file import load_scenario
 from swarmwire.world.scenario.scenario import Scenario
 
 FASTEST = 1e6  # factor in real time
-SHORTEST_QUANTUM_S = 0.001
+MIN_QUANTUM_S = 0.001
 LARGEST_SEED = 2**63 - 1
-MOST_SEEDS = 1_000_000
-MOST_ARENAS = 10_000  # of one world
+MAX_SEEDS = 1_000_000
+MAX_ARENAS = 10_000  # of one world
 SEEDS = "how many (9: 1 to 9), FIRST:END (4:10: 4 to 9), or a list (1,5,7; 9, for 9 alone)"
 Runners = int | str | None  # how many, "per-robot", or None for a local crew
 SeedsGiven = str | int | Sequence[int]  # how many from 1 on, as a number or text; a range or list as text; a list
@@ -24,8 +24,8 @@ def seed_list(given: SeedsGiven, said: str = "--seeds") -> tuple[int, ...]:
         seeds = _seeds_in(given) if isinstance(given, str | int) else list(given)
     except ValueError:
         raise BadInput(said, "", f"expected {SEEDS}; got {given!r}") from None
-    if not 0 < len(seeds) <= MOST_SEEDS:
-        raise BadInput(said, "", f"expected {SEEDS}, 1 to {MOST_SEEDS} of them; got {given!r}")
+    if not 0 < len(seeds) <= MAX_SEEDS:
+        raise BadInput(said, "", f"expected {SEEDS}, 1 to {MAX_SEEDS} of them; got {given!r}")
     good = all(type(seed) is int and 0 <= seed <= LARGEST_SEED for seed in (seeds[0], *seeds))
     if not good or (not isinstance(seeds, range) and len(set(seeds)) < len(seeds)):
         raise BadInput(said, "", f"expected different whole numbers from 0 to {LARGEST_SEED}; got {given!r}")
@@ -35,10 +35,10 @@ def seed_list(given: SeedsGiven, said: str = "--seeds") -> tuple[int, ...]:
 def _seeds_in(given: str | int) -> range | list[int]:
     """Unchecked; of a range that is too long its start, with one seed too many."""
     if isinstance(given, int) or given.strip().isdecimal():
-        return range(1, min(int(given), MOST_SEEDS + 1) + 1)
+        return range(1, min(int(given), MAX_SEEDS + 1) + 1)
     first, colon, end = given.partition(":")
     if colon:
-        return range(int(first), min(int(end), int(first) + MOST_SEEDS + 1))
+        return range(int(first), min(int(end), int(first) + MAX_SEEDS + 1))
     return [int(part) for part in given.split(",") if part.strip()]
 
 
@@ -52,8 +52,8 @@ def choose_seeds(scenario: Scenario, seed: int | None, seeds: SeedsGiven | None)
     if seed is not None:
         raise BadInput("--seed", "", "expected only one of --seed and --seeds")
     chosen = seed_list(seeds)
-    if len(chosen) > MOST_ARENAS:
-        most = f"at most {MOST_ARENAS} seeds side by side; sweep takes more"
+    if len(chosen) > MAX_ARENAS:
+        most = f"at most {MAX_ARENAS} seeds side by side; sweep takes more"
         raise BadInput("--seeds", "", f"expected {most}; got {len(chosen)}")
     return chosen
 
@@ -93,8 +93,8 @@ def quantum_of(quantum: float | None, factor: float | None, scenario: Scenario) 
     if scenario.radio is None:
         raise BadInput("--quantum", "", "expected a scenario with a radio: without one nothing happens between ticks")
     tick_s = 1 / scenario.time.rate_hz / factor
-    if not SHORTEST_QUANTUM_S <= quantum <= tick_s:
-        expected = f"expected {SHORTEST_QUANTUM_S:g} s to a tick's {tick_s:g} s of wall time, got {quantum!r}"
+    if not MIN_QUANTUM_S <= quantum <= tick_s:
+        expected = f"expected {MIN_QUANTUM_S:g} s to a tick's {tick_s:g} s of wall time, got {quantum!r}"
         raise BadInput("--quantum", "", expected)
     return quantum
 

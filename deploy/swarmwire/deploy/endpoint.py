@@ -16,7 +16,7 @@ from swarmwire.comms.wire.sessions import PRIVATE, unix_endpoint
 STALE_S = 60.0  # of a socket at which nobody listens: one that was just made may be about to
 ANSWER_S = 0.5  # of the system, for whoever listens
 SOCKET = "world"  # in a private directory
-LONGEST_PATH = 107  # of a unix socket, in bytes (sun_path has 108 with its end mark)
+MAX_PATH = 107  # of a unix socket, in bytes (sun_path has 108 with its end mark)
 
 
 def new_run_id() -> str:
@@ -66,8 +66,8 @@ def check_socket(path: Path) -> None:
     path = path.absolute()
     if not path.parent.is_dir():
         raise BadInput("--socket", str(path), "expected a path in a directory that exists")
-    if len(os.fsencode(path)) > LONGEST_PATH:
-        raise BadInput("--socket", str(path), f"expected a path of at most {LONGEST_PATH} bytes")
+    if len(os.fsencode(path)) > MAX_PATH:
+        raise BadInput("--socket", str(path), f"expected a path of at most {MAX_PATH} bytes")
     if not path.exists():
         return
     if not path.is_socket():

@@ -141,7 +141,7 @@ def test_of_several_runs_one_must_be_named(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_where_no_run_is_or_nobody_answers_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(joining_module, "LOOK_S", SHORT_S)
+    monkeypatch.setattr(joining_module, "POLL_S", SHORT_S)
     with closed_after(open_world("tcp/127.0.0.1:0", 10.0)) as session:
         endpoint = listens_at(session)[0]
         with pytest.raises(RunnerLost, match="there is no run at"):

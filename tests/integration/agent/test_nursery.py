@@ -15,7 +15,7 @@ from tests.support.agent.made_up_world import MadeUpWorld, made_up_world
 from tests.support.waiting import until
 
 END = frames.encode("end", -1, {})
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 TWO_AT_ONCE = """
 import sys
 from swarmwire.agent import nursery
@@ -39,7 +39,7 @@ class Nursery:
         """Its exit code, what it reported, and what people were told."""
         assert self.process.stdout
         assert self.process.stderr
-        code = self.process.wait(PATIENCE_S)
+        code = self.process.wait(TIMEOUT_S)
         return code, self.process.stdout.read(), self.process.stderr.read()
 
 

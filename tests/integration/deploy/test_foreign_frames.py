@@ -35,7 +35,7 @@ class Vandal:
             for key, payload in (
                 (answer, b"\x00garbage"),
                 (answer, b""),
-                (answer, b"\x00" * (frames.MOST_BYTES + 1)),
+                (answer, b"\x00" * (frames.MAX_BYTES + 1)),
                 (answer, frames.encode("dance", 4, {})),
                 (answer, frames.encode("actions", 1, nothing)),
                 (self.keys.answer("stranger"), frames.encode("actions", 4, {})),

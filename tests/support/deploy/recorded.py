@@ -26,7 +26,7 @@ def hastily() -> Generator[None]:
         join_parts(folder, name)
 
     with (
-        patch.object(chunk_limit, "LONGEST_S", chunk_limit.LONGEST_S / 50),
+        patch.object(chunk_limit, "MAX_S", chunk_limit.MAX_S / 50),
         patch.object(table_writer, "join_parts", say_and_join),
         patch.object(RerunRecording, "_send_bytes", sys.maxsize),
     ):

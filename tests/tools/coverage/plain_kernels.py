@@ -14,7 +14,7 @@ import numba
 import numpy as np
 import pytest
 
-MOST_CALLS = 60_000  # in one test: a few seconds
+MAX_CALLS = 60_000  # in one test: a few seconds
 
 
 class _Within(threading.local):
@@ -51,8 +51,8 @@ def _plain(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _count() -> None:
     _Calls.in_this_test += 1
-    if _Calls.in_this_test > MOST_CALLS:
-        pytest.skip(f"needs the compiler: it calls kernels more than {MOST_CALLS} times")
+    if _Calls.in_this_test > MAX_CALLS:
+        pytest.skip(f"needs the compiler: it calls kernels more than {MAX_CALLS} times")
 
 
 def _with_records(value: Any) -> Any:

@@ -8,8 +8,8 @@ from tests.tools.soak.samples import Sample, cpu_per_tick_ms
 
 WARM_UP = 1 / 6  # of the time: kernels are loaded, runners have all been there, buffers have had their largest content
 STRETCH = 1 / 6  # of the time: how long the first and the last stable stretch are
-MOST_GROWTH = 0.05  # of memory, descriptors and threads
-MOST_SLOWER = 0.10  # of the processor time of a tick: the machine has other work, too
+MAX_GROWTH = 0.05  # of memory, descriptors and threads
+MAX_SLOWER = 0.10  # of the processor time of a tick: the machine has other work, too
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ def flatness(samples: Mapping[str, Sequence[Sample]], end_s: float) -> list[Flat
             continue
         for what, name in (("memory, MiB", "rss_mib"), ("descriptors", "descriptors"), ("threads", "threads")):
             ends = [median(float(getattr(row, name)) for row in part) for part in (first, last)]
-            found.append(Flat(who, what, *ends, MOST_GROWTH))
+            found.append(Flat(who, what, *ends, MAX_GROWTH))
         costs = cpu_per_tick_ms(rows)
         thirds = [[ms for at_s, ms in costs if low <= at_s < high] for low, high in _thirds(warm_s, end_s)]
         if who.endswith("world") and all(thirds):
-            found.append(Flat(who, "processor time of a tick, ms", median(thirds[0]), median(thirds[-1]), MOST_SLOWER))
+            found.append(Flat(who, "processor time of a tick, ms", median(thirds[0]), median(thirds[-1]), MAX_SLOWER))
             walls = [[row.tick_ms for row in rows if low <= row.at_s < high] for low, high in _thirds(warm_s, end_s)]
             found.append(Flat(who, "wall time of a tick, ms", median(walls[0]), median(walls[-1]), float("inf")))
     return found

@@ -180,7 +180,7 @@ def test_a_runner_that_is_told_nothing_of_its_world_asks_again(
     heard: int, declared: int, undeclared: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(runner, "JOIN_S", 0.04)
-    monkeypatch.setattr(runner, "LOOK_S", 0.01)
+    monkeypatch.setattr(runner, "POLL_S", 0.01)
     session = Deaf(heard)
     watched = runner._watched_world(session, Keys("run1"), Inbox())  # pyright: ignore[reportArgumentType]
     assert (watched is None) == (heard > 4)

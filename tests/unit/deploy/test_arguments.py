@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.arguments import MOST_ARENAS, choose_seeds, real_time_factor, runner_count, seed_list
+from swarmwire.deploy.arguments import MAX_ARENAS, choose_seeds, real_time_factor, runner_count, seed_list
 from swarmwire.world.scenario.file import scenario_from
 from tests.support.world.samples import changed
 
@@ -50,9 +50,9 @@ def test_seeds_that_are_no_good_are_refused_by_their_option(seed, seeds, where):
 
 
 def test_so_many_arenas_as_no_machine_has_room_for_are_refused():
-    assert len(choose_seeds(SCENARIO, None, MOST_ARENAS)) == MOST_ARENAS
+    assert len(choose_seeds(SCENARIO, None, MAX_ARENAS)) == MAX_ARENAS
     with pytest.raises(BadInput, match="sweep takes more"):
-        choose_seeds(SCENARIO, None, MOST_ARENAS + 1)
+        choose_seeds(SCENARIO, None, MAX_ARENAS + 1)
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ def recorded(request, tmp_path, monkeypatch):
     """A folder as a run leaves it that ended, or that was killed just before: parts, and no summary."""
     if request.param == "killed":
         monkeypatch.setattr(table_writer, "join_parts", lambda *_: None)
-    monkeypatch.setattr(tick_recorder, "MOST_TICKS", 4)
+    monkeypatch.setattr(tick_recorder, "MAX_TICKS", 4)
     of, kill = static(3, arenas=2), Happened(0, 0.0, "kill", False, np.array([False, True, False] * 2))
     seen = list(wandering(of, TICKS, events=(kill,), finished=links([0, 1], [2, 0], [5, 6], 0, arena=[0, 1])))
     record(tmp_path, of, seen, packets=1.0)
@@ -67,7 +67,7 @@ def test_numbers_that_robots_told_are_recorded_from_the_first_on(tmp_path, monke
     """In parts of 4 ticks: told in the first, in the midst of one, in a later one, in the last, or never."""
     if killed:
         monkeypatch.setattr(table_writer, "join_parts", lambda *_: None)
-    monkeypatch.setattr(tick_recorder, "MOST_TICKS", 4)
+    monkeypatch.setattr(tick_recorder, "MAX_TICKS", 4)
     of, rng = static(3, arenas=2), np.random.default_rng(3)
     values = rng.normal(size=(TICKS, 6))
     values[:since] = np.nan

@@ -6,7 +6,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.robot_events import Kill
-from swarmwire.world.live_events import MOST_WAITING, Intervention, Interventions
+from swarmwire.world.live_events import MAX_WAITING, Intervention, Interventions
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.file import scenario_from
@@ -160,7 +160,7 @@ def test_an_event_whose_end_cannot_be_recorded_goes_on():
 
 def test_a_run_that_is_paused_lets_only_so_many_wait():
     given = door()
-    for _ in range(MOST_WAITING):
+    for _ in range(MAX_WAITING):
         given.give(KILL)
     with pytest.raises(BadInput, match="let the run go on"):
         given.give(KILL)

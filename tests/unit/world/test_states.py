@@ -1,6 +1,6 @@
 import numpy as np
 
-from swarmwire.comms.tick_io import MOST_STATES, Notes
+from swarmwire.comms.tick_io import MAX_STATES, Notes
 from swarmwire.world.annotations import States
 
 ALIVE = np.ones(6, np.bool_)
@@ -42,9 +42,9 @@ def test_the_dead_name_nothing_and_the_revived_start_afresh():
 
 def test_too_many_states_are_counted_and_leave_the_last_one():
     states = States(1, 1)
-    for i in range(MOST_STATES + 3):
+    for i in range(MAX_STATES + 3):
         states.take(notes((0, f"s{i}")), ALIVE[:1])
-    assert (states.dropped.tolist(), shown(states)) == ([3], [f"s{MOST_STATES - 1}"])
+    assert (states.dropped.tolist(), shown(states)) == ([3], [f"s{MAX_STATES - 1}"])
 
 
 def test_what_was_shown_is_not_written_to():
@@ -56,10 +56,10 @@ def test_what_was_shown_is_not_written_to():
 
 def test_each_arena_has_its_own_limit_so_that_it_is_beside_others_as_alone():
     states = States(2, 3)
-    for i in range(MOST_STATES + 2):
+    for i in range(MAX_STATES + 2):
         states.take(notes((0, f"a{i}"), (4, f"b{i % 3}")), ALIVE)
     states.take(notes((1, "b0"), (5, "a0"), (3, "new")), ALIVE)
     assert states.dropped.tolist() == [3, 0]
     assert shown(states)[1] == ""
-    assert shown(states)[3:] == ["new", f"b{(MOST_STATES + 1) % 3}", "a0"]
+    assert shown(states)[3:] == ["new", f"b{(MAX_STATES + 1) % 3}", "a0"]
     assert len(set(states.names)) == len(states.names)

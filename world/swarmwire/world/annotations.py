@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.tick_io import MOST_STATES, Notes, Values
+from swarmwire.comms.tick_io import MAX_STATES, Notes, Values
 
 
 class ToldValues:
@@ -83,7 +83,7 @@ class States:
         is_new = name not in self.names
         if not is_new and self._named[arena, self.names.index(name)]:
             return self.names.index(name)
-        if self._named[arena].sum() > MOST_STATES:  # each arena has its own limit: beside others it is as alone
+        if self._named[arena].sum() > MAX_STATES:  # each arena has its own limit: beside others it is as alone
             return ONE_TOO_MANY
         if is_new:
             self.names = (*self.names, name)

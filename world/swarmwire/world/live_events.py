@@ -67,8 +67,8 @@ def _schema() -> Node:
 # is kept before it takes effect: with that record a run is repeated bit for bit.
 
 
-MOST_TOLD = 200
-MOST_WAITING = 1000  # for the next tick: a run that is paused takes none
+MAX_TOLD = 200
+MAX_WAITING = 1000  # for the next tick: a run that is paused takes none
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,10 +122,8 @@ class Interventions:
             if event.needs_radio:
                 for radio in self._radios():
                     event.check_radio(radio)
-            if len(self._waiting) >= MOST_WAITING:
-                raise BadInput(
-                    "", "", f"expected at most {MOST_WAITING} events that wait for a tick; let the run go on"
-                )
+            if len(self._waiting) >= MAX_WAITING:
+                raise BadInput("", "", f"expected at most {MAX_WAITING} events that wait for a tick; let the run go on")
             if isinstance(event, Ramp) and event.over_s == 0.0:
                 for before in self._set_before(event.what):
                     self._undo(before)
@@ -182,7 +180,7 @@ class Interventions:
         `given` says that people gave it; the others are the scenario's.
         """
         with self._lock:
-            newest = sorted(self._events)[-MOST_TOLD:]
+            newest = sorted(self._events)[-MAX_TOLD:]
             return [
                 {
                     "number": number,

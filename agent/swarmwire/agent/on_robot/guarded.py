@@ -11,7 +11,7 @@ from swarmwire.agent.on_robot.settings import RobotSettings
 PIPE_OPTION, STANDBY_OPTION = "--heartbeats", "--standby"  # that people do not need
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # as of runners in emulation: an agent's arrays are small
 SILENT = 2.0  # times the watchdog's time may pass without a heartbeat
-LEAST_SILENT_S = 0.2  # so long other processes may hold up one that is well
+MIN_SILENT_S = 0.2  # so long other processes may hold up one that is well
 COMMAND = (sys.executable, "-P", "-m", "swarmwire.agent.cli")
 
 
@@ -41,4 +41,4 @@ def silent_s(watchdog_s: float, pace: float) -> float:
     >>> silent_s(0.5, 1.0), silent_s(0.5, 0.1), silent_s(0.01, 1.0)
     (1.0, 10.0, 0.2)
     """
-    return max(SILENT * watchdog_s / min(pace, 1.0), LEAST_SILENT_S)
+    return max(SILENT * watchdog_s / min(pace, 1.0), MIN_SILENT_S)

@@ -17,7 +17,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.wire.radio_bridge import Pose
 
-MOST_WAITING = 1 << 20  # bytes that may wait for a flush
+MAX_WAITING = 1 << 20  # bytes that may wait for a flush
 
 
 class RowFile:
@@ -42,7 +42,7 @@ class RowFile:
         """Add a row; None is an empty field."""
         self._writer.writerow(row)
         self._rows += 1
-        if self._waiting.tell() > MOST_WAITING:
+        if self._waiting.tell() > MAX_WAITING:
             self.flush()
 
     def flush(self) -> None:

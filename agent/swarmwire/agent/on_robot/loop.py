@@ -70,7 +70,7 @@ class Pacer:
 # --- How a robot that was lost is found again: tried with pauses that grow, until it answers or nobody wants it.
 
 
-FIRST_PAUSE_NS, LONGEST_PAUSE_NS = to_ns(0.2), to_ns(2.0)
+FIRST_PAUSE_NS, MAX_PAUSE_NS = to_ns(0.2), to_ns(2.0)
 
 
 def reconnect(driver: Driver, clock: Clock, end: End, meanwhile: Callable[[], None]) -> bool:
@@ -81,7 +81,7 @@ def reconnect(driver: Driver, clock: Clock, end: End, meanwhile: Callable[[], No
             driver.open()
             driver.stop()
         except DriverLost:
-            pause_ns = min(2 * pause_ns, LONGEST_PAUSE_NS)
+            pause_ns = min(2 * pause_ns, MAX_PAUSE_NS)
         else:
             return True
     return False

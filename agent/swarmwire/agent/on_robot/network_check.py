@@ -11,7 +11,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import Pose
 
-PATIENCE_S = 5.0
+TIMEOUT_S = 5.0
 
 
 class Presence:
@@ -28,7 +28,7 @@ class Presence:
     ) -> None:
         """`others` are to be heard, and `heard` tells which ever were; `pose` is the robot's newest, with a tracker."""
         self._clock, self._say, self._heard, self._pose = clock, say, heard, pose
-        self._patience_ns = to_ns(PATIENCE_S * pace)
+        self._patience_ns = to_ns(TIMEOUT_S * pace)
         self._silent, self._others = list(others), others
         self._began_ns = self._looked_ns = self._seen_ns = clock.now_ns()
         self._told_silent = self._told_unseen = False
@@ -69,7 +69,7 @@ class Presence:
         self._without_pose_ns += now_ns - self._looked_ns
         if not self._told_unseen and now_ns - self._seen_ns >= self._patience_ns:
             self._told_unseen = True
-            self._say(f"tracker: no pose of this robot has come for {PATIENCE_S:g} s")
+            self._say(f"tracker: no pose of this robot has come for {TIMEOUT_S:g} s")
 
 
 # --- Whether the certificate that a robot shows others goes with its key and its authority, before anything is opened.

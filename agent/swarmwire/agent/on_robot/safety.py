@@ -53,7 +53,7 @@ class Motors:
 
 
 LOOKS = 5  # in the time that it allows
-SHORTEST_LOOK_S = 0.01  # also of a robot that is emulated far faster than the wall clock
+MIN_LOOK_S = 0.01  # also of a robot that is emulated far faster than the wall clock
 
 
 class Watchdog:
@@ -76,7 +76,7 @@ class Watchdog:
     ) -> None:
         """`tell` is told for how many seconds nothing was heard of the loop, once the motors were stopped for it."""
         self._after_ns, self._stop, self._clock = to_ns(after_s), stop, clock
-        self._look_s = max(after_s / LOOKS / pace, SHORTEST_LOOK_S)  # of wall time
+        self._look_s = max(after_s / LOOKS / pace, MIN_LOOK_S)  # of wall time
         self._beat, self._tell = beat, tell
         self._fed_ns: int | None = None  # None: it rests
         self._lapsed_ns: int | None = None  # when it was fed last before it stopped the motors

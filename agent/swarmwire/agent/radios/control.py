@@ -15,8 +15,8 @@ from zenoh.handlers import Callback
 
 from swarmwire.comms.wire.robot_network import ESTOP, STATUS, STOPPED, SwarmKeys
 
-MOST_WAITING = 32  # questions; one more goes unanswered, and its asker asks again
-PATIENCE_S = 2.0  # for an answer that is under way when it is closed
+MAX_WAITING = 32  # questions; one more goes unanswered, and its asker asks again
+TIMEOUT_S = 2.0  # for an answer that is under way when it is closed
 
 
 class Controlled(Protocol):
@@ -40,7 +40,7 @@ class ControlPoint:
 
     def __init__(self, session: zenoh.Session, keys: SwarmKeys, own: str, controlled: Controlled) -> None:
         self._session, self._keys, self._own, self._controlled = session, keys, own, controlled
-        self._asked: queue.Queue[zenoh.Query | None] = queue.Queue(MOST_WAITING)
+        self._asked: queue.Queue[zenoh.Query | None] = queue.Queue(MAX_WAITING)
         self._declared: tuple[zenoh.Queryable[None], zenoh.LivelinessToken] | None = None
         self._thread = threading.Thread(target=self._answer_all, name="control", daemon=True)
         self.refused = 0
@@ -62,8 +62,8 @@ class ControlPoint:
             for one in declared:
                 one.undeclare()
         with suppress(queue.Full):  # an answer that does not end holds up nobody
-            self._asked.put(None, timeout=PATIENCE_S)
-        self._thread.join(PATIENCE_S)
+            self._asked.put(None, timeout=TIMEOUT_S)
+        self._thread.join(TIMEOUT_S)
 
     def counts(self) -> dict[str, int]:
         """What was asked in vain, by name."""

@@ -30,7 +30,7 @@ from swarmwire.comms.wire.tick_frames import encode_actions
 JOIN_S = 10.0  # how long a world may take to answer
 ONE_TRY_S = 1.0
 AGAIN_NS = to_ns(0.1)
-MOST_WAITING = 1024  # frames that may wait for the agent's next step
+MAX_WAITING = 1024  # frames that may wait for the agent's next step
 NO_COMMAND = np.zeros(1)
 
 
@@ -62,7 +62,7 @@ class AirRadio:
         self._row, self._clock = self._robots.index(own), clock
         self._wall: Clock = wall or WallClock()
         self._log: RadioLog = log or NoRadioLog()
-        self._inbox = BoundedInbox[_Arrival](MOST_WAITING)
+        self._inbox = BoundedInbox[_Arrival](MAX_WAITING)
         self._subscriber: zenoh.Subscriber[None] | None = None
         self._sequence = self._frames = self._far_too_large = 0
         self._counted = Counter[str]()

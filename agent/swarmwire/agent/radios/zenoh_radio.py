@@ -154,7 +154,7 @@ def range_bearing(own: Pose, sender: Pose) -> tuple[float, float]:
 # zenoh's stubs leave out the return types of put and undeclare.
 
 
-MOST_WAITING = 1024  # packets that may wait for the agent's next step
+MAX_WAITING = 1024  # packets that may wait for the agent's next step
 GIVES = ("range_m", "bearing_rad")  # with a tracker
 NEEDS = ("radio.range", "radio.bearing")  # what these meet
 NOWHERE = float("nan")
@@ -190,7 +190,7 @@ class ZenohRadio:
         self._sender_of = {robot: index for index, robot in enumerate(robots)}
         self._max_payload_bytes = max_payload_bytes
         self._log: RadioLog = log or NoRadioLog()
-        self._inbox = BoundedInbox[Arrival](MOST_WAITING)
+        self._inbox = BoundedInbox[Arrival](MAX_WAITING)
         self._subscriber: zenoh.Subscriber[None] | None = None
         self._publishers: dict[int, zenoh.Publisher] = {}  # by tag
         self._sequence = 0

@@ -21,8 +21,8 @@ from swarmwire.comms.errors import BadInput
 if TYPE_CHECKING:
     pass
 
-MOST_OF_RADIUS = 1.25  # how far from the axis a ring of LEDs may be: that of ARGoS's e-puck stands out by a fifth
-MOST_OF_HEIGHT = 2.0  # how high a LED may be: the foot-bot's beacon stands on a pole
+MAX_OF_RADIUS = 1.25  # how far from the axis a ring of LEDs may be: that of ARGoS's e-puck stands out by a fifth
+MAX_OF_HEIGHT = 2.0  # how high a LED may be: the foot-bot's beacon stands on a pole
 
 
 def fault_of_body(body: "Body") -> tuple[str, str] | None:
@@ -54,9 +54,9 @@ def unfit_senses(drive: object, altitude_m: object) -> Mapping[str, str]:
 
 def _fault_of_leds(leds: Leds, radius_m: float, height_m: float) -> tuple[str, str] | None:
     limits: dict[str, tuple[float, float, str]] = {
-        "radius_m": (leds.radius_m, MOST_OF_RADIUS * radius_m, f"{MOST_OF_RADIUS:g} times the body's radius"),
-        "height_m": (leds.height_m, MOST_OF_HEIGHT * height_m, "twice the body's height"),
-        "beacon_height_m": (leds.beacon_height_m, MOST_OF_HEIGHT * height_m, "twice the body's height"),
+        "radius_m": (leds.radius_m, MAX_OF_RADIUS * radius_m, f"{MAX_OF_RADIUS:g} times the body's radius"),
+        "height_m": (leds.height_m, MAX_OF_HEIGHT * height_m, "twice the body's height"),
+        "beacon_height_m": (leds.beacon_height_m, MAX_OF_HEIGHT * height_m, "twice the body's height"),
     }
     for key, (value, most, what) in limits.items():
         if value > most:

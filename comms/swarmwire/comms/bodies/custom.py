@@ -11,7 +11,7 @@ from swarmwire.comms.config import check_plain, parameter
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import resolve
 
-MOST_WIDE = 10_000  # numbers of a field, or of an actuator, of one robot
+MAX_WIDE = 10_000  # numbers of a field, or of an actuator, of one robot
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ def told_own_sheet(value: object, where: str, key: str) -> OwnSheet:
     mapping_of(where, f"{key}.params", table.get("params"))
     widths = mapping_of(where, f"{key}.fields", table.get("fields"))
     known = cast("Mapping[str, object]", widths).values()
-    if not all(type(width) is int and 0 <= width <= MOST_WIDE for width in known):
-        raise BadInput(where, f"{key}.fields", f"expected whole numbers from 0 to {MOST_WIDE}, got {widths!r}")
+    if not all(type(width) is int and 0 <= width <= MAX_WIDE for width in known):
+        raise BadInput(where, f"{key}.fields", f"expected whole numbers from 0 to {MAX_WIDE}, got {widths!r}")
     return built(OwnSheet, table, where, key)
 
 
@@ -83,6 +83,6 @@ def told_actuator_sheet(value: object, where: str, key: str) -> ActuatorSheet:
     table = mapping_of(where, key, value)
     mapping_of(where, f"{key}.params", table.get("params"))
     width = table.get("width")
-    if type(width) is not int or not 0 <= width <= MOST_WIDE:
-        raise BadInput(where, f"{key}.width", f"expected a whole number from 0 to {MOST_WIDE}, got {width!r}")
+    if type(width) is not int or not 0 <= width <= MAX_WIDE:
+        raise BadInput(where, f"{key}.width", f"expected a whole number from 0 to {MAX_WIDE}, got {width!r}")
     return built(ActuatorSheet, table, where, key)

@@ -10,7 +10,7 @@ from swarmwire.comms.config import fault_of, limits_of, one_of
 from swarmwire.comms.errors import BadInput
 
 GREATEST = 1e9  # of any number of a sheet: nothing on a robot is that large in its unit
-MOST_ITEMS = 1000  # of a list: what is told of each is kept for every robot
+MAX_ITEMS = 1000  # of a list: what is told of each is kept for every robot
 
 
 def mapping_of(where: str, key: str, value: object) -> dict[str, Any]:
@@ -64,8 +64,8 @@ def _value(hint: Any, value: object, where: str, key: str) -> Any:
         items = cast("list[object]", value)
         if not items:
             raise BadInput(where, key, "expected at least one item")
-        if len(items) > MOST_ITEMS:
-            raise BadInput(where, key, f"expected at most {MOST_ITEMS} items, got {len(items)}")
+        if len(items) > MAX_ITEMS:
+            raise BadInput(where, key, f"expected at most {MAX_ITEMS} items, got {len(items)}")
         if get_args(hint)[-1] is not Ellipsis and len(items) != len(get_args(hint)):
             raise BadInput(where, key, f"expected {len(get_args(hint))} values, got {value!r}")
         return tuple(_value(get_args(hint)[0], item, where, f"{key}[{i}]") for i, item in enumerate(items))

@@ -84,7 +84,7 @@ class Gain(LastingEvent):
 
 
 PHASE = purpose("jammer phase")
-LEAST_PERIOD_S = 10e-6  # less than a symbol of any radio here: noise that comes and goes so fast is constant noise
+MIN_PERIOD_S = 10e-6  # less than a symbol of any radio here: noise that comes and goes so fast is constant noise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,8 +111,8 @@ class Jammer(LastingEvent):
         if (self.at is None) == (self.robots is None):
             raise BadInput("", "", "expected either at = [x, y] or robots")
         super().check(groups)
-        if self.period_s < LEAST_PERIOD_S:
-            raise BadInput("", "period_s", f"expected at least {LEAST_PERIOD_S:f} s, got {self.period_s!r}")
+        if self.period_s < MIN_PERIOD_S:
+            raise BadInput("", "period_s", f"expected at least {MIN_PERIOD_S:f} s, got {self.period_s!r}")
 
     def check_radio(self, radio: Radio) -> None:
         """Raise BadInput for a disk, or where nothing on air disturbs anything."""

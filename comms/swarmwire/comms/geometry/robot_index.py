@@ -10,7 +10,7 @@ from numba import njit
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.kernels import borrowing
 
-MOST_CELLS_PER_SIDE = 512  # in each arena
+MAX_CELLS_PER_SIDE = 512  # in each arena
 
 
 class Grid(NamedTuple):
@@ -34,7 +34,7 @@ def build(x, y, arenas: int, size_m: tuple[float, float], reach_m: float, runnin
 
     Where `running` (arenas,) is False, the cells of the arena are empty; None: no arena is left out.
     """
-    cell_m = max(reach_m, max(size_m) / MOST_CELLS_PER_SIDE)
+    cell_m = max(reach_m, max(size_m) / MAX_CELLS_PER_SIDE)
     nx, ny = max(int(np.ceil(size_m[0] / cell_m)), 1), max(int(np.ceil(size_m[1] / cell_m)), 1)
     left_m, bottom_m = -0.5 * size_m[0], -0.5 * size_m[1]
     present = np.ones(arenas, np.bool_) if running is None else running
@@ -83,7 +83,7 @@ def _sort(x, y, present, cell_m, nx, ny, left_m, bottom_m):
 # spread over all cells as well, and a torus needs no cells of its own. Whoever finds something compares its position.
 
 
-MOST_PER_SIDE = 512
+MAX_PER_SIDE = 512
 SLACK = 1.0 + 1e-9  # two things at just the reach may be rounded apart
 
 
@@ -100,7 +100,7 @@ class Cells(NamedTuple):
 
 def cells_over(size_m: tuple[float, float], cell_m: float, arenas: int, items: int) -> Cells:
     """Cells for so many items, each of at least `cell_m` a side: what is nearer lies in the 3 x 3 around."""
-    nx, ny = (min(max(int(extent / (cell_m * SLACK)), 1), MOST_PER_SIDE) for extent in size_m)
+    nx, ny = (min(max(int(extent / (cell_m * SLACK)), 1), MAX_PER_SIDE) for extent in size_m)
     start = np.zeros(arenas * ny * nx + 1, np.int64)
     return Cells(nx, ny, nx / size_m[0], ny / size_m[1], start, np.zeros(items, np.int64))
 

@@ -12,9 +12,9 @@ from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.wire.frames import unpacked
 
 CONTROL_VERSION = 1
-MOST_BYTES = 64 * 1024  # of a request
-MOST_REPLY_BYTES = 16 * 1024 * 1024
-MOST_STEPS = 1_000_000
+MAX_BYTES = 64 * 1024  # of a request
+MAX_REPLY_BYTES = 16 * 1024 * 1024
+MAX_STEPS = 1_000_000
 
 # What may be asked, and the key that comes with it.
 DOES: dict[str, str | None] = {
@@ -49,7 +49,7 @@ def encode_request(request: Request) -> bytes:
 def decode_request(data: bytes) -> Request:
     """The request of these bytes; BadInput says in one line what was expected instead."""
     try:
-        asked = _map_of(data, MOST_BYTES)
+        asked = _map_of(data, MAX_BYTES)
     except BadFrame as fault:
         raise BadInput("", "", f"expected a request: {fault}") from None
     if type(asked.get("v")) is not int or asked["v"] != CONTROL_VERSION:
@@ -72,7 +72,7 @@ def encode_reply(reply: Mapping[str, Any]) -> bytes:
 
 def decode_reply(data: bytes) -> dict[str, Any]:
     """The answer in these bytes; BadFrame if they are none."""
-    reply = _map_of(data, MOST_REPLY_BYTES)
+    reply = _map_of(data, MAX_REPLY_BYTES)
     if type(reply.get("v")) is not int or reply["v"] != CONTROL_VERSION:
         raise BadFrame("malformed", f"version {reply.get('v')!r} of control, expected {CONTROL_VERSION}")
     return reply
@@ -80,9 +80,9 @@ def decode_reply(data: bytes) -> dict[str, Any]:
 
 def _value(do: str, value: object) -> Any:
     if do == "step":
-        if type(value) is int and 1 <= value <= MOST_STEPS:
+        if type(value) is int and 1 <= value <= MAX_STEPS:
             return value
-        raise BadInput("", "n", f"expected a whole number of ticks from 1 to {MOST_STEPS}, got {_shown(value)}")
+        raise BadInput("", "n", f"expected a whole number of ticks from 1 to {MAX_STEPS}, got {_shown(value)}")
     if do == "speed":
         if value is None or (type(value) in (int, float) and isfinite(cast("float", value))):
             return None if value is None else float(cast("float", value))

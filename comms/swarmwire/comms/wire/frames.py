@@ -20,7 +20,7 @@ from swarmwire.comms.errors import BadFrame
 
 
 UNCOUNTED_BYTES = 64 * 1024  # become a few MB at most; pragma: no mutate (only memory differs)
-MOST_ITEMS = 500_000  # lists, maps and what is in them: some 40 MB; of a frame's arrays each is one
+MAX_ITEMS = 500_000  # lists, maps and what is in them: some 40 MB; of a frame's arrays each is one
 
 
 def unpacked(data: bytes, most_bytes: int) -> Any:
@@ -39,11 +39,11 @@ def _counted(data: bytes) -> Any:
     def count(found: Sized) -> Sized:
         nonlocal items
         items += 1 + len(found)
-        if items > MOST_ITEMS:
-            raise ValueError(f"more than {MOST_ITEMS} items")
+        if items > MAX_ITEMS:
+            raise ValueError(f"more than {MAX_ITEMS} items")
         return found
 
-    return msgpack.unpackb(data, list_hook=count, object_hook=count, max_array_len=MOST_ITEMS, max_map_len=MOST_ITEMS)
+    return msgpack.unpackb(data, list_hook=count, object_hook=count, max_array_len=MAX_ITEMS, max_map_len=MAX_ITEMS)
 
 
 # --- Frames: msgpack maps of a version, a kind, a tick, named arrays as raw little-endian buffers, and a few plain
@@ -58,7 +58,7 @@ def _counted(data: bytes) -> Any:
 
 VERSION = 1  # of frames between world and runners, and of what runners ask before
 KEYS = {"v", "kind", "tick", "arrays", "values"}
-MOST_BYTES = 64 * 1024 * 1024  # of a frame
+MAX_BYTES = 64 * 1024 * 1024  # of a frame
 DTYPES = {code: np.dtype(code) for code in ("<f8", "<i8", "<u8", "|b1", "|u1")}
 TRUTHS = DTYPES["|b1"]
 
@@ -79,7 +79,7 @@ def encode(kind: str, tick: int, arrays: Mapping[str, AnyArray], values: Mapping
     return msgpack.packb({"v": VERSION, "kind": kind, "tick": tick, "arrays": packed, "values": dict(values or {})})
 
 
-def decode(data: bytes, most_bytes: int = MOST_BYTES) -> Frame:
+def decode(data: bytes, most_bytes: int = MAX_BYTES) -> Frame:
     """The frame of these bytes; BadFrame ("oversized" or "malformed") if they are none. Arrays are read-only views."""
     body = unpacked(data, most_bytes)
     # Written out by hand, not with `match` or `cast`, here and below: a world decodes some arrays from each of hundreds
@@ -112,7 +112,7 @@ def _shaped(dtype: np.dtype[Any], shape: list[Any], buffer: bytes) -> AnyArray |
     items = 1
     for length in shape:
         # Each length is bounded, too: 0 x 2^63 holds nothing, and yet numpy has no such array.
-        if type(length) is not int or not 0 <= length <= MOST_BYTES:
+        if type(length) is not int or not 0 <= length <= MAX_BYTES:
             return None
         items *= length
     axes = len(shape)

@@ -13,7 +13,7 @@ import msgpack
 
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.frames import MOST_BYTES, VERSION, unpacked
+from swarmwire.comms.wire.frames import MAX_BYTES, VERSION, unpacked
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Limits:
         join_s: from the assignment of robots to the word that their agents are built.
     """
 
-    link_bytes: int = 2 * MOST_BYTES
+    link_bytes: int = 2 * MAX_BYTES
     runners: int = 2000
     robots_per_runner: int = 20_000
     waiting: int = 64
-    waiting_bytes: int = 2 * MOST_BYTES
+    waiting_bytes: int = 2 * MAX_BYTES
     flood: int = 5000
     requests: int = 2000
     names: int = 50_000
@@ -90,7 +90,7 @@ class Offer:
     @classmethod
     def decode(cls, data: bytes) -> "Offer":
         """The offer of these bytes; BadFrame if they are none, "version" if they are of another version."""
-        told = versioned(data, frames.MOST_BYTES)  # with the names of all robots
+        told = versioned(data, frames.MAX_BYTES)  # with the names of all robots
         try:
             groups = tuple(_group(group) for group in told["groups"])
             factor = None if told["real_time"] is None else float(told["real_time"])

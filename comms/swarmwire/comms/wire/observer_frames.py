@@ -15,7 +15,7 @@ from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.geometry.floor import FloorImage
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.run_views import Glimpse, Scene
-from swarmwire.comms.tick_io import LONGEST_STATE, GroupSenses, Senses
+from swarmwire.comms.tick_io import MAX_STATE, GroupSenses, Senses
 from swarmwire.comms.truth import Finished, Happened, Obstacle, Static, Tally, Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame, checked_array
@@ -233,7 +233,7 @@ def _states(frame: Frame) -> tuple[str, ...]:
     found: object = frame.values.get("states")
     if type(found) is list:
         states = cast("list[object]", found)
-        if states and all(type(state) is str and len(state) <= LONGEST_STATE for state in states):
+        if states and all(type(state) is str and len(state) <= MAX_STATE for state in states):
             return tuple(cast("list[str]", states))
     raise BadFrame("malformed", "states: expected a list of texts")
 

@@ -15,7 +15,7 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import Heard, Outcomes
 from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.frames import MOST_BYTES, VERSION
+from swarmwire.comms.wire.frames import MAX_BYTES, VERSION
 from swarmwire.comms.wire.join import versioned
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_tick
 
@@ -38,7 +38,7 @@ class AirTerms:
     @classmethod
     def decode(cls, data: bytes) -> "AirTerms":
         """The terms of these bytes; BadFrame if they are none, "version" if they are of another version."""
-        values = versioned(data, MOST_BYTES)  # with the names of all robots
+        values = versioned(data, MAX_BYTES)  # with the names of all robots
         del values["v"]
         if values.keys() != {of.name for of in fields(cls)}:
             raise BadFrame("malformed", "expected the terms of an air")

@@ -21,7 +21,7 @@ import zenoh
 from swarmwire.comms.wire.join import LIMITS, Limits
 from swarmwire.comms.wire.network import Network, protocol_of
 
-LONGEST_S = 12.0  # after ten seconds zenoh gives up
+MAX_S = 12.0  # after ten seconds zenoh gives up
 
 _left: list[threading.Thread] = []
 
@@ -29,7 +29,7 @@ _left: list[threading.Thread] = []
 def left_closing(closing: threading.Thread) -> None:
     """A thread that goes on closing a session, for which nobody waits but the end of the process."""
     _left.append(closing)
-    atexit.register(closing.join, LONGEST_S)
+    atexit.register(closing.join, MAX_S)
 
 
 def end_now(code: int) -> None:
@@ -50,12 +50,12 @@ def end_now(code: int) -> None:
 # zenoh's stubs leave out the return type of close.
 
 
-PATIENCE_S = 1.0  # whoever is well answers in milliseconds
+TIMEOUT_S = 1.0  # whoever is well answers in milliseconds
 
 log = logging.getLogger(__name__)
 
 
-def close_session(session: zenoh.Session, patience_s: float = PATIENCE_S) -> None:
+def close_session(session: zenoh.Session, patience_s: float = TIMEOUT_S) -> None:
     """Close a session, waiting no longer than so for those who do not answer; safe to call again."""
     closing = threading.Thread(target=_close, args=(session,), name="closing", daemon=True)
     closing.start()
@@ -114,7 +114,7 @@ BLOCK_S = 5.0
 # A dead peer is noticed at once, by its closed socket. One that is frozen or out of reach is noticed after its lease:
 # on one machine practically never, since nobody is out of reach there, and whoever was stopped may go on; a run's own
 # time-outs count there. Elsewhere a world allows itself as long as it allows its runners.
-LEAST_LEASE_MS = 10_000
+MIN_LEASE_MS = 10_000
 CLIENT_LEASE_MS = 60_000
 LOCAL_LEASE_MS = 7 * 86_400_000
 LOCAL = "unixsock-stream/"
@@ -242,7 +242,7 @@ def _settings(
     endpoints: Sequence[str],
     network: Network | None,
     runner_timeout_s: float = 2 * BLOCK_S,
-    lease_ms: int = LEAST_LEASE_MS,
+    lease_ms: int = MIN_LEASE_MS,
 ) -> dict[str, Any]:
     for endpoint in endpoints:
         (network or Network()).check_safe(endpoint, "network", "endpoint")

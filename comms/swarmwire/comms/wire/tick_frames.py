@@ -11,7 +11,7 @@ from swarmwire.comms.bodies.drives import BRIGHTEST
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, UNTOLD, Heard, Outcomes, Payloads, SendResult, Sent
 from swarmwire.comms.tick_io import (
-    MOST_STATES,
+    MAX_STATES,
     NO_ACTUATIONS,
     NO_LED_CHANGES,
     NO_VALUES,
@@ -208,8 +208,8 @@ def _outcome_id(frame: Frame, to: IntArray) -> IntArray | None:
 def _notes(frame: Frame, rows: IntArray) -> Notes:
     noted, code = checked_array(frame, "notes", "<i8", (2, None))
     names: object = frame.values.get("states")
-    if type(names) is not list or not 0 < len(cast("list[object]", names)) <= MOST_STATES:
-        raise BadFrame("malformed", f"states: expected a list of 1 to {MOST_STATES} texts")
+    if type(names) is not list or not 0 < len(cast("list[object]", names)) <= MAX_STATES:
+        raise BadFrame("malformed", f"states: expected a list of 1 to {MAX_STATES} texts")
     try:
         states = tuple(checked_state(name) for name in cast("list[object]", names))
     except ValueError as error:

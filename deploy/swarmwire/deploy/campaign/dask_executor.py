@@ -22,8 +22,8 @@ from swarmwire.deploy.campaign.shipped import scenario_files
 from swarmwire.deploy.campaign.task import Task
 from swarmwire.deploy.record.modules import module_digests
 
-PATIENCE_S = 60.0  # without a single worker, at the begin and in between
-LOOK_S = 5.0  # between looks who is there, beside what dask tells
+TIMEOUT_S = 60.0  # without a single worker, at the begin and in between
+POLL_S = 5.0  # between looks who is there, beside what dask tells
 MUTE_LOOKS = 12  # in a row without an answer: with the time between them two minutes, and the scheduler is given up
 AHEAD = 2  # tasks in hand for each thread: one that it is at, one that it can begin at once
 
@@ -42,7 +42,7 @@ class DaskExecutor:
         say: Say | None = None,
         clock: Clock | None = None,
         connect_s: float = CONNECT_S,
-        patience_s: float = PATIENCE_S,
+        patience_s: float = TIMEOUT_S,
     ) -> None:
         """Connect, and see who is there; `workers` threads at most do tasks.
 
@@ -119,9 +119,9 @@ class DaskExecutor:
         self._supplied = True
 
     def _look_around(self) -> None:
-        if self._clock.now_ns() - self._looked_ns > to_ns(LOOK_S):
+        if self._clock.now_ns() - self._looked_ns > to_ns(POLL_S):
             try:
-                self._client.sync(self._crew.look_around, callback_timeout=LOOK_S)
+                self._client.sync(self._crew.look_around, callback_timeout=POLL_S)
                 self._mute_looks = 0
             except (TimeoutError, OSError):  # then `_check` will know, or the next look
                 self._mute_looks += 1

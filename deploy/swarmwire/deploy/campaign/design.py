@@ -17,7 +17,7 @@ from swarmwire.deploy.campaign.vary import Range, Vary
 Point = dict[str, Any]  # by path: the value
 GRID, LIST, RANDOM, LATIN = KINDS = ("grid", "list", "random", "latin")
 DRAWN = (RANDOM, LATIN)
-MOST_POINTS = 100_000
+MAX_POINTS = 100_000
 
 
 def points_of(
@@ -41,8 +41,8 @@ def points_of(
     values = [_values(vary, is_whole(vary.path)) for vary in varied]
     if kind == LIST:
         return _one_to_one(varied, values)
-    if prod(map(len, values)) > MOST_POINTS:
-        raise BadInput("--vary", "", f"expected at most {MOST_POINTS} points, got {prod(map(len, values))}")
+    if prod(map(len, values)) > MAX_POINTS:
+        raise BadInput("--vary", "", f"expected at most {MAX_POINTS} points, got {prod(map(len, values))}")
     return [_point(varied, combined) for combined in product(*values)]
 
 
@@ -74,8 +74,8 @@ def _drawn(
 ) -> list[Point]:
     if not varied:
         raise BadInput("--design", "", f"expected --vary with {kind}: the design is empty")
-    if count is None or not 0 < count <= MOST_POINTS:
-        raise BadInput("--points", "", f"expected 1 to {MOST_POINTS} points with --design {kind}, got {count}")
+    if count is None or not 0 < count <= MAX_POINTS:
+        raise BadInput("--points", "", f"expected 1 to {MAX_POINTS} points with --design {kind}, got {count}")
     if seed < 0:
         raise BadInput("--design-seed", "", f"expected a whole number of at least 0, got {seed}")
     shares = _random(varied, count, seed) if kind == RANDOM else _latin(len(varied), count, seed)

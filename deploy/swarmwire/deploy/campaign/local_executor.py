@@ -9,7 +9,7 @@ from swarmwire.deploy.campaign.executor import Finished
 from swarmwire.deploy.campaign.task import Task, result_from
 from swarmwire.deploy.campaign.worker_process import Message, WorkerProcess
 
-MOST_FALSE_STARTS = 3  # in a row: then it is the machine or the installation, and no task
+MAX_FALSE_STARTS = 3  # in a row: then it is the machine or the installation, and no task
 
 
 class WorkersFailed(SwarmwireError):
@@ -83,7 +83,7 @@ class LocalExecutor:
         if worker.ready:
             return [Finished(task, None, worker.how_it_died())]
         self._false_starts += 1
-        if self._false_starts >= MOST_FALSE_STARTS:
+        if self._false_starts >= MAX_FALSE_STARTS:
             raise WorkersFailed(f"no worker can start: {worker.how_it_died()} before it was ready")
         self.submit(task)
         return []

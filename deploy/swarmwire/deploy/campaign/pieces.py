@@ -9,7 +9,7 @@ from swarmwire.deploy.campaign.task import Task
 USUAL_PACK = 250  # arenas in a world: of ten robots each, 125 cost a tenth more per run, 50 half as much again
 LONG_PACK = 50  # of runs so long that a piece, lost as a whole where a campaign is killed, would be much work
 PACK_S = 30_000  # simulated, over all arenas: beyond, a pack has fewer than the usual, down to that of long runs
-MOST_ROBOTS = 5_000  # in a world of several arenas: from there on packing gains nothing, and memory is dear
+MAX_ROBOTS = 5_000  # in a world of several arenas: from there on packing gains nothing, and memory is dear
 ROUNDS = 2  # tasks for each worker at least, so that none is idle for long at the end
 
 
@@ -36,7 +36,7 @@ def usual_pack(campaign: Campaign, workers: int) -> int:
 
 def pack_for(points: int, seeds: int, robots: int, workers: int, most: int = LONG_PACK) -> int:
     """The same, of so many points with so many seeds each, at most so many robots in an arena, and `most` arenas."""
-    most = max(1, min(USUAL_PACK, most, MOST_ROBOTS // robots))
+    most = max(1, min(USUAL_PACK, most, MAX_ROBOTS // robots))
     packs = max(-(-seeds // most), -(-ROUNDS * workers // points))  # of each point
     return max(1, -(-seeds // packs))
 

@@ -20,7 +20,7 @@ from swarmwire.world.scenario.bodies import bodies_of, own_code_of
 from swarmwire.world.scenario.file import load_scenario, scenario_from
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 
-MOST_RUNS = 10_000_000
+MAX_RUNS = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,8 @@ def planned(asked: Asked) -> Plan:
         if vary.path in FIXED or vary.path == "format":
             raise vary.refused(f"expected another path: {vary.path} cannot vary")
     points = points_of(asked.design, asked.varied, asked.points, asked.design_seed, whole_numbers(scenario))
-    if len(points) * len(asked.seeds) > MOST_RUNS:
-        raise BadInput("--seeds", "", f"expected at most {MOST_RUNS} runs, got {len(points) * len(asked.seeds)}")
+    if len(points) * len(asked.seeds) > MAX_RUNS:
+        raise BadInput("--seeds", "", f"expected at most {MAX_RUNS} runs, got {len(points) * len(asked.seeds)}")
     strange = [seed for seed in asked.record_seeds if seed not in asked.seeds]
     if strange:
         raise BadInput("--record-seeds", "", f"expected seeds of the campaign, got {strange[0]}")

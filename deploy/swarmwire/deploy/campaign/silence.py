@@ -10,7 +10,7 @@ from swarmwire.comms.clock import Clock, WallClock, to_ns
 from swarmwire.comms.truth import Static, Tally, Truth
 
 SAY_S = 5.0  # between two words of a worker whose ticks go on
-MOST_S = 300.0  # without one; no tick takes so long, nor does what comes before the first and after the last
+MAX_S = 300.0  # without one; no tick takes so long, nor does what comes before the first and after the last
 STEP_S = 1.0  # that a look adds at most: who was frozen itself, with its machine or by Ctrl-Z, has heard nothing, too
 
 
@@ -21,7 +21,7 @@ class Silence:
         most_s: after which it has lasted too long.
     """
 
-    def __init__(self, clock: Clock | None = None, most_s: float = MOST_S) -> None:
+    def __init__(self, clock: Clock | None = None, most_s: float = MAX_S) -> None:
         self.most_s, self._clock = most_s, clock or WallClock()
         self._silent_ns, self._looked_ns = 0, self._clock.now_ns()
 

@@ -12,7 +12,7 @@ from swarmwire.comms.errors import SwarmwireError
 from swarmwire.deploy.campaign.task import Task
 from swarmwire.deploy.campaign.worker_process import Message, WorkerProcess
 
-LOOK_S = 0.25  # between looks whether a task is still wanted
+POLL_S = 0.25  # between looks whether a task is still wanted
 IDLE_S = 15.0  # after which a process ends that nobody took again: the campaign is over, or its coordinator is dead
 
 
@@ -40,7 +40,7 @@ class SpareProcess:
         self._process.give(task)
         while wanted():
             try:
-                message = self._heard.get(timeout=LOOK_S)
+                message = self._heard.get(timeout=POLL_S)
             except Empty:
                 if self._process.silence.too_long():
                     return {"lost": str(self._process.silence)}

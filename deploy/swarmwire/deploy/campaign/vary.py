@@ -16,7 +16,7 @@ EXPECTED = (
     "for random and latin designs PATH=FIRST:LAST; a range may end in :log"
 )
 LOG = "log"
-MOST_VALUES = 100_000
+MAX_VALUES = 100_000
 RANGE_KEYS = ("from", "to", "count", "scale")
 
 
@@ -130,16 +130,16 @@ def _number(text: str) -> Fraction | None:
 def _checked(vary: Vary) -> Vary:
     if isinstance(vary.values, Range):
         _check_range(vary, vary.values)
-    elif not 0 < len(vary.values) <= MOST_VALUES:
-        raise vary.refused(f"expected 1 to {MOST_VALUES} values, got {len(vary.values)}")
+    elif not 0 < len(vary.values) <= MAX_VALUES:
+        raise vary.refused(f"expected 1 to {MAX_VALUES} values, got {len(vary.values)}")
     elif any(value in vary.values[:place] for place, value in enumerate(vary.values)):
         raise vary.refused("expected different values: one is there twice")
     return vary
 
 
 def _check_range(vary: Vary, of: Range) -> None:
-    if of.count is not None and not 0 < of.count <= MOST_VALUES:
-        raise vary.refused(f"expected a COUNT from 1 to {MOST_VALUES}, got {of.count}")
+    if of.count is not None and not 0 < of.count <= MAX_VALUES:
+        raise vary.refused(f"expected a COUNT from 1 to {MAX_VALUES}, got {of.count}")
     if of.first == of.last and of.count != 1:
         raise vary.refused("expected FIRST and LAST to differ")
     if of.log and not (of.first > 0 and of.last > 0):

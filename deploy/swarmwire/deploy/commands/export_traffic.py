@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from swarmwire.metrics.run_folder import RunFolder
 
 SUFFIX = ".pcapng"
-MOST_S = 1e9  # above all that a run may last; in ns it still is a number of 64 bits
+MAX_S = 1e9  # above all that a run may last; in ns it still is a number of 64 bits
 
 
 def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_s: float | None) -> int:
@@ -46,8 +46,8 @@ def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_
 
 def _check_times(from_s: float | None, until_s: float | None) -> None:
     for option, value_s in (("--from", from_s), ("--until", until_s)):
-        if value_s is not None and not 0.0 <= value_s <= MOST_S:
-            raise BadInput(option, "", f"expected a time of 0 to {MOST_S:g} s, got {value_s:g}")
+        if value_s is not None and not 0.0 <= value_s <= MAX_S:
+            raise BadInput(option, "", f"expected a time of 0 to {MAX_S:g} s, got {value_s:g}")
     if from_s is not None and until_s is not None and not from_s < until_s:
         raise BadInput("--until", "", f"expected a time after --from {from_s:g}, got {until_s:g}")
 

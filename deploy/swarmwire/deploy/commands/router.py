@@ -23,7 +23,7 @@ from swarmwire.deploy.commands.access_options import (
 if TYPE_CHECKING:
     from swarmwire.deploy.certificates.member import Member
 
-LOOK_S = 0.2  # how often it is looked up whether it is to end
+POLL_S = 0.2  # how often it is looked up whether it is to end
 
 
 def router_command(
@@ -109,7 +109,7 @@ def _route(of: "Member", listen: list[str], connect: list[str], access: dict[str
             linked = Counter[str]()
             while not interrupt.asked:
                 linked = _told(linked, Counter(link.auth_identifier or link.dst for link in session.info.links()))
-                clock.sleep_until(clock.now_ns() + to_ns(LOOK_S))
+                clock.sleep_until(clock.now_ns() + to_ns(POLL_S))
     if not interrupt.hung_up:
         typer.echo("router: ended")
 

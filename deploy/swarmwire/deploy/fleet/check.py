@@ -15,7 +15,7 @@ from swarmwire.deploy.fleet.result import Result
 from swarmwire.deploy.fleet.watcher import SILENT, Watcher
 
 REACH_S = 3.0
-MOST_AHEAD_NS = 20_000_000  # of a clock: more would show in latencies between robots
+MAX_AHEAD_NS = 20_000_000  # of a clock: more would show in latencies between robots
 NS_PER_MS = 1_000_000
 FIRST_PUSH_BYTES = 150_000_000 + SPARE_BYTES  # what packages come to
 
@@ -62,6 +62,6 @@ async def _notes(session: HostSession, robot: Robot) -> list[str]:
 async def _clock(session: HostSession) -> str:
     ahead_ns, within_ns = await session.clock_ahead_ns(WallClock())
     told = f"clock {ahead_ns / NS_PER_MS:+.0f} ms (within {within_ns / NS_PER_MS:.0f})"
-    if abs(ahead_ns) - within_ns > MOST_AHEAD_NS:
+    if abs(ahead_ns) - within_ns > MAX_AHEAD_NS:
         return f"{told}: latencies will be wrong by that, run NTP on it (timedatectl set-ntp true)"
     return told

@@ -21,7 +21,7 @@ from swarmwire.deploy.fleet.sent_along import OLDEST, program, start_command
 
 BLOCK = 1 << 18  # bytes handed to the connection at a time
 CLOCK_QUESTIONS = 5
-PATIENCE_S = 180.0  # for an answer: slow cards take their time to write
+TIMEOUT_S = 180.0  # for an answer: slow cards take their time to write
 CURES = {
     "full": "make room: df -h; old logs lie in ~/swarmwire/*/log",
     "damaged": "do it again; if it stays so, the card may be worn out",
@@ -92,11 +92,11 @@ class HostSession:
 
     async def _answer(self, do: str) -> Any:
         try:
-            async with asyncio.timeout(PATIENCE_S):
+            async with asyncio.timeout(TIMEOUT_S):
                 line = await self._process.stdout.readline()
         except TimeoutError:
             raise HostFailed(
-                f"no answer to {do} within {PATIENCE_S:g} s", "is the host overloaded, or its card?"
+                f"no answer to {do} within {TIMEOUT_S:g} s", "is the host overloaded, or its card?"
             ) from None
         if not line.endswith(b"\n"):
             raise await self._ended()

@@ -19,14 +19,14 @@ from swarmwire.deploy.fleet.host_side.unpacking import NO_ARCHIVE, part_of, unpa
 from swarmwire.deploy.fleet.result import Result
 
 BLOCK = 1 << 18
-MOST_BYTES = 4 << 30  # of a log, packed as unpacked: a robot that was taken over must not fill this disk
+MAX_BYTES = 4 << 30  # of a log, packed as unpacked: a robot that was taken over must not fill this disk
 ABOUT = "robot.json"  # in every log
 NO_LOG = 3  # exit status of FETCH where there is none
 FETCH = """cd ~/swarmwire/{robot}/log 2>/dev/null || exit {no_log}
 newest=$(ls -1d {robot}-*/ 2>/dev/null | sort | tail -n 1)
 test -n "$newest" || exit {no_log}
 exec tar -czf - -C "$newest" ."""
-TOO_LARGE = f"its log is larger than {MOST_BYTES / 1e9:.1f} GB"
+TOO_LARGE = f"its log is larger than {MAX_BYTES / 1e9:.1f} GB"
 IN_PARTS = "copy what you need of it: scp, from ~/swarmwire/{robot}/log"
 NOTHING_PRINTED = "-- No entries --"  # of journalctl
 Say = Callable[[str, str], None]  # a robot's name, and a line of its
@@ -81,7 +81,7 @@ async def fetch_logs(fleet: Fleet, robots: Sequence[Robot], to: Path) -> list[Re
             async with await connection.create_process(command, encoding=None) as process:
                 while block := await process.stdout.read(BLOCK):
                     _keep(file, block)
-                    if file.tell() > MOST_BYTES:
+                    if file.tell() > MAX_BYTES:
                         raise HostFailed(TOO_LARGE, IN_PARTS.format(robot=robot.name))
                 said = (await process.stderr.read()).decode(errors="replace").strip()
             if process.exit_status == NO_LOG:
@@ -109,7 +109,7 @@ def _put(file: BinaryIO, folder: Path) -> None:
     try:
         part.mkdir()
         file.seek(0)
-        unpack(file, part, most_bytes=MOST_BYTES)
+        unpack(file, part, most_bytes=MAX_BYTES)
         shutil.rmtree(folder, ignore_errors=True)
         part.rename(folder)
     except (Refusal, OSError, *NO_ARCHIVE) as error:

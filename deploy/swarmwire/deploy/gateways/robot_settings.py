@@ -19,7 +19,7 @@ from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario
 
 ROBOTS = "robots"  # within the run folder
-WATCHDOG_STEPS, MOST_WATCHDOG_S = 2, 10.0  # what a robot takes: more than a step, and no more than this
+WATCHDOG_STEPS, MAX_WATCHDOG_S = 2, 10.0  # what a robot takes: more than a step, and no more than this
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class RobotSettings:
             "params": params_of(table.params, np.array([row - group.start])),
             "body": str(sheet) if sheet else table.body,
             "rate_hz": rate_hz,
-            "watchdog_s": min(max(self.scenario.run.watchdog_s, WATCHDOG_STEPS / rate_hz), MOST_WATCHDOG_S),
+            "watchdog_s": min(max(self.scenario.run.watchdog_s, WATCHDOG_STEPS / rate_hz), MAX_WATCHDOG_S),
             "max_linear_mps": drive.max_linear_mps,
             "max_angular_radps": drive.max_angular_radps,
             "driver": {"name": chosen.kind, "address": address, **_shared_options(chosen)},

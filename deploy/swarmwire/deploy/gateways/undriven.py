@@ -8,7 +8,7 @@ from swarmwire.comms.clock import to_s
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy.gateways.served import Served, ServedRobot
 
-SOON_S = 10.0  # wall time after the start, by which people have begun to drive what they mean to
+GRACE_S = 10.0  # wall time after the start, by which people have begun to drive what they mean to
 NAMED = 6  # robots, at most
 
 
@@ -25,7 +25,7 @@ class Undriven:
 
     def see(self, truth: Truth) -> None:
         """Tell of them once, when they could be driven."""
-        if not self._told and to_s(truth.time_ns) >= SOON_S * self._pace:
+        if not self._told and to_s(truth.time_ns) >= GRACE_S * self._pace:
             self._told = True
             self._tell("nobody drives")
 

@@ -15,7 +15,7 @@ FRAMES_PER_S = 30
 LINKS_PER_S = 5  # in large swarms, where links are most of a frame
 FEW = 200  # robots: up to so many, links come with every frame
 SMALL = 50  # robots: up to so many, everybody's senses are shown; of more, those of one
-MOST_FINISHED = 2000  # packets that ended in a tick: up to so many are shown, of more none
+MAX_FINISHED = 2000  # packets that ended in a tick: up to so many are shown, of more none
 
 
 @dataclass(slots=True)
@@ -75,7 +75,7 @@ class Sampling:
         static = self._static
         links = static.robots <= FEW or self._links.due(now_ns)
         shown = truth_of(truth, static, self._arena)
-        few = shown.finished is not None and len(shown.finished.fate) <= MOST_FINISHED
+        few = shown.finished is not None and len(shown.finished.fate) <= MAX_FINISHED
         shown = replace(shown, edges=shown.edges if links else None, finished=shown.finished if few else None)
         if static.robots > SMALL:
             shown = replace(shown, senses=senses_within(shown.senses, slice(self._selected, self._selected + 1)))

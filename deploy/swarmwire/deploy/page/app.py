@@ -19,7 +19,7 @@ from swarmwire.deploy.page.news import NewsThread
 from swarmwire.deploy.page.orders import Order
 
 FILES = Path(__file__).with_name("files")
-MOST_BYTES = 64 * 1024  # of an order
+MAX_BYTES = 64 * 1024  # of an order
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Shown:
 
 def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str, port: int) -> ASGIApp:
     """The page, for whoever asks with the token at this port of the loopback."""
-    app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, max_body_size=MOST_BYTES)
+    app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, max_body_size=MAX_BYTES)
 
     @app.get("/")
     async def index() -> FileResponse:

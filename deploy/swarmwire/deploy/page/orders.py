@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from swarmwire.deploy.control.remote_control import RemoteControl
 
-MOST_STEPS = 100_000
+MAX_STEPS = 100_000
 
 
 class _Order(BaseModel, ABC):
@@ -42,7 +42,7 @@ class Step(_Order):
     """So many ticks, then the run pauses."""
 
     do: Literal["step"]
-    n: int = Field(1, ge=1, le=MOST_STEPS)
+    n: int = Field(1, ge=1, le=MAX_STEPS)
 
     def give(self, control: RemoteControl) -> None:
         """Step."""

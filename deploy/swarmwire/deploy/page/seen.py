@@ -12,8 +12,8 @@ from swarmwire.comms.truth import Happened, Static
 from swarmwire.metrics.event_log import names
 
 NAMED = 5  # robots of an event, at most
-MOST_WHO = 200  # events; the status tells of no more either
-MOST_PLACES = 500  # robots: of more, the small map shows only some
+MAX_WHO = 200  # events; the status tells of no more either
+MAX_PLACES = 500  # robots: of more, the small map shows only some
 
 
 class Seen:
@@ -22,7 +22,7 @@ class Seen:
     def __init__(self, static: Static) -> None:
         self._rate_hz = static.rate_hz
         self._second: deque[tuple[int, int, int]] = deque()  # tick, heard, in range
-        self._every = -(-static.robots // MOST_PLACES)
+        self._every = -(-static.robots // MAX_PLACES)
         self._static = static
         self._who: dict[str, str] = {}
         self.numbers: dict[str, Any] = {"centre": None, "places": [], "pdr": None, "who": {}}
@@ -47,7 +47,7 @@ class Seen:
         """Whom each event changed when it began, by its number."""
         begun = {str(event.serial): whom(event, self._static) for event in events if not event.ended}
         if begun:  # of those that began before, the newest, as the status tells of no others
-            self._who = dict([*self._who.items(), *begun.items()][-MOST_WHO:])
+            self._who = dict([*self._who.items(), *begun.items()][-MAX_WHO:])
         return self._who
 
     def _pdr(self, glimpse: Glimpse) -> float | None:

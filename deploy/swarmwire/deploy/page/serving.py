@@ -15,7 +15,7 @@ from swarmwire.comms.errors import BadInput, SwarmwireError
 START_NS = 20 * NS_PER_S
 PAUSE_NS = NS_PER_S // 100
 TOKEN_BYTES = 24
-MOST_CONNECTIONS = 64
+MAX_CONNECTIONS = 64
 
 
 @contextmanager
@@ -52,7 +52,7 @@ def _config(app: ASGIApp) -> uvicorn.Config:
         log_config=None,
         access_log=False,  # it would tell the token
         server_header=False,
-        limit_concurrency=MOST_CONNECTIONS,
+        limit_concurrency=MAX_CONNECTIONS,
         timeout_graceful_shutdown=1,
     )
 

@@ -12,7 +12,7 @@ from swarmwire.comms.radio.traces import POSSIBLE, LinkTrace, LinkTraces, Quanti
 from swarmwire.metrics.measured_table import MeasuredTable
 from swarmwire.world.scenario.scenario import Scenario
 
-LONGEST_S = 1e9  # whose nanoseconds fit an integer
+MAX_S = 1e9  # whose nanoseconds fit an integer
 COLUMNS = {"time": "t_s", "sender": "tx", "receiver": "rx"}
 
 
@@ -48,7 +48,7 @@ def read_link_traces(path: Path, robots: Sequence[str]) -> LinkTraces:
     if not measured:
         raise table.refused("", f"expected at least one of the columns {', '.join(POSSIBLE)}, got none")
     time_s = table.numbers("t_s")
-    table.refuse_where(~(np.abs(time_s) < LONGEST_S), "t_s", "expected a time in s")
+    table.refuse_where(~(np.abs(time_s) < MAX_S), "t_s", "expected a time in s")
     time_ns = np.round(time_s * NS_PER_S).astype(np.int64)
     sender, receiver = (_index(table, column, robots) for column in ("tx", "rx"))
     values: dict[Quantity, FloatArray] = {quantity: table.numbers(quantity) for quantity in measured}

@@ -7,7 +7,7 @@ from swarmwire.metrics.radio_fit.loss_fit import LossFit
 from swarmwire.metrics.radio_fit.network_fit import NetworkFit
 from swarmwire.metrics.radio_fit.network_rows import network_rows
 
-MOST_LINKS = 30  # that are told one by one: the worst
+MAX_LINKS = 30  # that are told one by one: the worst
 
 
 def print_network_fit(fit: NetworkFit, title: str, console: Console) -> None:
@@ -27,7 +27,7 @@ def print_network_fit(fit: NetworkFit, title: str, console: Console) -> None:
 
 
 def _print_links(fit: NetworkFit, console: Console) -> None:
-    shown = sorted(fit.links, key=lambda link: link.pdr)[:MOST_LINKS]
+    shown = sorted(fit.links, key=lambda link: link.pdr)[:MAX_LINKS]
     some = f", the worst {len(shown)} of {len(fit.links)}" if len(shown) < len(fit.links) else ""
     table = titled_table(f"delivery by link{some}", header=True)
     for name in ("from", "to", "packets", "heard", "delivery"):

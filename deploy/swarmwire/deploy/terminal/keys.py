@@ -13,7 +13,7 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any
 
-LOOK_S = 0.5  # how often a run in the background looks whether it has the terminal again
+POLL_S = 0.5  # how often a run in the background looks whether it has the terminal again
 HIDE_CURSOR, SHOW_CURSOR = b"\x1b[?25l", b"\x1b[?25h"
 
 
@@ -69,7 +69,7 @@ class Keys:
         while True:
             foreground = _in_foreground()
             self._take()  # again, if the run comes back from the background
-            ready, _, _ = select.select([wake, 0] if foreground else [wake], [], [], LOOK_S)
+            ready, _, _ = select.select([wake, 0] if foreground else [wake], [], [], POLL_S)
             if wake in ready:
                 return
             if 0 in ready and _in_foreground():

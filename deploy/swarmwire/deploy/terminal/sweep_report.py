@@ -17,8 +17,8 @@ from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.texts import number_text, quantile_text
 
-MOST_POINTS = 20  # that are shown
-MOST_OUTCOMES = 4
+MAX_POINTS = 20  # that are shown
+MAX_OUTCOMES = 4
 
 
 def print_sweep(sweep: Sweep, console: Console, program: Path) -> None:
@@ -30,8 +30,8 @@ def print_sweep(sweep: Sweep, console: Console, program: Path) -> None:
         return
     campaign = CampaignFolder(folder)
     console.print(_table(campaign))
-    if len(campaign.points) > MOST_POINTS:
-        console.print(f"… and {len(campaign.points) - MOST_POINTS} more points")
+    if len(campaign.points) > MAX_POINTS:
+        console.print(f"… and {len(campaign.points) - MAX_POINTS} more points")
     if sweep.failed:
         failed = next(row for row in campaign.runs.iter_rows(named=True) if row["ended"] == FAILED)
         why = failed["error"].strip().splitlines()[-1]
@@ -53,7 +53,7 @@ def _table(folder: CampaignFolder) -> Table:
     for outcome in outcomes:
         table.add_column(Text(outcome.column.removesuffix(FINAL)), justify="right", overflow="fold")
     failed = folder.runs.filter(folder.runs["ended"] == FAILED)["point"].to_list()
-    for number, point in enumerate(about.points[:MOST_POINTS]):
+    for number, point in enumerate(about.points[:MAX_POINTS]):
         medians = [_median(folder.sample(outcome.column, number)) for outcome in outcomes]
         table.add_row(*(Text(value_text(value)) for value in point.values()), str(failed.count(number)), *medians)
     return table
@@ -64,7 +64,7 @@ def _outcomes(folder: CampaignFolder) -> Sequence[Outcome]:
     runs = folder.runs
     usual = [of for of in folder.outcomes if of.is_usual and of.column in runs.columns and runs[of.column].count()]
     first, pdr = [of for of in usual if of.column != PDR], [of for of in usual if of.column == PDR]
-    return first[: MOST_OUTCOMES - len(pdr)] + pdr
+    return first[: MAX_OUTCOMES - len(pdr)] + pdr
 
 
 def _median(sample: Sample) -> str:

@@ -8,7 +8,7 @@ from optuna.trial import TrialState
 
 from swarmwire.deploy.tuning.study_file import StudyFile
 
-FEWEST_TRIALS = 10  # complete ones: of fewer nothing can be told
+MIN_TRIALS = 10  # complete ones: of fewer nothing can be told
 
 
 def importance_of(study: StudyFile) -> Mapping[str, float]:
@@ -17,7 +17,7 @@ def importance_of(study: StudyFile) -> Mapping[str, float]:
     It tells how differently a parameter is spread in the best tenth of the trials and in all of them.
     """
     complete = [trial for trial in study.frozen() if trial.state == TrialState.COMPLETE]
-    if len(complete) < FEWEST_TRIALS or len(complete[0].params) < 2:
+    if len(complete) < MIN_TRIALS or len(complete[0].params) < 2:
         return {}
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)  # of trials that are too few, or all alike

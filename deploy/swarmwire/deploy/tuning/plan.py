@@ -15,8 +15,8 @@ from swarmwire.deploy.tuning.search import Search, search_from
 from swarmwire.world.scenario.scenario import Scenario
 
 SAMPLERS = ("tpe", "random")
-MOST_TRIALS = 100_000
-MOST_AT_ONCE = 1000
+MAX_TRIALS = 100_000
+MAX_AT_ONCE = 1000
 
 
 @dataclass(frozen=True)
@@ -65,14 +65,14 @@ def planned_tuning(asked: TuningAsked) -> TuningPlan:
 
 def check_trials(trials: int) -> None:
     """BadInput unless so many trials make sense."""
-    if not 0 < trials <= MOST_TRIALS:
-        raise BadInput("--trials", "", f"expected 1 to {MOST_TRIALS}, got {trials}")
+    if not 0 < trials <= MAX_TRIALS:
+        raise BadInput("--trials", "", f"expected 1 to {MAX_TRIALS}, got {trials}")
 
 
 def _check_numbers(asked: TuningAsked) -> None:
     check_trials(asked.trials)
-    if not 0 < asked.batch <= MOST_AT_ONCE:
-        raise BadInput("--batch", "", f"expected 1 to {MOST_AT_ONCE}, got {asked.batch}")
+    if not 0 < asked.batch <= MAX_AT_ONCE:
+        raise BadInput("--batch", "", f"expected 1 to {MAX_AT_ONCE}, got {asked.batch}")
     if asked.sampler not in SAMPLERS:
         raise BadInput("--sampler", "", f"expected {one_of(SAMPLERS, asked.sampler)}; got {asked.sampler!r}")
     if asked.sampler_seed < 0:

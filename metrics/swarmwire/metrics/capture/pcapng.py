@@ -11,7 +11,7 @@ BYTE_ORDER = 0x1A2B3C4D
 UNKNOWN_LENGTH = -1  # of the section: a reader goes from block to block
 COMMENT, APPLICATION, NAME, DESCRIPTION, RESOLUTION = 1, 4, 2, 3, 9  # options, of the block that each stands in
 NANOSECONDS = b"\x09"  # 10^-9 s
-LONGEST_OPTION = 65_535  # bytes
+MAX_OPTION = 65_535  # bytes
 
 
 def section(application: str) -> bytes:
@@ -41,7 +41,7 @@ def _block(kind: int, body: bytes, options: Sequence[tuple[int, bytes]]) -> byte
 
 def _text(text: str) -> bytes:
     """UTF-8, cut after the last character that an option has room for."""
-    return text.encode()[:LONGEST_OPTION].decode(errors="ignore").encode()
+    return text.encode()[:MAX_OPTION].decode(errors="ignore").encode()
 
 
 def _padded(data: bytes) -> bytes:

@@ -9,7 +9,7 @@ from swarmwire.metrics.drawing.extra import need_report_extra
 from swarmwire.metrics.drawing.looks import LONG_SIDE_IN, PAPER
 from swarmwire.metrics.whole_file import check_path, chosen_file
 
-LEAST_SIZE_PX, GREATEST_SIZE_PX = 100, 8000
+MIN_SIZE_PX, GREATEST_SIZE_PX = 100, 8000
 
 
 def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
@@ -21,8 +21,8 @@ def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    if not LEAST_SIZE_PX <= size_px <= GREATEST_SIZE_PX:
-        raise BadInput("--size", "", f"expected {LEAST_SIZE_PX} to {GREATEST_SIZE_PX} pixels, got {size_px}")
+    if not MIN_SIZE_PX <= size_px <= GREATEST_SIZE_PX:
+        raise BadInput("--size", "", f"expected {MIN_SIZE_PX} to {GREATEST_SIZE_PX} pixels, got {size_px}")
     dpi = size_px / max(width_in, height_in, LONG_SIDE_IN)
     # A hundredth more, since the canvas cuts off what is after the point.
     even = [(2 * round(side * dpi / 2) + 0.01) / dpi for side in (width_in, height_in)]

@@ -27,7 +27,7 @@ from swarmwire.metrics.drawing.swarm import Swarm
 from swarmwire.metrics.torus import whole_path
 
 TRAIL_S = 5.0
-MOST_TRAIL_POINTS = 64
+MAX_TRAIL_POINTS = 64
 _STRIP_IN = 1.15  # height of the metrics where they stand below the arena
 _LEGEND_WIDTH_IN = LONG_SIDE_IN - 0.3
 
@@ -109,7 +109,7 @@ class FilmFigure:
 def _trail(film: Film, index: int, trail_s: float) -> AnyArray:
     """Where the robots were in the last seconds, (points, n, 2), thinned if these are many ticks."""
     since = film.index_at(float(film.time_s[index]) - trail_s)
-    most = round(MOST_TRAIL_POINTS * max(1.0, trail_s / TRAIL_S))
+    most = round(MAX_TRAIL_POINTS * max(1.0, trail_s / TRAIL_S))
     every = max(1, (index - since) // most)
     return whole_path(film.pose[np.arange(index, since - 1, -every)[::-1], :, :2], film.static)
 

@@ -7,8 +7,8 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 
-MOST_BY_DEFAULT = 300  # frames
-MOST_FRAMES = 20_000
+MAX_BY_DEFAULT = 300  # frames
+MAX_FRAMES = 20_000
 _SPEEDS = (1, 2, 4, 5, 8, 10)  # times a power of ten
 
 
@@ -51,8 +51,8 @@ def footage(
     shown = frames_per_s or min(wanted, rate_hz * chosen)
     step_s = chosen / shown
     frames = _frames(end - start, step_s)
-    if frames > MOST_FRAMES:
-        raise BadInput("--speed", "", f"expected no more than {MOST_FRAMES} frames; {chosen:g} x makes {frames}")
+    if frames > MAX_FRAMES:
+        raise BadInput("--speed", "", f"expected no more than {MAX_FRAMES} frames; {chosen:g} x makes {frames}")
     at_s = start + step_s * np.arange(frames)
     ticks = np.clip(np.searchsorted(time_s, at_s + 1e-6, side="right") - 1, 0, len(time_s) - 1)
     return Footage(ticks, shown, chosen)
@@ -64,7 +64,7 @@ def _speed(duration_s: float, frames_per_s: float) -> float:
     while True:
         for factor in _SPEEDS:
             speed = factor * power
-            if _frames(duration_s, speed / frames_per_s) <= MOST_BY_DEFAULT:
+            if _frames(duration_s, speed / frames_per_s) <= MAX_BY_DEFAULT:
                 return speed
         power *= 10.0
 

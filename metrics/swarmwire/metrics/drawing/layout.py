@@ -10,7 +10,7 @@ _EDGE_IN, _GAP_IN = 0.14, 0.2
 _TITLE_IN, _LEGEND_ROW_IN = 0.36, 0.19
 _PANEL_BESIDE_IN = 1.95
 _FOOT_IN = 0.26  # below the arena: a scale bar, or part of its axes
-_LEAST_WIDTH_IN = 3.9
+_MIN_WIDTH_IN = 3.9
 _BESIDE_FROM = 0.62  # height by width of the arena from which its panel stands beside it
 
 
@@ -54,7 +54,7 @@ def lay_out(size_m: tuple[float, float], panel_in: float, legend_rows: int, axes
     low_in = _FOOT_IN + axes_in / 2 + below_in
     in_per_m = min((LONG_SIDE_IN - left_in - _EDGE_IN - beside_in) / across_m, (LONG_SIDE_IN - head_in - low_in) / up_m)
     arena_in = across_m * in_per_m, up_m * in_per_m
-    width_in = max(left_in + arena_in[0] + beside_in + _EDGE_IN, _LEAST_WIDTH_IN)
+    width_in = max(left_in + arena_in[0] + beside_in + _EDGE_IN, _MIN_WIDTH_IN)
     height_in = head_in + arena_in[1] + low_in
     place = left_in, low_in, *arena_in
     panel = None

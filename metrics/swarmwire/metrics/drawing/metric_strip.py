@@ -14,10 +14,10 @@ from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, SMALL_PT, S
 from swarmwire.metrics.drawing.metric_axes import is_count, limits, titled
 from swarmwire.metrics.registry import DELIVERY
 
-MOST_PLOTS = 4
+MAX_PLOTS = 4
 PREFERRED = ("target_best", "target_mean", "order", "largest_component", DELIVERY, "min_gap", "collisions")
 USUAL_PLOTS = 3
-_MOST_POINTS = 1500  # of a curve: more than a plot has pixels
+_MAX_POINTS = 1500  # of a curve: more than a plot has pixels
 _HEAD_IN, _FOOT_IN, _NUMBERS_IN, _APART_IN = 0.2, 0.18, 0.3, 0.16
 
 
@@ -31,8 +31,8 @@ def choose(metrics: Mapping[str, FloatArray], wanted: Sequence[str] | None) -> l
     for name in wanted:
         if name not in metrics:
             raise BadInput("--metric", name, f"was not recorded; expected {one_of(metrics, name)}")
-    if len(wanted) > MOST_PLOTS:
-        raise BadInput("--metric", "", f"expected {MOST_PLOTS} at most, got {len(wanted)}")
+    if len(wanted) > MAX_PLOTS:
+        raise BadInput("--metric", "", f"expected {MAX_PLOTS} at most, got {len(wanted)}")
     return list(wanted)
 
 
@@ -41,7 +41,7 @@ class MetricStrip:
 
     def __init__(self, figure: Any, layout: Layout, film: Film, names: Sequence[str]) -> None:
         """Draw what does not move."""
-        every = max(1, len(film.time_s) // _MOST_POINTS)
+        every = max(1, len(film.time_s) // _MAX_POINTS)
         self._plots = [
             _Plot(figure.add_axes(place), name, film, every, last)
             for name, (place, last) in zip(names, _places(layout, len(names)), strict=True)

@@ -32,7 +32,7 @@ from swarmwire.metrics.radio_fit.shadowing_fit import ShadowingFit
 RUNS_TITLE = "runs of lost packets by length"
 _HEIGHT_IN = 4.6
 _DECADE = 10.0  # of the farthest distance over the nearest, from which on the axis is logarithmic
-_MOST_POINTS = 4000
+_MAX_POINTS = 4000
 _LONGEST_SHARE = 0.999  # of bursts, that the axis reaches to
 _BAND = 1.645  # deviations: nine of ten packets
 
@@ -54,7 +54,7 @@ def _draw_rssi(axes: Any, fit: RadioFit) -> None:
     if not len(distance_m):
         say(axes, "no packet was received")
         return
-    every = max(1, len(distance_m) // _MOST_POINTS)
+    every = max(1, len(distance_m) // _MAX_POINTS)
     if distance_m.max() >= _DECADE * distance_m.min():
         from matplotlib.ticker import LogLocator
 

@@ -21,8 +21,8 @@ from swarmwire.metrics.palette import robot_color
 _COLOR = robot_color(0)
 _ROOM = 1.16  # of what is seen by what is drawn, so that numbers at the rays' ends fit
 _BELOW = -0.035  # where legend and bar are, as a share of the view's height
-_LEAST_LINE_PT = 0.9  # of a legend
-_LEAST_RADII = 2.0  # seen in each direction at least, in radii of the body
+_MIN_LINE_PT = 0.9  # of a legend
+_MIN_RADII = 2.0  # seen in each direction at least, in radii of the body
 
 
 def draw_from_above(axes: Any, body: Body) -> None:
@@ -32,7 +32,7 @@ def draw_from_above(axes: Any, body: Body) -> None:
     """
     rims = [sheet.range_m for sheet in body.senses.values() if isinstance(sheet, Rim)]
     reach_m = body.radius_m + max(rims, default=0.0)
-    half_m = _ROOM * max(reach_m, _LEAST_RADII * body.radius_m)
+    half_m = _ROOM * max(reach_m, _MIN_RADII * body.radius_m)
     axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal")
     axes.set_axis_off()
     _draw_disc(axes, body)
@@ -53,7 +53,7 @@ def draw_from_above(axes: Any, body: Body) -> None:
             ncols=3, loc="center right", bbox_to_anchor=(1.0, _BELOW), handlelength=1.3, columnspacing=1.2, **plain
         )
         for line in legend.get_lines():  # rays of a scan are too fine to be seen alone
-            line.set_linewidth(max(line.get_linewidth(), _LEAST_LINE_PT))
+            line.set_linewidth(max(line.get_linewidth(), _MIN_LINE_PT))
 
 
 def _draw_disc(axes: Any, body: Body) -> None:

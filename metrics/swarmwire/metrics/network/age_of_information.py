@@ -14,7 +14,7 @@ from swarmwire.comms.truth import Finished, Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
 
-MOST_PAIRS = 2**18  # of an arena: 2 MB
+MAX_PAIRS = 2**18  # of an arena: 2 MB
 NEVER = NOT_COUNTED = -1
 HEARD = int(Fate.HEARD)
 
@@ -59,7 +59,7 @@ class Newest:
 
     def __init__(self, static: Static) -> None:
         arenas, robots = static.arenas, static.robots
-        self._every = -(-robots * robots // MOST_PAIRS)  # robots from one receiver to the next
+        self._every = -(-robots * robots // MAX_PAIRS)  # robots from one receiver to the next
         receivers = -(-robots // self._every)
         index = np.arange(robots)
         self._place: IntArray = np.where(index % self._every == 0, index // self._every, NOT_COUNTED)  # as a receiver

@@ -13,7 +13,7 @@ from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment
 from swarmwire.metrics.sampled import Sampled
 
-MOST_DENSE = 100  # robots of which all eigenvalues are found as quickly as the one wanted of a sparse matrix
+MAX_DENSE = 100  # robots of which all eigenvalues are found as quickly as the one wanted of a sparse matrix
 SHIFT = 1e-3  # below all eigenvalues, so that the shifted matrix can be inverted
 DIGITS = 9
 
@@ -62,7 +62,7 @@ def _connectivity(moment: Moment) -> FloatArray | float:
     return value
 
 
-def second_eigenvalue(edges: IntArray, nodes: int, most_dense: int = MOST_DENSE) -> float:
+def second_eigenvalue(edges: IntArray, nodes: int, most_dense: int = MAX_DENSE) -> float:
     """The second smallest eigenvalue of the Laplacian of a connected graph of two nodes or more; `edges` (e, 2).
 
     Of a graph of more than `most_dense` nodes it is found by shift and invert (ARPACK, SuperLU).

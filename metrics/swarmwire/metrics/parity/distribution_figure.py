@@ -12,7 +12,7 @@ from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 
 _HEIGHT_IN = 2.1
 _BINS = 40
-_MOST_RUNS = 40  # that are drawn one by one
+_MAX_RUNS = 40  # that are drawn one by one
 
 
 def distribution_figure(row: MetricRow) -> Any:
@@ -22,7 +22,7 @@ def distribution_figure(row: MetricRow) -> Any:
     title = f"{row.metric.name.replace('_', ' ')}{unit}: % of ticks up to a value"
     axes = plain_axes(figure, (0.11, 0.17, 0.86, 0.68), title)
     if len(row.runs) > 1:
-        for values in row.runs[:_MOST_RUNS]:
+        for values in row.runs[:_MAX_RUNS]:
             axes.plot(*_rising(values), color=CURVE, lw=0.5, alpha=0.35)
     axes.plot(*_rising(np.concatenate(row.runs)), color=CURVE, lw=1.4, label="emulated")
     axes.plot(*_rising(row.values), color=ACCENT, lw=1.4, label="log")

@@ -20,7 +20,7 @@ from swarmwire.metrics.statistics.block_bootstrap import mean_difference_interva
 from swarmwire.metrics.statistics.distances import kolmogorov_smirnov, wasserstein_1
 from swarmwire.metrics.statistics.interval import UNKNOWN, Interval
 
-FEWEST_RUNS = 3  # that have a spread
+MIN_RUNS = 3  # that have a spread
 SPREAD = (0.05, 0.5, 0.95)
 ONLY_IN_RANGE = (
     "who was within range is not in the log, and not all were; the radio's delivery counts all on both sides"
@@ -76,7 +76,7 @@ class RadioRow:
     @property
     def within(self) -> bool | None:
         """Whether it is between the 5 % and the 95 % of the runs, as far as can be counted; None: too few."""
-        if self.runs < FEWEST_RUNS or math.isnan(self.of.log):
+        if self.runs < MIN_RUNS or math.isnan(self.of.log):
             return None
         return self.emulated.low - self.of.grain <= self.of.log <= self.emulated.high + self.of.grain
 
@@ -179,7 +179,7 @@ def _row(metric: Metric, runs: list[FloatArray], real: FloatArray) -> MetricRow:
         return MetricRow(metric, emulated, mean, nan, nan, nan, UNKNOWN, *values)
     pooled = np.concatenate(runs)
     reach, difference = nan, UNKNOWN
-    if len(runs) >= FEWEST_RUNS:
+    if len(runs) >= MIN_RUNS:
         reach = max(_to_others(runs, place) for place in range(len(runs)))
     elif len(runs) == 1:
         difference = mean_difference_interval(runs[0], real)

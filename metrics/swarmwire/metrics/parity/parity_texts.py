@@ -4,7 +4,7 @@ import math
 from collections import defaultdict
 from collections.abc import Mapping
 
-from swarmwire.metrics.parity.parity import FEWEST_RUNS, MetricRow, Parity, RadioRow, Spread
+from swarmwire.metrics.parity.parity import MIN_RUNS, MetricRow, Parity, RadioRow, Spread
 from swarmwire.metrics.statistics.texts import interval_text, number_text
 
 COLUMNS = ("metric", "emulated", "log", "distance", "spread", "KS", "within")  # heads of the table of metrics
@@ -48,7 +48,7 @@ def verdict(of: Parity) -> str:
     outside = [row.metric.name for row in of.judged if not row.within]
     outside += [row.of.name for row in of.judged_radio if not row.within]
     worst = f"; outside: {', '.join(outside)}" if outside else ""
-    if of.runs >= FEWEST_RUNS:
+    if of.runs >= MIN_RUNS:
         inside = f"{sum(metrics)} of {len(metrics)} metrics"
         if radio:
             parts = f"{inside}, {sum(radio)} of {len(radio)} of the radio"
@@ -58,7 +58,7 @@ def verdict(of: Parity) -> str:
             f"(of one more run about {number_text(of.outside_by_chance)} would lie outside by chance)."
         )
     if of.runs > 1:
-        return f"{of.runs} runs have no spread: give {FEWEST_RUNS} seeds or more."
+        return f"{of.runs} runs have no spread: give {MIN_RUNS} seeds or more."
     more = f" (of the radio's {len(of.radio)} numbers it tells nothing)" if of.radio else ""
     return (
         f"The means of {sum(metrics)} of {len(metrics)} metrics differ by no more than chance within one run{more}"
@@ -75,7 +75,7 @@ def meanings(of: Parity) -> list[str]:
         + " distance: Wasserstein-1 between the ticks' values, in the metric's unit; "
         "KS: Kolmogorov and Smirnov's, 0 to 1."
     ]
-    if of.runs >= FEWEST_RUNS:
+    if of.runs >= MIN_RUNS:
         lines.append(
             "spread: the greatest distance of one run to all others; within: the log is no farther from all runs. Of "
             "the radio, within: between 5 % and 95 % of the runs."

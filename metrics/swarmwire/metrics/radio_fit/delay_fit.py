@@ -19,7 +19,7 @@ from swarmwire.metrics.statistics.distances import kolmogorov_smirnov
 TAIL = 0.05  # the quantiles: this, the median, and 1 - this
 EVEN = 1000  # quantiles of a fitted delay that packets are held against
 FOLDS = 10  # parts of the packets by which errors are told
-LEAST_SHAPE, MOST_SHAPE = 2.01, 100.0  # of a Pareto law: below, it has no deviation; above, it is exponential
+MIN_SHAPE, MAX_SHAPE = 2.01, 100.0  # of a Pareto law: below, it has no deviation; above, it is exponential
 SYMMETRIC = 3.0  # deviations that a normal delay's mean is above 0 at least: nothing is cut off
 
 
@@ -116,15 +116,15 @@ def _pareto(low: float, middle: float, high: float) -> _Law | None:
         lower, upper = widths(shape)
         return upper / lower - (high - middle) / (middle - low)
 
-    if excess(LEAST_SHAPE) * excess(MOST_SHAPE) > 0.0:
+    if excess(MIN_SHAPE) * excess(MAX_SHAPE) > 0.0:
         return None
-    shape = float(cast("Any", optimize).brentq(excess, LEAST_SHAPE, MOST_SHAPE))
+    shape = float(cast("Any", optimize).brentq(excess, MIN_SHAPE, MAX_SHAPE))
     least_s = (middle - low) / widths(shape)[0]
     constant = low - least_s * (1.0 - TAIL) ** (-1.0 / shape)
     if constant < 0.0:
         shape = math.log((1.0 - TAIL) / TAIL) / math.log(high / low)
         constant, least_s = 0.0, low * (1.0 - TAIL) ** (1.0 / shape)
-        if shape < LEAST_SHAPE:
+        if shape < MIN_SHAPE:
             return None
     mean_s = least_s * shape / (shape - 1.0)
     deviation_s = mean_s / math.sqrt(shape * (shape - 2.0))

@@ -10,7 +10,7 @@ from swarmwire.metrics.radio_fit.delay_fit import DelayFit, fit_delays
 from swarmwire.metrics.radio_fit.estimate import Estimate
 from swarmwire.metrics.statistics.distances import kolmogorov_smirnov
 
-LEAST_PACKETS = 100
+MIN_PACKETS = 100
 TAIL = 0.05  # share of the packets at either end that may be unusual
 PERCENTS = (50.0, 90.0, 99.0)
 OTHER_SHAPE = 0.1  # Kolmogorov and Smirnov's distance from which on the delay is said not to be uniform
@@ -39,8 +39,8 @@ def fit_latency(latency_s: FloatArray) -> LatencyFit | str:
     twentieth of the packets at either end has no say. A negative constant, which no scenario takes, is 0.
     """
     known = latency_s[np.isfinite(latency_s)]
-    if len(known) < LEAST_PACKETS:
-        return f"needs {LEAST_PACKETS} packets with latency_s, got {len(known)}"
+    if len(known) < MIN_PACKETS:
+        return f"needs {MIN_PACKETS} packets with latency_s, got {len(known)}"
     low, high = np.quantile(known, (TAIL, 1.0 - TAIL)).tolist()
     jitter_s = (high - low) / (1.0 - 2.0 * TAIL)
     constant_s = low - TAIL * jitter_s

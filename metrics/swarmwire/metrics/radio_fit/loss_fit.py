@@ -16,8 +16,8 @@ from swarmwire.metrics.radio_fit.loss_sequences import LossSequences
 from swarmwire.metrics.radio_fit.runs_test import runs_z
 from swarmwire.metrics.radio_fit.two_states import log_likelihood
 
-LEAST_PACKETS, LEAST_LOST = 100, 10
-MOST_PACKETS = 200_000  # that the search for bursts goes through some hundred times: a few seconds
+MIN_PACKETS, MIN_LOST = 100, 10
+MAX_PACKETS = 200_000  # that the search for bursts goes through some hundred times: a few seconds
 BURSTY_Z = -3.0  # of the runs test: false alarm 1 in 700
 WIDEST, WIDEST_LOGIT = 8.0, 9.0  # how far logarithms of durations may go from the start, and logits from 0
 IMPOSSIBLE = 1e300  # the cost where the likelihood is 0
@@ -55,16 +55,16 @@ class LossFit:
 def fit_losses(sequences: LossSequences) -> LossFit | str:
     """The fits, or what they lack."""
     packets, lost = len(sequences.lost), int(sequences.lost.sum())
-    if packets < LEAST_PACKETS:
-        return f"needs {LEAST_PACKETS} packets, got {packets}"
+    if packets < MIN_PACKETS:
+        return f"needs {MIN_PACKETS} packets, got {packets}"
     if lost == packets:
         return f"needs packets that were received; all {packets} were lost"
     share = lost / packets
     loss = Estimate(share, math.sqrt(share * (1.0 - share) / packets))
-    sequences = sequences.thinned(MOST_PACKETS)
+    sequences = sequences.thinned(MAX_PACKETS)
     packets, lost = len(sequences.lost), int(sequences.lost.sum())
     single = LossModel("single losses", 1, _of_coin(lost, packets), None, {})
-    if min(lost, packets - lost) < LEAST_LOST:
+    if min(lost, packets - lost) < MIN_LOST:
         return LossFit(loss, (single,), math.nan, single)
     per_link = _single_per_link(sequences)
     bursts = _fit_all_bursts(sequences)

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.metrics.radio_fit.latency_fit import OTHER_SHAPE, LatencyFit, fit_latency
-from swarmwire.metrics.radio_fit.loss_fit import MOST_PACKETS, LossFit, fit_losses
+from swarmwire.metrics.radio_fit.loss_fit import MAX_PACKETS, LossFit, fit_losses
 from swarmwire.metrics.radio_fit.loss_sequences import LossSequences
 from swarmwire.metrics.radio_fit.network_log import NetworkLog
 from swarmwire.metrics.radio_fit.range_fit import RangeFit, fit_range
@@ -107,8 +107,8 @@ def _notes(found: RangeFit | str, latency: LatencyFit | str, losses: LossFit | s
             "all losses count here, those of obstacles and of collisions too; a scenario that makes such losses itself "
             "counts them twice"
         )
-    if packets > MOST_PACKETS:
-        notes.append(f"models of loss were fitted to {MOST_PACKETS} packets at most, in stretches chosen evenly")
+    if packets > MAX_PACKETS:
+        notes.append(f"models of loss were fitted to {MAX_PACKETS} packets at most, in stretches chosen evenly")
     return notes
 
 

@@ -7,11 +7,11 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.metrics.radio_fit.estimate import Estimate
 
-LEAST_PACKETS = 10
-LEAST_SPAN = 1.5  # the farthest distance over the nearest: a slope over less would be that of the noise
-LEAST_CLUSTERS = 10
+MIN_PACKETS = 10
+MIN_SPAN = 1.5  # the farthest distance over the nearest: a slope over less would be that of the noise
+MIN_CLUSTERS = 10
 # Along tunnels, which lead waves, it is near 1; below, range grows so fast with power that there is none.
-LEAST_EXPONENT, MOST_EXPONENT = 0.5, 20.0
+MIN_EXPONENT, MAX_EXPONENT = 0.5, 20.0
 
 
 @dataclass(frozen=True)
@@ -33,21 +33,21 @@ def design(distance_m: FloatArray) -> FloatArray:
 
 def why_not(distance_m: FloatArray) -> str | None:
     """What received packets at these distances lack for a fit; None if nothing."""
-    if len(distance_m) < LEAST_PACKETS:
-        return f"needs {LEAST_PACKETS} received packets, got {len(distance_m)}"
+    if len(distance_m) < MIN_PACKETS:
+        return f"needs {MIN_PACKETS} received packets, got {len(distance_m)}"
     span = float(distance_m.max() / distance_m.min())
-    if span < LEAST_SPAN:
-        return f"needs distances that span a factor of {LEAST_SPAN:g}, got {span:.2f}"
+    if span < MIN_SPAN:
+        return f"needs distances that span a factor of {MIN_SPAN:g}, got {span:.2f}"
     return None
 
 
 def why_none(fit: PathLossFit) -> str | None:
     """What is wrong with a line that no medium has; None if nothing."""
     exponent = round(fit.exponent.value, 3) + 0.0  # what arithmetic leaves of none is none, and none is not -0
-    if LEAST_EXPONENT <= exponent <= MOST_EXPONENT:
+    if MIN_EXPONENT <= exponent <= MAX_EXPONENT:
         return None
-    way = "does not fall" if exponent <= 0.0 else "falls too little" if exponent < LEAST_EXPONENT else "falls too fast"
-    bounds = f"{LEAST_EXPONENT:g} to {MOST_EXPONENT:g}"
+    way = "does not fall" if exponent <= 0.0 else "falls too little" if exponent < MIN_EXPONENT else "falls too fast"
+    bounds = f"{MIN_EXPONENT:g} to {MAX_EXPONENT:g}"
     return f"RSSI {way} with distance: expected an exponent of {bounds}, got {exponent:g}"
 
 
@@ -64,7 +64,7 @@ def fit_path_loss(distance_m: FloatArray, rssi_dbm: FloatArray, cluster: IntArra
     variance = inverse * (residual @ residual) / max(len(rssi_dbm) - 2, 1)
     clusters = np.unique(cluster, return_inverse=True)[1]
     count = int(clusters.max()) + 1
-    if count >= LEAST_CLUSTERS:
+    if count >= MIN_CLUSTERS:
         score = np.stack([np.bincount(clusters, x[:, i] * residual) for i in range(2)], axis=1)
         variance = inverse @ (score.T @ score) @ inverse * count / (count - 1)
     errors = np.sqrt(np.diag(variance))

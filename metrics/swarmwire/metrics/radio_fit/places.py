@@ -8,7 +8,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.radio_fit.radio_log import RadioLog
 
 SAME_PLACE_M = 0.05
-MOST_PLACES = 300
+MAX_PLACES = 300
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,6 @@ def places_of(log: RadioLog) -> Places:
     mean_ends = np.stack([np.bincount(place, ends_m[:, i]) / packets for i in range(4)], axis=1)
     mean_rssi = np.bincount(place, rssi_dbm) / packets
     in_order = np.argsort(first)  # evenly over the log, not over the cells
-    if len(in_order) > MOST_PLACES:
-        in_order = in_order[np.linspace(0, len(in_order) - 1, MOST_PLACES).round().astype(np.int64)]
+    if len(in_order) > MAX_PLACES:
+        in_order = in_order[np.linspace(0, len(in_order) - 1, MAX_PLACES).round().astype(np.int64)]
     return Places(mean_ends[in_order], mean_rssi[in_order], packets[in_order])

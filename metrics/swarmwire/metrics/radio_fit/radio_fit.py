@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.metrics.radio_fit.estimate import Estimate
-from swarmwire.metrics.radio_fit.loss_fit import MOST_PACKETS, LossFit, fit_losses
+from swarmwire.metrics.radio_fit.loss_fit import MAX_PACKETS, LossFit, fit_losses
 from swarmwire.metrics.radio_fit.loss_sequences import LossSequences, loss_sequences
 from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit, fit_path_loss, why_none, why_not
 from swarmwire.metrics.radio_fit.places import places_of
@@ -98,8 +98,8 @@ def _notes(log: RadioLog, losses: LossFit | str, shadowing: ShadowingFit | str, 
             "all losses count here, those of weak signals and of collisions too; a scenario whose reception or access "
             "makes such losses itself counts them twice"
         )
-    if packets > MOST_PACKETS:
-        notes.append(f"models of loss were fitted to {MOST_PACKETS} packets at most, in stretches chosen evenly")
+    if packets > MAX_PACKETS:
+        notes.append(f"models of loss were fitted to {MAX_PACKETS} packets at most, in stretches chosen evenly")
     if log.ends_m is None and isinstance(shadowing, str):
         notes.append("without positions the residuals' deviation is shadowing, fading and measurement together")
     return tuple(notes)

@@ -7,8 +7,8 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.metrics.radio_fit.estimate import Estimate
 
-LEAST_PACKETS = 100
-LEAST_BEYOND = 30  # packets in a row that were all lost farther out, for a range to have been seen
+MIN_PACKETS = 100
+MIN_BEYOND = 30  # packets in a row that were all lost farther out, for a range to have been seen
 STRAY = 0.01  # share of the packets beyond the range that may arrive nevertheless
 
 
@@ -30,18 +30,18 @@ def fit_range(distance_m: FloatArray, lost: BoolArray) -> RangeFit | str:
     known = np.isfinite(distance_m)
     order = np.argsort(distance_m[known], kind="stable")
     distance, heard = distance_m[known][order], ~lost[known][order]
-    if len(distance) < LEAST_PACKETS:
-        return f"needs {LEAST_PACKETS} packets with a distance, got {len(distance)}"
+    if len(distance) < MIN_PACKETS:
+        return f"needs {MIN_PACKETS} packets with a distance, got {len(distance)}"
     if not heard.any():
         return "needs packets that were received"
     count, total = np.arange(1.0, len(heard) + 1.0), np.cumsum(heard, dtype=np.float64)
     beyond, heard_beyond = len(heard) - count, total[-1] - total
     gain = _log_likelihood(total, count) + _log_likelihood_of(heard_beyond, beyond, STRAY)
     best = int(np.argmax(np.where(heard, gain, -np.inf)))  # a range ends where a packet was heard
-    reached = int(beyond[best]) >= LEAST_BEYOND
+    reached = int(beyond[best]) >= MIN_BEYOND
     if not reached:
         best = int(np.flatnonzero(heard)[-1])
-    near = distance[: best + 1][heard[: best + 1]][-LEAST_BEYOND:]
+    near = distance[: best + 1][heard[: best + 1]][-MIN_BEYOND:]
     error_m = float(near[-1] - near[0]) / max(len(near) - 1, 1)
     return RangeFit(Estimate(float(distance[best]), error_m if reached else float("nan")), reached, int(beyond[best]))
 

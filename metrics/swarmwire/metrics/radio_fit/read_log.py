@@ -11,7 +11,7 @@ from swarmwire.metrics.radio_fit.radio_log import RadioLog
 NEEDED = ("t_s", "tx", "rx", "seq", "rssi_dbm")
 ENDS = ("tx_x_m", "tx_y_m", "rx_x_m", "rx_y_m")
 DISTANCE = "distance_m"
-MOST_LOST = 10_000_000
+MAX_LOST = 10_000_000
 
 
 def read_log(path: Path) -> RadioLog:
@@ -77,10 +77,10 @@ def _refuse_disorder(
     ):
         table.refuse_where(_rows(order, same & wrong), column, expected)
     gaps = np.where(same, steps - 1.0, 0.0)
-    if gaps.sum() > MOST_LOST:
+    if gaps.sum() > MAX_LOST:
         widest = _rows(order, gaps == gaps.max())
         table.refuse_where(
-            widest, "seq", f"leaves {gaps.max():.0f} packets out; expected {MOST_LOST} lost in all at most"
+            widest, "seq", f"leaves {gaps.max():.0f} packets out; expected {MAX_LOST} lost in all at most"
         )
 
 

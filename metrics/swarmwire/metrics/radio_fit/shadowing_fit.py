@@ -17,7 +17,7 @@ from swarmwire.metrics.radio_fit.link_field import WAVES, link_features
 from swarmwire.metrics.radio_fit.path_loss_fit import design
 from swarmwire.metrics.radio_fit.places import Places
 
-LEAST_PLACES = 30
+MIN_PLACES = 30
 DRAWN = 200  # fields for the standard errors, which they give to 5 %
 FALSE_ALARM = 0.01
 FIELD, NOISE = purpose("fitted field"), purpose("fitted noise")
@@ -37,8 +37,8 @@ class ShadowingFit:
 def fit_shadowing(places: Places) -> ShadowingFit | str:
     """The fit, or what it lacks."""
     count = len(places.packets)
-    if count < LEAST_PLACES:
-        return f"needs {LEAST_PLACES} places of sender and receiver, got {count}"
+    if count < MIN_PLACES:
+        return f"needs {MIN_PLACES} places of sender and receiver, got {count}"
     moments = FieldMoments(places)
     found = moments.fit(moments.residuals(places.rssi_dbm[:, None]))
     noise = normal(KEY, np.arange(count)[:, None], np.arange(DRAWN), 0, NOISE) / np.sqrt(places.packets)[:, None]

@@ -17,7 +17,7 @@ from swarmwire.metrics.real_log.robot_log import HeardPackets, SentPackets
 
 EVERYBODY, NOBODY = -1, -2  # of `to`: all others; a robot that is not of these
 REORDERED = 50  # numbers that a packet may come late by
-MOST_LOST = 10_000_000
+MAX_LOST = 10_000_000
 USUAL = 0.99  # share of packets
 _EPOCH = 2**40  # numbers that a start of an agent may use
 
@@ -132,8 +132,8 @@ def _columns(
 def _filled(of: OwnPackets, where: str) -> OwnPackets:
     """With the packets that nobody heard, as if sent evenly between those around them, to everybody."""
     missed = np.where(np.diff(of.key // _EPOCH) == 0, np.diff(of.key) - 1, 0) if len(of.key) else of.key
-    if missed.sum() > MOST_LOST:
-        raise BadInput(where, "seq", f"leaves {missed.sum()} packets out; expected {MOST_LOST} lost in all at most")
+    if missed.sum() > MAX_LOST:
+        raise BadInput(where, "seq", f"leaves {missed.sum()} packets out; expected {MAX_LOST} lost in all at most")
     if not missed.sum():
         return of
     start = np.repeat(of.key[:-1], missed)

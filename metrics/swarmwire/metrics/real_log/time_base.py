@@ -11,7 +11,7 @@ from swarmwire.metrics.real_log.poses import GAP_S, longest_gap_s, posed_span_s
 from swarmwire.metrics.real_log.real_logs import RealLogs, named
 from swarmwire.metrics.real_log.robot_log import TICKS
 
-MOST_TICKS = 5_000_000  # which still fit the memory: days of steps
+MAX_TICKS = 5_000_000  # which still fit the memory: days of steps
 CUT_S = 1.0  # of a robot's log, from which on what is left out is worth a word
 
 
@@ -52,8 +52,8 @@ def time_base(logs: RealLogs) -> TimeBase:
     if ticks < 2:
         late, early = _names_at_ends(logs, spans)
         raise BadInput(logs.where, "", f"expected robots that ran at the same time: {late} began as {early} had ended")
-    if ticks > MOST_TICKS:
-        expected = f"expected {MOST_TICKS} steps in common at most, got {ticks}: was a clock set meanwhile?"
+    if ticks > MAX_TICKS:
+        expected = f"expected {MAX_TICKS} steps in common at most, got {ticks}: was a clock set meanwhile?"
         raise BadInput(logs.where, "t_s", expected)
     notes = [*_cut(logs, spans, start_s, end_s), *_pose_notes(logs, (start_s, end_s), has_poses=has_poses)]
     return TimeBase(start_s, rate_hz, ticks, has_poses, tuple(notes))

@@ -2,7 +2,7 @@
 
 from swarmwire.comms.clock import Clock, to_ns
 
-LONGEST_S = 2.0  # of wall time: a run that is killed loses no more than this, and the tick under way
+MAX_S = 2.0  # of wall time: a run that is killed loses no more than this, and the tick under way
 
 
 class ChunkLimit:
@@ -20,7 +20,7 @@ class ChunkLimit:
     def restart(self) -> None:
         """A new chunk begins."""
         now_ns = self._clock.now_ns()
-        self._due_ns = now_ns + max(to_ns(LONGEST_S), round(self._share * (now_ns - self._made_ns)))
+        self._due_ns = now_ns + max(to_ns(MAX_S), round(self._share * (now_ns - self._made_ns)))
 
     def reached(self, size: int) -> bool:
         """Whether a chunk of this size should be closed now."""

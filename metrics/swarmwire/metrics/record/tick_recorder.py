@@ -21,7 +21,7 @@ from swarmwire.metrics.record.tick_columns import (
 )
 
 CHUNK_BYTES = 4_000_000
-MOST_TICKS = 4096  # in a chunk, however small the swarm
+MAX_TICKS = 4096  # in a chunk, however small the swarm
 
 
 class TickRecorder:
@@ -46,7 +46,7 @@ class TickRecorder:
                 raise BadInput("", f"metrics.{name}", "expected another name: ticks.parquet has a column of this name")
         self._static = static
         rows = static.arenas * static.robots
-        self._ticks = min(MOST_TICKS, max(1, CHUNK_BYTES // (rows * BYTES_PER_ROBOT)))
+        self._ticks = min(MAX_TICKS, max(1, CHUNK_BYTES // (rows * BYTES_PER_ROBOT)))
         schema = tick_schema(static, self._names)
         self._writer = TableWriter(self._folder, "ticks", schema, self._may_drop)
         self._limit = ChunkLimit(self._ticks, self._clock)

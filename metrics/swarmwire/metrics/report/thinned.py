@@ -6,10 +6,10 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 
-MOST_POINTS = 800  # of a curve: about what a figure has dots for across
+MAX_POINTS = 800  # of a curve: about what a figure has dots for across
 
 
-def thinned(value: FloatArray, most: int = MOST_POINTS) -> IntArray:
+def thinned(value: FloatArray, most: int = MAX_POINTS) -> IntArray:
     """The places to draw of a curve (T,), rising: all, or of each stretch the least and the greatest value.
 
     A stretch without any value keeps its first place, so that a gap stays one.

@@ -11,12 +11,12 @@ from swarmwire.metrics.statistics.bootstrap import percentile_interval, resample
 from swarmwire.metrics.statistics.interval import LEVEL, UNKNOWN, Interval
 
 BLOCKS = 10
-LEAST_TICKS = 5  # of a block
+MIN_TICKS = 5  # of a block
 
 
 def block_means(series: FloatArray) -> FloatArray:
     """The means of 10 blocks of equal lengths, of fewer if the series (n,) is short, (blocks,)."""
-    blocks = min(BLOCKS, len(series) // LEAST_TICKS)
+    blocks = min(BLOCKS, len(series) // MIN_TICKS)
     length = len(series) // blocks if blocks else 0
     return series[len(series) - blocks * length :].reshape(blocks, length).mean(axis=1) if blocks else np.zeros(0)
 

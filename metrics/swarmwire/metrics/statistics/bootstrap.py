@@ -21,7 +21,7 @@ Counts = NDArray[np.float32]
 
 WORDS = 4  # that one draw brings, of 32 bits
 RESAMPLES = 2000
-FEWEST_RESAMPLES = 400  # of very large samples, where intervals are narrow anyhow
+MIN_RESAMPLES = 400  # of very large samples, where intervals are narrow anyhow
 DRAWS = 2_000_000  # per statistic, at most, as long as there are more than the fewest
 KEY = derive_key("statistics")
 DRAW = purpose("bootstrap")
@@ -33,7 +33,7 @@ def drawn(n: int, sample: int = 0) -> Counts:
 
     Another `sample` draws independently: for the second of two that are not paired.
     """
-    resamples = min(RESAMPLES, max(FEWEST_RESAMPLES, DRAWS // max(n, 1)))
+    resamples = min(RESAMPLES, max(MIN_RESAMPLES, DRAWS // max(n, 1)))
     resample, four = np.arange(resamples)[:, None], np.arange(-(-n // WORDS))
     words = np.stack(philox(KEY, DRAW, sample, resample, four), axis=-1).reshape(resamples, -1)[:, :n]
     picked = (words * np.uint64(n) >> np.uint64(32)).astype(np.int64)  # uneven by n / 2**32 at most

@@ -11,7 +11,7 @@ from scipy import optimize, special
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.statistics.interval import LEVEL, UNKNOWN, Interval
 
-FEWEST_STRESSES = 3  # two points lie on every curve
+MIN_STRESSES = 3  # two points lie on every curve
 PARAMETERS = 3  # a, b and the variance
 ROUNDING = 1e-24  # of squares, relative to all
 TELLING = 2.0  # AIC apart by less says little (Burnham and Anderson, 2002)
@@ -71,7 +71,7 @@ def degradation(stress: FloatArray, table: FloatArray, level: float = LEVEL) -> 
     Intervals are Student's, from the curvature of the squares. None if fewer than three stresses have values.
     """
     there = np.isfinite(table)
-    if np.count_nonzero(there.any(axis=1)) < FEWEST_STRESSES:
+    if np.count_nonzero(there.any(axis=1)) < MIN_STRESSES:
         return None
     x = np.broadcast_to(stress[:, None], table.shape)[there]
     y = table[there]

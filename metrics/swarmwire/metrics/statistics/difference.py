@@ -22,7 +22,7 @@ from swarmwire.metrics.statistics.resampled_times import resampled_quantiles
 from swarmwire.metrics.statistics.sample import Sample
 
 Test = Literal["Wilcoxon signed-rank", "Mann-Whitney", "paired Gehan", "log-rank"]
-FEWEST_PAIRS = 2
+MIN_PAIRS = 2
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Difference:
 def difference(first: Sample, second: Sample, level: float = LEVEL) -> Difference:
     """The difference of two samples of one kind."""
     seeds = np.intersect1d(first.seed, second.seed)
-    paired = len(seeds) >= FEWEST_PAIRS
+    paired = len(seeds) >= MIN_PAIRS
     one, other = (first.of_seeds(seeds), second.of_seeds(seeds)) if paired else (first, second)
     if not (len(one) and len(other)):
         test: Test = "log-rank" if first.kind == "time" else "Mann-Whitney"

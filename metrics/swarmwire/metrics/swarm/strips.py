@@ -15,7 +15,7 @@ from swarmwire.comms.kernels import borrowing
 from swarmwire.comms.truth import Static
 
 SLACK = 1.0 + 1e-9  # two robots at just the height may be rounded apart
-FEWEST_AROUND = 3  # strips around a torus, or a strip's neighbours above and below would be one
+MIN_AROUND = 3  # strips around a torus, or a strip's neighbours above and below would be one
 
 
 class Strips(NamedTuple):
@@ -72,7 +72,7 @@ def fill(strips, order, pose, alive, height_m, most, side_y_m):
     count, span_m = max(min(most, n), 1), high_m - low_m if n else 0.0
     if span_m < count * height_m * SLACK:
         count = max(int(span_m / (height_m * SLACK)), 1)
-    if side_y_m > 0.0 and count < FEWEST_AROUND:
+    if side_y_m > 0.0 and count < MIN_AROUND:
         count = 1
     per_m = count / span_m if span_m > 0.0 else 0.0
     start = strips.start

@@ -13,7 +13,7 @@ from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.moment import Moment
 
-MOST_CELLS = 2**27  # of all arenas: 128 MB
+MAX_CELLS = 2**27  # of all arenas: 128 MB
 ROUNDING = 1e-9  # of a cell
 TAKEN, FREE, SEEN = 0, 1, 2
 
@@ -31,8 +31,8 @@ class FloorCells:
         """All is unseen; BadInput if there are more cells than 2^27."""
         width_m, height_m = static.arena_size_m
         nx, ny = ceil(width_m / cell_m - ROUNDING), ceil(height_m / cell_m - ROUNDING)
-        if nx * ny * static.arenas > MOST_CELLS:
-            expected = f"expected at most {MOST_CELLS} cells in all arenas together, got {nx * ny * static.arenas}"
+        if nx * ny * static.arenas > MAX_CELLS:
+            expected = f"expected at most {MAX_CELLS} cells in all arenas together, got {nx * ny * static.arenas}"
             raise BadInput("", "cell_m", expected)
         self.cells: AnyArray = np.full((static.arenas, ny, nx), FREE, np.uint8)
         self._floor = width_m, height_m, static.boundary == "torus"

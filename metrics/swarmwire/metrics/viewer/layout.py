@@ -12,7 +12,7 @@ _MARGIN = 1.03  # of the arena's half width, so that its walls are seen
 _TICK, _TIME = "tick", "sim_time"
 _GROUND = [16, 18, 24]
 _ARENA_SHARE = 0.44  # of the window's width, for an arena as wide as it is high; a narrow one leaves more to the plots
-_LEAST_ARENA_SHARE, _SIDE_SHARE = 0.24, 0.19
+_MIN_ARENA_SHARE, _SIDE_SHARE = 0.24, 0.19
 _NARROW = 0.6  # width over height below which an arena gets the window's whole height
 _PAGE_ARENA_SHARE = 0.64
 _ROWS = [4.2, 1.0]  # of what is looked at, and of the events below it
@@ -26,7 +26,7 @@ def layout(static: Static, selected: str, play_state: Literal["playing", "follow
     import rerun.blueprint as rrb
 
     wide = static.arena_size_m[0] / static.arena_size_m[1]
-    arena_share = _ARENA_SHARE * min(max(wide, _LEAST_ARENA_SHARE / _ARENA_SHARE), 1.0)
+    arena_share = _ARENA_SHARE * min(max(wide, _MIN_ARENA_SHARE / _ARENA_SHARE), 1.0)
     side = rrb.Vertical(_legend(), _close_up(static, selected), _about(), row_shares=[0.65, 1.1, 1.25])
     plots = rrb.Vertical(*_plots(static))
     if wide < _NARROW:

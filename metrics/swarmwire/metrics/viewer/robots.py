@@ -15,7 +15,7 @@ from swarmwire.metrics.viewer.rows import RerunRows
 _TRAIL_ALPHA = 170
 _TRAILS, _HEADINGS, _ROBOTS = 2.0, 3.0, 4.0  # drawn in this order, above the links
 _HEADING_RADII = 2.5  # length of a heading's arrow in body radii, from the centre
-_LEAST_HEADING = 0.025  # and at least this share of the arena's larger side, so that it can be seen,
+_MIN_HEADING = 0.025  # and at least this share of the arena's larger side, so that it can be seen,
 _CROWDED = 0.25  # or this share / sqrt(robots) if that is less, so that a thousand do not cover one another
 
 
@@ -27,7 +27,7 @@ class RerunRobots:
         self._static, self._classes = static, RerunClasses(static)
         radii = [np.full(group.stop - group.start, group.body.radius_m) for group in static.groups]
         self.radius_m = np.concatenate(radii)  # (robots,)
-        least = min(_LEAST_HEADING, _CROWDED / math.sqrt(static.robots))
+        least = min(_MIN_HEADING, _CROWDED / math.sqrt(static.robots))
         self.heading_m = np.maximum(_HEADING_RADII * self.radius_m, least * max(static.arena_size_m))  # (robots,)
         self._arrow_m = self.heading_m[:, None].astype(np.float32)
         self._was: tuple[bytes, bytes] | None = None  # who was alive and at what when the colours were logged

@@ -14,7 +14,7 @@ from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from tests.support.swarms import (
     ANY_PORT,
     KEYS,
-    MOST_BYTES,
+    MAX_BYTES,
     ROBOTS,
     KeptLog,
     Wide,
@@ -89,7 +89,7 @@ def test_what_is_too_large_is_numbered_and_told_once_but_not_sent():
     with peers(2) as sessions:
         a, b = radio(sessions[0], ROBOTS[0], log=log, say=said.append), radio(sessions[1], ROBOTS[1])
         meet(sessions[0], [b])
-        large = Payloads.of([b"\1\2" + bytes(MOST_BYTES - 2), b"\1\2" + bytes(MOST_BYTES - 1), Word(number=3).encode()])
+        large = Payloads.of([b"\1\2" + bytes(MAX_BYTES - 2), b"\1\2" + bytes(MAX_BYTES - 1), Word(number=3).encode()])
         a.send(Sent(np.zeros(3, np.int64), np.full(3, BROADCAST), large))
         a.send(Sent(np.zeros(1, np.int64), np.full(1, BROADCAST), large.rows(np.array([1]))))
         a.send(words(4.0))
@@ -105,7 +105,7 @@ def test_what_is_too_large_is_numbered_and_told_once_but_not_sent():
         assert a.counts()["packets_too_large"] == 2
     assert [packet.fate for packet in log.sent_packets] == ["sent", "too_large", "sent", "too_large", "sent"]
     assert len(said) == 1
-    assert f"{MOST_BYTES + 1} bytes" in said[0]
+    assert f"{MAX_BYTES + 1} bytes" in said[0]
 
 
 def test_what_is_for_a_robot_that_is_not_there_or_for_the_sender_itself_is_numbered_only():
@@ -133,7 +133,7 @@ def test_what_is_for_a_robot_that_is_not_there_or_for_the_sender_itself_is_numbe
         (f"{KEYS.root}/radio/flock-1/*", packet(), "packets_malformed"),
         (f"{KEYS.root}/**/flock-1/{Word.tag:04x}", packet(), "packets_malformed"),
         ("**", packet(), "packets_of_unknown"),
-        (KEYS.radio("flock-1", Word.tag), packet() + bytes(MOST_BYTES), "packets_oversized"),
+        (KEYS.radio("flock-1", Word.tag), packet() + bytes(MAX_BYTES), "packets_oversized"),
         (KEYS.radio("flock-1", Word.tag), packet() + bytes(10**6), "packets_oversized"),
     ],
 )
@@ -163,7 +163,7 @@ def test_garbage_never_stops_a_radio():
 
 
 def test_a_flood_beyond_what_may_wait_is_counted_and_the_oldest_are_heard(monkeypatch):
-    monkeypatch.setattr(zenoh_radio, "MOST_WAITING", 50)
+    monkeypatch.setattr(zenoh_radio, "MAX_WAITING", 50)
     with radios() as (a, b):
         a.send(words(*range(80)))
         until(lambda: b.counts().get("packets_dropped") == 30)

@@ -167,7 +167,7 @@ def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
 
 
 def test_a_scheduler_that_is_frozen_is_given_up_in_a_line(tmp_path, reference, two_threads, monkeypatch):
-    monkeypatch.setattr(dask_executor, "LOOK_S", 0.1)
+    monkeypatch.setattr(dask_executor, "POLL_S", 0.1)
     monkeypatch.setattr(dask_executor, "MUTE_LOOKS", 3)
     long, freeze = ["duration_s=100000", "robots.pair.params.share=0.0"], two_threads.scheduler.suspend
     monkeypatch.setattr(sweeping, "execute", first_calls(freeze))

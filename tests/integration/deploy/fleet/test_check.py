@@ -60,7 +60,7 @@ def test_an_agent_that_needs_more_than_the_driver_gives_is_told(fleet, robots, e
 
 def test_a_clock_that_is_off_is_told_with_its_cure(fleet, robots, epuck, monkeypatch):
     fleet.add("flock-0", driver={"address": f"127.0.0.1:{epuck}"})
-    monkeypatch.setattr(check_module, "MOST_AHEAD_NS", -(10**12))
+    monkeypatch.setattr(check_module, "MAX_AHEAD_NS", -(10**12))
     assert "run NTP" in robots("check")[1][0]
 
 

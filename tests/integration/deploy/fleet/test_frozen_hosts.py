@@ -32,7 +32,7 @@ def test_a_host_that_freezes_in_the_middle_is_told_long_before_anybody_would_giv
 
 
 def test_a_host_that_takes_requests_and_answers_none_is_told(fleet, robots, monkeypatch):
-    monkeypatch.setattr(host_session, "PATIENCE_S", 0.2)
+    monkeypatch.setattr(host_session, "TIMEOUT_S", 0.2)
     fleet.add("flock-0").set_python("exec cat > /dev/null")
     code, lines = robots("push")
     assert code == 1
@@ -44,7 +44,7 @@ def sends(fleet, robots, tmp_path, monkeypatch):
     """What comes of a fetch of which the host sends this, where a log may have 10 kB."""
     host = fleet.add("flock-0")
     (host.root / "flock-0" / "log" / "flock-0-1").mkdir(parents=True)
-    monkeypatch.setattr(logs, "MOST_BYTES", 10_000)
+    monkeypatch.setattr(logs, "MAX_BYTES", 10_000)
 
     def fetched(command):
         (host.bin / "tar").write_text(f"#!/bin/sh\nexec {command}\n")

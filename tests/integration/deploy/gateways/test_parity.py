@@ -16,7 +16,7 @@ from tests.support.deploy.gateways.measured import Speeds, measured, outside
 SEEDS = range(1, 21)
 SEED = 2  # of runs through gateways
 PACES = (4.0, 2.0, 1.0)  # times real time
-MOST_MISSED = 0.1  # of the ticks: a machine that did not keep up tells nothing of the robots
+MAX_MISSED = 0.1  # of the ticks: a machine that did not keep up tells nothing of the robots
 KINDS = {"epuck2": "epuck2", "ros2": "turtlebot"}  # gateway and driver: the body in the scenarios' names
 TOUCHES = ("collisions", "wall_contacts")
 
@@ -79,10 +79,10 @@ def through_gateway(
         out = folder / f"at-{pace:g}"
         result = driven(scenario(behaviour, kind), kind, out, pace=pace, observers=[speeds], **more)
         assert result.realtime is not None
-        if result.realtime.missed_ticks <= MOST_MISSED * result.ticks:
+        if result.realtime.missed_ticks <= MAX_MISSED * result.ticks:
             return measured(result.arenas[0], speeds.of(0)), result
     pytest.skip(
-        f"more than {MOST_MISSED:.0%} of the ticks missed at every pace: that tells of this machine, not of robots"
+        f"more than {MAX_MISSED:.0%} of the ticks missed at every pace: that tells of this machine, not of robots"
     )
 
 

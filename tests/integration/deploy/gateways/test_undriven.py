@@ -10,7 +10,7 @@ BARE = Recording(tables=False, rrd=False)
 
 @pytest.mark.parametrize("driven", [(), (1,), (0, 1, 2)])
 def test_people_are_told_whom_nobody_drives(scenario, scripted, tmp_path, capsys, monkeypatch, driven) -> None:
-    monkeypatch.setattr(undriven, "SOON_S", 0.01)  # wall time: the tenth tick
+    monkeypatch.setattr(undriven, "GRACE_S", 0.01)  # wall time: the tenth tick
     out = tmp_path / "run"
     with Simulation(scenario, gateways={"other": "scripted"}, realtime=100, out=out, record=BARE) as simulation:
         scripted[-1].drive = dict.fromkeys(driven, (0.0, 0.0))

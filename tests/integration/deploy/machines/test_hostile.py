@@ -112,7 +112,7 @@ class Hostile:
         payload = standing(0, 10, AT_TICK)
         for _ in range(FLOOD):
             session.put(keys.answer(self.name), payload, congestion_control=BLOCK, attachment=OWN)
-        for size in (frames.MOST_BYTES + 1, LIMITS.link_bytes + 1):
+        for size in (frames.MAX_BYTES + 1, LIMITS.link_bytes + 1):
             session.put(keys.answer(self.name), bytes(size), congestion_control=BLOCK, attachment=OWN)
 
 

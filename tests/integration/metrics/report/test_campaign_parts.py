@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from swarmwire.metrics.report.campaign.levels import MOST_LEVELS, levels_of
+from swarmwire.metrics.report.campaign.levels import MAX_LEVELS, levels_of
 from swarmwire.metrics.report.campaign.rounding import rounding_of
 from swarmwire.metrics.report.figures.distributions import Group, distributions
 from swarmwire.metrics.report.figures.heat_map import heat_map
@@ -53,8 +53,8 @@ def test_true_and_lists_are_names():
 
 
 def test_as_many_values_as_can_be_shown_stay_apart():
-    levels = levels_of("x", tuple({"x": x} for x in range(MOST_LEVELS)))
-    assert (len(levels), levels.means) == (MOST_LEVELS, ())
+    levels = levels_of("x", tuple({"x": x} for x in range(MAX_LEVELS)))
+    assert (len(levels), levels.means) == (MAX_LEVELS, ())
 
 
 @pytest.mark.parametrize("values", [[x / 100 for x in range(100)], [0.0] * 50 + [x * x for x in range(50)]])

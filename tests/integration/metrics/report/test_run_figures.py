@@ -13,8 +13,8 @@ from swarmwire.metrics.report.run_figures.delivery_by_distance import delivery_b
 from swarmwire.metrics.report.run_figures.latency_histogram import latency_histogram, percentiles
 from swarmwire.metrics.report.run_figures.link_histogram import link_histogram
 from swarmwire.metrics.report.run_figures.link_matrix import link_matrix
-from swarmwire.metrics.report.run_figures.paths import MOST_PATHS, MOST_POINTS, paths_of
-from swarmwire.metrics.report.run_figures.small_panels import MOST_PANELS, small_panels
+from swarmwire.metrics.report.run_figures.paths import MAX_PATHS, MAX_POINTS, paths_of
+from swarmwire.metrics.report.run_figures.small_panels import MAX_PANELS, small_panels
 from swarmwire.metrics.report.run_figures.timeline import Curve, timeline
 from swarmwire.metrics.report.run_figures.trajectories import trajectories
 from swarmwire.metrics.report.run_sections.latencies import acts_at_ns
@@ -50,9 +50,9 @@ def test_panels_share_their_time_and_hold_the_curves():
 
 
 def test_many_metrics_are_small_and_the_first_of_very_many():
-    curves = [Curve(f"own_{i}", f"own {i}", TIME_S * i) for i in range(MOST_PANELS + 3)]
+    curves = [Curve(f"own_{i}", f"own {i}", TIME_S * i) for i in range(MAX_PANELS + 3)]
     figure = small_panels(TIME_S, curves)
-    assert [axes.get_title("left") for axes in figure.axes] == [f"own {i}" for i in range(MOST_PANELS)]
+    assert [axes.get_title("left") for axes in figure.axes] == [f"own {i}" for i in range(MAX_PANELS)]
     np.testing.assert_array_equal(figure.axes[2].lines[0].get_ydata(), TIME_S * 2)
 
 
@@ -113,8 +113,8 @@ def test_on_a_torus_the_pen_is_lifted_at_the_seam():
 def test_of_long_runs_of_many_robots_some_are_drawn_from_start_to_end():
     place_m = np.zeros((600, 3000, 2), np.float32)
     paths = paths_of(place_m, replace(two_groups()))
-    assert len(paths.robots) == MOST_PATHS
-    assert paths.place_m.size <= 2 * MOST_POINTS
+    assert len(paths.robots) == MAX_PATHS
+    assert paths.place_m.size <= 2 * MAX_POINTS
     assert (paths.robots[0], paths.robots[-1], paths.ticks[0], paths.ticks[-1]) == (0, 2999, 0, 599)
 
 

@@ -142,7 +142,7 @@ def test_bytes_turned_over_within_a_table_are_found(tmp_path):
 def killed(folder, monkeypatch, in_chunk=3):
     """A folder as a run leaves it that was killed: parts only."""
     monkeypatch.setattr(table_writer, "join_parts", lambda *_: None)
-    monkeypatch.setattr(tick_recorder, "MOST_TICKS", in_chunk)
+    monkeypatch.setattr(tick_recorder, "MAX_TICKS", in_chunk)
     fill(folder)
     (folder / "summary.json").unlink()
     (folder / "ticks" / "part-000003.parquet").unlink()  # the last tick's

@@ -30,7 +30,7 @@ from swarmwire.world.backends import zenoh_backend
 from swarmwire.world.backends.registry import RunnerHealth
 from swarmwire.world.backends.zenoh_backend import RemoteCrew, Surroundings
 from tests.support.agent.hosts import GIVES, assignment, group, heard_from, one_group, plain, spec
-from tests.support.waiting import PATIENCE_S
+from tests.support.waiting import TIMEOUT_S
 
 RUN = "r1"
 ROWS = [0, 1, 2, 3, 4]
@@ -231,7 +231,7 @@ def test_a_runner_whose_world_does_not_come_says_so(endpoint: str, monkeypatch: 
 def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many_more(
     endpoint: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(zenoh_backend, "POLL_S", PATIENCE_S)  # it would answer nobody while it waits for more to come
+    monkeypatch.setattr(zenoh_backend, "POLL_S", TIMEOUT_S)  # it would answer nobody while it waits for more to come
     keys, slots = Keys(RUN), parts("Counter", *([row] for row in ROWS))
     with opened(endpoint, slots) as crew, ThreadPoolExecutor() as others, open_runner(endpoint) as asking:
         started = others.submit(crew.start)
@@ -239,7 +239,7 @@ def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many
             (reply,) = asking.get(keys.join(f"r{row}"), payload=JoinRequest().encode(), timeout=TIMEOUT_S)
             assert reply.ok is not None
             asking.put(keys.answer(f"r{row}"), frames.encode("ready", -1, {}))
-        started.result(PATIENCE_S)
+        started.result(TIMEOUT_S)
 
 
 def test_when_nobody_joins_the_wait_ends_at_the_time_out(endpoint: str) -> None:

@@ -276,7 +276,7 @@ def test_what_is_no_frame_of_the_air_is_counted_by_the_robot_and_never_stops_it(
 
 
 def test_a_robot_that_is_slow_loses_what_does_not_fit_and_counts_it(monkeypatch):
-    monkeypatch.setattr(world_radio, "MOST_WAITING", 10)
+    monkeypatch.setattr(world_radio, "MAX_WAITING", 10)
     with bridged() as (bridge, session):
         radio = joined(session())
         exchange(bridge, radio)

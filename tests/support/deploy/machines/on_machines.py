@@ -12,7 +12,7 @@ from pathlib import Path
 
 from tests.support.deploy.machines.namespaces import Machine
 
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 
 
 class Started:
@@ -62,14 +62,14 @@ class Started:
         """Its exit code, waited for."""
         while self._next() is not None:
             continue
-        return self.process.wait(PATIENCE_S)
+        return self.process.wait(TIMEOUT_S)
 
     def _next(self) -> str | None:
         """The next line; None if there will be no more."""
         try:
-            line = self._arrived.get(timeout=PATIENCE_S)
+            line = self._arrived.get(timeout=TIMEOUT_S)
         except queue.Empty:
-            raise AssertionError(f"nothing more came for {PATIENCE_S:g} s: {self.lines}") from None
+            raise AssertionError(f"nothing more came for {TIMEOUT_S:g} s: {self.lines}") from None
         if line is not None:
             self.lines.append(line)
         return line

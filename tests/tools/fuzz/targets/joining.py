@@ -17,7 +17,7 @@ from swarmwire.comms.wire.control_frames import Request, decode_reply, encode_re
 from swarmwire.comms.wire.join import JoinRequest, Offer, OfferedGroup
 from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.controls import Controls
-from swarmwire.deploy.page.app import MOST_BYTES
+from swarmwire.deploy.page.app import MAX_BYTES
 from swarmwire.deploy.page.orders import Order
 from swarmwire.world.backends.join_policy import Refused, Terms
 from swarmwire.world.backends.lockstep import Lockstep
@@ -198,7 +198,7 @@ class PageOrders(DocumentTarget):
         return [JSON.pack(order) for order in (*orders, *more, *({"do": "event", "event": of} for of in EVENTS))]
 
     def feed(self, case: bytes) -> None:
-        if len(case) > MOST_BYTES:
+        if len(case) > MAX_BYTES:
             raise ValueError("too large")  # the page's server takes no more
         try:
             order = self.adapter.validate_json(case)

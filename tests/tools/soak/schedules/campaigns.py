@@ -20,7 +20,7 @@ from tests.tools.soak.supervised import PYTHON, Supervised, family
 
 SEEDS, LOSSES = 6, [0.0, 0.5]
 LONG = "duration_s=20"
-MOST_KILLS = 3
+MAX_KILLS = 3
 LIMIT_S = 240.0
 STACKS_S = 10.0  # for a process that is aborted to write where it stood
 
@@ -43,7 +43,7 @@ def play_campaign(plan: Plan, folder: Path) -> list[str]:
         def resumed() -> Sequence[str]:
             return ("--resume", str(campaign), "--retry-failed") if (campaign / "campaign.json").exists() else asked
 
-        for _ in range(int(rng.integers(1, MOST_KILLS + 1))):
+        for _ in range(int(rng.integers(1, MAX_KILLS + 1))):
             one = start(resumed())
             try:
                 threading.Event().wait(float(rng.uniform(0.5, 7.0)))

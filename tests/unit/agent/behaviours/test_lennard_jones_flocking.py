@@ -14,7 +14,7 @@ from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.deploy import run
 from tests.support.agent.hosts import group
 
-BASE_M, MOST_MPS = 0.14, 0.1
+BASE_M, MAX_MPS = 0.14, 0.1
 SCENARIO = Path("scenarios/behaviours/lennard_jones_flocking.toml")
 
 
@@ -73,8 +73,8 @@ def test_a_far_neighbour_ahead_pulls_and_one_out_of_reach_does_not():
 def test_a_near_neighbour_ahead_turns_the_robot_on_the_spot_and_one_behind_drives_it_on():
     left, right = wheels((0.5, 0.0))
     assert left == -right
-    assert abs(left) == pytest.approx(MOST_MPS)
-    assert wheels((0.5, 180.0)) == pytest.approx((MOST_MPS, MOST_MPS))
+    assert abs(left) == pytest.approx(MAX_MPS)
+    assert wheels((0.5, 180.0)) == pytest.approx((MAX_MPS, MAX_MPS))
 
 
 def test_neighbours_count_by_their_mean_and_those_out_of_reach_do_not_thin_it():
@@ -91,7 +91,7 @@ def test_beyond_10_degrees_it_turns_softly_and_within_it_does_not():
 
 
 def test_a_hard_turn_begins_beyond_90_degrees_and_lasts_until_70():
-    one, on_the_spot = One(), pytest.approx((-MOST_MPS, MOST_MPS))
+    one, on_the_spot = One(), pytest.approx((-MAX_MPS, MAX_MPS))
     assert one.step((1.0, 85.0)) != on_the_spot
     assert one.step((1.0, 95.0)) == on_the_spot
     assert one.step((1.0, 85.0)) == on_the_spot
@@ -101,12 +101,12 @@ def test_a_hard_turn_begins_beyond_90_degrees_and_lasts_until_70():
 
 def test_the_light_pulls_by_a_quarter_of_the_top_speed_unless_it_is_no_goal():
     ahead = 0  # at 7.5 degrees
-    assert One().step(light_ray=ahead) == pytest.approx((0.25 * MOST_MPS,) * 2)
+    assert One().step(light_ray=ahead) == pytest.approx((0.25 * MAX_MPS,) * 2)
     assert One(light=0.0).step(light_ray=ahead) == (0.0, 0.0)
 
 
 def test_a_range_that_noise_made_negative_is_a_neighbour_that_is_very_near():
-    assert wheels((-0.01, 180.0)) == pytest.approx((MOST_MPS, MOST_MPS))
+    assert wheels((-0.01, 180.0)) == pytest.approx((MAX_MPS, MAX_MPS))
 
 
 def spread_m(*overrides: str) -> float:

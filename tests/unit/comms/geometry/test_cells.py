@@ -9,8 +9,8 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.floor import Floor, Patch, packed_image
 from swarmwire.comms.geometry.ground import ground_of, shade_at, shades_over
 from swarmwire.comms.geometry.robot_index import (
-    MOST_CELLS_PER_SIDE,
-    MOST_PER_SIDE,
+    MAX_CELLS_PER_SIDE,
+    MAX_PER_SIDE,
     Grid,
     build,
     cell_of,
@@ -63,7 +63,7 @@ def test_every_robot_is_in_the_one_cell_of_its_place_and_arena(seed: int, arenas
 @pytest.mark.parametrize("reach_m", [1e-6, 1e6])
 def test_there_are_neither_too_many_cells_nor_none(reach_m: float) -> None:
     cells = cells_over((100.0, 50.0), reach_m, 1, 1)
-    assert 1 <= min(cells.nx, cells.ny) <= max(cells.nx, cells.ny) <= MOST_PER_SIDE
+    assert 1 <= min(cells.nx, cells.ny) <= max(cells.nx, cells.ny) <= MAX_PER_SIDE
 
 
 def test_arenas_that_are_over_have_nobody_in_their_cells() -> None:
@@ -121,7 +121,7 @@ def test_robots_of_running_arenas_are_in_the_one_cell_of_their_place(seed: int, 
 
 def test_a_tiny_reach_does_not_make_a_huge_table() -> None:
     grid = build(np.zeros(1), np.zeros(1), 1, (100.0, 50.0), 1e-6)
-    assert max(grid.nx, grid.ny) <= MOST_CELLS_PER_SIDE
+    assert max(grid.nx, grid.ny) <= MAX_CELLS_PER_SIDE
 
 
 SIZE_M = (4.0, 2.0)

@@ -13,7 +13,7 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays, refuse_negative
-from swarmwire.comms.radio.stages.delays import LONGEST_NS, delay_law, varying_delay_ns
+from swarmwire.comms.radio.stages.delays import MAX_NS, delay_law, varying_delay_ns
 from swarmwire.comms.radio.timing import (
     DSSS_RATES_BPS,
     IEEE_802_11A,
@@ -213,7 +213,7 @@ def test_the_last_draw_is_finite_and_a_whole_number_of_ns(distribution: str, mea
     law = law_of(distribution, mean_s, deviation_s)
     for u in (0.0, LAST_DRAW):
         assert isinstance(varying_delay_ns(law, u), int)
-        assert 0 <= varying_delay_ns(law, u) <= LONGEST_NS
+        assert 0 <= varying_delay_ns(law, u) <= MAX_NS
 
 
 def test_a_uniform_delay_that_would_be_negative_is_refused():

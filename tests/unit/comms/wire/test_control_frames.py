@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.wire.control_frames import (
-    MOST_BYTES,
+    MAX_BYTES,
     Request,
     decode_reply,
     decode_request,
@@ -109,7 +109,7 @@ def test_what_cannot_be_meant_is_refused_in_one_line(asked, line):
     assert line in str(caught.value)
 
 
-@pytest.mark.parametrize("data", [b"", b"\xc1", b"\x93" * 5000, bytes(MOST_BYTES + 1)])
+@pytest.mark.parametrize("data", [b"", b"\xc1", b"\x93" * 5000, bytes(MAX_BYTES + 1)])
 def test_bytes_that_are_no_request_are_refused(data):
     with pytest.raises(BadInput, match="expected a request"):
         decode_request(data)

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as npst
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.frames import DTYPES, MOST_ITEMS, UNCOUNTED_BYTES, unpacked
+from swarmwire.comms.wire.frames import DTYPES, MAX_ITEMS, UNCOUNTED_BYTES, unpacked
 
 shapes = npst.array_shapes(min_dims=1, max_dims=2, min_side=0, max_side=4)
 arrays = st.sampled_from(sorted(DTYPES)).flatmap(lambda code: npst.arrays(DTYPES[code], shapes))
@@ -268,7 +268,7 @@ def test_many_small_things_are_malformed_before_they_take_much_memory(shape, ite
 
 def test_a_map_of_many_keys_is_malformed() -> None:
     with pytest.raises(BadFrame, match="malformed"):
-        unpacked(msgpack.packb({str(key): None for key in range(MOST_ITEMS + 1)}), 2 * LARGE)
+        unpacked(msgpack.packb({str(key): None for key in range(MAX_ITEMS + 1)}), 2 * LARGE)
 
 
 def test_large_messages_of_few_things_and_all_small_ones_come_through() -> None:

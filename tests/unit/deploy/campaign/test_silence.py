@@ -2,7 +2,7 @@
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.deploy.campaign import spare_processes
-from swarmwire.deploy.campaign.silence import MOST_S, SAY_S, Alive, Silence
+from swarmwire.deploy.campaign.silence import MAX_S, SAY_S, Alive, Silence
 from swarmwire.deploy.campaign.spare_processes import SpareProcess
 from swarmwire.deploy.campaign.task import Task
 from tests.support.clocks import FakeClock
@@ -30,7 +30,7 @@ def test_who_looks_often_counts_the_time_and_who_was_frozen_itself_does_not():
     silence = Silence(clock)
     clock.time_ns += 3600 * NS_PER_S  # Ctrl-Z, and fg
     assert not silence.too_long()
-    for _ in range(int(MOST_S) - 1):
+    for _ in range(int(MAX_S) - 1):
         clock.time_ns += NS_PER_S
         assert not silence.too_long()
     clock.time_ns += NS_PER_S

@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.run_views import Glimpse
 from swarmwire.comms.truth import Happened
-from swarmwire.deploy.page.seen import MOST_PLACES, MOST_WHO, Seen
+from swarmwire.deploy.page.seen import MAX_PLACES, MAX_WHO, Seen
 from tests.support.metrics.truths import static, tally, truth
 
 OF = static(robots=4)
@@ -36,10 +36,10 @@ def test_the_centre_is_that_of_the_robots_alive():
 
 
 def test_of_a_large_swarm_some_are_shown():
-    large = static(robots=3 * MOST_PLACES)
+    large = static(robots=3 * MAX_PLACES)
     seen = Seen(large)
     seen.see(glimpse(of=large))
-    assert len(seen.numbers["places"]) == MOST_PLACES
+    assert len(seen.numbers["places"]) == MAX_PLACES
 
 
 def test_delivery_is_that_of_the_last_simulated_second():
@@ -64,9 +64,9 @@ def test_events_say_whom_they_changed_when_they_began(robots, told):
 
 def test_of_events_without_end_the_newest_are_kept():
     seen = Seen(OF)
-    for tick in range(MOST_WHO + 10):
+    for tick in range(MAX_WHO + 10):
         seen.see(glimpse(tick, events=(replace(happened([0]), serial=tick),)))
-    assert list(seen.numbers["who"]) == [str(tick) for tick in range(10, MOST_WHO + 10)]
+    assert list(seen.numbers["who"]) == [str(tick) for tick in range(10, MAX_WHO + 10)]
 
 
 def test_of_many_robots_some_are_named():

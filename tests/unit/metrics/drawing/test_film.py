@@ -8,7 +8,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.drawing.film import NO_STATE, film_of, states
-from swarmwire.metrics.drawing.footage import MOST_BY_DEFAULT, footage
+from swarmwire.metrics.drawing.footage import MAX_BY_DEFAULT, footage
 from tests.support.metrics.films import Folder, film, ticks_frame, two_groups
 
 
@@ -99,7 +99,7 @@ def cut(time_s=TIME_S, rate_hz=10, **given):
 def test_a_film_is_as_slow_as_its_usual_length_allows(duration_s, speed):
     found = cut(np.arange(duration_s * 10) / 10)
     assert found.speed == speed
-    assert MOST_BY_DEFAULT / 2 <= len(found.ticks) <= MOST_BY_DEFAULT
+    assert MAX_BY_DEFAULT / 2 <= len(found.ticks) <= MAX_BY_DEFAULT
     assert found.ticks.tolist() == list(range(0, duration_s * 10, speed))
 
 

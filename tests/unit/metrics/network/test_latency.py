@@ -172,7 +172,7 @@ def test_pairs_with_a_dead_robot_do_not_count_until_it_lives_again():
 
 
 def test_of_many_robots_every_nth_counts_as_a_receiver(monkeypatch):
-    monkeypatch.setattr(age_of_information, "MOST_PAIRS", 20)  # 6 x 6 / 20: every second
+    monkeypatch.setattr(age_of_information, "MAX_PAIRS", 20)  # 6 x 6 / 20: every second
     of = static(6)
     told = links_heard([0, 0, 0], [1, 2, 4], [90, 80, 60])
     assert ages(of, [truth(of, 1, finished=told)]).ravel().tolist() == [pytest.approx(0.03)]

@@ -48,7 +48,7 @@ def test_every_tick_comes_back_however_it_was_cut_into_parts(tmp_path_factory, t
     folder, of = tmp_path_factory.mktemp("run"), static(robots, arenas=arenas)
     seen = list(wandering(of, ticks))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tick_recorder, "MOST_TICKS", in_chunk)
+        patch.setattr(tick_recorder, "MAX_TICKS", in_chunk)
         recorded = record(folder, of, seen)
     assert recorded["ticks"] == {"rows": ticks * arenas, "dropped": 0}
     check(pl.read_parquet(folder / "ticks.parquet"), of, seen)

@@ -64,7 +64,7 @@ def test_answers_in_any_order_give_the_same() -> None:
         ("a", b"", "malformed"),
         ("a", b"\xc1", "malformed"),
         ("a", sound()[:-1], "malformed"),
-        ("a", bytes(frames.MOST_BYTES + 1), "oversized"),
+        ("a", bytes(frames.MAX_BYTES + 1), "oversized"),
         ("a", sound("b"), "malformed"),  # robots of another
         ("a", frames.encode("actions", 4, {}), "malformed"),
         ("a", encode_actions(3, actions([0, 1, 2, 3])), "wrong_tick"),

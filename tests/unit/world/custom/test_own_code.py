@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import body_from_mapping, load_body
-from swarmwire.comms.bodies.custom import MOST_WIDE
+from swarmwire.comms.bodies.custom import MAX_WIDE
 from swarmwire.comms.bodies.sensors import OwnSheet
 from swarmwire.comms.errors import BadInput, OwnCodeFailed
 from swarmwire.comms.tick_io import Actions, Actuations
@@ -233,7 +233,7 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
         (ACTUATOR + f'"{CODE}:NoWidth"', "actuators.x.kind: expected a width from 1 to 10000; NoWidth has 0"),
         (
             ACTUATOR + f'"{CODE}:TooWide"',
-            f"actuators.x.kind: expected a width from 1 to {MOST_WIDE}; TooWide has",
+            f"actuators.x.kind: expected a width from 1 to {MAX_WIDE}; TooWide has",
         ),
         (SENSE + f'"{CODE}:WideField"', "senses.x.kind: the field x of WideField: expected a width from 0 to 10000"),
         (ACTUATOR + f'"{PAINTER}"\ngain = -1', "actuators.x.gain: expected more than 0, got -1.0"),

@@ -172,10 +172,10 @@ def test_what_is_no_map_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert map_of(good, size_m=[4.0, 2.1]) == size
     too_large = "maze.toml: arena.map.resolution_m: expected an arena of at most 10000 m a side"
     assert map_of(good, map={"resolution_m": 300.0}) == too_large
-    monkeypatch.setattr(maps, "MOST_BOXES", 2)
+    monkeypatch.setattr(maps, "MAX_BOXES", 2)
     few = "a picture that makes at most 2 boxes: make it coarser, or free of specks"
     assert map_of(good) == f"{said} {few}: good.png"
-    monkeypatch.setattr(maps, "MOST_PIXELS", 799)
+    monkeypatch.setattr(maps, "MAX_PIXELS", 799)
     assert map_of(good) == f"{said} a picture of at most 799 pixels: good.png"
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
     assert map_of(good) == f"{said} a picture of at most 799 pixels: good.png"

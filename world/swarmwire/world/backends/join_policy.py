@@ -80,14 +80,14 @@ USUAL = Terms()  # of runners that the run starts itself
 
 
 NAME = re.compile(r"[\w.-]{1,64}", re.ASCII)  # of a runner: it is part of a key, so no wildcard, slash or hash
-MOST_SAID = 500  # letters
+MAX_SAID = 500  # letters
 
 
 class Refused(Exception):
     """A request that is not granted; the text goes back to the runner, and `count` says under which name it counts."""
 
     def __init__(self, text: str, count: str = "refused_join") -> None:
-        super().__init__(printable(text, MOST_SAID))
+        super().__init__(printable(text, MAX_SAID))
         self.count = count
 
 

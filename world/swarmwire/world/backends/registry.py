@@ -16,7 +16,7 @@ from swarmwire.comms.wire.agent_memory import GroupMemory, decode_memory, encode
 from swarmwire.comms.wire.join import Limits, Offer
 from swarmwire.world.backends.allocation import S, Slots
 from swarmwire.world.backends.join_policy import (
-    MOST_SAID,
+    MAX_SAID,
     USUAL,
     Refused,
     Terms,
@@ -88,7 +88,7 @@ class RunnerHealth:
 # counted by name and dropped; it never changes the state.
 
 
-MOST_TRACEBACK = 100_000  # letters: what a runner says of itself goes to people's terminals
+MAX_TRACEBACK = 100_000  # letters: what a runner says of itself goes to people's terminals
 OnLoss = Literal["stop", "dead", "wait", "stand", "coast"]
 GOES_ON = ("stand", "coast")  # where the run waits for nobody once it began
 
@@ -346,6 +346,6 @@ class Roster(ABC, Generic[S]):
     def _failed(self, slot: S, frame: frames.Frame) -> None:
         match frame.values:
             case {"robots": str(robots), "traceback": str(traceback)}:
-                raise AgentFailed(printable(robots, MOST_SAID), printable(traceback, MOST_TRACEBACK, keep="\n\t"))
+                raise AgentFailed(printable(robots, MAX_SAID), printable(traceback, MAX_TRACEBACK, keep="\n\t"))
             case _:
                 raise AgentFailed(slot.assignment.robots_text, "(the runner sent no traceback)")

@@ -30,7 +30,7 @@ from swarmwire.world.backends.registry import Change, Loss, OnLoss, Roster, Runn
 POLL_S = 0.2  # how often a wait looks up whether to go on waiting
 AWAY_S = 2.0  # longer between two looks: this process was frozen itself
 START_S = 60.0  # how long runners may take to join and build their agents
-MOST_TOLD = 200  # refusals: whoever asks for ever shall not fill the log
+MAX_TOLD = 200  # refusals: whoever asks for ever shall not fill the log
 FLOODED = "it sent far more than it was asked for"
 FAREWELL_S = 3.0  # how long runners may take to leave after the end
 
@@ -252,7 +252,7 @@ class RunnerCrew(ABC, Generic[R]):
                 reply = self._roster.join(runner if key == self._keys.join(runner) else key, request)
             except Refused as refusal:
                 self._refusals += 1
-                if self._refusals <= MOST_TOLD:
+                if self._refusals <= MAX_TOLD:
                     self._around.refused(runner, str(refusal))
                 query.reply_err(str(refusal))
                 return

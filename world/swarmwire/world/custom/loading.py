@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.custom import MOST_WIDE, ActuatorSheet
+from swarmwire.comms.bodies.custom import MAX_WIDE, ActuatorSheet
 from swarmwire.comms.bodies.sensors import OwnSheet, Sheet
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput, OwnCodeFailed
@@ -65,9 +65,9 @@ def _actuator(sheet: ActuatorSheet, where: str, key: str) -> ActuatorSheet:
     sheet = replace(sheet, kind=_entry_point(sheet.kind, ACTUATORS))
     own = _made(OwnActuator, sheet.kind, sheet.params, where, key)
     width: Any = _asked(own, "width", where, key)
-    if type(width) is not int or not 1 <= width <= MOST_WIDE:
+    if type(width) is not int or not 1 <= width <= MAX_WIDE:
         raise BadInput(
-            where, f"{key}.kind", f"expected a width from 1 to {MOST_WIDE}; {type(own).__name__} has {width!r}"
+            where, f"{key}.kind", f"expected a width from 1 to {MAX_WIDE}; {type(own).__name__} has {width!r}"
         )
     return replace(sheet, width=width)
 

@@ -23,7 +23,7 @@ from swarmwire.comms.wire.tick_frames import decode_actions
 # zenoh's stubs leave out the return types of put, reply and close.
 
 
-MOST_WAITING = 4096  # frames that may wait for the loop
+MAX_WAITING = 4096  # frames that may wait for the loop
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class AirBridge:
         self._network, self._keys, self._rows, self._air, self._access = network, keys, dict(rows), air, access
         self._row_of = {keys.air_sent(name): row for name, row in rows.items()}
         self._joins = {keys.air_join(name): row for name, row in rows.items()}
-        self._inbox = BoundedInbox[tuple[int, bytes]](MOST_WAITING)
+        self._inbox = BoundedInbox[tuple[int, bytes]](MAX_WAITING)
         self._session: zenoh.Session | None = None
         self._publishers: dict[int, zenoh.Publisher] = {}  # by row
         self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from PIL import Image
 
 FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF")  # PGM is one of PPM's family
-MOST_PIXELS = 2**24
+MAX_PIXELS = 2**24
 
 GreyArray = NDArray[np.float32]
 
@@ -35,16 +35,16 @@ def beside(where: str, name: str) -> Path:
 def read_grey(path: Path, where: str, key: str) -> GreyArray:
     """The greys of a picture, (rows, columns), 0 black … 1 white, top row first; on white where it is transparent.
 
-    BadInput names `where` and `key` for a file that is no picture, or one of more than `MOST_PIXELS`.
+    BadInput names `where` and `key` for a file that is no picture, or one of more than `MAX_PIXELS`.
     """
     from PIL import Image
 
-    too_large = BadInput(where, key, f"expected a picture of at most {MOST_PIXELS} pixels: {path}")
+    too_large = BadInput(where, key, f"expected a picture of at most {MAX_PIXELS} pixels: {path}")
     try:
         with catch_warnings():
             simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(path, formats=FORMATS) as image:
-                if image.width * image.height > MOST_PIXELS:
+                if image.width * image.height > MAX_PIXELS:
                     raise too_large
                 return _greys(image)
     except FileNotFoundError:
@@ -121,8 +121,8 @@ def _rows(left, row, column, columns):
 # --- What is the same in every arena of a scenario: its size, the obstacles of its map, its floor.
 
 
-MOST_BOXES = 10_000
-LONGEST_M = 10_000.0
+MAX_BOXES = 10_000
+MAX_M = 10_000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,14 +154,14 @@ def _read_map(
     if wanted_m is not None and not np.allclose(wanted_m, size_m, rtol=1e-6, atol=0.0):
         size, got = (" x ".join(f"{side:g}" for side in sides) for sides in (size_m, wanted_m))
         raise BadInput(where, "arena.size_m", f"expected {size} m, the size of the map, or none; got {got} m")
-    if max(size_m) > LONGEST_M:
-        raise BadInput(where, "arena.map.resolution_m", f"expected an arena of at most {LONGEST_M:g} m a side")
+    if max(size_m) > MAX_M:
+        raise BadInput(where, "arena.map.resolution_m", f"expected an arena of at most {MAX_M:g} m a side")
     if occupied.all():
         expected = f"expected free space: no pixel is as bright as occupied_below = {table.occupied_below:g}"
         raise BadInput(where, key, f"{expected}: {path}")
-    merged = merged_boxes(occupied, MOST_BOXES)
-    if len(merged) > MOST_BOXES:
-        expected = f"expected a picture that makes at most {MOST_BOXES} boxes: make it coarser, or free of specks"
+    merged = merged_boxes(occupied, MAX_BOXES)
+    if len(merged) > MAX_BOXES:
+        expected = f"expected a picture that makes at most {MAX_BOXES} boxes: make it coarser, or free of specks"
         raise BadInput(where, key, f"{expected}: {path}")
     height_m, side_m = inf if table.height_m is None else table.height_m, table.resolution_m
     return size_m, tuple(

@@ -11,7 +11,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import obstacle_arrays, sides_of
-from swarmwire.comms.geometry.robot_index import MOST_CELLS_PER_SIDE, cell_of
+from swarmwire.comms.geometry.robot_index import MAX_CELLS_PER_SIDE, cell_of
 from swarmwire.comms.truth import Group, Light, Obstacle
 from swarmwire.world.placement.maps import Layout
 from swarmwire.world.scenario.tables import ArenaTable, CylinderTable, ObstacleTable, PolygonTable
@@ -236,7 +236,7 @@ class Standing:
         """
         width, height = self._size_m
         widest = max((group.body.radius_m for group in groups), default=max(width, height))
-        cell_m = max(2.0 * widest + gap_m, max(width, height) / MOST_CELLS_PER_SIDE)
+        cell_m = max(2.0 * widest + gap_m, max(width, height) / MAX_CELLS_PER_SIDE)
         robots = groups[-1].stop if groups else 0
         circle, side_start = self._circle[: self._circles], self._side_start[: self._polygons + 1]
         if lights:

@@ -15,7 +15,7 @@ from swarmwire.world.placement.occupancy import GAP_M, Disc, Standing, Taken, he
 from swarmwire.world.placement.sampling import (
     BOX,
     DISC,
-    MOST_CANDIDATES,
+    MAX_CANDIDATES,
     RING,
     Region,
     free_circle,
@@ -43,7 +43,7 @@ def wrapped(angle_rad: FloatArray) -> FloatArray:
 
 
 ROBOT, HEADING = purpose("place of a robot"), purpose("heading of a robot")
-TRIED = f"none of {MOST_CANDIDATES} places tried is free"
+TRIED = f"none of {MAX_CANDIDATES} places tried is free"
 
 
 @dataclass(frozen=True, slots=True)

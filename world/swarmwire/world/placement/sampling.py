@@ -52,7 +52,7 @@ def candidate(region, key, entity, attempt, purpose):
 # --- The first of the keyed candidates for a place that is free. Compiled.
 
 
-MOST_CANDIDATES = 1000
+MAX_CANDIDATES = 1000
 
 
 @njit(cache=True)
@@ -60,7 +60,7 @@ def free_circle(
     taken: Taken, region: Region, key: np.uint64, entity: int, purpose: int, disc: Disc
 ) -> tuple[float, float]:
     """x, y of the first candidate where a disc is clear of all obstacles; nan if there is none."""
-    for attempt in range(MOST_CANDIDATES):
+    for attempt in range(MAX_CANDIDATES):
         x, y, inside = candidate(region, key, entity, attempt, purpose)
         inside = inside and within_arena(taken, x, y, disc.radius_m)  # obstacles lie within even a torus
         if inside and disc_clear_of_obstacles(taken, x, y, disc):
@@ -84,7 +84,7 @@ def free_polygon(
     `corners` (k, 2) are those at the origin and heading 0. A heading that is not finite is drawn with each candidate.
     """
     placed = np.empty_like(corners)
-    for attempt in range(MOST_CANDIDATES):
+    for attempt in range(MAX_CANDIDATES):
         turn = heading_rad
         if not np.isfinite(heading_rad):
             turn = (uniform(key, entity, attempt, 2, purpose) - 0.5) * TURN_RAD
@@ -115,7 +115,7 @@ def put_robots(
     ny, nx = taken.head.shape
     for robot in range(start, stop):
         found = False
-        for attempt in range(1 if len(fixed) else MOST_CANDIDATES):
+        for attempt in range(1 if len(fixed) else MAX_CANDIDATES):
             if len(fixed):
                 x, y, inside = fixed[robot - start, 0], fixed[robot - start, 1], True
             else:

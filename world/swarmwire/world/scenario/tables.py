@@ -45,13 +45,13 @@ class Table(BaseModel):
 
 
 Corner = tuple[float, float]
-MOST_POINTS = 100
+MAX_POINTS = 100
 
 
 def counter_clockwise(points: Sequence[Corner]) -> tuple[Corner, ...]:
     """These corners of a convex polygon, turned counter-clockwise; ValueError says what is wrong with them."""
-    if not 3 <= len(points) <= MOST_POINTS:
-        raise ValueError(f"expected 3 to {MOST_POINTS} points, got {len(points)}")
+    if not 3 <= len(points) <= MAX_POINTS:
+        raise ValueError(f"expected 3 to {MAX_POINTS} points, got {len(points)}")
     turned = tuple(points) if _turn(points[0], points[1], points[2]) > 0.0 else tuple(reversed(points))
     for i, start in enumerate(turned):
         after = (i + 1) % len(turned)

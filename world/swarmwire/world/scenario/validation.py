@@ -23,14 +23,14 @@ from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.schema import UNFIT, Node, forms, plain, words
 from swarmwire.world.scenario.tables import ObstacleTable
 
-MOST_KEYS = 6  # that are named after the first fault
+MAX_KEYS = 6  # that are named after the first fault
 
 
 def fault(error: ValidationError, schema: Node, where: str) -> BadInput:
     """The first fault of a validation error, with the keys of those that follow."""
     first, *others = (_explained(of, schema) for of in error.errors(include_url=False))
     keys = list(dict.fromkeys(key for key, _ in others))
-    more = f" (also wrong: {', '.join(keys[:MOST_KEYS])}{', …' if len(keys) > MOST_KEYS else ''})" if keys else ""
+    more = f" (also wrong: {', '.join(keys[:MAX_KEYS])}{', …' if len(keys) > MAX_KEYS else ''})" if keys else ""
     return BadInput(where, first[0], first[1] + more)
 
 
@@ -94,7 +94,7 @@ def _shown(value: object) -> str:
 # --- Checks that need more than one key of a scenario: bodies, physics steps, obstacles, the radio's offset, events.
 
 
-MOST_OF_RADIUS = 0.25  # how far a robot at full speed may move in one physics step
+MAX_OF_RADIUS = 0.25  # how far a robot at full speed may move in one physics step
 
 
 def check(scenario: Scenario, where: str) -> None:
@@ -118,7 +118,7 @@ def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> Non
     for group, engine in engines_of(scenario, bodies).items():
         body = bodies[group]
         tick_m = body.max_linear_mps * max(1.0, noise_of(body.drive).factor) / scenario.time.rate_hz
-        needed = math.ceil(tick_m / (MOST_OF_RADIUS * body.radius_m) - 1e-9)
+        needed = math.ceil(tick_m / (MAX_OF_RADIUS * body.radius_m) - 1e-9)
         if engine != "kinematic" and scenario.physics.steps < needed:
             text = f"so that a robot of {group} at full speed moves at most a quarter of its radius in one step"
             raise BadInput(where, "physics.steps", f"expected at least {needed}, {text}; got {scenario.physics.steps}")

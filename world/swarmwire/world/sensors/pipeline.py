@@ -22,7 +22,7 @@ from swarmwire.world.sensors.sensor import Field, Following, TrueSense
 
 NOISE, OUTLIER, OUTLYING, DROP_OUT = range(4)  # places in `purposes`
 FULL_TURN = 2.0 * np.pi
-LEAST_ANGLE = np.nextafter(-np.pi, 0.0)
+MIN_ANGLE = np.nextafter(-np.pi, 0.0)
 
 
 class Numbers(NamedTuple):
@@ -161,7 +161,7 @@ def _wrapped(angle):
     if -np.pi < angle <= np.pi:
         return angle
     turned = angle - FULL_TURN * np.ceil((angle - np.pi) / FULL_TURN)
-    return min(max(turned, LEAST_ANGLE), np.pi)
+    return min(max(turned, MIN_ANGLE), np.pi)
 
 
 # --- A sense as its group reads it: the truth at its rate, through the stages, and shown after its delay.

@@ -36,7 +36,7 @@ def _is_host(text: str) -> bool:
 
 
 _AT_ONCE = 65536  # bytes read in one call
-_MOST_DRAINED = 100  # calls: whoever sends more than that at once is no robot
+_MAX_DRAINED = 100  # calls: whoever sends more than that at once is no robot
 
 
 class Link:
@@ -95,7 +95,7 @@ class Link:
 
     def drain(self) -> None:
         """Take in what has come so far."""
-        for _ in range(_MOST_DRAINED):
+        for _ in range(_MAX_DRAINED):
             if not self.receive(0.0):
                 break
         self.answered = min(self.answered, self.sent)

@@ -141,7 +141,7 @@ def _gains_db(law, key):
 # --- Surveys of an arena's coverage: as a map from one place, and by distance over all places and directions.
 
 
-CANDIDATES, MOST_LINKS, FEWEST_LINKS = 20_000, 2000, 50  # links drawn for each distance
+CANDIDATES, MAX_LINKS, MIN_LINKS = 20_000, 2000, 50  # links drawn for each distance
 QUANTILES = (0.05, 0.95)
 SURVEY = purpose("survey of coverage")
 
@@ -210,7 +210,7 @@ def by_distance(
     """
     lengths_m = farthest_m * (np.arange(distances) + 0.5) / distances
     links = [_links(coverage, size_m, key, i, float(length_m)) for i, length_m in enumerate(lengths_m)]
-    fits = [i for i, (start, _) in enumerate(links) if len(start) >= FEWEST_LINKS]
+    fits = [i for i, (start, _) in enumerate(links) if len(start) >= MIN_LINKS]
     strengths = [coverage.mean_dbm(*links[i]) for i in fits]
     known = [strength for strength in strengths if strength is not None]
     return ByDistance(
@@ -240,5 +240,5 @@ def _links(
     way = np.stack([np.cos(2.0 * np.pi * turn), np.sin(2.0 * np.pi * turn)], axis=1)
     end = start + distance_m * way
     fits = np.flatnonzero((np.abs(end) <= 0.5 * np.array(size_m)).all(axis=1))
-    fits = fits[coverage.is_free(start[fits]) & coverage.is_free(end[fits])][:MOST_LINKS]
+    fits = fits[coverage.is_free(start[fits]) & coverage.is_free(end[fits])][:MAX_LINKS]
     return start[fits], end[fits]

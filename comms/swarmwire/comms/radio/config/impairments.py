@@ -7,7 +7,7 @@ from typing import ClassVar
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
 
-LONGEST_S = 1e6  # of a spell, on average
+MAX_S = 1e6  # of a spell, on average
 STEPS = ("p", "r", "interval_s")
 
 
@@ -19,10 +19,10 @@ class BurstsTable:
     """
 
     bad_s: float | None = parameter(
-        None, help="mean duration of a burst: 1 / b; 0.5 s without", unit="s", above=0, at_most=LONGEST_S
+        None, help="mean duration of a burst: 1 / b; 0.5 s without", unit="s", above=0, at_most=MAX_S
     )
     good_s: float | None = parameter(
-        None, help="mean time between bursts: 1 / a; 10 s without", unit="s", above=0, at_most=LONGEST_S
+        None, help="mean time between bursts: 1 / a; 10 s without", unit="s", above=0, at_most=MAX_S
     )
     mean_loss: float | None = parameter(
         None, help="instead of good_s: share of packets lost in the long run", at_least=0, below=1
@@ -68,8 +68,8 @@ class Bursts:
 
     written_as: ClassVar[type[BurstsTable]] = BurstsTable
 
-    bad_s: float = parameter(0.5, help="mean duration of a burst: 1 / b", unit="s", above=0, at_most=LONGEST_S)
-    good_s: float = parameter(10.0, help="mean time between bursts: 1 / a", unit="s", above=0, at_most=LONGEST_S)
+    bad_s: float = parameter(0.5, help="mean duration of a burst: 1 / b", unit="s", above=0, at_most=MAX_S)
+    good_s: float = parameter(10.0, help="mean time between bursts: 1 / a", unit="s", above=0, at_most=MAX_S)
     loss_bad: float = parameter(1.0, help="probability that a packet is lost in a burst", at_least=0, at_most=1)
     loss_good: float = parameter(0.0, help="probability that a packet is lost otherwise", at_least=0, at_most=1)
 
@@ -95,10 +95,10 @@ def bursts_of_mean(mean_loss: float, loss_bad: float, loss_good: float, bad_s: f
         raise BadInput("", "mean_loss", f"{between}; got {mean_loss:g}")
     if mean_loss == loss_good:
         # Never bad is no finite spell; a burst that loses no more than the time between is none.
-        return Bursts(bad_s, LONGEST_S, loss_good, loss_good)
+        return Bursts(bad_s, MAX_S, loss_good, loss_good)
     good_s = bad_s * (loss_bad - mean_loss) / (mean_loss - loss_good)
-    if good_s > LONGEST_S:
-        seldom = f"bursts of {bad_s:g} s would be more than {LONGEST_S:g} s apart"
+    if good_s > MAX_S:
+        seldom = f"bursts of {bad_s:g} s would be more than {MAX_S:g} s apart"
         raise BadInput("", "mean_loss", f"expected loss_good, {loss_good:g}, or more above it: {seldom}")
     return Bursts(bad_s, good_s, loss_bad, loss_good)
 

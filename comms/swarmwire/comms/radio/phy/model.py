@@ -110,7 +110,7 @@ def _meant(queued: Transmissions, row: Told, lives: Lives) -> BoolArray:
 # --- The way of signals: one run of events decides access and reception together, since each depends on the other.
 
 
-LEAST_ROOM = 4096
+MIN_ROOM = 4096
 
 
 class SignalWay(Way):
@@ -185,7 +185,7 @@ class SignalWay(Way):
             losses = self._losses()
             mac.line_up(state, self._events, start)
             most = int(max((state.places.stop - state.places.first).max(), _lengths(self._robot).max()))
-            room = room_for(max(LEAST_ROOM, 2 * (most + mac.FEW + len(self._packets)), 2 * self._told))
+            room = room_for(max(MIN_ROOM, 2 * (most + mac.FEW + len(self._packets)), 2 * self._told))
             done = False
             while not done:
                 done = mac.run_until(self._rules, losses, state, self._events, room, most, until_ns)

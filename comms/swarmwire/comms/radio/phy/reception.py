@@ -25,20 +25,20 @@ from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.receiver import Model, Receiver, chunk_success
 from swarmwire.comms.truth import NOBODY
 
-LEAST_OCTAVE, MOST_OCTAVE, ROWS = -10, 12, 256
-LEAST, MOST = 2.0**LEAST_OCTAVE, 2.0**MOST_OCTAVE
+MIN_OCTAVE, MAX_OCTAVE, ROWS = -10, 12, 256
+LEAST, MOST = 2.0**MIN_OCTAVE, 2.0**MAX_OCTAVE
 NEVER = -100.0  # of a bit that is never right
 MANY = 1000.0  # bits, so that success close to 1 keeps its digits
 THRESHOLD = int(Model.THRESHOLD)
 _FRACTION_BITS = np.int64(44)  # 52 bits of a double's fraction, of which 8 choose the row
 _FRACTION = np.int64(2**44 - 1)
-_FIRST = np.int64((1023 + LEAST_OCTAVE) * ROWS)
+_FIRST = np.int64((1023 + MIN_OCTAVE) * ROWS)
 
 
 def log_success_table(receiver: Receiver) -> FloatArray:
     """The table of a receiver; a threshold has none that would be of use."""
-    octave = np.repeat(np.arange(LEAST_OCTAVE, MOST_OCTAVE), ROWS)
-    sinr = np.append(2.0**octave * (1.0 + np.tile(np.arange(ROWS), MOST_OCTAVE - LEAST_OCTAVE) / ROWS), MOST)
+    octave = np.repeat(np.arange(MIN_OCTAVE, MAX_OCTAVE), ROWS)
+    sinr = np.append(2.0**octave * (1.0 + np.tile(np.arange(ROWS), MAX_OCTAVE - MIN_OCTAVE) / ROWS), MOST)
     return _table(receiver, sinr)
 
 

@@ -15,8 +15,8 @@ from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.radio.config.phy import FADINGS, Fading
 from swarmwire.comms.radio.propagation.shadowing import SUMS, cosine, sine, total
 
-MOST_TERMS = 1000
-MOST_STEPS = 60
+MAX_TERMS = 1000
+MAX_STEPS = 60
 PRECISION = 1e-16
 SMALLEST = 1e-300
 
@@ -33,7 +33,7 @@ def gamma_tails(shape, x):
     if x < shape + 1.0:
         term = 1.0 / shape
         below = term
-        for n in range(1, MOST_TERMS):
+        for n in range(1, MAX_TERMS):
             term *= x / (shape + n)
             below += term
             if term < below * PRECISION:
@@ -43,7 +43,7 @@ def gamma_tails(shape, x):
     b = x + 1.0 - shape
     c, d = 1.0 / SMALLEST, 1.0 / b
     fraction = d
-    for n in range(1, MOST_TERMS):
+    for n in range(1, MAX_TERMS):
         a = -n * (n - shape)
         b += 2.0
         d = a * d + b
@@ -71,7 +71,7 @@ def gamma_quantile(shape, below, above):
     low, high = 0.0, math.inf
     x = _start(shape, below, above)
     log_scale = math.lgamma(shape)
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         found_below, found_above = gamma_tails(shape, x)
         excess = found_below - below if below < above else above - found_above
         if excess > 0.0:

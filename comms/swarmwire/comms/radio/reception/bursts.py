@@ -43,7 +43,7 @@ def bad_after(was_bad, dt_s, a, b, u):
 
 STATE, LOSS = purpose("burst state"), purpose("burst loss")
 NO_LINK = -1  # a free place of the table
-LEAST_CAPACITY = 1024
+MIN_CAPACITY = 1024
 SCATTER = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden section: Knuth's multiplicative hashing
 
 
@@ -71,7 +71,7 @@ class BurstStates:
     def __init__(self, bursts: Bursts, keys: KeyArray, robots: int) -> None:
         self._bursts, self._keys, self._robots = bursts, keys, robots
         self._rows = len(keys) * robots
-        self._clear(LEAST_CAPACITY)
+        self._clear(MIN_CAPACITY)
 
     def __len__(self) -> int:
         """How many links are kept."""
@@ -122,7 +122,7 @@ class BurstStates:
         silent_ns = math.ceil((FORGOTTEN + 1.0) * relaxation_s * NS_PER_S)
         counts = (self._link != NO_LINK) & (now_ns - self._at_ns <= silent_ns)
         link, at_ns, bad = self._link[counts], self._at_ns[counts], self._bad[counts]
-        self._clear(max(1 << (4 * (len(link) + room) - 1).bit_length(), LEAST_CAPACITY))
+        self._clear(max(1 << (4 * (len(link) + room) - 1).bit_length(), MIN_CAPACITY))
         _insert(self._link, self._at_ns, self._bad, link, at_ns, bad)
         self._kept = len(link)
 

@@ -104,16 +104,16 @@ def chunk_success(receiver, sinr, bits):
 # --- Sensitivity: the least power at which frames get through, derived from the receiver's model and its noise.
 
 
-LEAST_DB, MOST_DB = -60.0, 100.0
+MIN_DB, MAX_DB = -60.0, 100.0
 HALVINGS = 60
 
 
 def sinr_for_db(receiver: Receiver, success: float, bits: int) -> float:
     """The SINR in dB from which a frame of so many bits is right with probability `success`; by bisection.
 
-    `LEAST_DB` if it is so everywhere, `MOST_DB` if nowhere.
+    `MIN_DB` if it is so everywhere, `MAX_DB` if nowhere.
     """
-    low, high = LEAST_DB, MOST_DB
+    low, high = MIN_DB, MAX_DB
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         if chunk_success(receiver, from_db(middle), bits) >= success:

@@ -18,7 +18,7 @@ from swarmwire.comms.radio.stages.measurements import to_sender_m
 from swarmwire.comms.radio.stages.stage import Medium, Stage
 
 UNIFORM, NORMAL, LOGNORMAL, PARETO = range(4)
-LONGEST_NS = 86_400 * NS_PER_S  # a day: a heavy tail's time still fits an integer
+MAX_NS = 86_400 * NS_PER_S  # a day: a heavy tail's time still fits an integer
 SMALLEST_TAIL = 2.0**-54  # half a step of a draw, so that no quantile is infinite
 
 
@@ -66,7 +66,7 @@ def varying_delay_ns(law, u):
         delay_s = math.exp(law.first + law.second * normal_quantile(u + SMALLEST_TAIL))
     else:
         delay_s = law.first * (1.0 - u) ** law.second
-    return int(min(delay_s * NS_PER_S, LONGEST_NS))
+    return int(min(delay_s * NS_PER_S, MAX_NS))
 
 
 # --- Latency and jitter: what passes between the end of the airtime and the moment at which a receiver has the packet.

@@ -21,7 +21,7 @@ SEES_NOTHING_MM = 8190  # what the time-of-flight sensor tells then
 DISTANCE_AHEAD_M = 0.035  # of the body's centre: where the time-of-flight sensor sits
 PER_G = 800  # of the accelerometer
 PER_MPS2 = PER_G / 9.80665
-MOST_ACCELERATION = 1536  # 2 g, in the same numbers
+MAX_ACCELERATION = 1536  # 2 g, in the same numbers
 PER_RADPS = 32768 / np.deg2rad(250.0)  # of the gyro
 PER_V = 4096 * 0.6 / 3.0  # of the battery: 12 bits of 3 V, behind a divider
 
@@ -70,7 +70,7 @@ def to_distance(range_m: FloatArray, sheet: Scan) -> AnyArray:
 
 def to_acceleration(value_mps2: FloatArray) -> AnyArray:
     """The accelerometer's number; it reads two g at most."""
-    return _whole(value_mps2 * PER_MPS2, -MOST_ACCELERATION, MOST_ACCELERATION)
+    return _whole(value_mps2 * PER_MPS2, -MAX_ACCELERATION, MAX_ACCELERATION)
 
 
 def to_turn(value_radps: FloatArray) -> AnyArray:

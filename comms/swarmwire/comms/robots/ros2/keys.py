@@ -97,7 +97,7 @@ def bridge_itself(zid: str) -> str:
 
 QOS = "::,10:,:,:,,"  # what differs from the defaults: nothing
 ANY = "*"
-MOST_TOPICS = 10_000  # of a node: ids of nodes and of their topics are whole numbers that no two in a session share
+MAX_TOPICS = 10_000  # of a node: ids of nodes and of their topics are whole numbers that no two in a session share
 
 
 def rmw_key(domain: int, topic: str, kind: str, type_hash: str = ANY) -> str:
@@ -129,7 +129,7 @@ class RmwNode:
         return f"{self._token(place, direction)}/{_mangled(topic)}/{dds_kind(kind)}/{type_hash}/{QOS}"
 
     def _token(self, place: int, direction: str) -> str:
-        node = self.place * MOST_TOPICS
+        node = self.place * MAX_TOPICS
         space = _mangled(self.namespace)
         return f"@ros2_lv/{self.domain}/{self.zid}/{node}/{node + place}/{direction}/%/{space}/{self.name}"
 

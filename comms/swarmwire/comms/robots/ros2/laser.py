@@ -28,7 +28,7 @@ def nearest_angle(of_rad: FloatArray, among_rad: FloatArray) -> tuple[IntArray, 
 # --- LaserScan messages: what they say, whatever the scanner, and those that an emulated one sends.
 
 
-MOST_RAYS = 100_000
+MAX_RAYS = 100_000
 FRAME = "base_scan"
 
 
@@ -46,7 +46,7 @@ def geometry_of(message: Any) -> Geometry:
     `angle_max` is not looked at: scanners disagree on whether it is the last ray's or the one after it.
     """
     first_rad, step_rad, rays = float(message.angle_min), float(message.angle_increment), len(message.ranges)
-    if not (np.isfinite(first_rad) and np.isfinite(step_rad)) or not 1 <= rays <= MOST_RAYS:
+    if not (np.isfinite(first_rad) and np.isfinite(step_rad)) or not 1 <= rays <= MAX_RAYS:
         raise BadFrame("malformed", f"{rays} rays from {first_rad!r} rad in steps of {step_rad!r} rad")
     return Geometry(first_rad, step_rad, rays)
 

@@ -64,7 +64,7 @@ def stamp_ns(header: Any) -> int:
 
 LITTLE = b"\x00\x01\x00\x00"
 SIZE = 4 + 48
-LONGEST_STAMPED = 512  # a frame's name of hundreds of letters is none
+MAX_STAMPED = 512  # a frame's name of hundreds of letters is none
 PADDING = 4  # some writers fill up to a multiple of four
 
 
@@ -96,7 +96,7 @@ def decode_twist(payload: bytes) -> Velocities:
 
 def decode_twist_stamped(payload: bytes) -> Velocities:
     """What a TwistStamped says, whenever it was made; BadFrame as `decode_twist`."""
-    if not SIZE < len(payload) <= LONGEST_STAMPED:
+    if not SIZE < len(payload) <= MAX_STAMPED:
         raise BadFrame("malformed", f"{len(payload)} bytes are no TwistStamped")
     (length,) = struct.unpack_from(_order(payload) + "I", payload, 12)
     return _velocities(payload, 4 + (12 + length + 7) // 8 * 8 + 48)

@@ -12,7 +12,7 @@ from typing import Any
 
 from swarmwire.deploy.fleet.host_side.folders import current, environment, releases, whole_in
 from swarmwire.deploy.fleet.host_side.refusal import Refusal
-from swarmwire.deploy.fleet.host_side.units import PATIENCE_S, systemctl, unit_text
+from swarmwire.deploy.fleet.host_side.units import TIMEOUT_S, systemctl, unit_text
 
 NO_SYSTEMD = "offline"  # as systemctl itself says it
 
@@ -64,9 +64,9 @@ def linger() -> str:
 def _loginctl(*arguments: str) -> "subprocess.CompletedProcess[str]":
     command = ["loginctl", *arguments]
     try:
-        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
     except subprocess.TimeoutExpired:
-        raise Refusal("systemd", f"loginctl {arguments[0]} takes longer than {PATIENCE_S:g} s") from None
+        raise Refusal("systemd", f"loginctl {arguments[0]} takes longer than {TIMEOUT_S:g} s") from None
 
 
 def present(robots: list[str]) -> dict[str, Any]:

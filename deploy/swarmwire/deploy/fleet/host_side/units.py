@@ -8,7 +8,7 @@ from typing import Any
 from swarmwire.deploy.fleet.host_side.folders import releases, write_whole
 from swarmwire.deploy.fleet.host_side.refusal import Refusal
 
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 SHOWN = ("Id", "LoadState", "ActiveState", "SubState", "Result", "MainPID", "NRestarts", "ActiveEnterTimestamp")
 
 ANSWERED = {"LoadState", "ActiveState", "SubState"}  # without these a state is not known
@@ -28,11 +28,11 @@ def systemctl(*arguments: str) -> "subprocess.CompletedProcess[str]":
     os.environ.setdefault("DBUS_SESSION_BUS_ADDRESS", f"unix:path={runtime}/bus")
     command = ["systemctl", "--user", *arguments]
     try:
-        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
     except FileNotFoundError:
         raise Refusal("systemd", "there is no systemctl") from None
     except subprocess.TimeoutExpired:
-        raise Refusal("systemd", f"systemctl {arguments[0]} takes longer than {PATIENCE_S:g} s") from None
+        raise Refusal("systemd", f"systemctl {arguments[0]} takes longer than {TIMEOUT_S:g} s") from None
 
 
 def managed(*arguments: str) -> str:

@@ -5,33 +5,33 @@ from swarmwire.metrics.report.campaign.figure_name import figure_name
 from swarmwire.metrics.report.campaign.levels import Levels, levels_of
 from swarmwire.metrics.report.campaign.samples import Samples
 from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence
-from swarmwire.metrics.report.figures.distributions import MOST_POINTS, Group, distributions
+from swarmwire.metrics.report.figures.distributions import MAX_POINTS, Group, distributions
 from swarmwire.metrics.report.section import Figure, Section
 from swarmwire.metrics.report.svg import as_svg
 
-MOST_PARAMETERS = 3
+MAX_PARAMETERS = 3
 
 
 def distribution_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Section | None:
     """The section; None if nothing is varied or nothing was measured."""
     parameters = samples.folder.parameters
-    levels = [levels_of(path, samples.folder.points) for path in parameters[:MOST_PARAMETERS]]
+    levels = [levels_of(path, samples.folder.points) for path in parameters[:MAX_PARAMETERS]]
     levels = [each for each in levels if len(each) > 1]
     figures = [_figure(samples, outcome, each) for outcome in outcomes for each in levels]
     if not figures:
         return None
     parts: list[str | Figure] = [_how_to_read(samples, outcomes, levels)]
-    left_out = parameters[MOST_PARAMETERS:]
+    left_out = parameters[MAX_PARAMETERS:]
     if left_out:
         parts.append(
-            f"By the first {MOST_PARAMETERS} parameters; left out: {listed([f'`{path}`' for path in left_out])}."
+            f"By the first {MAX_PARAMETERS} parameters; left out: {listed([f'`{path}`' for path in left_out])}."
         )
     return Section("Distributions", (*parts, *figures))
 
 
 def _how_to_read(samples: Samples, outcomes: tuple[Outcome, ...], levels: list[Levels]) -> str:
     text = (
-        f"Dots are runs; where groups have more than {MOST_POINTS}, the blue shape is their density. The box reaches "
+        f"Dots are runs; where groups have more than {MAX_POINTS}, the blue shape is their density. The box reaches "
         "from the lower to the upper quartile, the bar is the median."
     )
     if any(samples.limit(outcome) is not None for outcome in outcomes):

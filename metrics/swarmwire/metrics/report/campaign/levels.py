@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.metrics.campaign.about import Point, Value
 from swarmwire.metrics.report.campaign.words import short_value
 
-MOST_LEVELS = 16  # of numbers, beyond which they are put together
+MAX_LEVELS = 16  # of numbers, beyond which they are put together
 _BINS = 8
 
 
@@ -38,7 +38,7 @@ class Levels:
 
 
 def levels_of(path: str, points: tuple[Point, ...]) -> Levels:
-    """The levels of a parameter over all design points; more than MOST_LEVELS numbers become ranges, equally full."""
+    """The levels of a parameter over all design points; more than MAX_LEVELS numbers become ranges, equally full."""
     values = [point[path] for point in points]
     if all(_is_number(value) for value in values):
         return _of_numbers(path, np.array(values, dtype=np.float64))
@@ -49,7 +49,7 @@ def levels_of(path: str, points: tuple[Point, ...]) -> Levels:
 
 def _of_numbers(path: str, values: FloatArray) -> Levels:
     distinct, of_point = np.unique(values, return_inverse=True)
-    if len(distinct) <= MOST_LEVELS:
+    if len(distinct) <= MAX_LEVELS:
         return Levels(path, tuple(f"{value:.6g}" for value in distinct), distinct, of_point)
     edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, _BINS + 1)))
     of_point = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)

@@ -3,12 +3,12 @@
 from collections.abc import Collection
 
 from swarmwire.metrics.report.section import Section
-from swarmwire.metrics.statistics.bootstrap import FEWEST_RESAMPLES, RESAMPLES
+from swarmwire.metrics.statistics.bootstrap import MIN_RESAMPLES, RESAMPLES
 
 _ALWAYS = (
     "Values. Quartiles of numbers are interpolated linearly (Hyndman and Fan, The American Statistician 50, 1996, "
     "type 7). Intervals hold with 95 % confidence; those of medians and means of numbers are expanded bootstrap "
-    f"percentiles ({RESAMPLES:,} resamples, down to {FEWEST_RESAMPLES:,} of very large samples; Efron, Annals of "
+    f"percentiles ({RESAMPLES:,} resamples, down to {MIN_RESAMPLES:,} of very large samples; Efron, Annals of "
     "Statistics 7, 1979; Hesterberg, The American Statistician 69, 2015). Draws are keyed, so that the same data "
     "give the same intervals.",
 )

@@ -15,7 +15,7 @@ from swarmwire.metrics.report.section import Figure, Section, Table
 from swarmwire.metrics.report.svg import as_svg
 from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means
 from swarmwire.metrics.statistics.degradation import (
-    FEWEST_STRESSES,
+    MIN_STRESSES,
     Degradation,
     Fit,
     degradation,
@@ -58,7 +58,7 @@ def resilience_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Secti
 
 
 def _is_loss(levels: Levels) -> bool:
-    if levels.number is None or len(levels) < FEWEST_STRESSES or levels.path.rpartition(".")[2] not in _LOSSES:
+    if levels.number is None or len(levels) < MIN_STRESSES or levels.path.rpartition(".")[2] not in _LOSSES:
         return False
     return bool(levels.number[0] == 0.0 and levels.number[-1] <= 1.0)
 

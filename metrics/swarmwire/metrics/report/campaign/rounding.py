@@ -7,8 +7,8 @@ from statistics import median
 
 _DIGITS = 3  # of a number whose spread is not known
 _DIGITS_OF_SPREAD = 2
-_MOST_DIGITS = 5
-_MOST_DECIMALS = 6
+_MAX_DIGITS = 5
+_MAX_DECIMALS = 6
 _PLAIN_UP_TO = 1e7
 
 
@@ -39,8 +39,8 @@ def rounding_of(values: Sequence[float], spreads: Sequence[float] = ()) -> Round
     if all(value.is_integer() for value in map(float, known)):
         return Rounding(0)
     wanted = _decimals(median(widths), _DIGITS_OF_SPREAD) if widths else _decimals(median(known), _DIGITS)
-    decimals = max(0, min(wanted, _decimals(greatest, _MOST_DIGITS)))
-    return Rounding(decimals if decimals <= _MOST_DECIMALS else None)
+    decimals = max(0, min(wanted, _decimals(greatest, _MAX_DIGITS)))
+    return Rounding(decimals if decimals <= _MAX_DECIMALS else None)
 
 
 def _decimals(value: float, digits: int) -> int:

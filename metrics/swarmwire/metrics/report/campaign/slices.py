@@ -8,7 +8,7 @@ from math import prod
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.report.campaign.levels import Levels, levels_of
 
-MOST_SLICES = 4
+MAX_SLICES = 4
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ def slices_beside(folder: CampaignFolder, shown: Sequence[str], *, names_apart: 
     """The design points by what is not shown: numbers of a grid at their middle value, names one by one.
 
     Numbers of other designs are taken together, and so are names unless `names_apart` and their combinations are
-    MOST_SLICES at most.
+    MAX_SLICES at most.
     """
     whole = Slice("", "", frozenset(range(len(folder.points))))
     others = [levels_of(path, folder.points) for path in folder.parameters if path not in shown]
@@ -39,7 +39,7 @@ def slices_beside(folder: CampaignFolder, shown: Sequence[str], *, names_apart: 
     if folder.about.design != "grid":
         others = [levels for levels in others if levels.number is None]
     names = prod(len(levels) for levels in others if levels.number is None)
-    if not names_apart or names > MOST_SLICES:
+    if not names_apart or names > MAX_SLICES:
         others = [levels for levels in others if levels.number is not None]
     choices = [range(len(levels)) if levels.number is None else [(len(levels) - 1) // 2] for levels in others]
     return [

@@ -14,8 +14,8 @@ from swarmwire.metrics.report.section import Section, Table
 from swarmwire.metrics.statistics.summary import Summary
 from swarmwire.metrics.statistics.texts import number_text
 
-MOST_POINTS = 60  # beyond which tables are by the values of each parameter
-_MOST_OPEN_ROWS = 20  # of tables after the first that are not folded
+MAX_POINTS = 60  # beyond which tables are by the values of each parameter
+_MAX_OPEN_ROWS = 20  # of tables after the first that are not folded
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,13 @@ def summary_section(samples: Samples, chosen: ChosenOutcomes) -> Section:
     """The section."""
     columns, groups = _groups(samples)
     parts: list[str | Table] = []
-    if len(samples.folder.points) > MOST_POINTS:
+    if len(samples.folder.points) > MAX_POINTS:
         parts.append(
             f"There are {len(samples.folder.points):,} design points, so the tables are by the values of each "
             "parameter, over all values of the others. `summary.parquet` has every run."
         )
     for place, outcome in enumerate(chosen.shown):
-        folded = place > 0 and len(groups) > _MOST_OPEN_ROWS
+        folded = place > 0 and len(groups) > _MAX_OPEN_ROWS
         parts.append(_table(samples, outcome, columns, groups, folded=folded))
     for what, outcomes in (
         ("The same in all runs that have a value", chosen.constant),
@@ -52,7 +52,7 @@ def summary_section(samples: Samples, chosen: ChosenOutcomes) -> Section:
 def _groups(samples: Samples) -> tuple[tuple[str, ...], list[_Group]]:
     """The names of the first columns, and the rows."""
     points, parameters = samples.folder.points, samples.folder.parameters
-    if len(points) <= MOST_POINTS:
+    if len(points) <= MAX_POINTS:
         rows = [
             _Group(tuple(short_value(point[path]) for path in parameters), (number,))
             for number, point in enumerate(points)

@@ -10,13 +10,13 @@ from swarmwire.metrics.report.section import Figure, Section
 from swarmwire.metrics.report.svg import as_svg
 from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
 
-MOST_CURVES = 6
-_MOST_PARAMETERS = 2
+MAX_CURVES = 6
+_MAX_PARAMETERS = 2
 
 
 def survival_section(samples: Samples, times: tuple[Outcome, ...]) -> Section | None:
     """The section; None if there is no time."""
-    levels = [levels_of(path, samples.folder.points) for path in samples.folder.parameters[:_MOST_PARAMETERS]]
+    levels = [levels_of(path, samples.folder.points) for path in samples.folder.parameters[:_MAX_PARAMETERS]]
     levels = [each for each in levels if len(each) > 1] or [None]
     figures = [_figure(samples, outcome, each) for outcome in times for each in levels]
     if not figures:
@@ -36,7 +36,7 @@ def _figure(samples: Samples, outcome: Outcome, levels: Levels | None) -> Figure
         curves = [_curve(samples, outcome, "all runs", everything)]
         return Figure(name, as_svg(survival_curves(curves, "share still waiting", title), name), f"{title}.")
     name = figure_name("survival", outcome.column, levels.path)
-    last, count = len(levels) - 1, min(MOST_CURVES, len(levels))
+    last, count = len(levels) - 1, min(MAX_CURVES, len(levels))
     shown = [round(last * turn / (count - 1)) for turn in range(count)]
     curves = [_curve(samples, outcome, levels.short[level], tuple(levels.points(level))) for level in shown]
     drawn = survival_curves(curves, f"share still waiting, by {levels.path}", title)

@@ -19,8 +19,8 @@ from swarmwire.metrics.report.section import Figure, Section, Table
 from swarmwire.metrics.report.svg import as_svg
 from swarmwire.metrics.statistics.change_point import ChangePoint, change_point
 
-MOST_PARAMETERS = 3  # of which pairs are drawn
-_MOST_OPEN_ROWS = 20
+MAX_PARAMETERS = 3  # of which pairs are drawn
+_MAX_OPEN_ROWS = 20
 _Row = tuple[str, ...]
 
 
@@ -28,7 +28,7 @@ def transition_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Secti
     """The section; None unless a number is varied and something was measured."""
     folder = samples.folder
     levels = [levels_of(path, folder.points) for path in folder.parameters]
-    numbers = [each for each in levels if each.number is not None and len(each) > 1][:MOST_PARAMETERS]
+    numbers = [each for each in levels if each.number is not None and len(each) > 1][:MAX_PARAMETERS]
     if not numbers or not outcomes:
         return None
     figures: list[Figure] = []
@@ -173,4 +173,4 @@ def _table(rows: list[_Row]) -> Table:
     caption = f"Change points along `{along.pop()}`" if len(along) == 1 else "Change points"
     kept = [place for place in range(len(columns)) if place not in (1, 2) or len({row[place] for row in rows}) > 1]
     told = tuple(tuple(row[place] for place in kept) for row in rows)
-    return Table(tuple(columns[place] for place in kept), told, caption, folded=len(rows) > _MOST_OPEN_ROWS)
+    return Table(tuple(columns[place] for place in kept), told, caption, folded=len(rows) > _MAX_OPEN_ROWS)

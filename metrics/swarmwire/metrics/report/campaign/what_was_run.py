@@ -11,10 +11,10 @@ from swarmwire.metrics.report.campaign.words import listed, short_value
 from swarmwire.metrics.report.in_words import counted, shortened
 from swarmwire.metrics.report.section import Listing, Section, Table
 
-_MOST_VALUES = 24  # of a parameter, named one by one
-_MOST_ERRORS = 20
+_MAX_VALUES = 24  # of a parameter, named one by one
+_MAX_ERRORS = 20
 _LONGEST_ERROR = 240
-_MOST_POINTS = 6
+_MAX_POINTS = 6
 _DURATION = "duration_s"  # the path of how long a run lasts
 
 
@@ -73,7 +73,7 @@ def _values(wanted: Sequence[Value] | Mapping[str, Value]) -> str:
     if isinstance(wanted, Mapping):
         return f"from {short_value(wanted['from'])} to {short_value(wanted['to'])}"
     values = list(map(short_value, wanted))
-    if len(values) <= _MOST_VALUES:
+    if len(values) <= _MAX_VALUES:
         return ", ".join(values)
     return f"{', '.join(values[:3])}, … {values[-1]} ({len(values):,} values)"
 
@@ -114,7 +114,7 @@ def _failures(folder: CampaignFolder) -> list[str | Table]:
     )
     rows = [
         (shortened(" ".join(error.split()), _LONGEST_ERROR), str(count), str(first), _points(points))
-        for error, count, first, points in groups.select("error", "count", "first", "points").head(_MOST_ERRORS).rows()
+        for error, count, first, points in groups.select("error", "count", "first", "points").head(_MAX_ERRORS).rows()
     ]
     more = f" {counted(len(groups) - len(rows), 'rarer error')} left out." if len(groups) > len(rows) else ""
     caption = f"Runs that failed, by their error. They have no part in what follows.{more}"
@@ -122,5 +122,5 @@ def _failures(folder: CampaignFolder) -> list[str | Table]:
 
 
 def _points(points: list[int]) -> str:
-    named = ", ".join(map(str, points[:_MOST_POINTS]))
-    return named if len(points) <= _MOST_POINTS else f"{named}, … ({len(points)})"
+    named = ", ".join(map(str, points[:_MAX_POINTS]))
+    return named if len(points) <= _MAX_POINTS else f"{named}, … ({len(points)})"

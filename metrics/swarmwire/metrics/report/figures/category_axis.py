@@ -9,7 +9,7 @@ from swarmwire.metrics.report.in_words import shortened
 _LETTERS = 44  # that fit below a column's figure side by side
 _FEWEST = 5  # groups for which there is room, so that two do not look like barrels
 _LONGEST = 14
-_MOST_TURNED = 18
+_MAX_TURNED = 18
 
 
 def room_below_in(labels: Sequence[str]) -> float:
@@ -27,7 +27,7 @@ def set_categories(axes: Any, labels: Sequence[str]) -> None:
         every = -(-_letters(labels) // _LETTERS)
         axes.set_xticks(range(0, len(labels), every), labels[::every])
         return
-    every = -(-len(labels) // _MOST_TURNED)
+    every = -(-len(labels) // _MAX_TURNED)
     short = [shortened(label, _LONGEST) for label in labels[::every]]
     axes.set_xticks(range(0, len(labels), every), short, rotation=30, ha="right", rotation_mode="anchor")
 

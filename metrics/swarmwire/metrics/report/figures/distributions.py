@@ -12,7 +12,7 @@ from swarmwire.metrics.report.figures.category_axis import room_below_in, set_ca
 from swarmwire.metrics.report.figures.column_axes import LETTERS_PT, column_axes
 from swarmwire.metrics.report.figures.log_axis import fits_log, set_log
 
-MOST_POINTS = 40  # of a group, beyond which shapes are drawn
+MAX_POINTS = 40  # of a group, beyond which shapes are drawn
 _FEWEST_IN_SHAPE = 10
 _HALF_WIDTH = 0.36  # of a group, in groups
 _BOX_HALF_WIDTH = 0.11
@@ -36,7 +36,7 @@ def distributions(groups: Sequence[Group], title: str, x_label: str, limit: floa
     figure, axes = column_axes(title, x_label, foot_in=room_below_in(labels))
     everything = np.concatenate([group.values for group in groups])
     log = fits_log(everything if limit is None else np.append(everything, limit))
-    shapes = max(map(_runs, groups)) > MOST_POINTS
+    shapes = max(map(_runs, groups)) > MAX_POINTS
     for place, group in enumerate(groups):
         if shapes and len(group.values) >= _FEWEST_IN_SHAPE:
             _draw_shape(axes, place, group.values, log)

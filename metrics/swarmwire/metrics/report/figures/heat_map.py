@@ -13,8 +13,8 @@ from swarmwire.metrics.report.figures.response_curve import Jump
 from swarmwire.metrics.report.in_words import short, shortened
 
 _COLORS = "cividis"  # as ordered for those who cannot tell red from green, and in print without colours
-_ROW_IN, _LEAST_IN, _MOST_IN, _HEAD_IN = 0.2, 1.0, 2.6, 0.42
-_MOST_WRITTEN = 7  # columns and rows of cells into which values are written
+_ROW_IN, _MIN_IN, _MAX_IN, _HEAD_IN = 0.2, 1.0, 2.6, 0.42
+_MAX_WRITTEN = 7  # columns and rows of cells into which values are written
 _BEYOND, _NONE = "#f1e9f5", "#ffffff"
 
 
@@ -36,7 +36,7 @@ def heat_map(
 
     rows = len(y_labels)
     foot_in = room_below_in(x_labels)
-    height_in = _HEAD_IN + foot_in + float(np.clip(rows * _ROW_IN, _LEAST_IN, _MOST_IN))
+    height_in = _HEAD_IN + foot_in + float(np.clip(rows * _ROW_IN, _MIN_IN, _MAX_IN))
     figure, axes = column_axes(title, x_label, height_in, right_in=0.55, foot_in=foot_in, head_in=_HEAD_IN)
     known = values[np.isfinite(values)]
     least, greatest = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
@@ -47,7 +47,7 @@ def heat_map(
     shown = np.ma.masked_invalid(np.where(np.isposinf(values), greatest + 1.0 + abs(greatest), values))
     edges = np.arange(len(x_labels) + 1) - 0.5, np.arange(rows + 1) - 0.5
     axes.pcolormesh(*edges, shown, cmap=colors, norm=norm, edgecolors="white", linewidth=0.4)
-    written = max(len(x_labels), rows) <= _MOST_WRITTEN
+    written = max(len(x_labels), rows) <= _MAX_WRITTEN
     if written:
         _write_values(axes, values, norm)
     else:

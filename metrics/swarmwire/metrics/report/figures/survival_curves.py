@@ -12,7 +12,7 @@ from swarmwire.metrics.report.figures.column_axes import column_axes, plain_lege
 from swarmwire.metrics.report.figures.ordered_colors import ordered_colors
 
 _LEGEND_IN = 0.72
-_MOST_CORNERS, _MOST_TICKS = 300, 60
+_MAX_CORNERS, _MAX_TICKS = 300, 60
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def survival_curves(curves: Sequence[SurvivalCurve], title: str, x_label: str) -
         time_s, share = _steps(curve)
         axes.plot(time_s, share, drawstyle="steps-post", color=color, lw=1.3, label=curve.label, solid_capstyle="butt")
         ends_s = np.unique(curve.censored_s)
-        ends_s = ends_s[:: -(-len(ends_s) // _MOST_TICKS) or 1]
+        ends_s = ends_s[:: -(-len(ends_s) // _MAX_TICKS) or 1]
         if len(ends_s):
             at = share[np.maximum(np.searchsorted(time_s, ends_s, side="right") - 1, 0)]
             mark: Look = {"ms": 5, "mew": 1.1, "ls": "", "clip_on": False, "zorder": 4}
@@ -50,8 +50,8 @@ def _steps(curve: SurvivalCurve) -> tuple[FloatArray, FloatArray]:
     """The corners from 0 to the end, of which no more than can be told apart."""
     time_s = np.concatenate(([0.0], curve.time_s, [max(curve.end_s, *curve.time_s, 0.0)]))
     share = np.concatenate(([1.0], curve.share, [curve.share[-1] if len(curve.share) else 1.0]))
-    if len(time_s) <= _MOST_CORNERS:
+    if len(time_s) <= _MAX_CORNERS:
         return time_s, share
-    grid: FloatArray = np.linspace(0.0, float(time_s[-1]), _MOST_CORNERS)
+    grid: FloatArray = np.linspace(0.0, float(time_s[-1]), _MAX_CORNERS)
     last = np.unique(np.searchsorted(time_s, grid, side="right") - 1)
     return time_s[last], share[last]

@@ -10,8 +10,8 @@ from swarmwire.metrics.drawing.looks import FLOOR, INK, PAPER, SMALL_PT, SOFT
 from swarmwire.metrics.report.in_words import shortened
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 
-MOST_NAMED = 14  # robots, of which each has its name beside the matrix, and its percents in it
-MOST_LETTERS = 11  # of a name
+MAX_NAMED = 14  # robots, of which each has its name beside the matrix, and its percents in it
+MAX_LETTERS = 11  # of a name
 _LETTERS_ACROSS = 44
 _PALE = 0.5  # ratios from which on dark letters are read better
 _LEFT_IN, _RIGHT_IN, _TOP_IN, _BAR_IN = 0.62, 0.1, 0.26, 0.07
@@ -32,7 +32,7 @@ def link_matrix(static: Static, pdr: FloatArray) -> Any:
     axes.tick_params(labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
     axes.set_yticks(list(names), list(names.values()))
     axes.set_xticks(list(names), list(names.values()), rotation=90 if upright else 0)
-    if static.robots <= MOST_NAMED:
+    if static.robots <= MAX_NAMED:
         _write(axes, pdr)
     for group in static.groups[1:]:
         for line in (axes.axhline, axes.axvline):
@@ -49,11 +49,11 @@ def link_matrix(static: Static, pdr: FloatArray) -> Any:
 
 def _names(static: Static) -> tuple[dict[float, str], bool]:
     """Names by place, of robots or if these are many of groups, at their middle; and whether they stand upright."""
-    if static.robots <= MOST_NAMED:
+    if static.robots <= MAX_NAMED:
         names: dict[float, str] = dict(enumerate(static.robot_names))
     else:
         names = {0.5 * (group.start + group.stop - 1): group.name for group in static.groups}
-    names = {place: shortened(name, MOST_LETTERS) for place, name in names.items()}
+    names = {place: shortened(name, MAX_LETTERS) for place, name in names.items()}
     return names, sum(len(name) + 1 for name in names.values()) > _LETTERS_ACROSS
 
 

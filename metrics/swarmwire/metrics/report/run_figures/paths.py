@@ -8,9 +8,9 @@ from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.torus import whole_path
 
-MOST_PATHS = 1000
-MOST_POINTS = 30_000  # of all paths together: half a megabyte of a figure
-_LEAST_TICKS = 24
+MAX_PATHS = 1000
+MAX_POINTS = 30_000  # of all paths together: half a megabyte of a figure
+_MIN_TICKS = 24
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Paths:
 def paths_of(place_m: AnyArray, static: Static) -> Paths:
     """The paths to draw of robots at `place_m` (T, n, 2)."""
     ticks, robots = place_m.shape[:2]
-    drawn = _evenly(robots, MOST_PATHS)
-    kept = _evenly(ticks, max(_LEAST_TICKS, MOST_POINTS // max(1, len(drawn))))
+    drawn = _evenly(robots, MAX_PATHS)
+    kept = _evenly(ticks, max(_MIN_TICKS, MAX_POINTS // max(1, len(drawn))))
     own = place_m[:, drawn].astype(np.float64)
     lap = np.zeros(own.shape, np.int64)
     if static.boundary == "torus":

@@ -9,15 +9,15 @@ from swarmwire.metrics.drawing.plain_axes import plain_axes
 from swarmwire.metrics.report.run_figures.timeline import Curve, draw_curve
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 
-MOST_PANELS = 24
+MAX_PANELS = 24
 _COLUMNS = 2
 _TITLE_IN, _PANEL_IN, _TICKS_IN, _FOOT_IN = 0.26, 0.5, 0.2, 0.14
 _LEFT_IN, _APART_IN, _RIGHT_IN = 0.38, 0.42, 0.08
 
 
 def small_panels(time_s: FloatArray, curves: Sequence[Curve]) -> Any:
-    """The figure of these curves over `time_s` (T,); of more than `MOST_PANELS` the first."""
-    shown = list(curves)[:MOST_PANELS]
+    """The figure of these curves over `time_s` (T,); of more than `MAX_PANELS` the first."""
+    shown = list(curves)[:MAX_PANELS]
     rows = -(-len(shown) // _COLUMNS)
     row_in = _TITLE_IN + _PANEL_IN + _TICKS_IN
     height_in = rows * row_in + _FOOT_IN

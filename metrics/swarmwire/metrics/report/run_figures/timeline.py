@@ -16,8 +16,8 @@ from swarmwire.metrics.report.thinned import thinned
 
 _PANEL_IN, _TITLE_IN = 0.72, 0.24
 _LEFT_IN, _RIGHT_IN, _FOOT_IN, _TOP_IN = 0.36, 0.1, 0.34, 0.04
-_MOST_SHADED = 6  # spans that are shaded through all panels; of more there are lines, of many more nothing
-_MOST_LINES = 24
+_MAX_SHADED = 6  # spans that are shaded through all panels; of more there are lines, of many more nothing
+_MAX_LINES = 24
 
 
 @dataclass(frozen=True)
@@ -70,9 +70,9 @@ def draw_curve(axes: Any, time_s: FloatArray, curve: Curve) -> None:
 def _mark(axes: Any, lanes: Sequence[Lane], end_s: float) -> None:
     """What happened, through a panel, where it does not hide it."""
     spans = [span for lane in lanes for span in lane.spans]
-    if len(spans) > _MOST_LINES:
+    if len(spans) > _MAX_LINES:
         return
     for span in spans:
         axes.axvline(span.from_s, color=ACCENT, lw=0.6, alpha=0.6, zorder=0.5)
-        if span.until_s is not None and len(spans) <= _MOST_SHADED:
+        if span.until_s is not None and len(spans) <= _MAX_SHADED:
             axes.axvspan(span.from_s, min(span.until_s, end_s), color=ACCENT, alpha=0.08, lw=0, zorder=0.4)

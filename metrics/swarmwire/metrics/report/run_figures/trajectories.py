@@ -23,7 +23,7 @@ from swarmwire.metrics.report.run_figures.paths import Paths
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 
 TIME_PARTS = 6
-_EDGE_IN, _FOOT_IN, _SCALE_IN, _ROW_IN, _MOST_HIGH_IN = 0.08, 0.24, 0.16, 0.19, 4.4
+_EDGE_IN, _FOOT_IN, _SCALE_IN, _ROW_IN, _MAX_HIGH_IN = 0.08, 0.24, 0.16, 0.19, 4.4
 _CROWD = 200  # robots, from which on lines are thinner
 _DRAWN_ROBOTS = 1000  # more discs than these are drawn as pixels
 
@@ -71,7 +71,7 @@ def trajectories(
 def _lay_out(size_m: tuple[float, float], legend_rows: int, foot_in: float) -> Layout:
     pad_m = 2.0 * PAD * max(size_m)
     across_m, up_m = size_m[0] + pad_m, size_m[1] + pad_m
-    in_per_m = min((COLUMN_IN - 2 * _EDGE_IN) / across_m, _MOST_HIGH_IN / up_m)
+    in_per_m = min((COLUMN_IN - 2 * _EDGE_IN) / across_m, _MAX_HIGH_IN / up_m)
     wide_in, high_in = across_m * in_per_m, up_m * in_per_m
     head_in = legend_rows * _ROW_IN + 0.08
     height_in = head_in + high_in + foot_in

@@ -16,8 +16,8 @@ from swarmwire.metrics.report.svg import as_svg
 if TYPE_CHECKING:
     import polars as pl
 
-MOST_SQUARES = 60  # robots that a matrix is drawn of
-LEAST_PACKETS = 10  # in range, of a link that the histogram counts
+MAX_SQUARES = 60  # robots that a matrix is drawn of
+MIN_PACKETS = 10  # in range, of a link that the histogram counts
 NAME = "links"
 
 
@@ -30,14 +30,14 @@ def links(run: RunData) -> Figure | str:
     if not in_range.any():
         return "Delivery by link: nobody was in range of anybody."
     pdr = np.divide(heard, in_range, out=np.full(heard.shape, np.nan), where=in_range > 0)
-    if run.static.robots <= MOST_SQUARES:
+    if run.static.robots <= MAX_SQUARES:
         caption = "Delivery ratio of each link: heard, of the packets on air while the receiver was in range and sight."
         return Figure(NAME, as_svg(link_matrix(run.static, pdr), NAME), caption)
-    told = pdr[in_range >= LEAST_PACKETS]
+    told = pdr[in_range >= MIN_PACKETS]
     if not len(told):
-        return f"Delivery by link: no link had {LEAST_PACKETS} packets in range."
+        return f"Delivery by link: no link had {MIN_PACKETS} packets in range."
     caption = (
-        f"Delivery ratios of the {counted(len(told), 'link')} with at least {LEAST_PACKETS} packets in range; "
+        f"Delivery ratios of the {counted(len(told), 'link')} with at least {MIN_PACKETS} packets in range; "
         f"the dashed line is their median, {share(float(np.median(told)))}."
     )
     return Figure(NAME, as_svg(link_histogram(told), NAME), caption)

@@ -10,7 +10,7 @@ from swarmwire.metrics.registry import DELIVERY, METRICS
 from swarmwire.metrics.report.in_words import number
 from swarmwire.metrics.report.lanes import Lane, Span
 from swarmwire.metrics.report.run_data import ARENA, RunData
-from swarmwire.metrics.report.run_figures.small_panels import MOST_PANELS, small_panels
+from swarmwire.metrics.report.run_figures.small_panels import MAX_PANELS, small_panels
 from swarmwire.metrics.report.run_figures.timeline import Curve, timeline
 from swarmwire.metrics.report.run_sections.where import where
 from swarmwire.metrics.report.section import Figure, Section, Table
@@ -28,8 +28,8 @@ SECOND = (  # small, where they have a value that changes
     "min_gap",
 )
 _WHOLE = ("components",)
-_MOST_LANES = 8
-_MOST_EVENTS = 200
+_MAX_LANES = 8
+_MAX_EVENTS = 200
 _TITLES = {DELIVERY: "delivery: heard / in range, last second"}
 
 
@@ -42,7 +42,7 @@ def what_happened(run: RunData) -> Section:
     main = curves(film, MAIN)
     if main:
         lanes = [*_moments(run, film), *run.lanes]
-        figure = timeline(film.time_s, main, lanes[:_MOST_LANES])
+        figure = timeline(film.time_s, main, lanes[:_MAX_LANES])
         parts.append(Figure("timeline", as_svg(figure, "timeline"), _caption(main, lanes)))
     parts += where(run)
     others = curves(film, second(film))
@@ -90,12 +90,12 @@ def _caption(main: list[Curve], lanes: list[Lane]) -> str:
     text = f"{names[0].upper()}{names[1:]} over time"
     if not lanes:
         return f"{text}; no events."
-    more = f" Of {len(lanes)} kinds of events the first {_MOST_LANES} are drawn." if len(lanes) > _MOST_LANES else ""
+    more = f" Of {len(lanes)} kinds of events the first {_MAX_LANES} are drawn." if len(lanes) > _MAX_LANES else ""
     return f"{text}, and above it what happened: a bar until it was over, a diamond where no end is recorded.{more}"
 
 
 def _rest(what: str, there: int) -> str:
-    return f"{what} over time" + (f"; of {there} the first {MOST_PANELS}." if there > MOST_PANELS else ".")
+    return f"{what} over time" + (f"; of {there} the first {MAX_PANELS}." if there > MAX_PANELS else ".")
 
 
 def _events(run: RunData) -> list[str | Table]:
@@ -109,9 +109,9 @@ def _events(run: RunData) -> list[str | Table]:
             f"{row['do']} {row['part']}".strip().replace("_", " ") + (" ended" if row["ended"] else ""),
             _names(row["robots"]),
         )
-        for row in run.events.head(_MOST_EVENTS).iter_rows(named=True)
+        for row in run.events.head(_MAX_EVENTS).iter_rows(named=True)
     )
-    all_of = f"The first {_MOST_EVENTS} of {len(run.events)} events" if len(run.events) > _MOST_EVENTS else "All events"
+    all_of = f"The first {_MAX_EVENTS} of {len(run.events)} events" if len(run.events) > _MAX_EVENTS else "All events"
     return [Table(("time in s", "event", "robots that it changed"), rows, f"{all_of}.", folded=True)]
 
 

@@ -8,7 +8,7 @@ from swarmwire.metrics.report.in_words import counted, number
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.section import Listing, Section, Table
 
-_MOST_LINES = 300  # of the scenario
+_MAX_LINES = 300  # of the scenario
 _ENDED = {
     "duration": "with its duration",
     "stopped": "stopped",
@@ -43,9 +43,9 @@ def scenario_text(run: RunData) -> list[Section]:
     lines = run.scenario.splitlines()
     if not lines:
         return []
-    rest = len(lines) - _MOST_LINES
+    rest = len(lines) - _MAX_LINES
     cut = (f"{counted(rest, 'more line')} in `scenario.toml`.",) if rest > 0 else ()
-    return [Section("The scenario", (Listing("\n".join(lines[:_MOST_LINES])), *cut))]
+    return [Section("The scenario", (Listing("\n".join(lines[:_MAX_LINES])), *cut))]
 
 
 def _scenario(run: RunData) -> list[tuple[str, str]]:

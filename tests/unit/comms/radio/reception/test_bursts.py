@@ -13,7 +13,7 @@ from scipy import stats
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps, bursts_of_mean
-from swarmwire.comms.radio.reception.bursts import LEAST_CAPACITY, BurstStates, bad_after
+from swarmwire.comms.radio.reception.bursts import MIN_CAPACITY, BurstStates, bad_after
 
 KEYS = np.array([derive_key("bursts", arena) for arena in range(2)], np.uint64)
 ROBOTS = 20
@@ -180,7 +180,7 @@ def test_what_is_forgotten_does_not_change_fates_and_frees_room():
     assert np.array_equal(np.concatenate(parts), whole.lost(*table))
     assert len(whole) > 30_000
     assert max(kept) < 20 * per_tick
-    assert max(kept) > LEAST_CAPACITY
+    assert max(kept) > MIN_CAPACITY
 
 
 def test_no_packets_lose_nothing():

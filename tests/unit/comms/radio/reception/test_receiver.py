@@ -20,8 +20,8 @@ from swarmwire.comms.radio.propagation.decibels import from_db, to_db
 from swarmwire.comms.radio.reception import error_rates
 from swarmwire.comms.radio.reception.error_rates import all_right
 from swarmwire.comms.radio.reception.receiver import (
-    LEAST_DB,
-    MOST_DB,
+    MAX_DB,
+    MIN_DB,
     by_table,
     by_threshold,
     chunk_success,
@@ -164,8 +164,8 @@ def test_sensitivity_is_where_frames_begin_to_get_through():
 
 def test_what_always_or_never_succeeds_has_its_sensitivity_at_the_ends():
     flat = by_table(SuccessTable((0.0, 1.0), (0.5, 0.5), 8))
-    assert sinr_for_db(flat, 0.4, 8) == pytest.approx(LEAST_DB)
-    assert sinr_for_db(flat, 0.6, 8) == MOST_DB
+    assert sinr_for_db(flat, 0.4, 8) == pytest.approx(MIN_DB)
+    assert sinr_for_db(flat, 0.6, 8) == MAX_DB
 
 
 TABLE = SuccessTable((0.0, 6.0), (0.0, 1.0), 800)

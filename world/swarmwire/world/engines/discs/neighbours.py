@@ -14,7 +14,7 @@ from swarmwire.comms.kernels import borrowing
 from swarmwire.world.engines.discs.contacts import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, gap_to_fixed, gap_to_wall
 
 CELLS_PER_OBSTACLE = 4
-MOST_CELLS_PER_SIDE = 256
+MAX_CELLS_PER_SIDE = 256
 
 
 class ObstacleCells(NamedTuple):
@@ -34,7 +34,7 @@ def obstacle_cells(obstacles: Obstacles, size_m: tuple[float, float], reach_m: f
     """The cells of every arena."""
     arenas = len(obstacles.circle_start) - 1
     most = int((np.diff(obstacles.circle_start) + np.diff(obstacles.polygon_start)).max(initial=0))
-    per_side = min(max(int(np.ceil(np.sqrt(CELLS_PER_OBSTACLE * most))), 1), MOST_CELLS_PER_SIDE)
+    per_side = min(max(int(np.ceil(np.sqrt(CELLS_PER_OBSTACLE * most))), 1), MAX_CELLS_PER_SIDE)
     start = np.zeros(arenas * per_side * per_side + 1, np.int64)
     _fill(obstacles, size_m, per_side, reach_m, start, np.empty(0, np.int64))
     np.cumsum(start, out=start)

@@ -11,7 +11,7 @@ from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.robots.epuck2.commands import Commands, RobotCommand
 from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, PORT, Header, Request
 
-MOST_HOSTS = 254  # of a network of the last byte
+MAX_HOSTS = 254  # of a network of the last byte
 WHERE = "gateway epuck2"
 EXPECTED = 'expected "host:port" (ports count up), "127.0.1.*:port" (hosts count up from 1) or "host:0" (any ports)'
 
@@ -27,8 +27,8 @@ def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
         raise BadInput(WHERE, "address", f"{EXPECTED}; got {address!r}")
     first = int(port) if colon else PORT
     if host.endswith("*"):
-        if robots > MOST_HOSTS:
-            raise BadInput(WHERE, "address", f"expected at most {MOST_HOSTS} robots for {address!r}, got {robots}")
+        if robots > MAX_HOSTS:
+            raise BadInput(WHERE, "address", f"expected at most {MAX_HOSTS} robots for {address!r}, got {robots}")
         return [(f"{host[:-1]}{1 + i}", first) for i in range(robots)]
     last = first + robots - 1 if first else 0
     if last > 65535:
@@ -39,8 +39,8 @@ def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
 # --- One emulated e-puck2 as its connections see it; everything here runs in the gateway's thread.
 
 
-MOST_WAITING = 4  # connections; the one that has waited longest has given up
-MOST_UNREAD_BYTES = 1 << 20  # of answers; whoever reads none of them will not begin to
+MAX_WAITING = 4  # connections; the one that has waited longest has given up
+MAX_UNREAD_BYTES = 1 << 20  # of answers; whoever reads none of them will not begin to
 _BLACK_IMAGE = bytes([Header.IMAGE]) + bytes(PAYLOAD_BYTES[Header.IMAGE])
 _EMPTY = bytes([Header.EMPTY])
 
@@ -92,7 +92,7 @@ class EmulatedRobot:
             # Not at once: before Python 3.11.5 a transport begins to read after it is made, paused or not.
             asyncio.get_running_loop().call_soon(self._keep_waiting, connection)
             self._counts["clients_kept_waiting"] += self._served is not None
-            if len(self._waiting) > MOST_WAITING:
+            if len(self._waiting) > MAX_WAITING:
                 self._counts["connections_dropped"] += 1
                 self._waiting.popleft().transport.abort()
 
@@ -153,7 +153,7 @@ class EmulatedRobot:
             self._counts["left_unanswered"] += not connection.unanswered
             connection.unanswered = True
             return
-        if connection.transport.get_write_buffer_size() > MOST_UNREAD_BYTES:
+        if connection.transport.get_write_buffer_size() > MAX_UNREAD_BYTES:
             self._counts["unread_answers"] += 1
             connection.unanswered = True
             connection.transport.abort()
