@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmarks.agents import Ping
 from benchmarks.lines import print_line, spread
-from swarmwire.agent.local_backend import LocalCrew
+from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import Clock, WallClock
@@ -28,18 +28,18 @@ class Overhead:
 
 def overhead(clock: Clock, robots: int, packets: int, ticks: int) -> Overhead:
     """The overhead for so many robots in a process, each of which reads so many packets a step, or none."""
-    crew = LocalCrew(_assignment(robots))
-    crew.start()
+    backend = LocalBackend(_assignment(robots))
+    backend.start()
     nothing, all_heard = Heard.none(("range_m",)), _heard(robots, packets)
-    silent_us = _step_us(clock, crew, robots, nothing, ticks)
-    return Overhead(silent_us, (_step_us(clock, crew, robots, all_heard, ticks) - silent_us) / packets)
+    silent_us = _step_us(clock, backend, robots, nothing, ticks)
+    return Overhead(silent_us, (_step_us(clock, backend, robots, all_heard, ticks) - silent_us) / packets)
 
 
-def _step_us(clock: Clock, crew: LocalCrew, robots: int, heard: Heard, ticks: int) -> float:
+def _step_us(clock: Clock, backend: LocalBackend, robots: int, heard: Heard, ticks: int) -> float:
     senses = {"bots": GroupSenses(np.arange(robots), {"proximity.value": np.zeros((robots, RAYS))})}
     start_ns = clock.now_ns()
     for tick in range(ticks):
-        crew.act(tick, senses, heard)
+        backend.act(tick, senses, heard)
     return (clock.now_ns() - start_ns) / 1e3 / ticks / robots
 
 

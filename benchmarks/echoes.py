@@ -1,7 +1,7 @@
 """Processes that do nothing but answer: `python -m benchmarks.echoes ENDPOINT BYTES NAME …`, one forked for each name.
 
 They are clients of the same sessions as runners, read with zenoh's own handler, and answer each frame with so many
-bytes. They end with their standard input, as the nursery's runners do.
+bytes. They end with their standard input, as the agent host's runners do.
 """
 
 # zenoh's stubs leave out the return type of put.

@@ -13,7 +13,7 @@ from swarmwire.deploy import run
 from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.world.scenario.file import scenario_from
 
-PLAIN = "benchmarks.plain_nursery"
+PLAIN = "benchmarks.plain_agent_host"
 FLOCKING, BOID = "swarmwire.agent.behaviours:Flocking", "benchmarks.agents:Boid"
 
 
@@ -22,7 +22,7 @@ class Consumption:
 
     Attributes:
         uss_mb: memory that belongs to each runner alone.
-        all_gb: memory of world, nursery and runners together, as the sum of their PSS.
+        all_gb: memory of world, agent host and runners together, as the sum of their PSS.
         runner_us: processor time of a runner in a tick.
         world_ms: processor time of the world in a tick.
     """
@@ -40,13 +40,15 @@ class Consumption:
         if truth.tick not in (self.first, self.last):
             return
         world = psutil.Process()
-        nursery = [child for child in world.children() if RunnerProcesses.program in child.cmdline()]
-        runners = [runner for process in nursery for runner in process.children()]
+        agent_host = [child for child in world.children() if RunnerProcesses.program in child.cmdline()]
+        runners = [runner for process in agent_host for runner in process.children()]
         if truth.tick == self.first:
             memory = [runner.memory_full_info() for runner in runners]
             self.uss_mb = [of.uss / 1e6 for of in memory]
             # PSS: what some processes share counts for each by its part, so that the sum is what they take together.
-            self.all_gb = sum(of.pss for of in [*memory, *(one.memory_full_info() for one in [world, *nursery])]) / 1e9
+            self.all_gb = (
+                sum(of.pss for of in [*memory, *(one.memory_full_info() for one in [world, *agent_host])]) / 1e9
+            )
         its_s, theirs_s = _processor_s(world), sum(map(_processor_s, runners))
         ticks = self.last - self.first
         self.world_ms = (its_s - self._begun_s[0]) / ticks * 1e3

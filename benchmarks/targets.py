@@ -65,7 +65,7 @@ TARGETS = {
     "processes-200-plain": Target(2, "the same flock by 200 of `examples/protocol/runner.py`: zenoh and msgpack alone"),
     "processes-1000": Target(0.4, "1,000 of them"),
     "processes-1000-start": most(60, "from the call to the first tick, imports left out"),
-    "processes-1000-memory": most(16, "of world, nursery and runners together, as sum of their PSS"),
+    "processes-1000-memory": most(16, "of world, agent host and runners together, as sum of their PSS"),
     "wire-over-floor": most(
         1.6,
         "a tick of `processes-200` over that of as many processes that echo as many bytes, plus the agents' own time",

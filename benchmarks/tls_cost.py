@@ -30,7 +30,7 @@ from swarmwire.deploy.certificates.wanted import wanted
 from swarmwire.deploy.new_air import new_air
 from swarmwire.world.backends import allocation
 from swarmwire.world.backends.join_policy import Door, Terms
-from swarmwire.world.backends.zenoh_backend import RemoteCrew, Surroundings
+from swarmwire.world.backends.zenoh_backend import LockstepBackend, Surroundings
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.file import scenario_from
 
@@ -40,10 +40,10 @@ START_S = 60.0
 
 
 class InTurn:
-    """A crew that asks several, each in turn first, and keeps what each took."""
+    """A backend that asks several, each in turn first, and keeps what each took."""
 
-    def __init__(self, crews: dict[str, RemoteCrew]) -> None:
-        self._crews, self._clock = crews, WallClock()
+    def __init__(self, backends: dict[str, LockstepBackend]) -> None:
+        self._backends, self._clock = backends, WallClock()
         self.took_ns: list[dict[str, int]] = []
 
     def start(self) -> None:
@@ -55,7 +55,7 @@ class InTurn:
         took, actions = dict[str, int](), None
         for kind in (*KINDS[first:], *KINDS[:first]):
             before_ns = self._clock.now_ns()
-            actions = self._crews[kind].act(tick, senses, heard, outcomes)
+            actions = self._backends[kind].act(tick, senses, heard, outcomes)
             took[kind] = self._clock.now_ns() - before_ns
         self.took_ns.append(took)
         assert actions is not None
@@ -108,25 +108,25 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sw-", dir="/tmp")))
         names = tuple(f"r{i}" for i in range(robots))
         certs = _certificates(folder / "certs", names)
-        crews: dict[str, RemoteCrew] = {}
+        backends: dict[str, LockstepBackend] = {}
         for kind in KINDS:
             at: list[str] = []
             around = Surroundings(opened=at.extend)
-            crew = RemoteCrew(
+            backend = LockstepBackend(
                 _door(kind, folder, certs, names), kind, parts, START_S, clock, around, terms=Terms(open=True)
             )
-            stack.callback(crew.close)
-            crew.open()
+            stack.callback(backend.close)
+            backend.open()
             words = [at[0], kind, agent, str(certs) if kind == "tls" else "", *names]
             runners = subprocess.Popen(
                 [sys.executable, "-m", "benchmarks.tls_runners", *words],
                 env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
             )
-            crew.start()
+            backend.start()
             stack.callback(runners.wait, 10.0)
-            stack.callback(crew.close)
-            crews[kind] = crew
-        in_turn = InTurn(crews)
+            stack.callback(backend.close)
+            backends[kind] = backend
+        in_turn = InTurn(backends)
         simulation.metrics.begin(simulation.static)
         loop = Loop(simulation.world, new_air(scenario, simulation.world, None), in_turn, [simulation.metrics])
         steps_ns = list[int]()

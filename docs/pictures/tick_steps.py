@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from swarmwire.world.loop import Loop
 
-LANES: tuple[str, ...] = ("events", "air", "world", "mailbox", "crew", "observer")
+LANES: tuple[str, ...] = ("events", "air", "world", "mailbox", "backend", "observer")
 
 
 @dataclass(frozen=True)

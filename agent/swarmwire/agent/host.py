@@ -54,7 +54,7 @@ class Told(NamedTuple):
 NONE = np.empty(0, np.int64)
 
 
-# --- The host runs the agents of some robots, tick by tick: the same code in a local crew and in every runner.
+# --- The host runs the agents of some robots, tick by tick: the same code in a local backend and in every runner.
 
 
 NOT_OWN = -1

@@ -1,4 +1,4 @@
-"""The local crew: all agents of a run in this process."""
+"""The local backend: all agents of a run in this process."""
 
 from swarmwire.agent.host import Host
 from swarmwire.comms.arrays import AnyArray
@@ -7,8 +7,8 @@ from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
 from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 
 
-class LocalCrew:
-    """A Crew whose agents are called directly; arrays are passed, messages are encoded and decoded all the same."""
+class LocalBackend:
+    """A AgentBackend whose agents are called directly; arrays are passed, messages are encoded and decoded all the same."""
 
     def __init__(self, assignment: Assignment) -> None:
         self._assignment = assignment
@@ -40,7 +40,7 @@ class LocalCrew:
 
     def _started(self) -> Host:
         if self._host is None:
-            raise RuntimeError("the crew has not been started")
+            raise RuntimeError("the backend has not been started")
         return self._host
 
 

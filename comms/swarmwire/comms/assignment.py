@@ -1,4 +1,4 @@
-"""Which robots a crew or a runner plays, and all that its agents may know before the first tick."""
+"""Which robots a backend or a runner plays, and all that its agents may know before the first tick."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ class GroupAssignment:
 
 @dataclass(frozen=True)
 class Assignment:
-    """All robots of one runner (or of the whole run, for a crew in this process)."""
+    """All robots of one runner (or of the whole run, for a backend in this process)."""
 
     groups: tuple[GroupAssignment, ...]
     rate_hz: int

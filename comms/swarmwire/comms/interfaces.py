@@ -1,4 +1,4 @@
-"""The seams of the loop: a crew decides for the robots, observers look on, a judge says which arenas are over."""
+"""The seams of the loop: a backend decides for the robots, observers look on, a judge says which arenas are over."""
 
 from typing import Any, NamedTuple, Protocol
 
@@ -8,7 +8,7 @@ from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
 
 
-class Crew(Protocol):
+class AgentBackend(Protocol):
     """All agents of a run as the loop sees them: in this process, or runners behind the network."""
 
     def start(self) -> None:
@@ -52,7 +52,7 @@ class Judge(Protocol):
         ...
 
 
-# --- The seam within a tick: crews that keep to the wall clock send while it goes on, and hand over what is heard.
+# --- The seam within a tick: backends that keep to the wall clock send while it goes on, and hand over what is heard.
 
 
 class Put(NamedTuple):
@@ -75,8 +75,8 @@ class AirTime(Protocol):
         ...
 
 
-class TimedCrew(Crew, Protocol):
-    """A crew whose tick takes its time: all that is heard goes through it, whether or not the robot acts."""
+class TimedBackend(AgentBackend, Protocol):
+    """A backend whose tick takes its time: all that is heard goes through it, whether or not the robot acts."""
 
     def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
         """What every robot does in this tick, but for packets, which were put on the air.
@@ -86,8 +86,8 @@ class TimedCrew(Crew, Protocol):
         ...
 
 
-class HearingCrew(Crew, Protocol):
-    """A crew in this process whose agents can read between ticks."""
+class ReceivingBackend(AgentBackend, Protocol):
+    """A backend in this process whose agents can read between ticks."""
 
     def receive(self, heard: Heard, outcomes: Outcomes) -> None:
         """Keep this until the robots that it is for step, or hear."""

@@ -241,7 +241,7 @@ class SendResult(Explained):
 class Outcomes:
     """Packets that their senders' radios are done with, sorted by (row, id)."""
 
-    row: IntArray  # (k,) sender: to a VectorAgent 0 to n - 1, between crew and air arena x robots + index
+    row: IntArray  # (k,) sender: to a VectorAgent 0 to n - 1, between backend and air arena x robots + index
     id: IntArray  # (k,) that `send` returned
     result: IntArray  # (k,) SendResult
 

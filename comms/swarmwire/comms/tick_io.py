@@ -131,7 +131,7 @@ class Values:
 NO_VALUES = Values(np.empty(0, np.int64), np.empty(0))  # nobody tells any
 
 
-# --- What crosses between world and crew in a tick, as arrays: senses one way, commands and packets the other.
+# --- What crosses between world and backend in a tick, as arrays: senses one way, commands and packets the other.
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ LARGEST_SEED = 2**63 - 1
 MAX_SEEDS = 1_000_000
 MAX_ARENAS = 10_000  # of one world
 SEEDS = "how many (9: 1 to 9), FIRST:END (4:10: 4 to 9), or a list (1,5,7; 9, for 9 alone)"
-Runners = int | str | None  # how many, "per-robot", or None for a local crew
+Runners = int | str | None  # how many, "per-robot", or None for a local backend
 SeedsGiven = str | int | Sequence[int]  # how many from 1 on, as a number or text; a range or list as text; a list
 
 
@@ -59,7 +59,7 @@ def choose_seeds(scenario: Scenario, seed: int | None, seeds: SeedsGiven | None)
 
 
 def runner_count(runners: Runners, robots: int) -> int:
-    """How many runners there will be, 0 for a local crew; BadInput if there are not so many robots."""
+    """How many runners there will be, 0 for a local backend; BadInput if there are not so many robots."""
     if runners is None or runners == "none":
         return 0
     if runners == "per-robot":

@@ -1,4 +1,4 @@
-"""From what a run left in loop, observers and crew to its result."""
+"""From what a run left in loop, observers and backend to its result."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

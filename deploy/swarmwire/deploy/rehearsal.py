@@ -30,7 +30,7 @@ def rehearse(world: World, air: Air | None, metrics: Iterable[Metric]) -> None:
 
 
 class _Extras:
-    """A crew that drives and sends, whatever it is told."""
+    """A backend that drives and sends, whatever it is told."""
 
     def __init__(self, static: Static, *, sends: bool) -> None:
         rows = np.arange(static.arenas * static.robots)

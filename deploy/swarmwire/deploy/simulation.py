@@ -8,7 +8,7 @@ from typing import Any, Self, cast
 
 from swarmwire.comms.clock import PreciseClock, WallClock, to_s
 from swarmwire.comms.errors import BadInput, Interrupted, RecordFailed
-from swarmwire.comms.interfaces import Crew, Judge, Observer, TimedCrew
+from swarmwire.comms.interfaces import AgentBackend, Judge, Observer, TimedBackend
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.arguments import (
@@ -21,10 +21,10 @@ from swarmwire.deploy.arguments import (
     scenario_of,
     tick_count,
 )
+from swarmwire.deploy.backends import Backends
 from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.control.status import Status
 from swarmwire.deploy.controls import Controls
-from swarmwire.deploy.crews import Crews
 from swarmwire.deploy.endpoint import check_socket, new_run_id
 from swarmwire.deploy.gateways.behind import Behind
 from swarmwire.deploy.gateways.gateways import GatewaysGiven, as_gateways
@@ -39,7 +39,7 @@ from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.deploy.new_air import new_air
 from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
-from swarmwire.deploy.record.inputs import ReplayedCrew
+from swarmwire.deploy.record.inputs import ReplayedBackend
 from swarmwire.deploy.record.origin import Origin
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.record.run_record import RunRecord
@@ -53,10 +53,10 @@ from swarmwire.metrics.judge import Judge as StopJudge
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.world.backends.pacing import Pace
-from swarmwire.world.backends.realtime_backend import PacedCrew, RealTimeCrew
+from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend
 from swarmwire.world.backends.registry import Change, Loss, RunnerHealth
-from swarmwire.world.backends.zenoh_backend import RemoteCrew
-from swarmwire.world.gateways.backend import GatewayCrew
+from swarmwire.world.backends.zenoh_backend import LockstepBackend
+from swarmwire.world.gateways.backend import GatewayBackend
 from swarmwire.world.live_events import Interventions
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of, own_code
@@ -165,8 +165,8 @@ class Simulation:
         self._changes: list[Change] = []
         self._not_its_own = False  # whether it began with robots that had no agent, or code of a foreign runner
         self.served: Served | None = None
-        self._crews = self._new_crews(socket, listening)
-        self._crew: Crew | None = None
+        self._backends = self._new_backends(socket, listening)
+        self._backend: AgentBackend | None = None
         self._loop: Loop | None = None
         self._result: Result | None = None
 
@@ -222,14 +222,14 @@ class Simulation:
             if self._published and self._observed:  # what cannot be had is refused before anybody joins
                 stack.callback(self._published.close)
                 self._published.open()
-            crew = self._crew = stack.enter_context(self._crews.crew(self.served))
+            backend = self._backend = stack.enter_context(self._backends.backend(self.served))
             judging = [self._stop] if self._stop else []
             looking = [self.metrics, *judging, self._status, RadioTally(), EventLog()]
             self._watching: list[Observer] = [*looking, *self._observers]
             if self.served:
                 self._watching.append(Undriven(self.served, pace, self._record.say))
-            self._loop = self._new_loop(crew)
-            self._start(crew)
+            self._loop = self._new_loop(backend)
+            self._start(backend)
             self._exit = stack.pop_all()
         self._started_ns = self._clock.now_ns()
         return self
@@ -261,7 +261,7 @@ class Simulation:
             for observer in self._watching:
                 parts.update(observer.end(last))
             failed = {f"observer_failed_{observer.name}": 1 for observer in self._observers if observer.failed}
-            crew = self._crew
+            backend = self._backend
             self._result = outcome(
                 self.static,
                 parts,
@@ -282,14 +282,16 @@ class Simulation:
                 losses=self._losses,
                 changes=self._changes,
                 engines=self.world.engines,
-                realtime=crew.report() if isinstance(crew, PacedCrew | RealTimeCrew | GatewayCrew) else None,
+                realtime=backend.report()
+                if isinstance(backend, PacedBackend | RealTimeBackend | GatewayBackend)
+                else None,
                 folder=self.folder,
             )
         self._record.close(self._result)
 
     def health(self) -> RunnerHealth | None:
         """How the runners are doing; None if there are none."""
-        return self._crew.health() if isinstance(self._crew, RemoteCrew | RealTimeCrew) else None
+        return self._backend.health() if isinstance(self._backend, LockstepBackend | RealTimeBackend) else None
 
     @property
     def _early(self) -> list[Observer]:
@@ -310,10 +312,10 @@ class Simulation:
             metrics=self.metrics,
         )
 
-    def _new_loop(self, crew: Crew) -> Loop:
-        """The loop over world, air and crew, whose actions are kept where they need not follow from the seed."""
+    def _new_loop(self, backend: AgentBackend) -> Loop:
+        """The loop over world, air and backend, whose actions are kept where they need not follow from the seed."""
         rows = self.static.arenas * self.static.robots
-        acting = crew if self.inputs is None else ReplayedCrew(crew, self.inputs, rows, self.static.rate_hz)
+        acting = backend if self.inputs is None else ReplayedBackend(backend, self.inputs, rows, self.static.rate_hz)
         acting = self._record.recorded(acting, self._from_outside)
         return Loop(
             self.world,
@@ -323,17 +325,17 @@ class Simulation:
             self.scenario.events,
             self.judge,
             self.interventions,
-            cast("TimedCrew", acting) if self._recorded_quantum_s is not None else None,
+            cast("TimedBackend", acting) if self._recorded_quantum_s is not None else None,
         )
 
-    def _start(self, crew: Crew) -> None:
-        """Have the crew ready, and all who look on begin: some before, since people want to see who is missing."""
+    def _start(self, backend: AgentBackend) -> None:
+        """Have the backend ready, and all who look on begin: some before, since people want to see who is missing."""
         early = self._early if self._listens else []
         with ExitStack() as unless_begun:
             for observer in early:
                 observer.begin(self.static)
                 unless_begun.callback(observer.end, None)
-            crew.start()
+            backend.start()
             unless_begun.pop_all()
         self._not_its_own = bool((health := self.health()) and (health.robots_free or health.foreign))
         for observer in self._watching:
@@ -382,9 +384,9 @@ class Simulation:
         self.controls.hold(tick, self._stopped)
         self._status.began()
 
-    def _new_crews(self, socket: Path | None, listening: Listening | None) -> Crews:
+    def _new_backends(self, socket: Path | None, listening: Listening | None) -> Backends:
         """How the agents will be started."""
-        return Crews(
+        return Backends(
             scenario=self.scenario,
             static=self.static,
             agents=self.agents,

@@ -22,7 +22,7 @@ Act = Callable[[subprocess.Popen[str]], object]
 def long_run(tmp_path):
     process = started(LOSSY, *LONG, "--out", tmp_path / "run")
     children = family(process)
-    assert len(children) == 5  # a nursery and four runners
+    assert len(children) == 5  # an agent host and four runners
     yield process, children
     for left in [*children, psutil.Process(process.pid)] if process.poll() is None else children:
         if left.is_running():
@@ -41,7 +41,7 @@ def test_killing_the_world_leaves_no_process_and_no_socket(long_run):
     assert not directory.exists()
 
 
-def kill_nursery(process: subprocess.Popen[str]) -> None:
+def kill_agent_host(process: subprocess.Popen[str]) -> None:
     os.killpg(psutil.Process(process.pid).children()[0].pid, signal.SIGKILL)
 
 
@@ -54,11 +54,11 @@ def hang_up(process: subprocess.Popen[str]) -> None:
     ("act", "code", "said", "ended"),
     [
         (lambda process: runners_of(process)[2].kill(), 1, "was lost", "failed"),
-        (kill_nursery, 1, "was lost", "failed"),
+        (kill_agent_host, 1, "was lost", "failed"),
         (lambda process: process.send_signal(signal.SIGINT), 130, "", "interrupted"),
         (hang_up, 129, "", "interrupted"),
     ],
-    ids=["a runner is killed", "the nursery and all runners are", "Ctrl-C", "the terminal hangs up"],
+    ids=["a runner is killed", "the agent host and all runners are", "Ctrl-C", "the terminal hangs up"],
 )
 def test_it_ends_in_order_with_a_summary_and_whole_records(long_run, tmp_path, act: Act, code, said, ended):
     process, children = long_run

@@ -13,7 +13,7 @@ from swarmwire.deploy.new_air import new_air
 from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.backends import allocation as assignments
-from swarmwire.world.backends.zenoh_backend import RemoteCrew
+from swarmwire.world.backends.zenoh_backend import LockstepBackend
 from swarmwire.world.loop import Loop
 from tests.support.deploy.commands import LOSSY, ROOT
 
@@ -53,14 +53,14 @@ def test_which_runner_plays_which_robots_does_not_matter(local):
     parts = assignments.split(assignments.whole(simulation.scenario, simulation.world.static, specs), 3)
     run_id = new_run_id()
     with local_endpoint(None) as endpoint:
-        crew = RemoteCrew(endpoint, run_id, parts[::-1], 30.0, WallClock())
-        crew.open()
+        backend = LockstepBackend(endpoint, run_id, parts[::-1], 30.0, WallClock())
+        backend.open()
         processes = RunnerProcesses(endpoint, run_id, sorted(specs.values()), ["c", "b", "a"])
         try:
-            crew.start()
-            loop = Loop(simulation.world, new_air(simulation.scenario, simulation.world, traces=None), crew, [])
+            backend.start()
+            loop = Loop(simulation.world, new_air(simulation.scenario, simulation.world, traces=None), backend, [])
             loop.run(simulation.ticks)
         finally:
-            crew.close()
+            backend.close()
             processes.stop()
     assert loop.hexdigests() == local.trajectory_sha256

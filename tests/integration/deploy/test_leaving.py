@@ -11,13 +11,13 @@ import pytest
 
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.deploy import Recording, Result, RunFolder, Simulation, crews
+from swarmwire.deploy import Recording, Result, RunFolder, Simulation, backends
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.deploy.result import ArenaResult
 from swarmwire.metrics.registry import METRICS
 from swarmwire.metrics.verify.verify import verify
 from tests.support.agent.hosts import PLAYERS
-from tests.support.encoded_crew import EncodedCrew
+from tests.support.encoded_backend import EncodedBackend
 
 TICKS = 24
 SEEDS = (1, 2, 3, 4, 5)
@@ -224,7 +224,7 @@ def test_a_run_ends_when_its_last_arena_leaves(tmp_path: Path) -> None:
 def test_runners_do_not_mind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     path = scenario(tmp_path, name)
     here = packed(path, SEEDS[:3])
-    monkeypatch.setattr(crews, "LocalCrew", EncodedCrew)
+    monkeypatch.setattr(backends, "LocalBackend", EncodedBackend)
     there = packed(path, SEEDS[:3])
     assert there.arenas == here.arenas
     assert there.counts == here.counts

@@ -50,7 +50,7 @@ QUANTUM_S = 0.002
 
 def runners_here() -> list[psutil.Process]:
     """The processes of the run that goes on in this one."""
-    return [runner for nursery in psutil.Process().children() for runner in nursery.children()]
+    return [runner for agent_host in psutil.Process().children() for runner in agent_host.children()]
 
 
 def relays(folder: Path) -> list[str]:

@@ -13,9 +13,9 @@ from typer.testing import CliRunner, Result
 from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
 from swarmwire.comms.tick_io import Actions, Senses
-from swarmwire.deploy import Recording, Simulation, crews, repeat, run
+from swarmwire.deploy import Recording, Simulation, backends, repeat, run
 from swarmwire.deploy.cli import app
-from swarmwire.deploy.record.inputs import RecordedCrew
+from swarmwire.deploy.record.inputs import RecordedBackend
 from swarmwire.deploy.record.modules import PARTS, module_digests
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS
@@ -23,7 +23,7 @@ from swarmwire.world.scenario.file import load_scenario
 from swarmwire.world.scenario.scenario import same_content
 from tests.support.deploy.commands import LOSSY, ROOT
 from tests.support.deploy.joiners import Watcher, interrupt
-from tests.support.encoded_crew import EncodedCrew
+from tests.support.encoded_backend import EncodedBackend
 
 SHORT = ["duration_s=2"]
 FILE_AGENT = """
@@ -72,7 +72,7 @@ def test_a_run_is_the_same_again_also_through_frames(tmp_path, monkeypatch, enco
     disrupted = ROOT / "scenarios" / "flocking-disrupted.toml"
     run(disrupted, overrides=["duration_s=2", "radio.loss=0.4"], seed=7, out=tmp_path / "run")
     if encoded:
-        monkeypatch.setattr(crews, "LocalCrew", EncodedCrew)
+        monkeypatch.setattr(backends, "LocalBackend", EncodedBackend)
     repetition = repeat(tmp_path / "run")
     assert repetition.same
     assert repetition.changes == ()
@@ -284,7 +284,7 @@ def test_an_interrupted_run_is_repeated_as_far_as_it_came(tmp_path):
 
 
 class Standing:
-    """A crew whose robot stands."""
+    """A backend whose robot stands."""
 
     def start(self) -> None: ...
 
@@ -299,9 +299,9 @@ class Standing:
 
 def test_a_record_that_cannot_be_written_does_not_end_the_run_and_is_counted(tmp_path):
     (tmp_path / "inputs").write_text("in the way")
-    crew = RecordedCrew(Standing(), tmp_path, lambda tick: tick >= 2)
+    backend = RecordedBackend(Standing(), tmp_path, lambda tick: tick >= 2)
     for tick in range(5):
-        crew.act(tick, {}, Heard.none(), NO_OUTCOMES)
-    record = crew.record()
+        backend.act(tick, {}, Heard.none(), NO_OUTCOMES)
+    record = backend.record()
     assert record is not None
     assert (record.first_tick, record.ticks, record.ticks_not_recorded) == (2, 0, 3)

@@ -26,8 +26,8 @@ class Policies:
 
     def see(self, truth: Truth) -> None:
         """Ask, in every tick."""
-        nursery = [child for child in psutil.Process().children() if "swarmwire.agent.fork_server" in child.cmdline()]
-        self.found = [os.sched_getscheduler(runner.pid) for process in nursery for runner in process.children()]
+        agent_host = [child for child in psutil.Process().children() if "swarmwire.agent.agent_host" in child.cmdline()]
+        self.found = [os.sched_getscheduler(runner.pid) for process in agent_host for runner in process.children()]
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         """No part of the summary."""

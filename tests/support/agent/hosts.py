@@ -1,4 +1,4 @@
-"""What hosts, crews and lockstep are fed with in tests: assignments, senses and heard packets, all made up."""
+"""What hosts, backends and lockstep are fed with in tests: assignments, senses and heard packets, all made up."""
 
 from pathlib import Path
 from typing import Any

@@ -47,4 +47,4 @@ def family(process: subprocess.Popen[str]) -> list[psutil.Process]:
 
 def runners_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
     """The runners' processes of a run."""
-    return [runner for nursery in psutil.Process(process.pid).children() for runner in nursery.children()]
+    return [runner for agent_host in psutil.Process(process.pid).children() for runner in agent_host.children()]

@@ -143,7 +143,7 @@ class Joiners:
 
 
 class EncodedJoiners:
-    """A Crew of runners in this process that come and go as a script says; every frame is encoded and decoded.
+    """A AgentBackend of runners in this process that come and go as a script says; every frame is encoded and decoded.
 
     The script says what happens in a tick, which is open then; in tick -1, before the first: "join NAME" with a number
     of robots or their names, "leave NAME", "lose NAME", and "mute NAME": it answers no more, from this tick on.

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from swarmwire.deploy import Result, crews, run
-from tests.support.encoded_crew import EncodedCrew
+from swarmwire.deploy import Result, backends, run
+from tests.support.encoded_backend import EncodedBackend
 
 PER_ROBOT = 1000  # more runners than robots
 
@@ -16,5 +16,5 @@ def run_spread(scenario: Path, runners: int | None, **given: Any) -> Result:
     """A run with its robots in so many parts; None: agents get what they sense as it is."""
     with pytest.MonkeyPatch.context() as patched:
         if runners is not None:
-            patched.setattr(crews, "LocalCrew", partial(EncodedCrew, runners=runners))
+            patched.setattr(backends, "LocalBackend", partial(EncodedBackend, runners=runners))
         return run(scenario, **given)

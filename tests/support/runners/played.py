@@ -58,9 +58,9 @@ class Played:
         """Nothing yet."""
 
     def see(self, truth: Truth) -> None:
-        crew = self.simulation._crew
-        assert crew is not None
-        self.counted.append(Counter(crew.counts()))
+        backend = self.simulation._backend
+        assert backend is not None
+        self.counted.append(Counter(backend.counts()))
 
     def end(self, last: Tally | None) -> dict[str, Any]:
         return {}

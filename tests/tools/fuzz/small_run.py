@@ -62,7 +62,7 @@ SCENARIO: dict[str, Any] = {
 
 
 class SmallRun:
-    """The run, and itself the crew of its loop.
+    """The run, and itself the backend of its loop.
 
     Attributes:
         parts: the robots of each runner.

@@ -5,7 +5,7 @@ import pytest
 
 from swarmwire.agent import Agent, Robot
 from swarmwire.agent.host import Host, _Single
-from swarmwire.agent.local_backend import LocalCrew
+from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, Sent
 from tests.support.agent.hosts import SILENCE, assignment, group, heard_from, senses, spec, words
@@ -129,10 +129,10 @@ def test_what_is_for_the_step_fails_between_steps_with_the_robots_name(deed: str
 
 
 def test_a_crew_in_this_process_hands_on_what_its_agents_may_not_write_to() -> None:
-    crew = LocalCrew(assignment(group(spec("Echo"), [0, 1])))
+    backend = LocalBackend(assignment(group(spec("Echo"), [0, 1])))
     with pytest.raises(RuntimeError, match="has not been started"):
-        crew.hear(0, 0)
-    crew.start()
-    crew.act(0, {"flock": senses(0, [0, 1])}, SILENCE)
-    crew.receive(heard_from(words(1), [0]), NO_OUTCOMES)
-    assert numbers(crew.hear(0, 10)) == [(0, 1.0)]
+        backend.hear(0, 0)
+    backend.start()
+    backend.act(0, {"flock": senses(0, [0, 1])}, SILENCE)
+    backend.receive(heard_from(words(1), [0]), NO_OUTCOMES)
+    assert numbers(backend.hear(0, 10)) == [(0, 1.0)]

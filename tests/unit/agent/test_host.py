@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
 from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.host import Host
-from swarmwire.agent.local_backend import LocalCrew
+from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.messages import encode_dict
 from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Heard, Payloads, Sent
@@ -288,16 +288,16 @@ def test_an_agent_that_cannot_be_made_is_named_with_its_own_traceback() -> None:
 
 
 def test_a_local_crew_acts_between_start_and_close_only() -> None:
-    crew = LocalCrew(assignment(group(spec("Counter"), [0])))
+    backend = LocalBackend(assignment(group(spec("Counter"), [0])))
     with pytest.raises(RuntimeError, match="not been started"):
-        crew.act(0, one_group(0, [0]), SILENCE)
-    crew.start()
-    assert crew.act(0, one_group(0, [0]), SILENCE).linear_mps.tolist() == [1.0]
-    assert crew.counts() == {}
-    crew.close()
-    crew.close()
+        backend.act(0, one_group(0, [0]), SILENCE)
+    backend.start()
+    assert backend.act(0, one_group(0, [0]), SILENCE).linear_mps.tolist() == [1.0]
+    assert backend.counts() == {}
+    backend.close()
+    backend.close()
     with pytest.raises(RuntimeError):
-        crew.act(1, one_group(1, [0]), SILENCE)
+        backend.act(1, one_group(1, [0]), SILENCE)
 
 
 def test_draws_belong_to_robot_tick_and_purpose() -> None:

@@ -3,9 +3,9 @@
 import pytest
 
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.deploy import crews, run
+from swarmwire.deploy import backends, run
 from tests.support.deploy.commands import LOSSY
-from tests.support.encoded_crew import EncodedCrew
+from tests.support.encoded_backend import EncodedBackend
 
 AGENTS = """
 import sys
@@ -64,7 +64,7 @@ def agent(tmp_path):
 @pytest.fixture(params=[False, True], ids=["directly", "encoded"])
 def _layout(request, monkeypatch):
     if request.param:
-        monkeypatch.setattr(crews, "LocalCrew", EncodedCrew)
+        monkeypatch.setattr(backends, "LocalBackend", EncodedBackend)
 
 
 @pytest.mark.usefixtures("_layout")

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy import Result, crews, run
+from swarmwire.deploy import Result, backends, run
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.simulation import Simulation
 from tests.support.deploy.commands import LOSSY
@@ -16,7 +16,7 @@ from tests.support.deploy.joiners import HERE, WANDERER, EncodedJoiners, Watcher
 def played(monkeypatch, tmp_path):
     """A short run of wanderers as a script says, and what was told; without one, with all agents in one host."""
     agent = shutil.copy(WANDERER, tmp_path)
-    crew: list[EncodedJoiners] = []
+    backend: list[EncodedJoiners] = []
 
     def play(on_loss: str = "stop", script: dict[int, list[str]] | None = None) -> tuple[Result, Watcher, list[str]]:
         watcher = Watcher()
@@ -25,12 +25,12 @@ def played(monkeypatch, tmp_path):
             if script is not None:
 
                 def made(assignment):
-                    crew.append(EncodedJoiners(assignment, on_loss, script))
-                    return crew[-1]
+                    backend.append(EncodedJoiners(assignment, on_loss, script))
+                    return backend[-1]
 
-                patched.setattr(crews, "LocalCrew", made)
+                patched.setattr(backends, "LocalBackend", made)
             result = run(LOSSY, overrides=overrides, observers=[watcher])
-        told = [f"{change.what} {change.runner} {change.tick}" for of in crew for change in of.roster.changes]
+        told = [f"{change.what} {change.runner} {change.tick}" for of in backend for change in of.roster.changes]
         return result, watcher, told
 
     return play

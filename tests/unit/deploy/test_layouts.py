@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.deploy import Result, crews, run
+from swarmwire.deploy import Result, backends, run
 from tests.support.deploy.commands import LOSSY, ROOT
-from tests.support.encoded_crew import EncodedCrew
+from tests.support.encoded_backend import EncodedBackend
 
 SHORT = ["duration_s=1.5"]
 SCENARIOS = sorted(
@@ -28,7 +28,7 @@ def encoded(monkeypatch: pytest.MonkeyPatch, scenario: Path, **given) -> Result:
     seeds = given.pop("seeds", None)
     overrides = given.pop("overrides", SHORT)
     with monkeypatch.context() as patched:
-        patched.setattr(crews, "LocalCrew", partial(EncodedCrew, **given))
+        patched.setattr(backends, "LocalBackend", partial(EncodedBackend, **given))
         result = run(scenario, overrides=overrides, seeds=seeds)
     assert not any(name.endswith("_frames") for name in result.counts), result.counts
     return result

@@ -1,11 +1,11 @@
-"""What events do to the world, tick by tick, with a crew that is made for the purpose."""
+"""What events do to the world, tick by tick, with a backend that is made for the purpose."""
 
 from typing import Any
 
 import numpy as np
 import pytest
 
-from swarmwire.agent.local_backend import LocalCrew
+from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.events.selection import Selection, Swarm
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
@@ -34,7 +34,7 @@ class Watch:
 
 
 class Ahead:
-    """A crew that drives everyone who is there, and keeps who that was."""
+    """A backend that drives everyone who is there, and keeps who that was."""
 
     def __init__(self, linear_mps: float = 0.1) -> None:
         self.linear_mps = linear_mps
@@ -54,14 +54,14 @@ class Ahead:
     def close(self) -> None: ...
 
 
-def ran(poses: list[list[float]], events: list[dict[str, Any]], ticks: int = 30, crew: Any = None) -> list[Truth]:
+def ran(poses: list[list[float]], events: list[dict[str, Any]], ticks: int = 30, backend: Any = None) -> list[Truth]:
     watch = Watch()
     scenario = posed(poses, events=events, radio={"range_m": 9.0})
     world = World(scenario, [1], {})
     keys, size_m = world.keys, scenario.arena.size_m
     assert scenario.radio
     air = Air(scenario.radio, keys, len(poses), size_m, obstacle_arrays(world.static.obstacles), 10)
-    Loop(world, air, crew or Ahead(), [watch], scenario.events).run(ticks)
+    Loop(world, air, backend or Ahead(), [watch], scenario.events).run(ticks)
     return watch.seen
 
 
@@ -73,10 +73,10 @@ TWO = [[-1.0, 0.0, 0.0], [-1.0, 1.0, 0.0]]
 
 
 def test_a_killed_robot_brakes_and_leaves_the_frames_until_it_is_revived():
-    crew = Ahead()
-    seen = ran(TWO, [at("kill", 0.45, "a-0", for_s=1.0)], crew=crew)
+    backend = Ahead()
+    seen = ran(TWO, [at("kill", 0.45, "a-0", for_s=1.0)], backend=backend)
     assert [truth.alive.tolist() for truth in seen] == [[not 5 <= tick < 15, True] for tick in range(30)]
-    assert crew.rows == [[1] if 5 <= tick < 15 else [0, 1] for tick in range(30)]
+    assert backend.rows == [[1] if 5 <= tick < 15 else [0, 1] for tick in range(30)]
     assert (seen[5].command[0] == 0).all()
     assert np.array_equal(seen[7].pose[0], seen[15].pose[0])
     assert seen[29].pose[0, 0] > seen[15].pose[0, 0] + 0.1
@@ -138,9 +138,9 @@ def test_all_may_be_dead_and_the_run_goes_on():
     world = World(scenario, [1], {})
     whole = assignments.whole(scenario, world.static, {"a": "swarmwire.agent.behaviours:Diffusion"})
     world.live(np.zeros(2, np.bool_))
-    crew = LocalCrew(whole)
-    crew.start()
-    assert len(crew.act(0, world.sense(0), Heard.none(), NO_OUTCOMES).rows) == 0
+    backend = LocalBackend(whole)
+    backend.start()
+    assert len(backend.act(0, world.sense(0), Heard.none(), NO_OUTCOMES).rows) == 0
 
 
 def test_the_radio_graph_leaves_out_the_dead_radios_that_are_off_and_pairs_that_are_apart():

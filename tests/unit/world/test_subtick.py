@@ -1,4 +1,4 @@
-"""The air of a crew that takes its time: no packet is lost between ticks, and nothing depends on when one looks."""
+"""The air of a backend that takes its time: no packet is lost between ticks, and nothing depends on when one looks."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -126,7 +126,7 @@ def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> t
 
 @dataclass
 class Sender:
-    """A crew whose robot 0 sends in the middle of each tick, and which notes what it is handed."""
+    """A backend whose robot 0 sends in the middle of each tick, and which notes what it is handed."""
 
     told: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
 
@@ -134,7 +134,7 @@ class Sender:
         """Ready."""
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
-        raise AssertionError("a crew that takes its time is asked in time")
+        raise AssertionError("a backend that takes its time is asked in time")
 
     def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
         start_ns = tick_start_ns(tick, 10)
@@ -173,8 +173,8 @@ class Tallies:
 
 def test_the_loop_shows_observers_what_was_heard_within_a_tick_and_counts_what_was_sent_to_nobody():
     scenario = scenario_from(SAMPLE, "sample")
-    world, crew, seen = World(scenario, [1], {}), Sender(), Tallies()
-    loop = Loop(world, new_air(scenario, world, None), crew, [seen], timed=crew)
+    world, backend, seen = World(scenario, [1], {}), Sender(), Tallies()
+    loop = Loop(world, new_air(scenario, world, None), backend, [seen], timed=backend)
     loop.run(5)
     last = loop.end()
     assert last is not None
@@ -182,7 +182,7 @@ def test_the_loop_shows_observers_what_was_heard_within_a_tick_and_counts_what_w
     assert int(total.sent.sum()) == 5
     assert total.fates.sum() == total.intended.sum()
     assert loop.counts()["packets_to_nobody"] == 5
-    assert [sender for sender, _ in crew.told] == [0] * len(crew.told)
+    assert [sender for sender, _ in backend.told] == [0] * len(backend.told)
 
 
 class OverAfter:
@@ -210,8 +210,8 @@ class FromBoth(Sender):
 
 def test_of_an_arena_that_leaves_what_was_heard_within_its_last_tick_counts_and_the_rest_is_in_flight():
     scenario = scenario_from(SAMPLE, "sample")
-    world, crew, seen = World(scenario, [1, 2], {}), FromBoth(), Tallies()
-    loop = Loop(world, new_air(scenario, world, None), crew, [seen], judge=OverAfter(3), timed=crew)
+    world, backend, seen = World(scenario, [1, 2], {}), FromBoth(), Tallies()
+    loop = Loop(world, new_air(scenario, world, None), backend, [seen], judge=OverAfter(3), timed=backend)
     loop.run(6)
     last = loop.end()
     assert last is not None

@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.events.event import Event
-from swarmwire.comms.interfaces import Crew, Judge, Observer, TimedCrew
+from swarmwire.comms.interfaces import AgentBackend, Judge, Observer, TimedBackend
 from swarmwire.comms.packets import NO_OUTCOMES, NOWHERE, Heard, Outcomes, Sent
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.radio.results import News
@@ -55,14 +55,14 @@ class Mailbox:
         return here.select(np.flatnonzero(acts))
 
 
-# --- The loop: one tick, written once. What differs between modes is only the crew.
+# --- The loop: one tick, written once. What differs between modes is only the backend.
 
 
 ALWAYS_TOLD = ("clipped_commands", "nan_commands")
 
 
 class Loop:
-    """Drives world, air and crew through `ticks` ticks and shows each to the observers.
+    """Drives world, air and backend through `ticks` ticks and shows each to the observers.
 
     An arena that its judge finds over leaves the world: what it came to is what it would have come to alone.
 
@@ -74,19 +74,19 @@ class Loop:
         self,
         world: World,
         air: Air | None,
-        crew: Crew,
+        backend: AgentBackend,
         observers: Sequence[Observer],
         events: Sequence[Event] = (),
         judge: Judge | None = None,
         interventions: Interventions | None = None,
-        timed: TimedCrew | None = None,
+        timed: TimedBackend | None = None,
     ) -> None:
         """`judge` is asked after each tick, once observers saw it; without one no arena is over before the run is.
 
-        `interventions` are asked at the start of each tick for events that people want. `timed` is the crew, if it is
+        `interventions` are asked at the start of each tick for events that people want. `timed` is the backend, if it is
         to put packets on the air and hand them over while a tick goes on.
         """
-        self.world, self.air, self.crew, self.observers = world, air, crew, observers
+        self.world, self.air, self.backend, self.observers = world, air, backend, observers
         self.ticks_done = 0
         self._judge = judge
         self._running, self._left_after = world.running.copy(), np.zeros(world.static.arenas, np.int64)
@@ -104,7 +104,7 @@ class Loop:
     def run(
         self, ticks: int, stopped: Callable[[], bool] = lambda: False, hold: Callable[[int], None] = lambda _: None
     ) -> None:
-        """Run up to tick `ticks`, until all arenas are over, or until `stopped()`; the crew must have been started.
+        """Run up to tick `ticks`, until all arenas are over, or until `stopped()`; the backend must have been started.
 
         `hold` returns when the tick that it is given may begin; it changes when a tick begins, never what is in it.
         """
@@ -115,7 +115,7 @@ class Loop:
             self.step()
 
     def step(self) -> Truth:
-        """One tick, in the order of the design: events, air, senses, crew, air, physics, observers, judge."""
+        """One tick, in the order of the design: events, air, senses, backend, air, physics, observers, judge."""
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
         self._intervene(tick, start_ns)
@@ -183,7 +183,10 @@ class Loop:
     def counts(self) -> dict[str, int]:
         """Faults on the way between agents and world so far, by name; what is always told also where there is none."""
         told = {name: int(counted.sum()) for name, counted in self._counted().items()}
-        return {**self.crew.counts(), **{name: count for name, count in told.items() if count or name in ALWAYS_TOLD}}
+        return {
+            **self.backend.counts(),
+            **{name: count for name, count in told.items() if count or name in ALWAYS_TOLD},
+        }
 
     def arena_counts(self) -> list[dict[str, int]]:
         """Those of them that belong to an arena, of each: by name, where there is any."""
@@ -197,7 +200,7 @@ class Loop:
         return {**self.world.counts(), **packets}
 
     def _receive(self, start_ns: int) -> tuple[News | None, Heard, Outcomes]:
-        """What came of the radio up to a tick's start; of that, what the crew is to be told."""
+        """What came of the radio up to a tick's start; of that, what the backend is to be told."""
         if self._in_time:
             news, packets, outcomes = self._in_time.begin(start_ns)
             self._open = news.tally
@@ -216,7 +219,7 @@ class Loop:
             self.air.hold(world.pose, world.alive.copy())
         if self._timed and self._in_time:
             return self._timed.act_in_time(tick, senses, packets, outcomes, self._in_time)
-        actions = self.crew.act(tick, senses, packets, outcomes)
+        actions = self.backend.act(tick, senses, packets, outcomes)
         if self.air:
             self.air.send(start_ns, tick, self._addressable(actions.sent))
         elif len(actions.sent):

@@ -1,4 +1,4 @@
-"""The air of a loop whose crew takes its time: packets are put on it, and heard, also in the middle of a tick.
+"""The air of a loop whose backend takes its time: packets are put on it, and heard, also in the middle of a tick.
 
     a tick begins    `begin`      what became final since the last tick, for observers; what of it nobody was handed yet
     it goes on       `send`       packets come: those of a step wait for their robot's turn, others go out at once

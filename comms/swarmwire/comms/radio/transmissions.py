@@ -86,7 +86,7 @@ class Intake:
         `sent_at_ns` (rows,) is when each robot sends, `others_alive` (rows,) whom a robot's broadcast intends: those of
         the epoch.
         """
-        if (sent.sender[1:] < sent.sender[:-1]).any():  # nothing may depend on how the crew was divided
+        if (sent.sender[1:] < sent.sender[:-1]).any():  # nothing may depend on how the backend was divided
             sent = sent.select(np.argsort(sent.sender, kind="stable"))
         sequence = _numbers(sent.sender.copy(), self._sent_before)
         somewhere = sent.to != NOWHERE

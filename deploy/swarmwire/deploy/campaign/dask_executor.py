@@ -60,20 +60,20 @@ class DaskExecutor:
             stack.enter_context(hushed())
             self._client = connected(on, connect_s)
             stack.callback(_closed, self._client)
-            self._crew = self._new_crew(patience_s)
+            self._backend = self._new_backend(patience_s)
             self._open = stack.pop_all()
 
     @property
     def slots(self) -> int:
         """Twice as many as threads work at tasks."""
-        threads = sum(list(self._crew.threads.values()))
+        threads = sum(list(self._backend.threads.values()))
         return AHEAD * (threads if self._limit is None else min(threads, self._limit))
 
     def submit(self, task: Task) -> None:
         """Have a task done by whoever is free first."""
         if not self._supplied:
             self._supply()
-        self._client.loop.add_callback(self._crew.take, task)
+        self._client.loop.add_callback(self._backend.take, task)
 
     def finished(self, timeout_s: float) -> list[Finished]:
         """What is over; ClusterFailed if the cluster is gone, or its workers are and stay so."""
@@ -92,10 +92,10 @@ class DaskExecutor:
     def close(self) -> None:
         """Cancel what is under way, and leave the cluster."""
         with suppress(TimeoutError, RuntimeError):  # its loop is closed where the scheduler has long been gone
-            self._client.sync(self._crew.end, callback_timeout=CLOSE_S)
+            self._client.sync(self._backend.end, callback_timeout=CLOSE_S)
         self._open.close()
 
-    def _new_crew(self, patience_s: float) -> DaskCrew:
+    def _new_backend(self, patience_s: float) -> DaskCrew:
         """All workers that are there, and from now on those that come."""
         fitness = Fitness()
         cards = first_cards(self._client, self._on, patience_s, self._say)
@@ -115,13 +115,13 @@ class DaskExecutor:
     def _supply(self) -> None:
         """Send the scenario's files, of which there are none before the first task."""
         code = [f"{module}:" for module in read_campaign(self._scenario.parent).modules]
-        self._client.loop.add_callback(self._crew.supply, scenario_files(self._scenario), module_digests(code))
+        self._client.loop.add_callback(self._backend.supply, scenario_files(self._scenario), module_digests(code))
         self._supplied = True
 
     def _look_around(self) -> None:
         if self._clock.now_ns() - self._looked_ns > to_ns(POLL_S):
             try:
-                self._client.sync(self._crew.look_around, callback_timeout=POLL_S)
+                self._client.sync(self._backend.look_around, callback_timeout=POLL_S)
                 self._mute_looks = 0
             except (TimeoutError, OSError):  # then `_check` will know, or the next look
                 self._mute_looks += 1
@@ -137,7 +137,7 @@ class DaskExecutor:
         if self._mute_looks >= MUTE_LOOKS:
             raise ClusterFailed(f"{self._on}: the scheduler does not answer; {go_on}")
         now_ns = self._clock.now_ns()
-        if self._crew.threads:
+        if self._backend.threads:
             self._without_ns = None
         elif self._without_ns is None:
             self._without_ns = now_ns

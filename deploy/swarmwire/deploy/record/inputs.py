@@ -19,7 +19,7 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.interfaces import AirTime, Crew, Put, TimedCrew
+from swarmwire.comms.interfaces import AgentBackend, AirTime, Put, TimedBackend
 from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire import frames
@@ -43,27 +43,27 @@ class InputsRecord:
     ticks_not_recorded: int  # the disk was full, or the like
 
 
-class RecordedCrew:
-    """A crew whose actions are recorded from the first tick on at which `outside(tick)` holds."""
+class RecordedBackend:
+    """A backend whose actions are recorded from the first tick on at which `outside(tick)` holds."""
 
-    def __init__(self, crew: Crew | TimedCrew, folder: Path, outside: Callable[[int], bool]) -> None:
-        self._crew, self._path, self._outside = crew, folder / INPUTS, outside
+    def __init__(self, backend: AgentBackend | TimedBackend, folder: Path, outside: Callable[[int], bool]) -> None:
+        self._backend, self._path, self._outside = backend, folder / INPUTS, outside
         self._sha256 = hashlib.sha256()
         self._first_tick: int | None = None
         self._ticks = self._missed = 0
-        self.start, self.counts, self.close = crew.start, crew.counts, crew.close
+        self.start, self.counts, self.close = backend.start, backend.counts, backend.close
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick."""
-        actions = self._crew.act(tick, senses, heard, outcomes)
+        actions = self._backend.act(tick, senses, heard, outcomes)
         if self._first_tick is not None or self._outside(tick):
             self._record(tick, actions, {})
         return actions
 
     def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
-        """The same of a crew that puts packets on the air itself."""
+        """The same of a backend that puts packets on the air itself."""
         noted = _Noted(air)
-        actions = cast("TimedCrew", self._crew).act_in_time(tick, senses, heard, outcomes, noted)
+        actions = cast("TimedBackend", self._backend).act_in_time(tick, senses, heard, outcomes, noted)
         if self._first_tick is not None or self._outside(tick):
             self._record(tick, actions, _puts_arrays(noted.puts))
         return actions
@@ -176,10 +176,10 @@ class RecordedInputs:
         return BadInput(str(self._path), f"frame {place}", f"expected the actions of a tick: {fault}")
 
 
-class ReplayedCrew:
-    """A crew whose agents act until the first recorded tick; from there on the record does."""
+class ReplayedBackend:
+    """A backend whose agents act until the first recorded tick; from there on the record does."""
 
-    def __init__(self, agents: Crew, inputs: RecordedInputs, robots: int, rate_hz: int) -> None:
+    def __init__(self, agents: AgentBackend, inputs: RecordedInputs, robots: int, rate_hz: int) -> None:
         """`robots` in all arenas."""
         self._agents, self._inputs, self._robots, self._rate_hz = agents, inputs, robots, rate_hz
         self.start, self.counts, self.close = agents.start, agents.counts, agents.close

@@ -9,11 +9,11 @@ from types import TracebackType
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput, RecordFailed
-from swarmwire.comms.interfaces import Crew, Observer, TimedCrew
+from swarmwire.comms.interfaces import AgentBackend, Observer, TimedBackend
 from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.live.published import Published
-from swarmwire.deploy.record.inputs import InputsRecord, RecordedCrew
+from swarmwire.deploy.record.inputs import InputsRecord, RecordedBackend
 from swarmwire.deploy.record.interventions import InterventionsLog, InterventionsRecord
 from swarmwire.deploy.record.new_folder import make_folder
 from swarmwire.deploy.record.origin import Origin, origin_of
@@ -44,7 +44,7 @@ class RunRecord:
         self.folder = None if out is None else make_folder(out)
         self._clock = clock
         self._log = RunLog(self.folder, clock) if self.folder else None
-        self._recorded: RecordedCrew | None = None
+        self._recorded: RecordedBackend | None = None
         self._interventions = InterventionsLog(self.folder) if self.folder else None
         self.failed: RecordFailed | None = None
 
@@ -129,15 +129,17 @@ class RunRecord:
             rmtree(self.folder, ignore_errors=True)  # it was new or empty, so all that is in it is of this run
             self.folder = self._log = None
 
-    def recorded(self, crew: Crew | TimedCrew, outside: Callable[[int], bool]) -> Crew | TimedCrew:
-        """The crew, with its actions kept in the folder from the first tick on at which `outside(tick)` holds."""
+    def recorded(
+        self, backend: AgentBackend | TimedBackend, outside: Callable[[int], bool]
+    ) -> AgentBackend | TimedBackend:
+        """The backend, with its actions kept in the folder from the first tick on at which `outside(tick)` holds."""
         if self.folder is None:
-            return crew
-        self._recorded = RecordedCrew(crew, self.folder, outside)
+            return backend
+        self._recorded = RecordedBackend(backend, self.folder, outside)
         return self._recorded
 
     def inputs(self) -> InputsRecord | None:
-        """What was recorded of the crew; None if nothing."""
+        """What was recorded of the backend; None if nothing."""
         return self._recorded.record() if self._recorded else None
 
     def keep(self, intervention: Intervention) -> None:

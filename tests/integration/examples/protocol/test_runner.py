@@ -14,7 +14,7 @@ from examples.protocol.runner import BROADCAST, TAG, VERSION
 from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.comms import packets
 from swarmwire.comms.wire import frames
-from swarmwire.deploy import crews, repeat, run
+from swarmwire.deploy import backends, repeat, run
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.world.scenario.file import load_scenario
@@ -63,7 +63,7 @@ def mixed(monkeypatch: pytest.MonkeyPatch) -> list[Mixed]:
         started.append(Mixed(*given, **more))
         return started[-1]
 
-    monkeypatch.setattr(crews, "RunnerProcesses", start)
+    monkeypatch.setattr(backends, "RunnerProcesses", start)
     return started
 
 

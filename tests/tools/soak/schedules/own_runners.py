@@ -59,8 +59,8 @@ class Nursed(Actors):
     def _own(self) -> list[Own]:
         found: list[Own] = []
         for one in psutil.Process().children():
-            with suppress(psutil.Error):  # a nursery whose runners are all dead has ended
-                if "swarmwire.agent.fork_server" in one.cmdline():
+            with suppress(psutil.Error):  # an agent host whose runners are all dead has ended
+                if "swarmwire.agent.agent_host" in one.cmdline():
                     found += [Own(child) for child in sorted(one.children(), key=lambda child: child.pid)]
         return found
 

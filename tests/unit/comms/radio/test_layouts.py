@@ -1,4 +1,4 @@
-"""Results do not depend on how the world, the crew or time is divided, and order is kept where it is asked for."""
+"""Results do not depend on how the world, the backend or time is divided, and order is kept where it is asked for."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,10 +1,10 @@
 """The pace of real time: the clock is asked to wait until each tick is over, and every lag is counted and told."""
 
-from swarmwire.agent.local_backend import LocalCrew
+from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import Heard
 from swarmwire.world.backends.pacing import Pace
-from swarmwire.world.backends.realtime_backend import PacedCrew
+from swarmwire.world.backends.realtime_backend import PacedBackend
 from tests.support.agent.hosts import GIVES, assignment, group, one_group, spec
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock
 
@@ -53,8 +53,8 @@ def test_a_lag_is_told_at_once_but_not_every_tick() -> None:
 
 def test_a_local_crew_is_paced_and_does_what_it_does_otherwise() -> None:
     clock, pace, _ = paced()
-    free, crew = (LocalCrew(assignment(group(spec("Counter"), [0, 1]))) for _ in range(2))
-    held = PacedCrew(crew, pace)
+    free, backend = (LocalBackend(assignment(group(spec("Counter"), [0, 1]))) for _ in range(2))
+    held = PacedBackend(backend, pace)
     free.start()
     held.start()
     for tick in range(2):

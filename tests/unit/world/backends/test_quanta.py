@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from swarmwire.agent.local_backend import LocalCrew
+from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.interfaces import Put
 from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
 from swarmwire.world.backends.pacing import Pace
-from swarmwire.world.backends.realtime_backend import PacedCrew
+from swarmwire.world.backends.realtime_backend import PacedBackend
 from swarmwire.world.subtick import Quanta
 from tests.support.agent.hosts import GIVES, assignment, group, one_group, spec
 from tests.support.agent.players import Word
@@ -146,16 +146,16 @@ def test_tick_jitter_is_what_a_tick_began_after_the_end_of_the_one_before() -> N
 def test_agents_in_this_process_hear_within_the_tick_and_what_they_send_goes_out_at_once() -> None:
     clock = FakeClock()
     pace, quanta = quanta_of(clock)
-    crew = PacedCrew(LocalCrew(assignment(group(spec("Echo"), [0, 1]))), pace, quanta)
-    crew.start()
+    backend = PacedBackend(LocalBackend(assignment(group(spec("Echo"), [0, 1]))), pace, quanta)
+    backend.start()
     air = Air(due_ns=[25 * MS], payload=Word(number=1.0).encode())
-    crew.act_in_time(0, one_group(0, [0, 1]), Heard.none(GIVES), NO_OUTCOMES, air)
+    backend.act_in_time(0, one_group(0, [0, 1]), Heard.none(GIVES), NO_OUTCOMES, air)
     of_step, echo = air.puts
     assert (of_step.at_ns, of_step.tick, of_step.sent.sender.tolist()) == (0, 0, [0, 1])
     assert (echo.at_ns, echo.tick, echo.sent.sender.tolist()) == (30 * MS, None, [1])
-    told = crew.report()
+    told = backend.report()
     assert told.quantum_s == 0.010
     assert told.delivery is not None
     assert told.delivery.count == 1
-    assert crew.act(1, one_group(1, [0, 1]), Heard.none(GIVES)).sent.sender.tolist() == [0, 1]
-    crew.close()
+    assert backend.act(1, one_group(1, [0, 1]), Heard.none(GIVES)).sent.sender.tolist() == [0, 1]
+    backend.close()

@@ -1,4 +1,4 @@
-"""Crews in real time: each act ends when its tick is over by the wall clock, whoever has answered by then."""
+"""Backends in real time: each act ends when its tick is over by the wall clock, whoever has answered by then."""
 
 # pyright: reportUnknownMemberType=false
 
@@ -9,7 +9,7 @@ import zenoh
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock, tick_start_ns, to_s
-from swarmwire.comms.interfaces import AirTime, HearingCrew, Put
+from swarmwire.comms.interfaces import AirTime, Put, ReceivingBackend
 from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.world.backends.inbox import Item, RunnerInbox
@@ -17,7 +17,7 @@ from swarmwire.world.backends.join_policy import USUAL, Door, Terms
 from swarmwire.world.backends.pacing import Delays, Pace
 from swarmwire.world.backends.realtime import RealTime
 from swarmwire.world.backends.registry import OnLoss
-from swarmwire.world.backends.zenoh_backend import RunnerCrew, Surroundings
+from swarmwire.world.backends.zenoh_backend import Surroundings, ZenohBackend
 from swarmwire.world.subtick import Quanta
 
 
@@ -50,19 +50,19 @@ def report_of(pace: Pace, quanta: Quanta | None) -> RealTimeReport:
     )
 
 
-class PacedCrew:
-    """A crew in this process, paced by the wall clock: an agent that takes too long makes the loop lag."""
+class PacedBackend:
+    """A backend in this process, paced by the wall clock: an agent that takes too long makes the loop lag."""
 
-    def __init__(self, crew: HearingCrew, pace: Pace, quanta: Quanta | None = None) -> None:
-        self._crew, self._pace, self._quanta = crew, pace, quanta
+    def __init__(self, backend: ReceivingBackend, pace: Pace, quanta: Quanta | None = None) -> None:
+        self._backend, self._pace, self._quanta = backend, pace, quanta
         self._puts: list[Put] = []
-        self.start, self.counts, self.close = crew.start, crew.counts, crew.close
+        self.start, self.counts, self.close = backend.start, backend.counts, backend.close
 
     def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick."""
         self._pace.begin()
         self._pace.handed_over(heard.heard_at_ns)
-        actions = self._crew.act(tick, senses, heard, outcomes)
+        actions = self._backend.act(tick, senses, heard, outcomes)
         self._pace.hold(tick)
         return actions
 
@@ -71,8 +71,8 @@ class PacedCrew:
         assert self._quanta
         self._pace.begin()
         self._pace.handed_over(heard.heard_at_ns)
-        self._crew.receive(heard, outcomes)
-        actions = self._crew.act(tick, senses, Heard.none(tuple(heard.given)), NO_OUTCOMES)
+        self._backend.receive(heard, outcomes)
+        actions = self._backend.act(tick, senses, Heard.none(tuple(heard.given)), NO_OUTCOMES)
         self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
         self._quanta.pass_tick(tick, air, self)
         return replace(actions, sent=Sent.none())
@@ -84,8 +84,8 @@ class PacedCrew:
 
     def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> None:
         """Let agents that read between ticks read."""
-        self._crew.receive(heard, outcomes)
-        sent = self._crew.hear(tick, at_ns)
+        self._backend.receive(heard, outcomes)
+        sent = self._backend.hear(tick, at_ns)
         if len(sent):
             self._puts.append(Put(self._pace.now_ns(), None, sent))
 
@@ -94,7 +94,7 @@ class PacedCrew:
         return report_of(self._pace, self._quanta)
 
 
-class RealTimeCrew(RunnerCrew[RealTime]):
+class RealTimeBackend(ZenohBackend[RealTime]):
     """All agents of a run in runners, none of which the loop waits for; `realtime` decides, this carries the bytes."""
 
     congestion = zenoh.CongestionControl.DROP  # a runner that reads nothing must not hold up the world

@@ -39,7 +39,7 @@ R = TypeVar("R", bound=Roster[Any])
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a crew asks and tells whoever runs it.
+    """What a backend asks and tells whoever runs it.
 
     `trouble` says why there is no more point in waiting for runners (a process that exited), or None; it is asked while
     any loss ends the run. `stopped` says whether the run is to end; `lost` is told of a loss that the run survives,
@@ -55,7 +55,7 @@ class Surroundings:
     opened: Callable[[tuple[str, ...]], None] = lambda _: None
 
 
-class RunnerCrew(ABC, Generic[R]):
+class ZenohBackend(ABC, Generic[R]):
     """All agents of a run in runners that join at `endpoint`; how the loop waits for them is the subclass's affair."""
 
     congestion = zenoh.CongestionControl.BLOCK  # of frames to runners
@@ -308,13 +308,13 @@ class RunnerCrew(ABC, Generic[R]):
             self._answers[key] = session.declare_subscriber(key, put)
 
 
-# --- The remote crew in lockstep: the loop waits for every runner, as fast as the machine allows.
+# --- The remote backend in lockstep: the loop waits for every runner, as fast as the machine allows.
 
 
 ALONE = Surroundings()
 
 
-class RemoteCrew(RunnerCrew[Lockstep]):
+class LockstepBackend(ZenohBackend[Lockstep]):
     """All agents of a run in runners; `lockstep` decides, this carries the bytes."""
 
     def __init__(

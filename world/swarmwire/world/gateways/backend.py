@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.interfaces import AirTime, HearingCrew, Put
+from swarmwire.comms.interfaces import AirTime, Put, ReceivingBackend
 from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
 from swarmwire.comms.tick_io import Actions, LedChanges, Senses
 from swarmwire.comms.truth import Group
@@ -66,7 +66,7 @@ class GatewayGroup:
         return whole
 
 
-# --- The crew of a run some of whose robots answer as real ones: foreign programs drive them, and nobody waits for
+# --- The backend of a run some of whose robots answer as real ones: foreign programs drive them, and nobody waits for
 # those.
 #
 #     a tick begins     poses, readings and packets heard go out
@@ -97,12 +97,12 @@ class RobotsAir(Protocol):
         ...
 
 
-class GatewayCrew:
-    """The robots of some groups behind gateways, all others played by another crew, in one arena and in real time."""
+class GatewayBackend:
+    """The robots of some groups behind gateways, all others played by another backend, in one arena and in real time."""
 
     def __init__(
         self,
-        inner: HearingCrew,
+        inner: ReceivingBackend,
         groups: Sequence[GatewayGroup],
         air: RobotsAir | None,
         pace: Pace,
@@ -158,7 +158,7 @@ class GatewayCrew:
             self._puts.append(Put(self._pace.now_ns(), None, sent))
 
     def counts(self) -> dict[str, int]:
-        """Faults of the inner crew, of gateways by their kind, of what is shown, and of the air between."""
+        """Faults of the inner backend, of gateways by their kind, of what is shown, and of the air between."""
         found = Counter(self._inner.counts())
         found.update(self._show_counts())
         for group in self._groups:

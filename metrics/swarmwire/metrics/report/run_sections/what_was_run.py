@@ -83,10 +83,12 @@ def _course(run: RunData) -> list[tuple[str, str]]:
         wanted = f" of {number(asked / run.static.rate_hz)} s" if isinstance(asked, int) else ""
         return [("ended", f"no summary: it was killed, or goes on; {reached}{wanted}")]
     runners = summary["runners"]
-    crew = "agents in the world's process" if not runners else f"agents in {counted(runners, 'process', 'processes')}"
+    backend = (
+        "agents in the world's process" if not runners else f"agents in {counted(runners, 'process', 'processes')}"
+    )
     return [
         ("engine", summary["engine"]),
-        ("mode", f"{summary['mode']}, {crew}"),
+        ("mode", f"{summary['mode']}, {backend}"),
         *([("stops at", "; ".join(summary["stop"]))] if summary["stop"] else []),
         ("ended", _ended(summary)),
         (

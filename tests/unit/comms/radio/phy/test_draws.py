@@ -1,4 +1,4 @@
-"""Over signals, how time, world or crew are divided changes nothing; each fate is computed once more from its draws."""
+"""Over signals, how time, world or backend are divided changes nothing; each fate is computed once more from its draws."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,7 @@
-"""A nursery: one process that imports what runners need, then forks a runner for each name it is given.
+"""An agent host: one process that imports what runners need, then forks a runner for each name it is given.
 
 Forking after the import makes a thousand runners cheap: they start in milliseconds and share the code's memory. The
-nursery itself never opens a zenoh session (one opened in a child of a process that has had one hangs). It is a program
+agent host itself never opens a zenoh session (one opened in a child of a process that has had one hangs). It is a program
 of its own rather than multiprocessing's fork server, which would run the user's script again in every runner.
 
 Only some runners are on their way to their robots at a time; the next is forked as soon as one has got its own. If a

@@ -1,4 +1,4 @@
-"""The remote crew over a real unix socket, with real runners: what it does, and what nobody can do to it."""
+"""The remote backend over a real unix socket, with real runners: what it does, and what nobody can do to it."""
 
 import os
 import queue
@@ -16,7 +16,7 @@ import psutil
 import pytest
 
 from swarmwire.agent import runner
-from swarmwire.agent.local_backend import LocalCrew
+from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import WallClock, to_ns
 from swarmwire.comms.errors import AgentFailed, BadInput, Interrupted, RunnerLost
@@ -28,13 +28,12 @@ from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.world.backends import zenoh_backend
 from swarmwire.world.backends.registry import RunnerHealth
-from swarmwire.world.backends.zenoh_backend import RemoteCrew, Surroundings
+from swarmwire.world.backends.zenoh_backend import LockstepBackend, Surroundings
 from tests.support.agent.hosts import GIVES, assignment, group, heard_from, one_group, plain, spec
 from tests.support.waiting import TIMEOUT_S
 
 RUN = "r1"
 ROWS = [0, 1, 2, 3, 4]
-TIMEOUT_S = 20.0
 
 
 @pytest.fixture
@@ -48,29 +47,29 @@ def parts(agent: str, *rows: list[int]) -> list[Assignment]:
 
 
 @contextmanager
-def opened(endpoint: str, slots: list[Assignment], timeout_s: float = TIMEOUT_S) -> Generator[RemoteCrew]:
-    crew = RemoteCrew(endpoint, RUN, slots, timeout_s, WallClock(), start_s=timeout_s)
+def opened(endpoint: str, slots: list[Assignment], timeout_s: float = TIMEOUT_S) -> Generator[LockstepBackend]:
+    backend = LockstepBackend(endpoint, RUN, slots, timeout_s, WallClock(), start_s=timeout_s)
     try:
-        crew.open()
-        yield crew
+        backend.open()
+        yield backend
     finally:
-        crew.close()
+        backend.close()
 
 
 @contextmanager
 def processes(endpoint: str, names: list[str], agent: str = "Chatter") -> Generator["subprocess.Popen[bytes]"]:
-    """A nursery and its runners; none is left afterwards, whatever happened."""
-    command = [sys.executable, "-m", "swarmwire.agent.fork_server", endpoint, RUN, spec(agent), *names]
+    """An agent host and its runners; none is left afterwards, whatever happened."""
+    command = [sys.executable, "-m", "swarmwire.agent.agent_host", endpoint, RUN, spec(agent), *names]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True, env=environment
-    ) as nursery:
+    ) as agent_host:
         try:
-            yield nursery
+            yield agent_host
         finally:
-            if nursery.stdin is not None:
-                nursery.stdin.close()  # the life line: it ends all that are left
-            nursery.wait(10.0)
+            if agent_host.stdin is not None:
+                agent_host.stdin.close()  # the life line: it ends all that are left
+            agent_host.wait(10.0)
 
 
 @contextmanager
@@ -95,9 +94,9 @@ def thread(endpoint: str, name: str) -> Generator["queue.SimpleQueue[BaseExcepti
         assert not playing.is_alive()
 
 
-def three_ticks(crew: RemoteCrew, rows: list[int]) -> None:
+def three_ticks(backend: LockstepBackend, rows: list[int]) -> None:
     for tick in range(3):
-        crew.act(tick, one_group(tick, rows), Heard.none(GIVES))
+        backend.act(tick, one_group(tick, rows), Heard.none(GIVES))
 
 
 def hear(before: Actions | None) -> Heard:
@@ -106,29 +105,29 @@ def hear(before: Actions | None) -> Heard:
 
 @pytest.mark.parametrize("rows", [[ROWS], [[0, 2, 4], [1, 3]], [[row] for row in ROWS]], ids=["one", "two", "each"])
 def test_runners_do_exactly_what_the_local_crew_does(endpoint: str, rows: list[list[int]]) -> None:
-    local = LocalCrew(assignment(group(spec("Chatter"), ROWS)))
+    local = LocalBackend(assignment(group(spec("Chatter"), ROWS)))
     local.start()
     before: Actions | None = None
     names = [f"r{i}" for i in range(len(rows))]
-    with processes(endpoint, names) as nursery:
-        with opened(endpoint, parts("Chatter", *rows)) as crew:
-            crew.start()
+    with processes(endpoint, names) as agent_host:
+        with opened(endpoint, parts("Chatter", *rows)) as backend:
+            backend.start()
             for tick in range(6):
                 acting = [row for row in ROWS if (row + tick) % 4]  # robots drop out and come back
                 expected = local.act(tick, one_group(tick, acting), hear(before))
-                got = crew.act(tick, one_group(tick, acting), hear(before))
+                got = backend.act(tick, one_group(tick, acting), hear(before))
                 assert plain(got) == plain(expected)
                 assert len(expected.sent) == 3 * len(acting)
                 before = expected
-            assert not crew.counts()
-        assert nursery.wait(10.0) == 0  # told that the run is over, they leave by themselves
-    assert nursery.stdout is not None
+            assert not backend.counts()
+        assert agent_host.wait(10.0) == 0  # told that the run is over, they leave by themselves
+    assert agent_host.stdout is not None
 
 
 def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
     keys = Keys(RUN)
-    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as crew:
-        crew.start()
+    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as backend:
+        backend.start()
         with open_runner(endpoint) as foreign:
             for key in (keys.answer("r0"), keys.answer("stranger"), keys.alive("stranger")):
                 foreign.put(key, b"\xc1 no frame")
@@ -145,49 +144,49 @@ def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
             ]
             names = {"malformed_frames", "unknown_runner_frames", "wrong_tick_frames", "unexpected_kind_frames"}
             tick = 0
-            while not names | {"bad_join", "refused_join"} <= set(crew.counts()) or crew.counts()["bad_join"] < 2:
-                got = crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
+            while not names | {"bad_join", "refused_join"} <= set(backend.counts()) or backend.counts()["bad_join"] < 2:
+                got = backend.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
                 tick += 1
                 assert got.linear_mps.tolist() == [float(tick)] * len(ROWS)
             errors = [reply.err for replies in asked for reply in replies]
         texts = [error.payload.to_string() if error else "granted" for error in errors]
         assert [text.split()[0] for text in texts] == ["malformed:", "expected", "all"]
-        got = crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
+        got = backend.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
         assert got.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
-        assert set(crew.counts()) == names | {"bad_join", "refused_join"}
+        assert set(backend.counts()) == names | {"bad_join", "refused_join"}
 
 
 def test_a_runner_that_vanishes_is_lost_and_its_robots_are_named(endpoint: str) -> None:
     slots = parts("Vanishing", [0, 3, 4], [1, 2])  # in tick 2 it is robots 0 and 4 whose compass shows more than 0
-    with processes(endpoint, ["a", "b"], "Vanishing") as nursery:
-        with opened(endpoint, slots) as crew:
-            crew.start()
+    with processes(endpoint, ["a", "b"], "Vanishing") as agent_host:
+        with opened(endpoint, slots) as backend:
+            backend.start()
             with pytest.raises(RunnerLost) as caught:
-                three_ticks(crew, ROWS)
+                three_ticks(backend, ROWS)
             assert caught.value.robots == "flock-0, flock-3, flock-4"
             assert caught.value.runner in {"a", "b"}
             assert "gone" in caught.value.reason
-        assert nursery.stdout is not None
-        assert nursery.stdout.readline().split()[1] == b"3"  # the nursery tells the exit code
+        assert agent_host.stdout is not None
+        assert agent_host.stdout.readline().split()[1] == b"3"  # the agent host tells the exit code
 
 
 def test_a_failing_agent_ends_the_run_with_its_own_traceback(endpoint: str) -> None:
-    with processes(endpoint, ["a", "b"], "Failing") as nursery:
-        with opened(endpoint, parts("Failing", [0, 1], [2, 3])) as crew:
-            crew.start()
+    with processes(endpoint, ["a", "b"], "Failing") as agent_host:
+        with opened(endpoint, parts("Failing", [0, 1], [2, 3])) as backend:
+            backend.start()
             with pytest.raises(AgentFailed) as caught:
-                three_ticks(crew, [0, 1, 2, 3])
-        assert nursery.wait(10.0) == 0
+                three_ticks(backend, [0, 1, 2, 3])
+        assert agent_host.wait(10.0) == 0
     assert caught.value.robots == "flock-0"
     assert "NotDeclared" in caught.value.traceback
     assert "print(robot.proximity)" in caught.value.traceback
 
 
 def test_an_agent_that_cannot_be_made_ends_the_run_before_its_first_tick(endpoint: str) -> None:
-    with thread(endpoint, "r0") as ends, opened(endpoint, parts("Unmade", [0, 1])) as crew:
+    with thread(endpoint, "r0") as ends, opened(endpoint, parts("Unmade", [0, 1])) as backend:
         with pytest.raises(AgentFailed) as caught:
-            crew.start()
-        crew.close()
+            backend.start()
+        backend.close()
         assert ends.get(timeout=20.0) is None
     assert caught.value.robots == "flock-0, flock-1"
     assert "no memory left" in caught.value.traceback
@@ -195,21 +194,21 @@ def test_an_agent_that_cannot_be_made_ends_the_run_before_its_first_tick(endpoin
 
 def test_an_agent_that_is_not_there_ends_the_run_with_the_reason(endpoint: str) -> None:
     fails = pytest.raises(AgentFailed, match="no such name: 'Nowhere'")
-    with thread(endpoint, "r0"), opened(endpoint, parts("Nowhere", [0])) as crew, fails:
-        crew.start()
+    with thread(endpoint, "r0"), opened(endpoint, parts("Nowhere", [0])) as backend, fails:
+        backend.start()
 
 
 def test_a_runner_too_many_is_told_so(endpoint: str) -> None:
-    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as crew:
-        crew.start()
+    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as backend:
+        backend.start()
         with thread(endpoint, "r1") as ends:
             tick = 0
-            while "refused_join" not in crew.counts():
-                crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
+            while "refused_join" not in backend.counts():
+                backend.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
                 tick += 1
             end = ends.get(timeout=20.0)
-        crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))  # that it left does not matter
-        crew.close()
+        backend.act(tick, one_group(tick, ROWS), Heard.none(GIVES))  # that it left does not matter
+        backend.close()
     assert isinstance(end, RunnerLost)
     assert end.reason == "all robots are taken"
 
@@ -217,8 +216,8 @@ def test_a_runner_too_many_is_told_so(endpoint: str) -> None:
 def test_a_runner_may_come_before_its_world(endpoint: str) -> None:
     for _ in range(8):  # a world that listens but cannot answer yet is but a moment: one try would rarely meet it
         with thread(endpoint, "r0") as ends:
-            with opened(endpoint, parts("Counter", [0])) as crew:
-                crew.start()
+            with opened(endpoint, parts("Counter", [0])) as backend:
+                backend.start()
             assert ends.get(timeout=20.0) is None
 
 
@@ -233,8 +232,8 @@ def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many
 ) -> None:
     monkeypatch.setattr(zenoh_backend, "POLL_S", TIMEOUT_S)  # it would answer nobody while it waits for more to come
     keys, slots = Keys(RUN), parts("Counter", *([row] for row in ROWS))
-    with opened(endpoint, slots) as crew, ThreadPoolExecutor() as others, open_runner(endpoint) as asking:
-        started = others.submit(crew.start)
+    with opened(endpoint, slots) as backend, ThreadPoolExecutor() as others, open_runner(endpoint) as asking:
+        started = others.submit(backend.start)
         for row in ROWS:
             (reply,) = asking.get(keys.join(f"r{row}"), payload=JoinRequest().encode(), timeout=TIMEOUT_S)
             assert reply.ok is not None
@@ -243,31 +242,31 @@ def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many
 
 
 def test_when_nobody_joins_the_wait_ends_at_the_time_out(endpoint: str) -> None:
-    with opened(endpoint, parts("Counter", [0, 1]), timeout_s=0.05) as crew, pytest.raises(RunnerLost) as caught:
-        crew.start()
+    with opened(endpoint, parts("Counter", [0, 1]), timeout_s=0.05) as backend, pytest.raises(RunnerLost) as caught:
+        backend.start()
     assert caught.value.robots == "flock-0, flock-1"
     assert caught.value.reason == "no answer for 0.05 s"
 
 
 def test_trouble_ends_the_wait_at_once(endpoint: str) -> None:
-    crew = RemoteCrew(
+    backend = LockstepBackend(
         endpoint, RUN, parts("Counter", [0]), 600.0, WallClock(), Surroundings(lambda: "its process ended")
     )
     try:
         with pytest.raises(RunnerLost, match="its process ended"):
-            crew.start()
+            backend.start()
     finally:
-        crew.close()
+        backend.close()
 
 
 def test_a_socket_in_use_is_bad_input_and_the_run_on_it_goes_on(endpoint: str) -> None:
-    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", [0])) as crew:
-        crew.start()
-        second = RemoteCrew(endpoint, "other", parts("Counter", [0]), TIMEOUT_S, WallClock())
+    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", [0])) as backend:
+        backend.start()
+        second = LockstepBackend(endpoint, "other", parts("Counter", [0]), TIMEOUT_S, WallClock())
         with pytest.raises(BadInput, match="expected an endpoint that is free"):
             second.open()
         second.close()
-        got = crew.act(0, one_group(0, [0]), Heard.none(GIVES))
+        got = backend.act(0, one_group(0, [0]), Heard.none(GIVES))
         assert got.linear_mps.tolist() == [1.0]
 
 
@@ -281,28 +280,28 @@ def test_the_socket_that_a_dead_world_left_is_used_again(endpoint: str) -> None:
     with socket.socket(socket.AF_UNIX) as dead:
         dead.bind(path)
     assert Path(path).is_socket()
-    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", [0])) as crew:
-        crew.start()
-        assert crew.act(0, one_group(0, [0]), Heard.none(GIVES)).linear_mps.tolist() == [1.0]
+    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", [0])) as backend:
+        backend.start()
+        assert backend.act(0, one_group(0, [0]), Heard.none(GIVES)).linear_mps.tolist() == [1.0]
 
 
 def test_a_crew_may_be_closed_twice_and_before_it_opened(endpoint: str) -> None:
-    crew = RemoteCrew(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, WallClock())
-    crew.close()
-    crew.open()
-    crew.close()
-    crew.close()
+    backend = LockstepBackend(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, WallClock())
+    backend.close()
+    backend.open()
+    backend.close()
+    backend.close()
 
 
 def test_runners_leave_when_the_world_is_killed(endpoint: str) -> None:
     """A world in a process of its own, killed without a word."""
     program = f"""
 from swarmwire.comms.clock import WallClock, to_ns
-from swarmwire.world.backends.zenoh_backend import RemoteCrew
-from tests.integration.world.backends.test_remote_crew import RUN, parts
+from swarmwire.world.backends.zenoh_backend import LockstepBackend
+from tests.integration.world.backends.test_zenoh_backend import RUN, parts
 
-crew = RemoteCrew({endpoint!r}, RUN, parts("Counter", [0]), 60.0, WallClock())
-crew.start()
+backend = LockstepBackend({endpoint!r}, RUN, parts("Counter", [0]), 60.0, WallClock())
+backend.start()
 print("started", flush=True)
 input()
 """
@@ -320,41 +319,41 @@ input()
             world.kill()
 
 
-def kill_one(nursery: "subprocess.Popen[bytes]") -> None:
-    child = psutil.Process(nursery.pid).children()[0]
+def kill_one(agent_host: "subprocess.Popen[bytes]") -> None:
+    child = psutil.Process(agent_host.pid).children()[0]
     child.kill()
     child.wait(20.0)
 
 
 def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
-    with ExitStack() as later, processes(endpoint, ["a", "b"]) as nursery:
+    with ExitStack() as later, processes(endpoint, ["a", "b"]) as agent_host:
         around = Surroundings(lost=lambda _: (later.enter_context(thread(endpoint, "c")), None)[1])
-        crew = RemoteCrew(endpoint, RUN, parts("Counter", [0, 1], [2]), TIMEOUT_S, WallClock(), around, "wait")
-        later.callback(crew.close)
-        crew.start()
+        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0, 1], [2]), TIMEOUT_S, WallClock(), around, "wait")
+        later.callback(backend.close)
+        backend.start()
         for tick in range(2):
-            crew.act(tick, one_group(tick, [0, 1, 2]), Heard.none(GIVES))
-        kill_one(nursery)
-        got = crew.act(2, one_group(2, [0, 1, 2]), Heard.none(GIVES))
+            backend.act(tick, one_group(tick, [0, 1, 2]), Heard.none(GIVES))
+        kill_one(agent_host)
+        got = backend.act(2, one_group(2, [0, 1, 2]), Heard.none(GIVES))
         steps = dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True))
         assert steps in ({0: 1.0, 1: 1.0, 2: 3.0}, {0: 3.0, 1: 3.0, 2: 1.0})
-        assert crew.counts() == {"runners_lost": 1, "runners_joined_late": 1}
-        crew.close()
+        assert backend.counts() == {"runners_lost": 1, "runners_joined_late": 1}
+        backend.close()
 
 
 def test_a_run_that_waits_for_a_runner_can_be_ended(endpoint: str) -> None:
-    with processes(endpoint, ["a", "b"]) as nursery:
+    with processes(endpoint, ["a", "b"]) as agent_host:
         asked: list[bool] = []
         around = Surroundings(stopped=lambda: bool(asked))
-        crew = RemoteCrew(endpoint, RUN, parts("Counter", [0], [1]), TIMEOUT_S, WallClock(), around, "wait")
+        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0], [1]), TIMEOUT_S, WallClock(), around, "wait")
         try:
-            crew.start()
-            kill_one(nursery)
+            backend.start()
+            kill_one(agent_host)
             asked.append(True)
             with pytest.raises(Interrupted):
-                crew.act(0, one_group(0, [0, 1]), Heard.none(GIVES))
+                backend.act(0, one_group(0, [0, 1]), Heard.none(GIVES))
         finally:
-            crew.close()
+            backend.close()
 
 
 class LeapingClock(WallClock):
@@ -370,39 +369,39 @@ class LeapingClock(WallClock):
 def test_a_pause_between_ticks_that_is_longer_than_the_time_out_loses_no_runner(endpoint: str) -> None:
     clock = LeapingClock()
     with thread(endpoint, "r0") as ends:
-        crew = RemoteCrew(endpoint, RUN, parts("Counter", ROWS), TIMEOUT_S, clock)
-        with closing(crew):
-            crew.start()
+        backend = LockstepBackend(endpoint, RUN, parts("Counter", ROWS), TIMEOUT_S, clock)
+        with closing(backend):
+            backend.start()
             for tick in range(3):
-                actions = crew.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
+                actions = backend.act(tick, one_group(tick, ROWS), Heard.none(GIVES))
                 assert actions.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
                 clock.ahead_ns += to_ns(10 * TIMEOUT_S)
-            assert not crew.counts()
-            assert crew.health() == RunnerHealth(ready=1, lost=0)
+            assert not backend.counts()
+            assert backend.health() == RunnerHealth(ready=1, lost=0)
         assert ends.get(timeout=20.0) is None
 
 
 def test_time_for_which_the_world_itself_was_frozen_is_no_runners_fault(endpoint: str) -> None:
     """A runner is slow, and meanwhile the world is frozen for longer than its time-out; both go on together."""
     clock, waits = LeapingClock(), list[RunnerHealth]()
-    with processes(endpoint, ["a"]) as nursery:
+    with processes(endpoint, ["a"]) as agent_host:
 
         def frozen() -> bool:
-            if crew.health().ready and not waits:
-                waits.append(crew.health())
+            if backend.health().ready and not waits:
+                waits.append(backend.health())
                 clock.ahead_ns += to_ns(10 * TIMEOUT_S)
                 child.resume()
             return False
 
-        crew = RemoteCrew(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, clock, Surroundings(stopped=frozen))
-        with closing(crew):
-            crew.start()
-            child = psutil.Process(nursery.pid).children()[0]
+        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, clock, Surroundings(stopped=frozen))
+        with closing(backend):
+            backend.start()
+            child = psutil.Process(agent_host.pid).children()[0]
             waits.clear()
             child.suspend()
-            actions = crew.act(0, one_group(0, [0]), Heard.none(GIVES))
+            actions = backend.act(0, one_group(0, [0]), Heard.none(GIVES))
             assert actions.linear_mps.tolist() == [1.0]
             assert waits[0].waits_s > 0
             assert waits[0].waits_for == "a, which plays flock-0"
-            assert crew.health() == RunnerHealth(ready=1, lost=0)
-            crew.close()
+            assert backend.health() == RunnerHealth(ready=1, lost=0)
+            backend.close()

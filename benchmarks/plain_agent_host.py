@@ -1,6 +1,6 @@
-"""A nursery of runners that know swarmwire by its protocol alone: `python -m benchmarks.plain_nursery`.
+"""An agent host of runners that know swarmwire by its protocol alone: `python -m benchmarks.plain_agent_host`.
 
-Arguments and the end are those of swarmwire's own nursery, so that it can stand in its place.
+Arguments and the end are those of swarmwire's own agent host, so that it can stand in its place.
 """
 
 import argparse

@@ -5,10 +5,10 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from swarmwire.agent.local_backend import LocalCrew
+from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock
-from swarmwire.comms.interfaces import Crew
+from swarmwire.comms.interfaces import AgentBackend
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.endpoint import local_endpoint
 from swarmwire.deploy.gateways.served import Served
@@ -18,17 +18,17 @@ from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.backends.join_policy import Door
 from swarmwire.world.backends.pacing import Pace
-from swarmwire.world.backends.realtime_backend import PacedCrew, RealTimeCrew
+from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend
 from swarmwire.world.backends.registry import Change, Loss
-from swarmwire.world.backends.zenoh_backend import RemoteCrew, Surroundings
-from swarmwire.world.gateways.backend import GatewayCrew
+from swarmwire.world.backends.zenoh_backend import LockstepBackend, Surroundings
+from swarmwire.world.gateways.backend import GatewayBackend
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.subtick import Quanta
 
 
 @dataclass(frozen=True)
-class Crews:
-    """How a run's crew is made. `agents` names, by group, the spec of the agent."""
+class Backends:
+    """How a run's backend is made. `agents` names, by group, the spec of the agent."""
 
     scenario: Scenario
     static: Static
@@ -46,14 +46,14 @@ class Crews:
     quanta: Quanta | None = None  # of real time, in which packets cross also between ticks
 
     @contextmanager
-    def crew(self, served: Served | None = None) -> Generator[Crew]:
-        """The crew, ended with the context; it plays no robot that is served, but hands on what programs tell it."""
+    def backend(self, served: Served | None = None) -> Generator[AgentBackend]:
+        """The backend, ended with the context; it plays no robot that is served, but hands on what programs tell it."""
         whole = assignments.whole(self.scenario, self.static, dict(self.agents))
         if served and self.pace:
             names = {group.name for group in served.groups}
             others = replace(whole, groups=tuple(group for group in whole.groups if group.name not in names))
-            with closing(LocalCrew(others)) as local:
-                yield GatewayCrew(
+            with closing(LocalBackend(others)) as local:
+                yield GatewayBackend(
                     local,
                     served.groups,
                     served.air,
@@ -65,14 +65,14 @@ class Crews:
                 )
             return
         if self.listening is not None:
-            crew = self._remote(self.listening.door(self.run_id), [whole], self._around_open(self.listening))
-            with closing(crew):
-                crew.open()
-                yield crew
+            backend = self._remote(self.listening.door(self.run_id), [whole], self._around_open(self.listening))
+            with closing(backend):
+                backend.open()
+                yield backend
             return
         if not self.runners:
-            with closing(LocalCrew(whole)) as local:
-                yield PacedCrew(local, self.pace, self.quanta) if self.pace else local
+            with closing(LocalBackend(whole)) as local:
+                yield PacedBackend(local, self.pace, self.quanta) if self.pace else local
             return
         processes: list[RunnerProcesses] = []
 
@@ -89,19 +89,19 @@ class Crews:
                 lambda change, _: self._changed(change),
                 self._refused,
             )
-            crew = self._remote(endpoint, parts, around)
+            backend = self._remote(endpoint, parts, around)
             try:
-                crew.open()
+                backend.open()
                 specs = sorted(set(self.agents.values()))
                 processes.append(RunnerProcesses(endpoint, self.run_id, specs, names, waited_for=self.pace is None))
-                yield crew
+                yield backend
             finally:
-                crew.close()
+                backend.close()
                 for process in processes:
                     process.stop()
 
     def _around_open(self, listening: Listening) -> Surroundings:
-        """What the crew of a world that listens asks and tells."""
+        """What the backend of a world that listens asks and tells."""
         told = listening.told
 
         def changed(change: Change, free: tuple[str, ...]) -> None:
@@ -129,12 +129,14 @@ class Crews:
     def _refused(self, runner: str, why: str) -> None:
         self.say(f"refused {runner!r}: {why}")
 
-    def _remote(self, door: Door | str, parts: list[Assignment], around: Surroundings) -> RemoteCrew | RealTimeCrew:
+    def _remote(
+        self, door: Door | str, parts: list[Assignment], around: Surroundings
+    ) -> LockstepBackend | RealTimeBackend:
         table, factor = self.scenario.run, self.pace.factor if self.pace else None
         terms = new_terms(self.scenario, self.static, self.agents, self.run_id, factor, self.listening)
         timeout_s, on_loss = table.runner_timeout_s, table.on_runner_loss
         if self.pace:
-            return RealTimeCrew(
+            return RealTimeBackend(
                 door,
                 self.run_id,
                 parts,
@@ -147,7 +149,7 @@ class Crews:
                 terms,
                 self.quanta,
             )
-        return RemoteCrew(door, self.run_id, parts, timeout_s, self.clock, around, on_loss, terms=terms)
+        return LockstepBackend(door, self.run_id, parts, timeout_s, self.clock, around, on_loss, terms=terms)
 
     def _survive(self, loss: Loss, endpoint: str) -> None:
         """Tell people of a runner that was lost, and of what they can do."""
@@ -156,6 +158,6 @@ class Crews:
             self.say(f"lost runner {loss}; its robots stand still")
             return
         agents = ",".join(sorted(set(self.agents.values())))
-        takeover = f"python -m swarmwire.agent.fork_server {endpoint} {self.run_id} {agents} NAME"
+        takeover = f"python -m swarmwire.agent.agent_host {endpoint} {self.run_id} {agents} NAME"
         until = "waiting for another" if self.scenario.run.on_runner_loss == "wait" else "another may take over"
         self.say(f"lost runner {loss}; {until}, such as: {takeover}")

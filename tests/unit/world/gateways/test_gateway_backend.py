@@ -11,7 +11,7 @@ from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Pay
 from swarmwire.comms.tick_io import Actions, GroupSenses, LedChanges
 from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
-from swarmwire.world.gateways.backend import GatewayCrew, GatewayGroup
+from swarmwire.world.gateways.backend import GatewayBackend, GatewayGroup
 from swarmwire.world.subtick import Quanta
 from tests.support.agent.hosts import GIVES, heard_from
 from tests.support.clocks import FakeClock
@@ -21,7 +21,7 @@ TICK_NS = NS_PER_S // 10
 
 
 class Inner:
-    """A crew that drives its robots 0 and 1 at 0.5 m/s, and keeps what it was given."""
+    """A backend that drives its robots 0 and 1 at 0.5 m/s, and keeps what it was given."""
 
     def __init__(self) -> None:
         self.given: list[Any] = []
@@ -65,7 +65,7 @@ class Air:
 
 
 class Around:
-    """A crew of two robots of its own and three behind a gateway, rows 2 to 4."""
+    """A backend of two robots of its own and three behind a gateway, rows 2 to 4."""
 
     def __init__(self, *, air: bool = True, quantum_s: float | None = None) -> None:
         self.clock, self.inner, self.said = FakeClock(), Inner(), []
@@ -76,7 +76,7 @@ class Around:
         pace = Pace(self.clock, 10, 1.0, self.said.append)
         self.shown = 0
         quanta = Quanta(self.clock, pace, 10, quantum_s) if quantum_s else None
-        self.crew = GatewayCrew(self.inner, [group], self.air, pace, 10, self.show, lambda: {"unseen": 4}, quanta)
+        self.backend = GatewayBackend(self.inner, [group], self.air, pace, 10, self.show, lambda: {"unseen": 4}, quanta)
 
     def show(self) -> None:
         self.shown += 1
@@ -85,7 +85,7 @@ class Around:
         rows = np.array(alive, np.int64)
         fields = {"proximity.value": np.tile(rows + 0.1 * tick, (8, 1)).T, "odometry.left_m": rows + 0.01 * tick}
         senses = {"a": GroupSenses(np.array([0, 1]), {}), "b": GroupSenses(rows, fields)}
-        return self.crew.act(tick, senses, Heard.none(GIVES) if heard is None else heard, outcomes)
+        return self.backend.act(tick, senses, Heard.none(GIVES) if heard is None else heard, outcomes)
 
 
 def commands(actions: Actions) -> dict[int, tuple[float, float]]:
@@ -161,7 +161,7 @@ def test_without_a_radio_nothing_but_commands_is_taken() -> None:
 def test_a_group_that_does_not_act_in_a_tick_is_told_nothing_and_commanded_all_the_same() -> None:
     around = Around()
     around.gateway.drive = {0: (0.1, 0.0)}
-    actions = around.crew.act(3, {"a": GroupSenses(np.array([0, 1]), {})}, Heard.none(GIVES))
+    actions = around.backend.act(3, {"a": GroupSenses(np.array([0, 1]), {})}, Heard.none(GIVES))
     assert not around.gateway.published
     assert commands(actions)[2] == (0.1, 0.0)
 
@@ -173,7 +173,7 @@ def test_a_tick_lasts_as_long_as_it_says_and_lag_is_reported() -> None:
     assert around.clock.now_ns() - began_ns == TICK_NS
     around.clock.time_ns += 3 * TICK_NS
     around.act(1, [2, 3, 4])
-    report = around.crew.report()
+    report = around.backend.report()
     assert (report.factor, report.missed_ticks, report.worst_lag_s) == (1.0, 1, pytest.approx(0.2))
     assert len(around.said) == 1
 
@@ -190,19 +190,19 @@ def test_a_loop_that_lags_by_more_than_a_tick_does_not_make_up_for_it() -> None:
     around.act(3, [2, 3, 4])  # half a tick late: the next one is shorter
     around.act(4, [2, 3, 4])
     assert around.clock.now_ns() - began_ns == 3 * TICK_NS
-    assert around.crew.report().missed_ticks == 2
+    assert around.backend.report().missed_ticks == 2
 
 
 def test_faults_are_counted_by_kind_of_gateway_and_only_where_there_are_any() -> None:
     around = Around()
     around.gateway.faults = {"garbage": 3, "half_packets": 0}
-    assert around.crew.counts() == {"inner": 1, "unseen": 4, "scripted_garbage": 3, "air_late": 2}
+    assert around.backend.counts() == {"inner": 1, "unseen": 4, "scripted_garbage": 3, "air_late": 2}
 
 
 def test_the_agents_of_others_start_and_end_with_it() -> None:
     around = Around()
-    around.crew.start()
-    around.crew.close()
+    around.backend.start()
+    around.backend.close()
     assert around.inner.given == ["started", "closed"]
 
 
@@ -229,7 +229,7 @@ def test_in_quanta_robots_behind_gateways_are_told_when_it_is_due_and_what_they_
     fields = {"proximity.value": np.zeros((3, 8)), "odometry.left_m": np.zeros(3)}
     senses = {"a": GroupSenses(np.array([0, 1]), {}), "b": GroupSenses(rows, fields)}
     around.gateway.drive = {1: (0.05, -0.7)}
-    actions = around.crew.act_in_time(0, senses, Heard.none(GIVES), NO_OUTCOMES, air)
+    actions = around.backend.act_in_time(0, senses, Heard.none(GIVES), NO_OUTCOMES, air)
     assert around.air is not None
     heard = [told.receiver.tolist() for _, told, _ in around.air.published if len(told)]
     assert heard == [[3]]
@@ -239,4 +239,4 @@ def test_in_quanta_robots_behind_gateways_are_told_when_it_is_due_and_what_they_
     assert set(air.sent[2:]) == {(None, b"outer"), (None, b"echo")}
     assert not len(actions.sent)
     assert commands(actions)[3] == (0.05, -0.7)
-    assert around.crew.report().quantum_s == 0.010
+    assert around.backend.report().quantum_s == 0.010

@@ -12,8 +12,8 @@ from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import closed_after, open_runner, unix_endpoint
 from swarmwire.world.backends.join_policy import Terms
 from swarmwire.world.backends.registry import Change
-from swarmwire.world.backends.zenoh_backend import RemoteCrew, Surroundings
-from tests.integration.world.backends.test_remote_crew import RUN
+from swarmwire.world.backends.zenoh_backend import LockstepBackend, Surroundings
+from tests.integration.world.backends.test_zenoh_backend import RUN
 from tests.support.agent.hosts import assignment, group, spec
 from tests.support.waiting import until
 
@@ -27,7 +27,7 @@ def endpoint() -> Iterator[str]:
 
 
 class Told:
-    """What a crew told, and what a test does upon it."""
+    """What a backend told, and what a test does upon it."""
 
     def __init__(self) -> None:
         self.changes: list[Change] = []
@@ -42,23 +42,25 @@ class Told:
         self.endpoints = endpoints
 
 
-def crew_at(endpoint: str, told: Told, limits: Limits) -> RemoteCrew:
+def backend_at(endpoint: str, told: Told, limits: Limits) -> LockstepBackend:
     whole = [assignment(group(spec("Counter"), [0, 1, 2]))]
     around = Surroundings(changed=told.changed, opened=told.opened)
-    return RemoteCrew(endpoint, RUN, whole, 20.0, WallClock(), around, "stand", terms=Terms(OFFER, True, limits=limits))
+    return LockstepBackend(
+        endpoint, RUN, whole, 20.0, WallClock(), around, "stand", terms=Terms(OFFER, True, limits=limits)
+    )
 
 
 def test_who_takes_robots_and_builds_no_agents_loses_them(endpoint: str) -> None:
     told, keys = Told(), Keys(RUN)
-    with closing(crew_at(endpoint, told, Limits(join_s=0.2))) as crew:
-        crew.open()
+    with closing(backend_at(endpoint, told, Limits(join_s=0.2))) as backend:
+        backend.open()
         assert told.endpoints == (endpoint,)
         with closed_after(open_runner(endpoint)) as idler:
             asked = [
                 idler.get(keys.offer("idler")),
                 idler.get(keys.join("idler"), payload=JoinRequest(names=("flock-1",)).encode()),
             ]
-            until(lambda: (crew._take_in(), told.changes)[1])
+            until(lambda: (backend._take_in(), told.changes)[1])
             replies = [next(iter(replies)) for replies in asked]
     assert all(reply.ok is not None for reply in replies)
     offer = Offer.decode(replies[0].ok.payload.to_bytes()) if replies[0].ok else None

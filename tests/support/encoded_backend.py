@@ -19,8 +19,8 @@ from swarmwire.world.backends.allocation import split
 from swarmwire.world.backends.lockstep import Lockstep
 
 
-class EncodedCrew:
-    """A Crew of `runners` runners in this process."""
+class EncodedBackend:
+    """A AgentBackend of `runners` runners in this process."""
 
     def __init__(self, assignment: Assignment, runners: int = 3, *, backwards: bool = False) -> None:
         """`backwards` gives the first runner the last robots."""
